@@ -1,0 +1,3 @@
+"""What was drawn, and what it is worth."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,231 @@
+"""The records that flow between the stages, frozen, with arrays inside.
+
+Sheet coordinates are millimetres from the upright sheet's top left corner, x right, y down.
+Where a record holds a *complex* position it is x - i y: y points up, so that the argument of a
+difference is the direction counter-clockwise from the sheet's +x, as in `reference`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+GreyImage = NDArray[np.uint8]
+Box = tuple[float, float, float, float]
+"""x, y, width, height in sheet millimetres."""
+
+MECHANISM = "mechanism"
+VELOCITY_PLAN = "velocity_plan"
+ACCELERATION_PLAN = "acceleration_plan"
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something a person should know: a stable code, a sentence, the file it concerns."""
+
+    code: str
+    message: str
+    file: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """One page as stored in its file, before any rotation.
+
+    Attributes
+    ----------
+    source, page : file name as the user gave it, and page number from 1
+    grey : (h, w) uint8, 255 = paper
+    dpi : horizontal and vertical resolution that the file states, or None
+    turn_deg : counter-clockwise turn that the file asks viewers to apply (EXIF, PDF), 0/90/180/270
+    paper_mm : width and height of the stored image on paper where the file states it (PDF), or None
+    """
+
+    source: str
+    page: int
+    grey: GreyImage
+    dpi: tuple[float, float] | None = None
+    turn_deg: int = 0
+    paper_mm: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Whose page this is, as its QR code says."""
+
+    assignment: str
+    student_id: str
+    n: int | None
+    position: int | None
+    kind: str
+    """`all`, `velocity` or `acceleration`: which drawing the page is for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """A page in millimetres.
+
+    Attributes
+    ----------
+    mm_to_px : (3, 3) homography, upright sheet mm (y down) to stored pixels; the centre of the
+        stored image's top left pixel is (0, 0)
+    page_mm : the paper's width and height
+    method : `markers`, or `combined` (frame, paper and dpi weighed together)
+    px_per_mm : mean resolution
+    rotation_deg : counter-clockwise turn that makes the stored image upright
+    residual_mm : root mean square misfit of the evidence used
+    scale_se : relative standard error of a length, common to the whole sheet
+    drawable_mm : the box inside the frame, where drawings can be
+    zones : the printed sheet's zones by name, empty for a plain sheet
+    identity : from the QR code, or None
+    problems : evidence that disagrees or is missing
+    """
+
+    mm_to_px: FloatArray
+    page_mm: tuple[float, float]
+    method: str
+    px_per_mm: float
+    rotation_deg: float
+    residual_mm: float
+    scale_se: float
+    drawable_mm: Box
+    zones: Mapping[str, Box] = field(default_factory=dict)
+    identity: Identity | None = None
+    problems: tuple[Problem, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Strokes:
+    """Straight strokes of a sheet, a row each, in millimetres, y down.
+
+    Attributes
+    ----------
+    ends : (n, 2, 2) the two ends, on the fitted centre line
+    width : (n,) mean width of the ink
+    se_offset : (n,) standard error of the line's position across, at the stroke's middle
+    se_angle : (n,) standard error of its direction, radians
+    se_end : (n, 2) standard error along the line of each end
+    coverage : (n,) share of the length that is inked, 1 for a solid stroke
+    darkness : (n,) mean contrast to the paper, 0..1
+    """
+
+    ends: FloatArray
+    width: FloatArray
+    se_offset: FloatArray
+    se_angle: FloatArray
+    se_end: FloatArray
+    coverage: FloatArray
+    darkness: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.width)
+
+
+@dataclass(frozen=True, slots=True)
+class InkMap:
+    """Where there is ink: a coarse map for asking whether something is drawn.
+
+    Attributes
+    ----------
+    ink : (h, w) uint8, 0 = paper .. 255 = full ink, upright, y down
+    px_per_mm : resolution; sheet point (x, y) mm is at column x * px_per_mm, row y * px_per_mm
+    """
+
+    ink: GreyImage
+    px_per_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ink:
+    """Everything that was found on a sheet, in millimetres, y down.
+
+    Attributes
+    ----------
+    strokes : straight strokes
+    circles : (m, 3) small circles (joints, pivots) and arcs closed enough to have a centre: x, y, r
+    arrowheads : (k, 3) x, y of the tip and direction in radians counter-clockwise (y up) it points to
+    marks : (j, 4) boxes x, y, w, h of what is neither: letters, digits, hatching, blobs
+    where : the ink map
+    """
+
+    strokes: Strokes
+    circles: FloatArray
+    arrowheads: FloatArray
+    marks: FloatArray
+    where: InkMap
+
+
+@dataclass(frozen=True, slots=True)
+class ReadNode:
+    """A named node as drawn.
+
+    Attributes
+    ----------
+    at : complex, x - i y in sheet millimetres
+    cov : (2, 2) covariance in mm^2, axes x and y up
+    confidence : probability that the name is right and the place within 0.5 mm of what was drawn
+    """
+
+    at: complex
+    cov: FloatArray
+    confidence: float
+
+    @property
+    def se_mm(self) -> float:
+        """Root mean square of the two principal standard errors."""
+        return float(np.sqrt(np.trace(self.cov) / 2.0))
+
+
+@dataclass(frozen=True, slots=True)
+class ReadVector:
+    """A named vector as drawn, or as measured by the student.
+
+    Attributes
+    ----------
+    length_mm, se_mm : length on paper; None where only a direction or value is known
+    direction_deg, se_deg : counter-clockwise from the sheet's +x, 0 <= d < 360; None if not known
+    confidence : probability that this is the vector named, within 0.5 mm
+    """
+
+    length_mm: float | None
+    se_mm: float
+    direction_deg: float | None
+    se_deg: float | None
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A mechanism sketch, velocity plan or acceleration plan as read."""
+
+    nodes: Mapping[str, ReadNode]
+    vectors: Mapping[str, ReadVector]
+
+
+@dataclass(frozen=True, slots=True)
+class Unread:
+    """A node or vector that was asked for and not read, and why. False in a condition."""
+
+    name: str
+    reason: str
+
+    def __bool__(self) -> bool:
+        return False
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What was drawn (or measured by hand), with names.
+
+    Attributes
+    ----------
+    figures : by `mechanism`, `velocity_plan`, `acceleration_plan`; absent where not on the sheet
+    unread : what was asked for and not read
+    problems : what a person should know
+    """
+
+    figures: Mapping[str, Figure]
+    unread: tuple[Unread, ...] = ()
+    problems: tuple[Problem, ...] = ()

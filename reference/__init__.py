@@ -1,0 +1,1 @@
+"""What a perfect student draws: exact plane kinematics and its graphical construction."""
