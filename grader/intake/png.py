@@ -1,0 +1,41 @@
+"""PNG files: one page."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from grader.intake.grey import to_grey
+from grader.intake.limits import Door, check_size, damaged, truncated
+from grader.intake.tags import of_image
+from grader.records import Page
+
+_END = b"IEND"
+_END_WITHIN = 64
+
+
+def _pages(path: Path) -> Iterator[Page]:
+    try:
+        with Image.open(path) as image:
+            check_size(path, 1, *image.size)
+            dpi, turn_deg = of_image(image)
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise damaged(path, 1, "its header cannot be read") from error
+    data = path.read_bytes()
+    if _END not in data[-_END_WITHIN:]:
+        # The decoder would fill the missing rows with black or nothing.
+        raise truncated(path, 1)
+    pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise damaged(path, 1, "it cannot be decoded")
+    yield Page(path.name, 1, to_grey(pixels), dpi, turn_deg)
+
+
+def _count(path: Path) -> int:
+    del path
+    return 1
+
+
+DOOR = Door(_pages, _count)

@@ -1,0 +1,79 @@
+"""TIFF files: one page or many; G4, LZW, deflate, JPEG; 1-bit, grey, colour."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import tifffile
+
+from grader.intake.grey import to_grey
+from grader.intake.limits import Door, check_pages, check_size, damaged
+from grader.intake.tags import Dpi, from_unit, turn_of
+from grader.records import GreyImage, Page
+
+_DECODING = (ValueError, RuntimeError, OSError, KeyError, IndexError, TypeError, tifffile.TiffFileError)
+"""What the decoders raise for bad data (imagecodecs' own errors are RuntimeErrors)."""
+
+
+def _pages(path: Path) -> Iterator[Page]:
+    with _opened(path) as file:
+        check_pages(path, _length(path, file))
+        for number, page in enumerate(file.pages, start=1):
+            if not isinstance(page, tifffile.TiffPage):
+                raise damaged(path, number, "its directory cannot be read")
+            check_size(path, number, page.imagewidth, page.imagelength)
+            orientation = int(_value(page, "Orientation", 1))
+            yield Page(path.name, number, _grey(path, number, page), _dpi(page), turn_of(orientation))
+
+
+def _opened(path: Path) -> tifffile.TiffFile:
+    try:
+        return tifffile.TiffFile(path)
+    except _DECODING as error:
+        raise damaged(path, 1, "its header cannot be read") from error
+
+
+def _length(path: Path, file: tifffile.TiffFile) -> int:
+    try:
+        return len(file.pages)
+    except _DECODING as error:
+        raise damaged(path, 1, "its list of pages cannot be read") from error
+
+
+def _grey(path: Path, number: int, page: tifffile.TiffPage) -> GreyImage:
+    try:
+        pixels = np.squeeze(page.asarray())
+    except _DECODING as error:
+        raise damaged(path, number, str(error) or type(error).__name__) from error
+    if page.photometric == tifffile.PHOTOMETRIC.PALETTE and page.colormap is not None:
+        pixels = (np.moveaxis(page.colormap[:, pixels], 0, -1) >> 8).astype(np.uint8)
+    if page.photometric == tifffile.PHOTOMETRIC.MINISWHITE:
+        pixels = ~pixels
+    if pixels.ndim == 3 and pixels.shape[2] in (3, 4):
+        pixels = pixels[..., [2, 1, 0, *range(3, pixels.shape[2])]]
+    try:
+        return to_grey(pixels)
+    except ValueError as error:
+        raise damaged(path, number, str(error)) from error
+
+
+def _dpi(page: tifffile.TiffPage) -> Dpi | None:
+    x, y = _value(page, "XResolution", None), _value(page, "YResolution", None)
+    if not (isinstance(x, tuple) and isinstance(y, tuple) and x[1] and y[1]):
+        return None
+    return from_unit(x[0] / x[1], y[0] / y[1], int(_value(page, "ResolutionUnit", 2)))
+
+
+def _value(page: tifffile.TiffPage, name: str, default: object) -> object:
+    tag = page.tags.get(name)
+    return default if tag is None else tag.value
+
+
+def _count(path: Path) -> int:
+    with _opened(path) as file:
+        pages = _length(path, file)
+    check_pages(path, pages)
+    return pages
+
+
+DOOR = Door(_pages, _count)
