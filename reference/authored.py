@@ -1,0 +1,296 @@
+"""Authored files: mechanisms and assignments in TOML, validated, all faults of a file at once."""
+
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    ValidationError,
+    WithJsonSchema,
+)
+
+from reference import formula
+from reference.errors import AuthoredFileError, Finding
+from reference.formula import Formula
+
+LENGTH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class Authored(BaseModel):
+    """A table of an authored file: frozen, nothing unknown, nothing coerced."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, arbitrary_types_allowed=True)
+
+
+def _read_formula(value: object) -> Formula:
+    if isinstance(value, Formula):
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError('a number or a formula in quotes, such as "2*(30+n)", is expected')  # noqa: TRY004
+    return formula.parse(value)
+
+
+def _check_joint(name: str) -> str:
+    if not name.isalnum() or not name[0].isalpha() or name.lower() in {"o", "n"}:
+        raise ValueError(f"'{name}' is no joint's name: a letter, then letters or digits (not o or n)")
+    return name
+
+
+FormulaText = Annotated[
+    Formula,
+    BeforeValidator(_read_formula),
+    PlainSerializer(lambda f: f.text),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
+]
+Joint = Annotated[str, Field(min_length=1, max_length=4), AfterValidator(_check_joint)]
+Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
+LinkName = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,4}$")]
+Point = Annotated[list[FormulaText], Field(min_length=2, max_length=2)]
+TwoJoints = Annotated[list[Joint], Field(min_length=2, max_length=2)]
+TwoFormulas = Annotated[list[FormulaText], Field(min_length=2, max_length=2)]
+
+
+class Text(Authored):
+    """A text in the languages of feedback; English is required."""
+
+    en: str
+    ro: str | None = None
+    ru: str | None = None
+
+    def in_language(self, language: str) -> str:
+        """The text in a language, or in English where it is not given."""
+        return getattr(self, language, None) or self.en
+
+
+class CrankTable(Authored):
+    """The driven link. `omega` in rad/s, counter-clockwise positive."""
+
+    link: LinkName = "1"
+    pivot: Joint
+    pin: Joint
+    length: FormulaText
+    angle_deg: FormulaText
+    omega: FormulaText
+    epsilon: FormulaText | None = None
+
+
+class DyadTable(Authored):
+    """Assur group RRR: two links that meet in `node`."""
+
+    type: Literal["RRR"]
+    node: Joint
+    pins: TwoJoints
+    links: Annotated[list[LinkName], Field(min_length=2, max_length=2)]
+    lengths: TwoFormulas
+    side: Literal["left", "right"]
+    """Of the directed line pins[0] -> pins[1]."""
+
+
+class GuideTable(Authored):
+    """A fixed straight guide: a point of it and its direction, degrees counter-clockwise from +x."""
+
+    through: Point
+    angle_deg: FormulaText
+
+
+class SliderTable(Authored):
+    """Assur group RRP: a rod from `pin` to the slider `node` on a fixed guide."""
+
+    type: Literal["RRP"]
+    node: Joint
+    pin: Joint
+    link: LinkName
+    length: FormulaText
+    guide: GuideTable
+    side: Literal["ahead", "behind"]
+    """Where the slider is, seen from the pin along the guide's direction."""
+
+
+class PlateTable(Authored):
+    """A third point of the link through `base`, by its distances from base[0] and base[1]."""
+
+    type: Literal["plate"]
+    node: Joint
+    base: TwoJoints
+    link: LinkName
+    lengths: TwoFormulas
+    side: Literal["left", "right"] = "left"
+    """Of the directed line base[0] -> base[1]; without meaning where the three are in line."""
+
+
+class PointOnLineTable(Authored):
+    """A point of the link through `base`: base[0] + ratio (base[1] - base[0])."""
+
+    type: Literal["point_on_line"]
+    node: Joint
+    base: TwoJoints
+    link: LinkName
+    ratio: FormulaText
+
+
+GroupTable = Annotated[
+    DyadTable | SliderTable | PlateTable | PointOnLineTable, Field(discriminator="type")
+]
+
+
+class MechanismFile(Authored):
+    """A mechanism: lengths in `length_unit`, numbers or formulas of the assignment's values."""
+
+    schema_version: Literal[1]
+    id: Identifier
+    title: Text
+    length_unit: Literal["m", "cm", "mm"]
+    ground: Annotated[dict[Joint, Point], Field(min_length=1)]
+    crank: CrankTable
+    group: list[GroupTable] = []
+
+
+class Range(Authored):
+    """Whole numbers from .. to, both included."""
+
+    first: Annotated[int, Field(alias="from")]
+    last: Annotated[int, Field(alias="to")]
+
+    @property
+    def values(self) -> range:
+        """The numbers."""
+        return range(self.first, self.last + 1)
+
+
+class VariantTable(Authored):
+    """What a student's number n (and a position) sets: formulas, each may use those above it."""
+
+    n: Range | None = None
+    position: Range | None = None
+    values: dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], FormulaText] = {}
+
+
+class ScalesTable(Authored):
+    """The assignment's own rule for the scales.
+
+    Formulas of the variant's values and of `crank_mm` (drawn length of the crank), `crank_m` (its
+    real length), `omega`, then `kL`, then `kv`. `rule` says them as the student knows them.
+    """
+
+    crank_mm: FormulaText
+    kL: FormulaText  # noqa: N815 - the field's own name for it
+    kv: FormulaText
+    ka: FormulaText
+    bare_units: dict[Literal["kL", "kv", "ka"], str] = {}
+    """The unit of a scale that a student writes as a bare number, where the assignment says one."""
+
+
+class PageTable(Authored):
+    """A sheet that a student hands in, with the figures drawn on it."""
+
+    kind: Literal["all", "velocity", "acceleration"]
+    figures: Annotated[
+        list[Literal["mechanism", "velocity_plan", "acceleration_plan"]], Field(min_length=1)
+    ]
+
+
+class GivenTable(Authored):
+    """One datum as told to the student: label = value unit."""
+
+    label: str
+    value: FormulaText
+    unit: str = ""
+
+
+class AssignmentFile(Authored):
+    """An assignment: a mechanism, what varies, the scales, the sheets, the names students see."""
+
+    schema_version: Literal[1]
+    id: Identifier
+    title: Text
+    task: Text
+    mechanism: str | MechanismFile
+    rubric: str
+    variant: VariantTable = VariantTable()
+    scales: ScalesTable
+    plate_images: Literal["perpendiculars", "similarity"] = "perpendiculars"
+    page: Annotated[list[PageTable], Field(min_length=1)]
+    given: list[GivenTable] = []
+    names: dict[str, str] = {}
+    assumptions: list[str] = []
+
+
+def load(model: type[Model], path: Path) -> Model:
+    """Read and validate one authored file.
+
+    Raises AuthoredFileError with every fault found, each with its path in the file.
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise AuthoredFileError(str(path), (Finding("$", "there is no such file"),)) from error
+    except OSError as error:
+        raise AuthoredFileError(str(path), (Finding("$", f"cannot be read: {error.strerror}"),)) from error
+    except UnicodeDecodeError as error:
+        raise AuthoredFileError(str(path), (Finding("$", "is not UTF-8 text"),)) from error
+    except tomllib.TOMLDecodeError as error:
+        raise AuthoredFileError(str(path), (Finding("$", f"is not TOML: {error}"),)) from error
+    return validate(model, data, str(path))
+
+
+def validate(model: type[Model], data: dict[str, Any], file: str) -> Model:
+    """Validate a table; raises AuthoredFileError with every fault."""
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise AuthoredFileError(file, tuple(findings_of(error, model))) from error
+
+
+def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Finding]:
+    """pydantic's faults as paths and plain sentences."""
+    for fault in error.errors():
+        path = "$" + "".join(_path_part(part) for part in fault["loc"])
+        message = fault["msg"].removeprefix("Value error, ")
+        if fault["type"] == "extra_forbidden":
+            message = "is not known here; check its spelling" + _near(str(fault["loc"][-1]), model)
+        elif fault["type"] == "missing":
+            message = "is missing"
+        yield Finding(path, message)
+
+
+_UNION_TAGS = {"RRR", "RRP", "plate", "point_on_line", "str", "MechanismFile"}
+
+
+def _path_part(part: str | int) -> str:
+    if isinstance(part, int):
+        return f"[{part}]"
+    return "" if part in _UNION_TAGS else f".{part}"
+
+
+def _near(name: str, model: type[BaseModel]) -> str:
+    import difflib  # noqa: PLC0415 - only on the way to an error message
+
+    fields = {field for kind in _models_in(model, set()) for field in kind.model_fields}
+    near = difflib.get_close_matches(name, sorted(fields), n=1)
+    return f" (did you mean {near[0]}?)" if near else ""
+
+
+def _models_in(model: type[BaseModel], seen: set[type[BaseModel]]) -> set[type[BaseModel]]:
+    from typing import get_args  # noqa: PLC0415
+
+    if model in seen:
+        return seen
+    seen.add(model)
+    waiting: list[Any] = [field.annotation for field in model.model_fields.values()]
+    while waiting:
+        kind = waiting.pop()
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            _models_in(kind, seen)
+        else:
+            waiting.extend(get_args(kind))
+    return seen

@@ -1,0 +1,149 @@
+"""Formulas of authored files, such as ``"2*(30+n)"``: parsed, bounded, never executed as code.
+
+Only numbers, names, + - * / ** and unary signs, parentheses, and a few functions are understood;
+every formula is bounded in length and depth, and exponents in size, so that a hostile one costs
+nothing. Evaluation works on floats and on NumPy arrays alike.
+"""
+
+import ast
+import difflib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from reference.geometry import FloatArray
+
+MAX_LENGTH = 200
+MAX_DEPTH = 20
+MAX_EXPONENT = 16
+
+Value = FloatArray | float
+
+CONSTANTS: Mapping[str, float] = {"pi": math.pi}
+FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+    "tan": np.tan,
+    "abs": np.abs,
+    "floor": np.floor,
+    "ceil": np.ceil,
+    "radians": np.radians,
+    "degrees": np.degrees,
+}
+_OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: lambda x, y: x + y,
+    ast.Sub: lambda x, y: x - y,
+    ast.Mult: lambda x, y: x * y,
+    ast.Div: np.true_divide,
+    ast.Mod: np.mod,
+    ast.Pow: np.power,
+}
+
+
+class FormulaError(ValueError):
+    """The formula cannot be understood, or gives no finite number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A parsed formula: its text, and the names that it needs."""
+
+    text: str
+    tree: ast.expr
+    names: frozenset[str]
+
+    def __call__(self, values: Mapping[str, Value]) -> FloatArray:
+        """Evaluate with the named values (floats or arrays that broadcast).
+
+        Raises FormulaError for an unknown name (with the near ones) and for a result that is not
+        finite everywhere.
+        """
+        unknown = sorted(self.names - values.keys())
+        if unknown:
+            raise FormulaError(f"'{self.text}': {_unknown_name(unknown[0], values)}")
+        with np.errstate(all="ignore"):
+            result = np.asarray(_evaluate(self.tree, values), dtype=np.float64)
+        if not np.all(np.isfinite(result)):
+            raise FormulaError(f"'{self.text}' does not give a finite number for these data")
+        return result
+
+
+def parse(text: str | float) -> Formula:
+    """Parse a number or the text of a formula.
+
+    Raises FormulaError that says what is not allowed in it.
+    """
+    text = str(text).strip()
+    if len(text) > MAX_LENGTH:
+        raise FormulaError(f"a formula of {len(text)} characters; at most {MAX_LENGTH} are allowed")
+    try:
+        tree = ast.parse(text.replace("^", "**"), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        raise FormulaError(f"'{text}' is not a formula") from error
+    names: set[str] = set()
+    _check(tree, names, text, depth=0)
+    return Formula(text, tree, frozenset(names))
+
+
+def _check(node: ast.expr, names: set[str], text: str, depth: int) -> None:
+    if depth > MAX_DEPTH:
+        raise FormulaError(f"'{text}' is nested deeper than {MAX_DEPTH}")
+    match node:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            if not math.isfinite(float(value)):
+                raise FormulaError(f"'{text}' holds a number that is not finite")
+        case ast.Name(id=name):
+            if name not in CONSTANTS:
+                names.add(name)
+        case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):
+            _check(operand, names, text, depth + 1)
+        case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _OPERATORS:
+            if isinstance(operator, ast.Pow):
+                _check_exponent(right, text)
+            _check(left, names, text, depth + 1)
+            _check(right, names, text, depth + 1)
+        case ast.Call(func=ast.Name(id=function), args=[argument], keywords=[]):
+            if function not in FUNCTIONS:
+                raise FormulaError(f"'{text}': {_unknown_name(function, FUNCTIONS)}")
+            _check(argument, names, text, depth + 1)
+        case _:
+            raise FormulaError(
+                f"'{text}': only numbers, names, + - * / % ** and {', '.join(FUNCTIONS)} may be used"
+            )
+
+
+def _check_exponent(exponent: ast.expr, text: str) -> None:
+    match exponent:
+        case ast.Constant(value=int() | float() as value) if abs(value) <= MAX_EXPONENT:
+            return
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as value)) if (
+            abs(value) <= MAX_EXPONENT
+        ):
+            return
+    raise FormulaError(f"'{text}': an exponent must be a number of at most {MAX_EXPONENT}")
+
+
+def _evaluate(node: ast.expr, values: Mapping[str, Value]) -> Any:  # noqa: ANN401 - floats or arrays
+    match node:
+        case ast.Constant(value=value):
+            return float(value)  # type: ignore[arg-type]
+        case ast.Name(id=name):
+            return CONSTANTS[name] if name in CONSTANTS else values[name]
+        case ast.UnaryOp(op=operator, operand=operand):
+            inner = _evaluate(operand, values)
+            return -inner if isinstance(operator, ast.USub) else inner
+        case ast.BinOp(left=left, op=operator, right=right):
+            return _OPERATORS[type(operator)](_evaluate(left, values), _evaluate(right, values))
+        case ast.Call(func=ast.Name(id=function), args=[argument]):
+            return FUNCTIONS[function](_evaluate(argument, values))
+    raise AssertionError(f"an unchecked node {node!r}")
+
+
+def _unknown_name(name: str, known: Mapping[str, object]) -> str:
+    near = difflib.get_close_matches(name, list(known), n=2)
+    hint = f"; did you mean {' or '.join(near)}?" if near else f"; known: {', '.join(sorted(known))}"
+    return f"unknown name {name}{hint}"
