@@ -29,8 +29,11 @@ class Variant:
     position: int | None = None
 
     def __str__(self) -> str:
-        told = [f"{name} = {value}" for name, value in (("n", self.n), ("position", self.position))
-                if value is not None]
+        told = [
+            f"{name} = {value}"
+            for name, value in (("n", self.n), ("position", self.position))
+            if value is not None
+        ]
         return ", ".join(told) or "the only variant"
 
 
@@ -66,7 +69,7 @@ class Assignment:
     def variant(self, n: int | None, position: int | None = None) -> Variant:
         """The variant asked for; raises CallError that says what is missing or out of range."""
         spec = self.file.variant
-        chosen = {}
+        chosen: dict[str, int | None] = {}
         for name, given, allowed in (("n", n, spec.n), ("position", position, spec.position)):
             if allowed is None:
                 chosen[name] = None
@@ -94,7 +97,7 @@ class Assignment:
         """The mechanism of every variant, SI, arrays of shape (N,)."""
         return build_mechanism(self.mechanism_file, self.values(variants), len(variants))
 
-    def scales(  # noqa: PLR0913 - one argument per thing a student may declare
+    def scales(
         self,
         variants: list[Variant],
         *,
@@ -184,8 +187,11 @@ def _check_formulas(assignment: Assignment) -> list[Finding]:
     if not variants:
         return [Finding("$.variant", "the range of n or position is empty: 'from' must not exceed 'to'")]
     findings: list[Finding] = []
-    for what, path in ((assignment.values, "$.variant.values"), (assignment.mechanism, "$.mechanism"),
-                       (assignment.scales, "$.scales")):
+    for what, path in (
+        (assignment.values, "$.variant.values"),
+        (assignment.mechanism, "$.mechanism"),
+        (assignment.scales, "$.scales"),
+    ):
         try:
             what(variants)
         except FormulaError as error:

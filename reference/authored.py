@@ -138,9 +138,7 @@ class PointOnLineTable(Authored):
     ratio: FormulaText
 
 
-GroupTable = Annotated[
-    DyadTable | SliderTable | PlateTable | PointOnLineTable, Field(discriminator="type")
-]
+GroupTable = Annotated[DyadTable | SliderTable | PlateTable | PointOnLineTable, Field(discriminator="type")]
 
 
 class MechanismFile(Authored):
@@ -194,9 +192,7 @@ class PageTable(Authored):
     """A sheet that a student hands in, with the figures drawn on it."""
 
     kind: Literal["all", "velocity", "acceleration"]
-    figures: Annotated[
-        list[Literal["mechanism", "velocity_plan", "acceleration_plan"]], Field(min_length=1)
-    ]
+    figures: Annotated[list[Literal["mechanism", "velocity_plan", "acceleration_plan"]], Field(min_length=1)]
 
 
 class GivenTable(Authored):
@@ -252,7 +248,7 @@ def validate(model: type[Model], data: dict[str, Any], file: str) -> Model:
 
 
 def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Finding]:
-    """pydantic's faults as paths and plain sentences."""
+    """Pydantic's faults as paths and plain sentences."""
     for fault in error.errors():
         path = "$" + "".join(_path_part(part) for part in fault["loc"])
         message = fault["msg"].removeprefix("Value error, ")

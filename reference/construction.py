@@ -29,7 +29,7 @@ Errors = Mapping[tuple[str, int, str], FloatArray]
 ``angle`` (radians, of a line), ``shift`` (mm, of a line, to its left), ``length`` (mm, of a
 length transferred), ``x`` and ``y`` (mm, of the node's mark itself)."""
 
-NO_ERROR = np.float64(0.0)
+NO_ERROR: FloatArray = np.asarray(0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class View:
 
     def error(self, node: str, slot: int, kind: str) -> FloatArray:
         """One error of the hand, zero where there is none."""
-        return np.asarray(self.errors.get((node, slot, kind), NO_ERROR))
+        return self.errors.get((node, slot, kind), NO_ERROR)
 
 
 # Directions ---------------------------------------------------------------------------------------
@@ -224,12 +224,16 @@ def fixed_point(view: View, name: str) -> ComplexArray:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """A known vector laid off from a node: a length along a direction (a negative one backwards)."""
+    """A known vector laid off from a node: a length along a direction (a negative one backwards).
+
+    `factor` multiplies the length: 1 for a right one, -1 for a wrong sense, 0 for one left out.
+    """
 
     node: str
     start: str
     length: Length
     along: Direction
+    factor: float = 1.0
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -239,7 +243,8 @@ class Given:
     def place(self, view: View) -> ComplexArray:
         """The vector's end."""
         foot, along = drawn(view, self.node, 0, view.nodes[self.start], self.along.at(view))
-        return np.asarray(foot + along * (self.length.at(view) + view.error(self.node, 0, "length")))
+        length = self.factor * self.length.at(view) + view.error(self.node, 0, "length")
+        return np.asarray(foot + along * length)
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,10 +286,9 @@ class TwoArcs:
         """The meeting point."""
         p, q = (view.nodes[centre] for centre in self.centres)
         r, s = (
-            radius.at(view) + view.error(self.node, slot, "length")
-            for slot, radius in enumerate(self.radii)
+            radius.at(view) + view.error(self.node, slot, "length") for slot, radius in enumerate(self.radii)
         )
-        return geometry.two_arcs(p, r, q, s, np.float64(self.side))
+        return geometry.two_arcs(p, r, q, s, self.side)
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,9 +311,7 @@ class ArcAndLine:
         along = Fixed(f"angle {self.guide}").at(view)
         foot, along = drawn(view, self.node, 1, fixed_point(view, self.guide), along)
         radius = self.radius.at(view) + view.error(self.node, 0, "length")
-        return geometry.arc_and_line(
-            view.nodes[self.centre], radius, foot, along, np.float64(self.side)
-        )
+        return geometry.arc_and_line(view.nodes[self.centre], radius, foot, along, self.side)
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,11 +337,15 @@ class Divide:
 
 @dataclass(frozen=True, slots=True)
 class Similar:
-    """The image of a link's third point: the triangle of the plan similar to that of the mechanism."""
+    """The image of a link's third point: the triangle of the plan similar to that of the mechanism.
+
+    `mirrored` for the mistake of a triangle similar but traversed the other way round.
+    """
 
     node: str
     base: tuple[str, str]
     model: tuple[str, str, str]
+    mirrored: bool = False
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -349,7 +355,10 @@ class Similar:
     def place(self, view: View) -> ComplexArray:
         """The third corner."""
         p, q = (view.nodes[end] for end in self.base)
-        return geometry.similar(p, q, *(view.nodes[corner] for corner in self.model))
+        corners = [view.nodes[corner] for corner in self.model]
+        if self.mirrored:
+            corners = [np.conj(corner) for corner in corners]
+        return geometry.similar(p, q, *corners)
 
 
 # Vectors and the whole ----------------------------------------------------------------------------
@@ -391,12 +400,15 @@ class Construction:
     poles : the pole's node by plan
     vectors : named vectors by name
     rates : angular velocities and accelerations by name
+    images : for each image of a plate's third point, the step that finds it by similarity, whichever
+        way the construction itself finds it
     """
 
     figures: Mapping[str, tuple[Step, ...]]
     poles: Mapping[str, str]
     vectors: Mapping[str, Vector]
     rates: Mapping[str, AngularRate]
+    images: Mapping[str, Similar] = field(default_factory=dict)
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -463,12 +475,13 @@ def evaluate(
     needed = None if wanted is None else ancestors(construction, wanted)
     nodes: dict[str, ComplexArray] = {}
     view = View(nodes, parameters, errors or {})
-    for step in construction.steps:
-        if needed is not None and step.node not in needed:
-            continue
-        if step.node in given:
-            nodes[step.node] = np.asarray(given[step.node])
-        else:
-            mark = view.error(step.node, 0, "x") + 1j * view.error(step.node, 0, "y")
-            nodes[step.node] = np.asarray(step.place(view) + mark)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for step in construction.steps:
+            if needed is not None and step.node not in needed:
+                continue
+            if step.node in given:
+                nodes[step.node] = np.asarray(given[step.node])
+            else:
+                mark = view.error(step.node, 0, "x") + 1j * view.error(step.node, 0, "y")
+                nodes[step.node] = np.asarray(step.place(view) + mark)
     return nodes

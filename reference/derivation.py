@@ -19,7 +19,6 @@ from reference.construction import (
     Given,
     Line,
     Normal,
-    Parameters,
     Pivot,
     Pole,
     Scaled,
@@ -46,6 +45,7 @@ class _Draft:
     acceleration: list[Step] = field(default_factory=list)
     vectors: dict[str, Vector] = field(default_factory=dict)
     rates: dict[str, AngularRate] = field(default_factory=dict)
+    images: dict[str, Similar] = field(default_factory=dict)
 
     def image(self, joint: str, *, primed: bool = False) -> str:
         """The node of a joint in the velocity (or acceleration) plan."""
@@ -95,9 +95,10 @@ def construction_of(
         poles["acceleration_plan"] = ACCELERATION_POLE
     keep = {step.node for steps in figures.values() for step in steps}
     vectors = {name: draft.vectors[name] for name in _in_order(draft) if draft.vectors[name].head in keep}
-    rates = {name: draft.rates[name] for name in sorted(draft.rates, reverse=True)}
-    rates = {name: rate for name, rate in rates.items() if rate.vector in vectors}
-    return Construction(figures, poles, vectors, rates)
+    ordered = sorted(draft.rates.values(), key=lambda rate: (rate.name.startswith("epsilon"), rate.name))
+    rates = {rate.name: rate for rate in ordered if rate.vector in vectors}
+    images = {node: step for node, step in draft.images.items() if node in keep}
+    return Construction(figures, poles, vectors, rates, images)
 
 
 def _in_order(draft: _Draft) -> list[str]:
@@ -147,8 +148,9 @@ def _draw_group(draft: _Draft, group: Group) -> None:
             else:
                 radii = (Scaled(pair(p, node), "kL"), Scaled(pair(q, node), "kL"))
                 draft.sketch.append(TwoArcs(node, (p, q), radii, group.side))
+            _note_similar_images(draft, node, (p, q))
             if group.line_ratio is not None or draft.plate_by_similarity:
-                _similar_images(draft, node, (p, q), (p, q, node))
+                _similar_images(draft, node, (p, q))
             else:
                 _rotations(draft, node, {p: link, q: link})
         case PointOnLine(node=node, base=(p, q)):
@@ -165,9 +167,7 @@ def pair(pin: str, node: str) -> str:
     return f"{pin}{node}"
 
 
-def _rotations(
-    draft: _Draft, node: str, links: Mapping[str, str], guide: Fixed | None = None
-) -> None:
+def _rotations(draft: _Draft, node: str, links: Mapping[str, str], guide: Fixed | None = None) -> None:
     """Both images of a node that turns about each pin (and, with a guide, slides along it)."""
     lines = [Line(draft.image(pin), Along(pin, node, 1)) for pin in links]
     ends = [_normal_component(draft, node, pin) for pin in links]
@@ -196,13 +196,18 @@ def _normal_component(draft: _Draft, node: str, pin: str) -> str:
     return end
 
 
-def _similar_images(
-    draft: _Draft, node: str, base: tuple[str, str], model: tuple[str, str, str]
-) -> None:
+def _note_similar_images(draft: _Draft, node: str, base: tuple[str, str]) -> None:
+    """The similarity steps of a plate's third point, for both plans."""
     p, q = base
-    for primed, steps in ((False, draft.velocity), (True, draft.acceleration)):
+    for primed in (False, True):
         ends = (draft.image(p, primed=primed), draft.image(q, primed=primed))
-        steps.append(Similar(draft.image(node, primed=primed), ends, model))
+        image = draft.image(node, primed=primed)
+        draft.images[image] = Similar(image, ends, (p, q, node))
+
+
+def _similar_images(draft: _Draft, node: str, base: tuple[str, str]) -> None:
+    draft.velocity.append(draft.images[draft.image(node)])
+    draft.acceleration.append(draft.images[draft.image(node, primed=True)])
     for pin in base:
         if not draft.mechanism.is_ground(pin):
             draft.vector(f"v_{node}{pin}", draft.image(pin), draft.image(node), link=(pin, node))
@@ -224,7 +229,7 @@ def _absolute(draft: _Draft, node: str) -> None:
 
 
 def _rates(draft: _Draft, link: str, about: str, joints: tuple[str, str]) -> None:
-    """omega and epsilon of a link, from the first vector found that turns it."""
+    """Omega and epsilon of a link, from the first vector found that turns it."""
     for name, vector in ((f"omega_{link}", f"v_{about}"), (f"epsilon_{link}", f"a_{about}_t")):
         draft.rates.setdefault(name, AngularRate(name, vector, joints, pair(*joints)))
 
@@ -257,9 +262,7 @@ def parameters_of(
 
 def _group_parameters(group: Group) -> dict[str, FloatArray]:
     match group:
-        case Dyad(node=node, pins=pins, lengths_m=lengths) | Plate(
-            node=node, base=pins, lengths_m=lengths
-        ):
+        case Dyad(node=node, pins=pins, lengths_m=lengths) | Plate(node=node, base=pins, lengths_m=lengths):
             known = {pair(pin, node): length for pin, length in zip(pins, lengths, strict=True)}
             if isinstance(group, Plate) and group.line_ratio is not None:
                 known[f"ratio {node}"] = group.line_ratio

@@ -13,17 +13,17 @@ QUARTER_TURN = 1j
 
 
 def cross(u: ComplexArray, v: ComplexArray) -> FloatArray:
-    """u x v, positive when v lies to the left of u."""
+    """U x v, positive when v lies to the left of u."""
     return np.asarray(u.real * v.imag - u.imag * v.real)
 
 
 def dot(u: ComplexArray, v: ComplexArray) -> FloatArray:
-    """u . v."""
+    """U . v."""
     return np.asarray(u.real * v.real + u.imag * v.imag)
 
 
 def unit(u: ComplexArray) -> ComplexArray:
-    """u / |u|; nan where u is zero, which has no direction."""
+    """U / |u|; nan where u is zero, which has no direction."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(u / np.abs(u))
 
@@ -40,7 +40,7 @@ def meet(p: ComplexArray, u: ComplexArray, q: ComplexArray, v: ComplexArray) -> 
 
 
 def two_arcs(
-    p: ComplexArray, p_radius: FloatArray, q: ComplexArray, q_radius: FloatArray, side: FloatArray
+    p: ComplexArray, p_radius: FloatArray, q: ComplexArray, q_radius: FloatArray, side: int
 ) -> ComplexArray:
     """The third corner of a triangle on pq by its other two sides; nan where it does not close.
 
@@ -62,7 +62,7 @@ def two_arcs(
 
 
 def arc_and_line(
-    p: ComplexArray, radius: FloatArray, q: ComplexArray, u: ComplexArray, side: FloatArray
+    p: ComplexArray, radius: FloatArray, q: ComplexArray, u: ComplexArray, side: int
 ) -> ComplexArray:
     """Where the arc about p meets the line through q along the unit vector u; nan where it does not.
 
@@ -77,6 +77,6 @@ def arc_and_line(
 def similar(
     p: ComplexArray, q: ComplexArray, model_p: ComplexArray, model_q: ComplexArray, model_r: ComplexArray
 ) -> ComplexArray:
-    """r such that triangle p q r is directly similar to the model (Mehmke's image)."""
+    """R such that triangle p q r is directly similar to the model (Mehmke's image)."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(p + (q - p) * ((model_r - model_p) / (model_q - model_p)))

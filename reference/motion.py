@@ -74,7 +74,7 @@ def _assemble(motion: Motion, group: Group) -> None:
     match group:
         case Dyad():
             p, q = (at[pin] for pin in group.pins)
-            node = geometry.two_arcs(p, group.lengths_m[0], q, group.lengths_m[1], np.float64(group.side))
+            node = geometry.two_arcs(p, group.lengths_m[0], q, group.lengths_m[1], group.side)
             _refuse_open(group.node, node, _gap_of_triangle(p, q, group.lengths_m))
             sine = np.abs(cross(node - p, node - q)) / (np.abs(node - p) * np.abs(node - q))
         case Plate():
@@ -87,7 +87,7 @@ def _assemble(motion: Motion, group: Group) -> None:
             node, sine = p + (q - p) * group.ratio, np.ones_like(group.ratio)
         case Slider():
             pin, along = at[group.pin], geometry.direction(group.guide_rad)
-            node = geometry.arc_and_line(pin, group.length_m, group.guide_m, along, np.float64(group.side))
+            node = geometry.arc_and_line(pin, group.length_m, group.guide_m, along, group.side)
             gap = np.abs(cross(along, pin - group.guide_m)) - group.length_m
             _refuse_open(group.node, node, gap)
             sine = np.abs(dot(node - pin, along)) / group.length_m
@@ -99,12 +99,13 @@ def _plate_corner(p: ComplexArray, q: ComplexArray, group: Plate) -> ComplexArra
     """A plate's third point; exactly in line with its base where the lengths say so."""
     if group.line_ratio is not None:
         return np.asarray(p + (q - p) * group.line_ratio)
-    return geometry.two_arcs(p, group.lengths_m[0], q, group.lengths_m[1], np.float64(group.side))
+    return geometry.two_arcs(p, group.lengths_m[0], q, group.lengths_m[1], group.side)
 
 
 def _gap_of_triangle(p: ComplexArray, q: ComplexArray, sides: tuple[FloatArray, FloatArray]) -> FloatArray:
     distance = np.abs(q - p)
-    return np.maximum(distance - (sides[0] + sides[1]), np.abs(sides[0] - sides[1]) - distance)
+    too_far = distance - (sides[0] + sides[1])
+    return np.asarray(np.maximum(too_far, np.abs(sides[0] - sides[1]) - distance))
 
 
 def _refuse_open(node: str, place: ComplexArray, gap_m: FloatArray) -> None:
@@ -169,7 +170,7 @@ def _accelerate(motion: Motion, group: Group) -> None:
 def _two_turns(
     u: ComplexArray, w: ComplexArray, known: ComplexArray, node: str
 ) -> tuple[FloatArray, FloatArray]:
-    """x and y of i (x u - y w) = known: dotted with w, then with u."""
+    """X and y of i (x u - y w) = known: dotted with w, then with u."""
     area = cross(u, w)
     with np.errstate(invalid="ignore", divide="ignore"):
         x, y = dot(known, w) / area, dot(known, u) / area
@@ -180,7 +181,7 @@ def _two_turns(
 def _turn_and_slide(
     u: ComplexArray, along: ComplexArray, known: ComplexArray, node: str
 ) -> tuple[FloatArray, FloatArray]:
-    """x and s of known + i x u = s along (along is a unit vector)."""
+    """X and s of known + i x u = s along (along is a unit vector)."""
     with np.errstate(invalid="ignore", divide="ignore"):
         x = -cross(along, known) / dot(u, along)
     _refuse_singular(node, x)

@@ -1,0 +1,160 @@
+"""The exact plan of a variant, or of many: named nodes and vectors, in SI and in millimetres on paper.
+
+Taken from the closed form of `reference.motion`, not from the construction: the two are
+independent roads, and the tests hold them against each other.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from reference.assignment import Assignment, Scales, Variant
+from reference.construction import Construction, TwoLines, View, evaluate
+from reference.derivation import construction_of, image_name, parameters_of
+from reference.geometry import ComplexArray, FloatArray, cross, dot
+from reference.mechanism import Mechanism
+from reference.mistakes import Drawing
+from reference.motion import Motion, move
+
+ZERO_SHARE = 1e-9
+"""A vector shorter than this share of its plan's size is a zero vector and has no direction."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Exact plans of N variants; arrays of shape (N,), y up.
+
+    Attributes
+    ----------
+    nodes_mm : by figure and node, complex, millimetres from the figure's origin (a plan's pole)
+    vectors_si : by name, complex, m/s and m/s^2
+    rates : omega_k, epsilon_k, rad/s and rad/s^2, counter-clockwise positive
+    """
+
+    variants: tuple[Variant, ...]
+    mechanism: Mechanism
+    motion: Motion
+    scales: Scales
+    drawing: Drawing
+    nodes_mm: Mapping[str, Mapping[str, ComplexArray]]
+    vectors_si: Mapping[str, ComplexArray]
+    rates: Mapping[str, FloatArray]
+
+    @property
+    def construction(self) -> Construction:
+        """How it is drawn."""
+        return self.drawing.construction
+
+    def drawn_mm(self, vector: str) -> ComplexArray:
+        """A vector on paper, complex millimetres."""
+        scale = getattr(self.scales, self.construction.vectors[vector].scale)
+        return np.asarray(self.vectors_si[vector] / scale)
+
+    def size_mm(self, figure: str) -> FloatArray:
+        """The largest distance of a plan's node from its pole."""
+        return np.asarray(np.max([np.abs(node) for node in self.nodes_mm[figure].values()], axis=0))
+
+    def direction_deg(self, vector: str) -> FloatArray:
+        """Counter-clockwise from +x, 0 <= d < 360; nan for a zero vector."""
+        figure = self.construction.figure_of(self.construction.vectors[vector].head)
+        drawn = self.drawn_mm(vector)
+        angle = np.degrees(np.angle(drawn)) % 360.0 % 360.0
+        return np.where(np.abs(drawn) <= ZERO_SHARE * self.size_mm(figure), np.nan, angle)
+
+
+def exact_plan(
+    assignment: Assignment,
+    variants: list[Variant],
+    scales: Scales | None = None,
+    *,
+    accelerations: bool = True,
+) -> Plan:
+    """The exact plans of some variants, at the scales given or those that the assignment proposes.
+
+    Raises MechanismError where a variant does not assemble.
+    """
+    mechanism = assignment.mechanism(variants)
+    scales = scales or assignment.scales(variants)
+    motion = move(mechanism, accelerations=accelerations)
+    by_similarity = assignment.file.plate_images == "similarity"
+    construction = construction_of(mechanism, accelerations=accelerations, plate_by_similarity=by_similarity)
+    nodes = _nodes(construction, mechanism, motion, scales)
+    vectors = {
+        name: (nodes[figure][vector.head] - nodes[figure][vector.tail]) * getattr(scales, vector.scale)
+        for figure in construction.poles
+        for vector in construction.vectors_of(figure)
+        for name in (vector.name,)
+    }
+    ordered = {name: vectors[name] for name in construction.vectors}
+    rates = _rates(construction, motion, ordered)
+    parameters = parameters_of(mechanism, scales.kL, scales.kv, scales.ka)
+    drawing = Drawing(construction, parameters)
+    return Plan(tuple(variants), mechanism, motion, scales, drawing, nodes, ordered, rates)
+
+
+def _nodes(
+    construction: Construction, mechanism: Mechanism, motion: Motion, scales: Scales
+) -> dict[str, dict[str, ComplexArray]]:
+    """Every node from the closed form: images of the joints, and ends of normal components."""
+    figures = {"mechanism": {joint: np.asarray(r / scales.kL) for joint, r in motion.position.items()}}
+    for figure, pole in construction.poles.items():
+        primed = figure == "acceleration_plan"
+        rate, scale = (motion.acceleration, scales.ka) if primed else (motion.velocity, scales.kv)
+        zero = np.zeros(np.shape(scale), dtype=np.complex128)
+        nodes: dict[str, ComplexArray] = {pole: zero}
+        for joint in mechanism.joints:
+            if not mechanism.is_ground(joint):
+                nodes[image_name(joint, primed=primed)] = np.asarray(rate[joint] / scale)
+        for vector in construction.vectors_of(figure):
+            if vector.is_normal and vector.link:
+                nodes[vector.head] = nodes[vector.tail] + _normal(motion, *vector.link) / scales.ka
+        figures[figure] = {step.node: nodes[step.node] for step in construction.figures[figure]}
+    return figures
+
+
+def _normal(motion: Motion, pin: str, node: str) -> ComplexArray:
+    """The normal component of node about pin: v^2 / l towards the pin."""
+    arm = motion.position[node] - motion.position[pin]
+    relative = motion.velocity[node] - motion.velocity[pin]
+    return np.asarray(-arm * (dot(relative, relative) / dot(arm, arm)))
+
+
+def _rates(
+    construction: Construction, motion: Motion, vectors: Mapping[str, ComplexArray]
+) -> dict[str, FloatArray]:
+    rates = {}
+    for name, rate in construction.rates.items():
+        tail, head = rate.link
+        arm = motion.position[head] - motion.position[tail]
+        rates[name] = np.asarray(cross(arm, vectors[rate.vector]) / dot(arm, arm))
+    return rates
+
+
+def conditioning(plan: Plan) -> dict[str, FloatArray]:
+    """How well the plan can be computed and drawn.
+
+    ``transmission X``: |sin| on which joint X hangs; ``predicted_error``: relative error of the
+    computed velocities, eps / min(transmission)^2; ``crossing X``: the angle in degrees at which the
+    construction lines of node X meet (90 is best).
+    """
+    transmission = plan.motion.transmission
+    told: dict[str, FloatArray] = {f"transmission {node}": sine for node, sine in transmission.items()}
+    worst = np.min(list(transmission.values()), axis=0) if transmission else np.ones(len(plan.variants))
+    told["predicted_error"] = np.finfo(float).eps / worst**2
+    nodes = evaluate(plan.construction, plan.drawing.parameters)
+    told.update(crossings_deg(plan.construction, plan.drawing, nodes))
+    return told
+
+
+def crossings_deg(
+    construction: Construction, drawing: Drawing, nodes: Mapping[str, ComplexArray]
+) -> dict[str, FloatArray]:
+    """The angle between the two construction lines of each node that is found by two lines."""
+    view = View(nodes, drawing.parameters)
+    angles = {}
+    for step in construction.steps:
+        if isinstance(step, TwoLines):
+            u, v = step.first.along.at(view), step.second.along.at(view)
+            angles[f"crossing {step.node}"] = np.degrees(np.arcsin(np.minimum(np.abs(cross(u, v)), 1.0)))
+    return angles
