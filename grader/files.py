@@ -1,0 +1,51 @@
+"""Files written whole or not at all."""
+
+import contextlib
+import os
+import secrets
+from pathlib import Path
+
+from reference.errors import PlanmarkError
+
+
+class OutputError(PlanmarkError):
+    """A file could not be written: folder missing, no room, no permission."""
+
+    exit_status = 5
+
+
+def write_whole(path: Path, data: bytes | str) -> None:
+    """Write a file so that readers see the old one or the new one, never a part.
+
+    Text is stored as UTF-8 with its line ends as they are. Missing folders are made. The temporary
+    file lies beside the target, because a rename is atomic only within one file system.
+
+    Raises OutputError with the system's reason; the target is then as it was.
+    """
+    content = data.encode("utf-8") if isinstance(data, str) else data
+    temporary = path.with_name(f".{path.name[:40]}.{secrets.token_hex(6)}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _write_new(temporary, content)
+        temporary.replace(path)
+    except OSError as error:
+        _forget(temporary)
+        raise OutputError(
+            "cannot_write",
+            f"{path}: cannot be written ({error.strerror or error}); choose another place or make room",
+        ) from error
+    except BaseException:
+        _forget(temporary)
+        raise
+
+
+def _write_new(path: Path, content: bytes) -> None:
+    with path.open("xb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _forget(temporary: Path) -> None:
+    with contextlib.suppress(OSError):
+        temporary.unlink()
