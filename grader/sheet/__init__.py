@@ -1,0 +1,22 @@
+"""A page to millimetres on the upright sheet.
+
+A printed answer sheet is registered by its markers. On a plain sheet the drawing frame, the paper's
+edges and the file's stated resolution are weighed together by their uncertainty; what disagrees or
+is missing is told as `Problem`, and what cannot be settled is refused with the reason.
+"""
+
+from grader.records import Page, Sheet, Unread
+from grader.sheet.plain import register_plain
+
+try:
+    from grader.sheet import markers
+except ImportError:  # pragma: no cover
+    markers = None  # type: ignore[assignment]
+
+__all__ = ["rectify"]
+
+
+def rectify(page: Page) -> Sheet | Unread:
+    """The page's map from millimetres to pixels, or, false in a condition, why there is none."""
+    sheet = None if markers is None else markers.register(page)
+    return register_plain(page) if sheet is None else sheet

@@ -1,0 +1,189 @@
+"""Long straight lines that run nearly along the image's axes: frame, paper edges, title block."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from grader.pixels import Flat, cut_across, robust_line, shrink
+from grader.records import FloatArray, GreyImage
+
+_LONG_SIDE_PX = 1400
+"""About 3.3 px/mm on A3: a frame's stroke is still two pixels wide."""
+_AXIS_DEG = 16.0
+"""Skew, roll and the convergence of a photo together stay under this."""
+_COLLINEAR_PX = 1.8
+_LEAST_PX = 12.0
+_LEAST_SHARE = 0.12
+"""Of the image's width or height; the title block's lines are kept too."""
+_STROKE_PX = (0.3, 6.5)
+"""Distance of the two borders of a drawn line at the reduced resolution."""
+
+RIDGE = "ridge"
+STEP = "step"
+
+
+@dataclass(frozen=True, slots=True)
+class LongLine:
+    """A long line, in full pixels.
+
+    Attributes
+    ----------
+    across : True for a horizontal one (runs along x)
+    kind : `ridge`, a drawn stroke; `step`, a border between bright and dark
+    bright : for a step the side that is bright: +1 below or right of it, -1 above or left
+    ends : (2, 2) left and right, or upper and lower, end
+    inked : share of the length that was seen
+    """
+
+    across: bool
+    kind: str
+    bright: int
+    ends: FloatArray
+    inked: float
+
+    @property
+    def length(self) -> float:
+        return float(np.hypot(*(self.ends[1] - self.ends[0])))
+
+    def at(self, position: float) -> float:
+        """y at x = position for a horizontal line, x at y = position for a vertical one."""
+        i = 0 if self.across else 1
+        (p0, q0), (p1, q1) = self.ends[:, [i, 1 - i]]
+        return float(q0 + (position - p0) * (q1 - q0) / (p1 - p0))
+
+
+def long_lines(flat: Flat) -> list[LongLine]:
+    """All long lines, longest first, with drawn strokes fitted to their middle at full resolution."""
+    scale = min(1.0, _LONG_SIDE_PX / max(flat.grey.shape))
+    small = shrink(flat.grey, scale)
+    pieces = _pieces(small)
+    found: list[LongLine] = []
+    for across in (True, False):
+        edges = _edges(small, pieces, across=across)
+        chains = {sign: _chains(edges[edges[:, 4] == sign], small.shape, across=across) for sign in (-1, 1)}
+        found += _paired(chains, across=across)
+    full = [_full_size(line, scale) for line in found]
+    refined = [_refined(flat, line, 1.0 / scale) if line.kind == RIDGE else line for line in full]
+    return sorted(refined, key=lambda line: -line.length * line.inked)
+
+
+def _pieces(small: GreyImage) -> FloatArray:
+    """(n, 4) straight borders between dark and bright: x, y, x, y."""
+    lines = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD, scale=1.0).detect(small)[0]
+    return np.zeros((0, 4)) if lines is None else np.asarray(lines, dtype=np.float64).reshape(-1, 4)
+
+
+def _edges(small: GreyImage, pieces: FloatArray, *, across: bool) -> FloatArray:
+    """(n, 5) of position and value at both ends, and which side is bright, for lines along one axis."""
+    ends = pieces.copy() if across else pieces[:, [1, 0, 3, 2]]
+    flip = ends[:, 0] > ends[:, 2]
+    ends[flip] = ends[flip][:, [2, 3, 0, 1]]
+    length = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1])
+    flat_enough = np.abs(ends[:, 3] - ends[:, 1]) <= np.tan(np.radians(_AXIS_DEG)) * (ends[:, 2] - ends[:, 0])
+    ends = ends[flat_enough & (length >= _LEAST_PX)]
+    return np.column_stack([ends, _bright_side(small if across else small.T, ends)])
+
+
+def _bright_side(image: GreyImage, ends: FloatArray) -> FloatArray:
+    share = np.linspace(0.1, 0.9, 9)[None, :]
+    x = ends[:, [0]] + share * (ends[:, [2]] - ends[:, [0]])
+    y = ends[:, [1]] + share * (ends[:, [3]] - ends[:, [1]])
+    high, wide = image.shape
+    column = np.clip(np.rint(x), 0, wide - 1).astype(int)
+
+    def level(shift: float) -> FloatArray:
+        return image[np.clip(np.rint(y + shift), 0, high - 1).astype(int), column].mean(axis=1)
+
+    return np.where(level(1.2) >= level(-1.2), 1.0, -1.0)
+
+
+def _chains(edges: FloatArray, shape: tuple[int, ...], *, across: bool) -> list[tuple[FloatArray, float]]:
+    """Collinear edges joined: ((2, 2) ends as position, value; seen length share)."""
+    least = _LEAST_SHARE * (shape[1] if across else shape[0])
+    length = edges[:, 2] - edges[:, 0]
+    order = np.argsort(-length)
+    free = np.ones(len(edges), dtype=bool)
+    chains: list[tuple[FloatArray, float]] = []
+    for first in order:
+        if not free[first]:
+            continue
+        members = np.array([first])
+        for _ in range(4):
+            line = _weighted_line(edges[members], length[members])
+            near = np.maximum(
+                np.abs(edges[:, 1] - np.polyval(line, edges[:, 0])),
+                np.abs(edges[:, 3] - np.polyval(line, edges[:, 2])),
+            )
+            grown = np.flatnonzero(free & (near <= _COLLINEAR_PX))
+            if len(grown) == 0 or np.array_equal(grown, members):
+                break
+            members = grown
+        free[members] = False
+        free[first] = False
+        low, high = edges[members, 0].min(), edges[members, 2].max()
+        if high - low >= least:
+            ends = np.array([[low, np.polyval(line, low)], [high, np.polyval(line, high)]])
+            chains.append((ends, min(1.0, float(length[members].sum() / (high - low)))))
+    return chains
+
+
+def _weighted_line(edges: FloatArray, length: FloatArray) -> FloatArray:
+    x = np.concatenate([edges[:, 0], edges[:, 2]])
+    y = np.concatenate([edges[:, 1], edges[:, 3]])
+    return np.asarray(np.polyfit(x, y, 1, w=np.sqrt(np.concatenate([length, length]))))
+
+
+def _paired(chains: dict[int, list[tuple[FloatArray, float]]], *, across: bool) -> list[LongLine]:
+    """Two borders, bright outside both, are one drawn line; a border alone is a step."""
+    lines: list[LongLine] = []
+    used: set[int] = set()
+    for ends, seen in chains[-1]:
+        partner = None
+        for index, (other, other_seen) in enumerate(chains[1]):
+            low, high = max(ends[0, 0], other[0, 0]), min(ends[1, 0], other[1, 0])
+            shorter = min(ends[1, 0] - ends[0, 0], other[1, 0] - other[0, 0])
+            gap = _value(other, (low + high) / 2) - _value(ends, (low + high) / 2)
+            if high - low > 0.6 * shorter and _STROKE_PX[0] < gap < _STROKE_PX[1]:
+                partner = index
+                both = np.array([min(ends[0, 0], other[0, 0]), max(ends[1, 0], other[1, 0])])
+                middle = [(_value(ends, p) + _value(other, p)) / 2 for p in both]
+                lines.append(_line(np.column_stack([both, middle]), max(seen, other_seen), across, RIDGE, 0))
+                used.add(index)
+                break
+        if partner is None:
+            lines.append(_line(ends, seen, across, STEP, -1))
+    lines += [
+        _line(ends, seen, across, STEP, 1) for index, (ends, seen) in enumerate(chains[1]) if index not in used
+    ]
+    return lines
+
+
+def _line(ends: FloatArray, seen: float, across: bool, kind: str, bright: int) -> LongLine:  # noqa: FBT001
+    return LongLine(across, kind, bright, ends if across else ends[:, ::-1].copy(), seen)
+
+
+def _value(ends: FloatArray, position: float) -> float:
+    (p0, q0), (p1, q1) = ends
+    return float(q0 + (position - p0) * (q1 - q0) / (p1 - p0))
+
+
+def _full_size(line: LongLine, scale: float) -> LongLine:
+    ends = (line.ends + 0.5) / scale - 0.5
+    return LongLine(line.across, line.kind, line.bright, ends, line.inked)
+
+
+def _refined(flat: Flat, line: LongLine, full_per_small: float) -> LongLine:
+    """The line through the middle of the ink, at full resolution."""
+    start, end = line.ends
+    reach = 4.0 * full_per_small
+    cuts = cut_across(flat, start, end, reach, 0.6 * reach)
+    width = cuts.right - cuts.left
+    good = np.isfinite(cuts.offset) & (width < 1.8 * np.nanmedian(width))
+    if good.sum() < 20:
+        return line
+    a, b, _, _ = robust_line(cuts.along[good], cuts.offset[good], 0.05)
+    direction = (end - start) / line.length
+    normal = np.array([-direction[1], direction[0]])
+    ends = np.array([start + a * normal, end + (a + b * line.length) * normal])
+    return LongLine(line.across, line.kind, line.bright, ends, float(good.mean()))
