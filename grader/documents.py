@@ -1,0 +1,319 @@
+"""Every JSON document that enters or leaves, as pydantic models with a published schema.
+
+Coordinates in documents are millimetres from the upright sheet's top left corner (x right, y down);
+nodes of an exact plan are relative to their pole, y up. Directions are degrees counter-clockwise
+from +x, 0 <= d < 360. Real values are SI; scales are real units per millimetre on paper.
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from reference.authored import AssignmentFile, MechanismFile
+from reference.errors import CallError
+
+SCHEMA_VERSION = 1
+
+Version = Literal[1]
+Verdict = Literal["full", "partial", "none", "follow_through", "review", "not_judged"]
+Status = Literal["graded", "needs_review", "unreadable", "missing"]
+ScaleName = Literal["kL", "kv", "ka"]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+MistakeCode = Literal[
+    "parallel_for_perpendicular",
+    "wrong_link",
+    "sense_reversed",
+    "rpm_not_converted",
+    "scale_wrong",
+    "normal_reversed",
+    "normal_missing",
+    "normal_from_absolute",
+    "other_variant",
+    "other_assembly",
+    "image_mirrored",
+    "wrong_intersection",
+    "vector_missing",
+    "labels_swapped",
+    "figure_rotated",
+    "arithmetic",
+]
+
+
+class Document(BaseModel):
+    """A table of a JSON document: frozen, nothing unknown, only finite numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+# Measurements: what a student measured ------------------------------------------------------------
+
+
+class MeasurementsDocument(Document):
+    """One student's measurements: drawn lengths and directions, and values computed from them."""
+
+    model_config = ConfigDict(strict=True)
+
+    schema_version: Version = 1
+    student_id: str | None = None
+    n: int | None = None
+    position: int | None = None
+    scales: dict[ScaleName, str | float] = {}
+    """As the student declares them, with their units."""
+    segments_mm: dict[str, Annotated[float, Field(ge=0.0)]] = {}
+    directions_deg: dict[str, float] = {}
+    """Counter-clockwise from the assignment's +x."""
+    values: dict[str, float] = {}
+    """SI; angular values counter-clockwise positive."""
+
+
+# Reading: what was read on one sheet --------------------------------------------------------------
+
+
+class ProblemDocument(Document):
+    """Something a person should know."""
+
+    code: str
+    message: str
+    file: str | None = None
+
+
+class SheetDocument(Document):
+    """Where the sheet lies in its image."""
+
+    method: str
+    px_per_mm: float
+    rotation_deg: float
+    residual_mm: float
+    mm_to_px: list[list[float]]
+    """(3, 3) homography; the centre of the stored image's top left pixel is (0, 0)."""
+
+
+class NodeDocument(Document):
+    """A node as drawn, sheet millimetres."""
+
+    x_mm: float
+    y_mm: float
+    se_mm: float
+    confidence: Share
+
+
+class VectorDocument(Document):
+    """A vector as drawn; a zero vector has no direction."""
+
+    length_mm: float | None
+    se_mm: float
+    direction_deg: float | None
+    se_deg: float | None
+    confidence: Share
+
+
+class FigureDocument(Document):
+    """A mechanism sketch or a plan as read."""
+
+    nodes: dict[str, NodeDocument]
+    vectors: dict[str, VectorDocument]
+
+
+class UnreadDocument(Document):
+    """What was asked for and not read, and why."""
+
+    name: str
+    reason: str
+
+
+class TimingDocument(Document):
+    """Milliseconds by stage."""
+
+    decode: float
+    sheet: float
+    ink: float
+    reading: float
+    total: float
+
+
+class ReadingDocument(Document):
+    """What was read on one page; `sheet` is null where the page could not be registered."""
+
+    schema_version: Version = 1
+    source: str
+    page: int
+    student_id: str | None
+    sheet: SheetDocument | None
+    figures: dict[Literal["mechanism", "velocity_plan", "acceleration_plan"], FigureDocument]
+    unread: list[UnreadDocument] = []
+    problems: list[ProblemDocument] = []
+    timing_ms: TimingDocument | None = None
+
+
+# Report: a submission's verdicts ------------------------------------------------------------------
+
+
+class QuantityDocument(Document):
+    """A vector's drawn length and direction, and the real value that they stand for."""
+
+    length_mm: float | None = None
+    direction_deg: float | None = None
+    value: float | None = None
+    unit: str | None = None
+
+
+class ToleranceDocument(Document):
+    """How far the drawing may be off for full marks."""
+
+    length_mm: float | None = None
+    direction_deg: float | None = None
+
+
+class CriterionDocument(Document):
+    """The verdict on one criterion of the rubric."""
+
+    id: str
+    title: str
+    vector: str | None
+    """The vector or angular quantity judged; null for a scale."""
+    points: float | None
+    """Null while under review, and where not judged."""
+    max_points: float
+    verdict: Verdict
+    measured: QuantityDocument
+    expected: QuantityDocument
+    tolerance: ToleranceDocument
+    confidence: Share
+    mistake: str | None = None
+    """Code of the mistake that explains a loss."""
+    feedback: str = ""
+
+
+class MistakeDocument(Document):
+    """A mistake that explains what is off: its code, where it was made, the criteria it explains."""
+
+    code: MistakeCode
+    at: str
+    explains: list[str]
+    confidence: Share
+    detail: str = ""
+
+
+class ScaleDocument(Document):
+    """A scale: as declared (real units per millimetre), as used for marking, and whether assumed."""
+
+    declared: float | None
+    used: float | None
+    assumed: bool
+    text: str | None = None
+    """As the student wrote it."""
+    refused: str | None = None
+    """Why a declared scale was not accepted."""
+
+
+class ReadSheets(Document):
+    """The pages behind a report."""
+
+    sheets: list[ReadingDocument] = []
+
+
+class ReportDocument(Document):
+    """A submission's report."""
+
+    schema_version: Version = 1
+    student_id: str
+    assignment: str
+    variant: dict[str, int]
+    """``{"n": 7}``; empty where the assignment has no n."""
+    position: int | None
+    status: Status
+    score: float | None
+    """Null while anything is under review, and for a submission missing or unreadable."""
+    score_range: tuple[float, float] | None
+    max_score: float
+    criteria: list[CriterionDocument] = []
+    mistakes: list[MistakeDocument] = []
+    scales: dict[ScaleName, ScaleDocument] = {}
+    problems: list[ProblemDocument] = []
+    reading: ReadSheets = ReadSheets()
+
+
+class UnmatchedDocument(Document):
+    """A page or file that is nobody's, or claimed by two sources that disagree."""
+
+    file: str
+    page: int | None = None
+    code: str
+    message: str
+
+
+class ResultsDocument(Document):
+    """A class's results."""
+
+    schema_version: Version = 1
+    assignment: str
+    reports: list[ReportDocument]
+    unmatched: list[UnmatchedDocument] = []
+
+
+# Plan: the exact plan of a variant ----------------------------------------------------------------
+
+
+class ScalesDocument(Document):
+    """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm."""
+
+    kL: float  # noqa: N815 - the field's own name for it
+    kv: float
+    ka: float
+
+
+class PlanVector(Document):
+    """An exact vector; a zero vector's direction is null."""
+
+    value: float
+    unit: str
+    drawn_mm: float
+    direction_deg: float | None
+
+
+class PlanDocument(Document):
+    """The exact plan of one variant; plan nodes relative to their pole, y up."""
+
+    schema_version: Version = 1
+    assignment: str
+    variant: dict[str, int]
+    position: int | None
+    scales: ScalesDocument
+    points_m: dict[str, tuple[float, float]]
+    vectors: dict[str, PlanVector]
+    nodes_mm: dict[str, dict[str, tuple[float, float]]]
+    angular: dict[str, float]
+    conditioning: dict[str, float | dict[str, float]]
+
+
+# Schemas ------------------------------------------------------------------------------------------
+
+
+def _models() -> dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]]:
+    from grader.rubric import RubricFile  # noqa: PLC0415 - rubrics know nothing of documents
+
+    return {
+        "measurements": (MeasurementsDocument, "validation"),
+        "reading": (ReadingDocument, "serialization"),
+        "report": (ReportDocument, "serialization"),
+        "results": (ResultsDocument, "serialization"),
+        "plan": (PlanDocument, "serialization"),
+        "mechanism": (MechanismFile, "validation"),
+        "assignment": (AssignmentFile, "validation"),
+        "rubric": (RubricFile, "validation"),
+    }
+
+
+def schema_names() -> list[str]:
+    """The names that `schema` knows."""
+    return list(_models())
+
+
+def schema(name: str) -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of a document or authored file; CallError for an unknown name."""
+    models = _models()
+    if name not in models:
+        raise CallError("unknown_schema", f"there is no schema '{name}': known are {', '.join(models)}")
+    model, mode = models[name]
+    found = model.model_json_schema(mode=mode)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}

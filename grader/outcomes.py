@@ -1,0 +1,166 @@
+"""What judging a submission leaves behind: structured, without a word in any language.
+
+`comparison` makes an `Outcome` per rubric criterion, `diagnosis` a `Mistake` per explanation,
+`scoring` the points; `feedback` turns the `Reason`s into sentences in the student's language.
+
+Codes of reasons, with their parameters (numbers in mm, degrees or SI; names as in the assignment):
+
+===================== ====================================================== =========================
+code                  parameters                                             said when
+===================== ====================================================== =========================
+right                                                                        within the tolerance
+too_long, too_short   measured_mm, expected_mm, off_mm, tolerance_mm         the drawn length is off
+turned_left,          measured_deg, expected_deg, off_deg, tolerance_deg     the direction is off:
+turned_right                                                                 must turn back right/left
+reversed                                                                     points the opposite way
+should_be_zero        measured_mm, tolerance_mm                              a zero vector was drawn
+too_short_to_judge    length_mm, least_mm                                    no direction is asked of it
+value_too_large,      measured, expected, off, tolerance, unit               a computed value is off
+value_too_small
+value_reversed        measured, expected, unit                               its sign is wrong
+not_measured                                                                 nothing was handed in
+optional                                                                     not handed in, not asked
+unread                reason                                                 asked for, not read
+doubtful              confidence                                             read without confidence
+near_limit            se, off, tolerance, what                               the error straddles a limit
+readings_disagree     first, second, unit                                    scan and measurements differ
+follows               what, of                                               right from own earlier value
+                      (what: nodes, scale, vector, value; of: its name)
+scale_refused         text, why                                              declared, not understood
+scale_off             declared, expected, unit                               declared, contradicted
+scale_assumed         used, unit                                             not declared
+===================== ====================================================== =========================
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from grader.documents import Verdict
+
+Param = float | str
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why a verdict is what it is: a stable code and its parameters (table above)."""
+
+    code: str
+    params: Mapping[str, Param] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A drawn or expected vector, an angular value or a scale; None where not known or meaningless.
+
+    Attributes
+    ----------
+    length_mm, direction_deg : on paper
+    value, unit : real, SI
+    """
+
+    length_mm: float | None = None
+    direction_deg: float | None = None
+    value: float | None = None
+    unit: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """What full marks allow; for values and scales `value` (same unit as the quantity)."""
+
+    length_mm: float | None = None
+    direction_deg: float | None = None
+    value: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The verdict on one criterion.
+
+    Attributes
+    ----------
+    criterion : id in the rubric
+    name : the vector, angular quantity or scale judged
+    verdict : full, partial, none, follow_through, review, not_judged
+    possible : under review, the verdicts it lies between (worst, best); else twice the verdict
+    measured, expected, tolerance : the evidence; `expected` is against the original data, or
+        against the student's own earlier values where the verdict is follow_through
+    confidence : that the verdict is right
+    reasons : most important first; never empty
+    mistake : code of the mistake that explains a loss, or None
+    """
+
+    criterion: str
+    name: str
+    verdict: Verdict
+    measured: Quantity
+    expected: Quantity
+    tolerance: Tolerance
+    confidence: float
+    reasons: tuple[Reason, ...]
+    possible: tuple[Verdict, Verdict]
+    mistake: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """An explanation of what is off: code of the contract, where, which criteria it explains."""
+
+    code: str
+    at: str
+    explains: tuple[str, ...]
+    confidence: float
+    detail: Mapping[str, Param] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class UsedScale:
+    """A scale as declared and as used for marking, real units per millimetre.
+
+    Attributes
+    ----------
+    text : as the student wrote it, None where not declared
+    declared : parsed, None where not declared or refused
+    used : what the marking used
+    assumed : whether `used` is the assignment's rule or the drawn crank instead of the declared
+    refused : why a declared text was not accepted (English, for a person), or None
+    """
+
+    text: str | None
+    declared: float | None
+    used: float
+    assumed: bool
+    refused: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Points: `total` is None while anything is under review; `low`, `high` say between what.
+
+    Attributes
+    ----------
+    points : by criterion; None where under review or not judged
+    maximum : the rubric's total; `total`, `low` and `high` are scaled to it where criteria were
+        not judged
+    """
+
+    points: Mapping[str, float | None]
+    total: float | None
+    low: float
+    high: float
+    maximum: float
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """Everything that marking one submission found."""
+
+    outcomes: tuple[Outcome, ...]
+    mistakes: tuple[Mistake, ...]
+    scales: Mapping[str, UsedScale]
+    score: Score
+
+    @property
+    def needs_review(self) -> bool:
+        """Whether a person must look before the score counts."""
+        return self.score.total is None
