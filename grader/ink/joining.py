@@ -1,0 +1,92 @@
+"""Pieces on one line joined into one stroke."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grader.records import FloatArray
+
+_OFF_PX = 1.5
+"""Pieces this near to one line are of it: 0.25 mm, under the distance of strokes told apart."""
+_GAP_PX = 14.0
+_TURN = 0.16
+"""Least cosine-complement guard: pieces that differ by more than 9 degrees are never joined."""
+_ROUNDS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """Strokes at the working resolution: (n, 2, 2) ends and (n,) widths, px."""
+
+    ends: FloatArray
+    width: FloatArray
+
+
+def join(ends: FloatArray, width: FloatArray, gap_px: float = _GAP_PX) -> Pieces:
+    """Longest first, take in all free pieces that lie on its line without too large a gap."""
+    length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+    free = np.ones(len(ends), dtype=bool)
+    joined: list[FloatArray] = []
+    widths: list[float] = []
+    for first in np.argsort(-length):
+        if not free[first]:
+            continue
+        line, members = _grown(ends, length, free, int(first), gap_px)
+        free[members] = False
+        joined.append(line)
+        widths.append(float(np.average(width[members], weights=length[members])))
+    if not joined:
+        return Pieces(np.zeros((0, 2, 2)), np.zeros(0))
+    return Pieces(np.stack(joined), np.array(widths))
+
+
+def _grown(
+    ends: FloatArray, length: FloatArray, free: np.ndarray, first: int, gap_px: float
+) -> tuple[FloatArray, np.ndarray]:
+    members = np.array([first])
+    line = ends[first]
+    for _ in range(_ROUNDS):
+        grown = _on_line(ends, free, line, gap_px)
+        grown = np.union1d(grown, [first])
+        if np.array_equal(grown, members):
+            break
+        members = grown
+        line = _fitted(ends[members], length[members])
+    return line, members
+
+
+def _on_line(ends: FloatArray, free: np.ndarray, line: FloatArray, gap_px: float) -> np.ndarray:
+    """Free pieces near the line and reached from it without a gap over `gap_px`."""
+    span = line[1] - line[0]
+    size = float(np.hypot(*span))
+    u = span / size
+    v = np.array([-u[1], u[0]])
+    relative = ends - line[0]
+    t, d = relative @ u, relative @ v
+    turn = np.abs(d[:, 1] - d[:, 0]) <= _TURN * np.abs(t[:, 1] - t[:, 0])
+    # A short line does not know its direction: allow for half a pixel at its ends, growing outward.
+    beyond = np.maximum(np.maximum(-t, t - size), 0.0)
+    allowed = _OFF_PX + np.minimum(0.5 * beyond / size, 1.0)
+    near = np.flatnonzero(free & turn & (np.abs(d) <= allowed).all(axis=1))
+    low, high = t[near].min(axis=1), t[near].max(axis=1)
+    reach_low, reach_high = 0.0, size
+    taken = np.zeros(len(near), dtype=bool)
+    while True:
+        more = ~taken & (low <= reach_high + gap_px) & (high >= reach_low - gap_px)
+        if not more.any():
+            return near[taken]
+        taken |= more
+        reach_low = min(reach_low, float(low[more].min()))
+        reach_high = max(reach_high, float(high[more].max()))
+
+
+def _fitted(ends: FloatArray, length: FloatArray) -> FloatArray:
+    """Line by weighted total least squares through the pieces, ending where they end."""
+    points = ends.reshape(-1, 2)
+    weight = np.repeat(length, 2)
+    centre = np.average(points, axis=0, weights=weight)
+    off = points - centre
+    _, vectors = np.linalg.eigh((off * weight[:, None]).T @ off)
+    u = vectors[:, 1]
+    t = off @ u
+    return np.stack([centre + t.min() * u, centre + t.max() * u])

@@ -1,0 +1,115 @@
+"""First guesses of strokes: straight runs of the ink's borders, shifted to the stroke's middle.
+
+Borders, not skeletons: where two strokes run together at a small angle their ink is one band, whose
+skeleton is neither; but each keeps its own outer border.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from grader.pixels import BoolArray
+from grader.records import FloatArray, GreyImage
+
+PX_PER_MM = 6.0
+"""Resolution at which ink is looked for; strokes of 0.3 mm are two pixels wide."""
+_FAINT = 20
+"""Of 255: fainter than a construction line drawn with a hard pencil is paper."""
+_PEAK_WINDOW_PX = 7
+_HALF = 0.5
+_POLYGON_PX = 1.0
+_LEAST_PX = 5.0
+_SOFTEN_PX = 0.7
+_WIDEST_PX = 12
+_BUNDLE = 1.6
+"""An ink band this many pens wide is more than one stroke."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seeds:
+    """Guesses of strokes at the working resolution, a row each.
+
+    Attributes
+    ----------
+    ends : (n, 2, 2) px on the guessed middle line
+    width : (n,) px, the guessed width of the single stroke
+    pen_px : usual width of a stroke on the sheet
+    mask : (h, w) bool, ink
+    soft : (h, w) uint8 contrast, softened
+    """
+
+    ends: FloatArray
+    width: FloatArray
+    pen_px: float
+    mask: BoolArray
+    soft: GreyImage
+
+
+def find_seeds(contrast: GreyImage) -> Seeds:
+    """Straight runs of at least 0.8 mm along the borders of the ink."""
+    soft = np.asarray(cv2.GaussianBlur(contrast, (0, 0), _SOFTEN_PX), dtype=np.uint8)
+    mask = ink_mask(soft)
+    edges = _border_runs(mask)
+    if len(edges) == 0:
+        return Seeds(np.zeros((0, 2, 2)), np.zeros(0), 2.0, mask > 0, soft)
+    inward, width = _band_width(mask, edges)
+    length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
+    long_enough = length >= 2.0 * PX_PER_MM
+    pen = _usual(width[long_enough], length[long_enough]) if long_enough.any() else 2.0
+    single = np.where(width <= _BUNDLE * pen, width, pen)
+    # Border pixels are ink: the band's edge lies half a pixel further out.
+    shift = (single - 1.0) / 2.0
+    return Seeds(edges + (inward * shift[:, None])[:, None, :], single, pen, mask > 0, soft)
+
+
+def ink_mask(soft: GreyImage) -> GreyImage:
+    """Ink as 1: darker than half of the darkest ink nearby, so that faint and dark strokes both keep
+    their width and neighbours their gap."""
+    peak = cv2.dilate(soft, np.ones((_PEAK_WINDOW_PX, _PEAK_WINDOW_PX), np.uint8))
+    half = cv2.multiply(peak, _HALF)
+    return np.asarray(((soft >= half) & (soft >= _FAINT)).astype(np.uint8))
+
+
+def _border_runs(mask: GreyImage) -> FloatArray:
+    """(n, 2, 2) straight runs of the borders, with the ink on one fixed hand."""
+    contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    runs = []
+    for contour in contours:
+        if len(contour) < 2 * _LEAST_PX:
+            continue
+        corners = cv2.approxPolyDP(contour, _POLYGON_PX, closed=True)[:, 0, :].astype(np.float64)
+        runs.append(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
+    if not runs:
+        return np.zeros((0, 2, 2))
+    edges = np.concatenate(runs)
+    return np.asarray(edges[np.hypot(*(edges[:, 1] - edges[:, 0]).T) >= _LEAST_PX])
+
+
+def _band_width(mask: GreyImage, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """((n, 2) unit normals into the ink, (n,) median width of the ink band there, px)."""
+    share = np.linspace(0.1, 0.9, 9)
+    direction = edges[:, 1] - edges[:, 0]
+    direction /= np.hypot(*direction.T)[:, None]
+    normal = np.column_stack([-direction[:, 1], direction[:, 0]])
+    points = edges[:, None, 0] + share[None, :, None] * (edges[:, None, 1] - edges[:, None, 0])
+    depth = np.arange(1, _WIDEST_PX + 1)
+    both = [_run(mask, points, sign * normal, depth) for sign in (1.0, -1.0)]
+    ink_side = np.where(np.median(both[0], axis=1) >= np.median(both[1], axis=1), 1.0, -1.0)
+    inner = np.where(ink_side[:, None] > 0, both[0], both[1])
+    return ink_side[:, None] * normal, np.median(inner, axis=1) + 1.0
+
+
+def _run(mask: GreyImage, points: FloatArray, normal: FloatArray, depth: FloatArray) -> FloatArray:
+    """How many pixels of ink follow each border point along its normal."""
+    at = points[:, :, None, :] + depth[None, None, :, None] * normal[:, None, None, :]
+    column = np.clip(np.rint(at[..., 0]), 0, mask.shape[1] - 1).astype(int)
+    row = np.clip(np.rint(at[..., 1]), 0, mask.shape[0] - 1).astype(int)
+    return np.asarray(np.cumprod(mask[row, column], axis=2).sum(axis=2), dtype=np.float64)
+
+
+def _usual(width: FloatArray, weight: FloatArray) -> float:
+    """Weighted lower quartile: bundles are wider than a pen, nothing is narrower."""
+    order = np.argsort(width)
+    cumulated = np.cumsum(weight[order])
+    return float(width[order][np.searchsorted(cumulated, 0.35 * cumulated[-1])])
