@@ -1,0 +1,180 @@
+"""The printed sheet's geometry: markers, zones and boxes, in millimetres from the top left corner.
+
+Every printed page follows one of `TEMPLATES`. The template's number is in the ids of its markers, so
+that a scanned page tells by itself where its zones are and grading needs no file beside it.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray
+
+PAGE_MM = (420.0, 297.0)
+FRAME_MM: Box = (20.0, 10.0, 390.0, 277.0)
+"""ISO 5457: 20 mm at the left for filing, 10 mm elsewhere."""
+DRAWING_MM: Box = (23.0, 51.0, 384.0, 212.0)
+"""Between the head and the foot of the sheet; the zones divide it."""
+
+MARKER_MM = 12.0
+MARKERS_PER_TEMPLATE = 8
+_MARKER_X_MM = (24.0, 144.0, 274.0, 394.0)
+_MARKER_Y_MM = (14.0, 271.0)
+
+CODE_MM: Box = (363.0, 13.0, 28.0, 28.0)
+"""Where the QR code is printed, quiet zone included."""
+SCALE_BOXES: dict[str, Box] = {
+    name: (306.0, 13.0 + 9.5 * row, 53.0, 8.0) for row, name in enumerate(("kL", "kv", "ka"))
+}
+_ZONE_GAP_MM = 4.0
+_FIELD_COLUMNS = ((39.0, 103.0), (159.0, 113.0), (289.0, 103.0))
+"""Left edge and width of the three stretches between the foot's markers."""
+_FIELD_TOP_MM, _FIELD_HEIGHT_MM = 265.5, 20.0
+MAX_FIELDS = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """One way to divide the drawing area.
+
+    Attributes
+    ----------
+    number : 0.. ; its markers have the ids 8 number .. 8 number + 7
+    zones : boxes by figure
+    """
+
+    number: int
+    zones: dict[str, Box]
+
+    @property
+    def figures(self) -> frozenset[str]:
+        """The figures that have a zone."""
+        return frozenset(self.zones)
+
+    @property
+    def marker_ids(self) -> range:
+        """Ids of its markers, in the order of `MARKER_CORNERS`."""
+        first = self.number * MARKERS_PER_TEMPLATE
+        return range(first, first + MARKERS_PER_TEMPLATE)
+
+
+def _marker_corners() -> FloatArray:
+    """(8, 4, 2) corners from the top left, clockwise on the sheet: the upper row, then the lower."""
+    lefts = np.array([(x, y) for y in _MARKER_Y_MM for x in _MARKER_X_MM])
+    square = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]) * MARKER_MM
+    return np.asarray(lefts[:, None, :] + square[None, :, :])
+
+
+MARKER_CORNERS = _marker_corners()
+
+
+def _cut(box: Box, shares: Iterable[float], *, across: bool) -> list[Box]:
+    """Divide a box into columns (`across`) or rows by shares that sum up to 1, a gap between."""
+    x, y, w, h = box
+    parts = list(shares)
+    free = (w if across else h) - _ZONE_GAP_MM * (len(parts) - 1)
+    ends = list(accumulate(free * part + _ZONE_GAP_MM for part in parts))
+    starts = [0.0, *ends[:-1]]
+    sizes = [round(free * part, 3) for part in parts]
+    if across:
+        return [(round(x + start, 3), y, size, h) for start, size in zip(starts, sizes, strict=True)]
+    return [(x, round(y + start, 3), w, size) for start, size in zip(starts, sizes, strict=True)]
+
+
+def _divisions() -> list[dict[str, Box]]:
+    """Every division there is. Its place in this list is printed on paper: append, never reorder."""
+    m, v, a = MECHANISM, VELOCITY_PLAN, ACCELERATION_PLAN
+    found: list[dict[str, Box]] = [{m: DRAWING_MM}, {v: DRAWING_MM}, {a: DRAWING_MM}]
+    for plan in (v, a):
+        for share in (0.28, 0.4, 0.5, 0.6, 0.72):
+            found.append(dict(zip((m, plan), _cut(DRAWING_MM, (share, 1 - share), across=True), strict=True)))
+        found.append(dict(zip((m, plan), _cut(DRAWING_MM, (0.5, 0.5), across=False), strict=True)))
+    for share in (0.4, 0.5):
+        found.append(dict(zip((v, a), _cut(DRAWING_MM, (share, 1 - share), across=True), strict=True)))
+    for shares in ((1 / 3, 1 / 3, 1 / 3), (0.4, 0.25, 0.35)):
+        found.append(dict(zip((m, v, a), _cut(DRAWING_MM, shares, across=True), strict=True)))
+    for share in (0.35, 0.45, 0.55):
+        left, right = _cut(DRAWING_MM, (share, 1 - share), across=True)
+        for top in (0.4, 0.55):
+            found.append(dict(zip((m, v), _cut(left, (top, 1 - top), across=False), strict=True)) | {a: right})
+        found.append({m: left} | dict(zip((v, a), _cut(right, (0.45, 0.55), across=False), strict=True)))
+    return found
+
+
+TEMPLATES = tuple(Template(number, zones) for number, zones in enumerate(_divisions()))
+CALIBRATION = Template(30, {})
+"""The page that measures printer and scanner; 31 templates of 8 ids fill the dictionary of 250."""
+
+
+def template_of(marker_id: int) -> Template | None:
+    """The template that a marker belongs to, None for an id that is not in use."""
+    number = marker_id // MARKERS_PER_TEMPLATE
+    if number == CALIBRATION.number:
+        return CALIBRATION
+    return TEMPLATES[number] if 0 <= number < len(TEMPLATES) else None
+
+
+def field_boxes(names: tuple[str, ...]) -> dict[str, Box]:
+    """Boxes for written lengths in the sheet's foot, as large as their number allows.
+
+    The label is printed left of the box, within the same cell. Beyond `MAX_FIELDS` names none is given.
+    """
+    if len(names) > MAX_FIELDS:
+        return {}
+    rows, per_stretch = next(
+        (rows, per_stretch)
+        for rows, per_stretch in ((1, 3), (1, 4), (2, 3), (2, 4), (2, 5), (3, 4), (3, 5), (4, 5))
+        if rows * per_stretch * len(_FIELD_COLUMNS) >= len(names)
+    )
+    height = min(_FIELD_HEIGHT_MM / rows - 1.0, 8.0)
+    top = _FIELD_TOP_MM + (_FIELD_HEIGHT_MM - rows * (height + 1.0)) / 2.0 + 0.5
+    cells: list[Box] = []
+    for row in range(rows):
+        for left, width in _FIELD_COLUMNS:
+            cell = width / per_stretch
+            label = min(12.0, 0.42 * cell)
+            y = round(top + row * (height + 1.0), 3)
+            cells.extend(
+                (round(left + k * cell + label, 3), y, round(cell - label - 1.0, 3), round(height, 3))
+                for k in range(per_stretch)
+            )
+    return dict(zip(names, cells, strict=False))
+
+
+class _Told(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class MarkerPlace(_Told):
+    """A printed marker: its id and its corners from the top left, clockwise."""
+
+    id: int
+    corners_mm: list[tuple[float, float]]
+
+
+class PageLayout(_Told):
+    """Where everything is on the pages of one kind. `zones` holds the figures' boxes and `fields`."""
+
+    kind: Literal["all", "velocity", "acceleration", "calibration"]
+    markers: list[MarkerPlace]
+    zones: dict[str, Box | dict[str, Box]]
+
+
+class Layout(_Told):
+    """`layout.json`: millimetres from the upright sheet's top left corner, x right, y down."""
+
+    schema_version: Literal[1] = 1
+    page_mm: tuple[float, float] = PAGE_MM
+    pages: list[PageLayout]
+
+
+def marker_places(template: Template) -> list[MarkerPlace]:
+    """The markers of a template as `layout.json` tells them."""
+    return [
+        MarkerPlace(id=number, corners_mm=[(float(x), float(y)) for x, y in corners])
+        for number, corners in zip(template.marker_ids, MARKER_CORNERS, strict=True)
+    ]

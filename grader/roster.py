@@ -1,0 +1,322 @@
+"""The roster: who the students are, their variants, and which scans are theirs.
+
+A CSV file with the columns ``student_id,name`` and optionally ``n,position,email,kL,kv,ka,lang,scans``;
+a student with several positions has a line for each. Comma or semicolon separated; in a
+semicolon-separated file numbers have decimal commas, and a `scans` field of several files is quoted.
+"""
+
+import csv
+import difflib
+import io
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grader.records import Problem
+from reference.errors import AuthoredFileError, Finding
+
+STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
+LANGUAGES = ("en", "ro", "ru")
+SCALES = ("kL", "kv", "ka")
+COLUMNS = ("student_id", "name", "n", "position", "email", *SCALES, "lang", "scans")
+DRAFT_COLUMNS = ("why", "sure")
+"""What `planmark match` adds for the person who checks its draft; without meaning here."""
+_REQUIRED = ("student_id", "name")
+_MAX_LINES = 20_000
+_ALMOST = 0.75
+"""Likeness from which an unknown column is taken for a misspelt one."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScanRef:
+    """A file of the folder, or one page of it (from 1)."""
+
+    file: str
+    page: int | None = None
+
+    def __str__(self) -> str:
+        return self.file if self.page is None else f"{self.file}#{self.page}"
+
+    def covers(self, file: str, page: int) -> bool:
+        """Whether a page of a file is meant."""
+        return self.file == file and self.page in (None, page)
+
+
+@dataclass(frozen=True, slots=True)
+class RosterRow:
+    """A student, in one position where the assignment has positions.
+
+    Attributes
+    ----------
+    scales : as declared, text with a unit, by ``kL``, ``kv``, ``ka``; only those given
+    line : line of the file, from 1
+    """
+
+    student_id: str
+    name: str = ""
+    n: int | None = None
+    position: int | None = None
+    email: str | None = None
+    scales: Mapping[str, str] = field(default_factory=dict)
+    lang: str | None = None
+    scans: tuple[ScanRef, ...] = ()
+    line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Roster:
+    """All rows in the file's order.
+
+    Attributes
+    ----------
+    file : name of the file
+    rows : a row per student and position
+    problems : what a person should know, such as columns passed over
+    """
+
+    file: str
+    rows: tuple[RosterRow, ...]
+    problems: tuple[Problem, ...] = ()
+
+    @property
+    def student_ids(self) -> tuple[str, ...]:
+        """Every student once, in the roster's order."""
+        return tuple(dict.fromkeys(row.student_id for row in self.rows))
+
+    def rows_of(self, student_id: str) -> tuple[RosterRow, ...]:
+        """The rows of one student."""
+        return tuple(row for row in self.rows if row.student_id == student_id)
+
+
+def read_roster(path: Path | str) -> Roster:
+    """Read a roster.
+
+    Raises AuthoredFileError with every fault of the file, each with the number of its line.
+    """
+    path = Path(path)
+    return parse_roster(_text_of(path), path.name)
+
+
+def parse_roster(text: str, file: str = "roster.csv") -> Roster:
+    """The roster in a text; raises as `read_roster` does."""
+    delimiter = delimiter_of(text)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
+    findings: list[Finding] = []
+    lines = list(_lines(reader, findings))
+    if not lines:
+        findings = findings or [Finding("line 1", "the file is empty; its first line must name the columns")]
+        raise AuthoredFileError(file, tuple(findings))
+    header = [name.strip() for name in lines[0][1]]
+    findings.extend(_check_header(header))
+    rows: list[RosterRow] = []
+    if not findings:
+        for number, cells in lines[1:]:
+            row = _Row(number, header, cells, delimiter).read(findings)
+            if row is not None:
+                rows.append(row)
+        findings.extend(_check_together(rows))
+        if not rows and not findings:
+            findings.append(Finding("line 2", "there are no students below the line of column names"))
+    if findings:
+        raise AuthoredFileError(file, tuple(findings))
+    return Roster(file, tuple(rows), tuple(_passed_over(header, file)))
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        finding = Finding("$", f"cannot be read: {error.strerror or error}")
+        raise AuthoredFileError(str(path), (finding,)) from error
+    except UnicodeDecodeError as error:
+        advice = "is not UTF-8 text; save it as CSV in UTF-8"
+        raise AuthoredFileError(str(path), (Finding("$", advice),)) from error
+
+
+def delimiter_of(text: str) -> str:
+    """`;` or `,`, whichever the first line of a CSV text has more of."""
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    return ";" if first.count(";") > first.count(",") else ","
+
+
+def _lines(reader: "csv._reader", findings: list[Finding]) -> Iterator[tuple[int, list[str]]]:
+    """Numbered lines that are not blank; a line number is that of the record's first line."""
+    begin = 1
+    while True:
+        try:
+            cells = next(reader)
+        except StopIteration:
+            return
+        except csv.Error as error:
+            findings.append(Finding(f"line {begin}", f"is no CSV: {error}; check its quotes"))
+            return
+        if begin > _MAX_LINES:
+            findings.append(Finding(f"line {begin}", f"more than {_MAX_LINES} lines are no class"))
+            return
+        if any(cell.strip() for cell in cells):
+            yield begin, cells
+        begin = reader.line_num + 1
+
+
+def _check_header(header: list[str]) -> Iterator[Finding]:
+    for name in _REQUIRED:
+        if name not in header:
+            yield Finding("line 1", f"column {name} is missing")
+    for name in sorted({name for name in header if name and header.count(name) > 1}):
+        yield Finding("line 1", f"column {name} is there {header.count(name)} times")
+    for name in header:
+        if name in COLUMNS or name in DRAFT_COLUMNS:
+            continue
+        near = _near(name)
+        if near is not None and near not in header:
+            yield Finding("line 1", f"column '{name}' is not known; did you mean {near}?")
+
+
+def _near(name: str) -> str | None:
+    by_lower = {column.lower(): column for column in COLUMNS}
+    found = difflib.get_close_matches(name.lower().replace(" ", "_"), by_lower, n=1, cutoff=_ALMOST)
+    return by_lower[found[0]] if found else None
+
+
+def _passed_over(header: list[str], file: str) -> Iterator[Problem]:
+    unknown = [name for name in header if name and name not in COLUMNS and name not in DRAFT_COLUMNS]
+    if unknown:
+        message = f"columns without meaning here are passed over: {', '.join(unknown)}"
+        yield Problem("roster_columns", message, file)
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """One line while it is being read."""
+
+    line: int
+    header: list[str]
+    cells: list[str]
+    delimiter: str
+
+    def read(self, findings: list[Finding]) -> RosterRow | None:
+        """The row, or None with its faults added to `findings`."""
+        before = len(findings)
+        if len(self.cells) > len(self.header) and any(cell.strip() for cell in self.cells[len(self.header) :]):
+            advice = f"; quote a field that holds a '{self.delimiter}'"
+            told = f"has {len(self.cells)} fields, the first line names {len(self.header)} columns{advice}"
+            findings.append(Finding(f"line {self.line}", told))
+            return None
+        cells = [cell.strip() for cell in self.cells] + [""] * (len(self.header) - len(self.cells))
+        known = {name: cell for name, cell in zip(self.header, cells, strict=False) if name in COLUMNS}
+        row = RosterRow(
+            student_id=self._student_id(known["student_id"], findings),
+            name=known["name"],
+            n=self._whole("n", known.get("n", ""), findings),
+            position=self._whole("position", known.get("position", ""), findings),
+            email=known.get("email") or None,
+            scales={name: known[name] for name in SCALES if known.get(name)},
+            lang=self._language(known.get("lang", ""), findings),
+            scans=tuple(self._scans(known.get("scans", ""), findings)),
+            line=self.line,
+        )
+        return row if len(findings) == before else None
+
+    def _told(self, column: str, message: str) -> Finding:
+        return Finding(f"line {self.line}, {column}", message)
+
+    def _student_id(self, text: str, findings: list[Finding]) -> str:
+        if not text:
+            findings.append(self._told("student_id", "is empty"))
+        elif STUDENT_ID.fullmatch(text) is None:
+            allowed = "letters A-Z a-z, digits, '.', '_' and '-', at most 64"
+            findings.append(self._told("student_id", f"'{_short(text)}' is refused: {allowed} are allowed"))
+        elif set(text) == {"."}:
+            findings.append(self._told("student_id", f"'{text}' is refused: it cannot name a folder"))
+        return text
+
+    def _whole(self, column: str, text: str, findings: list[Finding]) -> int | None:
+        """A whole number; spreadsheets may have added zeros as decimals (7.0, or 7,0 beside semicolons)."""
+        if not text:
+            return None
+        mark = "," if self.delimiter == ";" else "."
+        found = re.fullmatch(rf"([+-]?\d{{1,9}})(?:{re.escape(mark)}0+)?", text, re.ASCII)
+        if found is None:
+            findings.append(self._told(column, f"'{_short(text)}' is no whole number"))
+            return None
+        return int(found[1])
+
+    def _language(self, text: str, findings: list[Finding]) -> str | None:
+        if text and text.lower() not in LANGUAGES:
+            told = f"'{_short(text)}' is not known; there are {', '.join(LANGUAGES)}"
+            findings.append(self._told("lang", told))
+        return text.lower() or None
+
+    def _scans(self, text: str, findings: list[Finding]) -> Iterator[ScanRef]:
+        for part in (part.strip() for part in text.split(";")):
+            if part:
+                ref = parse_scan(part)
+                if isinstance(ref, str):
+                    findings.append(self._told("scans", ref))
+                else:
+                    yield ref
+
+
+def parse_scan(text: str) -> ScanRef | str:
+    """`class.pdf#3` or `extra.jpg`; a sentence about what is wrong where it is neither."""
+    file, mark, page = text.rpartition("#")
+    if not mark:
+        return ScanRef(text)
+    if re.fullmatch(r"\d{1,6}", page, re.ASCII):
+        if not file or int(page) < 1:
+            return f"'{_short(text)}': a page is FILE#NUMBER, from 1"
+        return ScanRef(file, int(page))
+    # A file's own name may have a # in it; what follows one in `#3-4` is a page written wrongly.
+    if "." in page:
+        return ScanRef(text)
+    return f"'{_short(text)}': after # one page number is expected, from 1"
+
+
+def _check_together(rows: list[RosterRow]) -> Iterator[Finding]:
+    """Faults between lines: a student twice, a file of two students, ids that only case tells apart."""
+    first: dict[tuple[str, int | None], int] = {}
+    spelled: dict[str, RosterRow] = {}
+    for row in rows:
+        key = (row.student_id, row.position)
+        if key in first:
+            where = "" if row.position is None else f" in position {row.position}"
+            told = f"{row.student_id}{where} is on line {first[key]} already"
+            yield Finding(f"line {row.line}, student_id", told)
+        first.setdefault(key, row.line)
+        other = spelled.setdefault(row.student_id.lower(), row)
+        if other.student_id != row.student_id:
+            told = f"{row.student_id} and {other.student_id} (line {other.line}) differ in case only"
+            yield Finding(f"line {row.line}, student_id", told)
+    yield from _check_positions(rows)
+    yield from _check_scans(rows)
+
+
+def _check_positions(rows: list[RosterRow]) -> Iterator[Finding]:
+    """A student with several lines needs a position on each."""
+    lines: dict[str, list[RosterRow]] = {}
+    for row in rows:
+        lines.setdefault(row.student_id, []).append(row)
+    for several in lines.values():
+        if len(several) > 1 and any(row.position is not None for row in several):
+            for row in several:
+                if row.position is None:
+                    told = f"is empty, but {row.student_id} has other lines with positions"
+                    yield Finding(f"line {row.line}, position", told)
+
+
+def _check_scans(rows: list[RosterRow]) -> Iterator[Finding]:
+    owners: dict[str, list[tuple[ScanRef, RosterRow]]] = {}
+    for row in rows:
+        for ref in row.scans:
+            named = owners.setdefault(ref.file, [])
+            for other, owner in named:
+                if other.page is None or ref.page is None or other.page == ref.page:
+                    told = f"{ref} is named on line {owner.line} already ({other})"
+                    yield Finding(f"line {row.line}, scans", told)
+                    break
+            named.append((ref, row))
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 40 else text[:37] + "..."
