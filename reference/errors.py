@@ -4,7 +4,8 @@ PlanmarkError            caught once, at the rim
 |- AuthoredFileError     a mechanism, assignment or rubric file is wrong (exit status 2)
 |- CallError             the call is wrong: unknown assignment, n out of range (exit status 2)
 |- MechanismError        the mechanism does not assemble, or is singular there (exit status 3)
-|- InputFileError        a scan, roster or measurement file cannot be used (exit status 4)
+|- InputFileError        a scan, roster or measurement file cannot be used (exit status 2 where the
+                         call names it; in a folder that is graded, a problem of its report)
 """
 
 from dataclasses import dataclass
@@ -60,5 +61,3 @@ class MechanismError(PlanmarkError):
 
 class InputFileError(PlanmarkError):
     """A file handed in cannot be used."""
-
-    exit_status = 4

@@ -1,0 +1,8 @@
+"""The command line. Each command's work is imported only when the command runs."""
+
+from grader.cli.app import app
+
+
+def main() -> None:
+    """Run ``planmark``; see `grader.cli.app` for exit statuses."""
+    app()

@@ -1,0 +1,66 @@
+"""The application: its commands, and what becomes of errors.
+
+Exit status: 0 all done; 1 done, but something needs a person; 2 the call or an authored file is
+wrong; 3 a mechanism does not assemble or is singular; 5 a file cannot be written.
+"""
+
+import sys
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from grader import __version__
+from reference.errors import PlanmarkError
+
+
+class Commands(TyperGroup):
+    """The group of commands; errors of planmark end in one message and their exit status."""
+
+    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - click's own signature
+        """Run a command, and tell a known error in words instead of a traceback."""
+        try:
+            return super().invoke(ctx)
+        except PlanmarkError as error:
+            typer.secho(f"planmark: {error.message}", err=True, fg="red")
+            ctx.exit(error.exit_status)
+
+
+app = typer.Typer(
+    cls=Commands,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Marks velocity and acceleration plans of planar mechanisms drawn on A3 sheets.",
+)
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"planmark {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", callback=_tell_version, is_eager=True, help="Tell the version and end."),
+    ] = False,
+) -> None:
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure:
+            reconfigure(encoding="utf-8", errors="replace")
+
+
+AssignmentArgument = Annotated[
+    str, typer.Argument(metavar="ASSIGNMENT", help="A built-in name (pump, press, ...) or a .toml file.")
+]
+NumberOption = Annotated[
+    int | None, typer.Option("--n", help="The student's number, where data depend on it.")
+]
+PositionOption = Annotated[int | None, typer.Option("--position", help="The position, where there are some.")]
+LanguageOption = Annotated[str, typer.Option("--lang", help="Language of feedback: en, ro or ru.")]
+
+from grader.cli import commands  # noqa: E402, F401 - registers the commands on the application above
