@@ -20,7 +20,9 @@ _PAPER_LONG_SIDE_PX = 640
 _CLOSE_PX = 17
 """Closing window there (11 mm): wider than any stroke, letter or filled arrowhead."""
 _ACROSS_STEP_PX = 0.5
-_MAX_SAMPLES = 800
+_REMAP_ROWS = 32000
+"""Image maps may not have more rows."""
+_TUKEY_ROUNDS = 6
 _TUKEY = 4.685
 """Tukey's constant: 95 % efficient for normal errors."""
 
@@ -78,69 +80,105 @@ def shrink(grey: GreyImage, scale: float) -> GreyImage:
 
 @dataclass(frozen=True, slots=True)
 class Cuts:
-    """A stroke cut across at many places along a guessed line.
+    """k strokes cut across at n places each along guessed lines; distances in pixels.
 
     Attributes
     ----------
-    along : (n,) distance from the guess's start, px
-    offset : (n,) middle of the ink across the guess, px, positive to the left of its direction
-        seen with y down (along (-dy, dx)); nan where the guess crosses no ink
-    left, right : (n,) the two borders of the ink, px
-    dark : (n,) contrast at the middle
+    along : (k, n) distance from each guess's start
+    left, right : (k, n) the two borders of the ink nearest to the guess, positive towards
+        (-dy, dx) of its direction; nan where the guess crosses no ink
+    dark : (k, n) contrast at the middle of the ink, 0 where there is none
     """
 
     along: FloatArray
-    offset: FloatArray
     left: FloatArray
     right: FloatArray
     dark: FloatArray
 
+    @property
+    def offset(self) -> FloatArray:
+        """(k, n) middle of the ink."""
+        return (self.left + self.right) / 2.0
 
-def cut_across(
-    flat: Flat, start: FloatArray, end: FloatArray, reach_px: float, capture_px: float
+    @property
+    def width(self) -> FloatArray:
+        """(k, n) width of the ink."""
+        return self.right - self.left
+
+
+def cut_across(  # noqa: PLR0913
+    flat: Flat,
+    ends: FloatArray,
+    count: int,
+    reach_px: float,
+    capture_px: FloatArray,
+    level: FloatArray | None = None,
 ) -> Cuts:
-    """Borders of the ink across the line from `start` to `end`, one cut about every pixel.
+    """Borders of the ink across lines from `ends[:, 0]` to `ends[:, 1]`, (k, 2, 2), `count` cuts each.
 
     Each cut looks `reach_px` to either side; the run of ink taken is the one nearest to the guess,
-    within `capture_px`. A border is where the contrast passes half of the stroke's own.
+    within `capture_px` (k,). A border is where the contrast passes `level` (k,), by default half of
+    the stroke's own.
     """
-    length = float(np.hypot(*(end - start)))
-    count = int(np.clip(length, 8, _MAX_SAMPLES))
-    along = (np.arange(count) + 0.5) * (length / count)
-    direction = (end - start) / max(length, 1e-9)
-    normal = np.array([-direction[1], direction[0]])
+    span = ends[:, 1] - ends[:, 0]
+    length = np.maximum(np.hypot(span[:, 0], span[:, 1]), 1e-9)
+    share = (np.arange(count) + 0.5) / count
+    u = span / length[:, None]
+    normal = np.column_stack([-u[:, 1], u[:, 0]])
     half = int(np.ceil(reach_px / _ACROSS_STEP_PX))
     across = np.arange(-half, half + 1) * _ACROSS_STEP_PX
-    x = start[0] + along[:, None] * direction[0] + across[None, :] * normal[0]
-    y = start[1] + along[:, None] * direction[1] + across[None, :] * normal[1]
-    return _borders(flat.contrast(x, y), along, across, capture_px)
+    middle = ends[:, None, 0] + share[None, :, None] * span[:, None, :]
+    contrast = _contrast_across(flat, middle, normal, across)
+    k, n, m = contrast.shape
+    near = np.abs(across)[None, :] <= capture_px[:, None]
+    if level is None:
+        peak = np.where(near[:, None, :], contrast, 0.0).max(axis=2)
+        level = 0.5 * np.median(np.sort(peak, axis=1)[:, int(0.3 * n) :], axis=1)
+    left, right, dark = _borders(
+        contrast.reshape(k * n, m), across, np.repeat(near, n, axis=0), np.repeat(level, n)
+    )
+    along = share[None, :] * length[:, None]
+    return Cuts(along, left.reshape(k, n), right.reshape(k, n), dark.reshape(k, n))
 
 
-def _borders(contrast: Float32Array, along: FloatArray, across: FloatArray, capture_px: float) -> Cuts:
-    near = np.abs(across) <= capture_px
-    peak = contrast[:, near].max(axis=1)
-    level = 0.5 * float(np.median(peak[peak >= np.quantile(peak, 0.3)]))
-    inked = contrast > level
-    rows = np.arange(len(along))
-    columns = np.arange(len(across))
-    distance = np.where(inked & near[None, :], np.abs(across)[None, :], np.inf)
+def _contrast_across(flat: Flat, middle: FloatArray, normal: FloatArray, across: FloatArray) -> Float32Array:
+    """(k, n, m) contrast at `middle` (k, n, 2) moved along `normal` (k, 2) by `across` (m,)."""
+    k, n, _ = middle.shape
+    m = len(across)
+    result = np.empty((k, n, m), dtype=np.float32)
+    rows = max(1, _REMAP_ROWS // n)
+    for first in range(0, k, rows):
+        part = slice(first, first + rows)
+        at = middle[part, :, None, :] + across[None, None, :, None] * normal[part, None, None, :]
+        x = np.ascontiguousarray(at[..., 0].reshape(-1, m))
+        y = np.ascontiguousarray(at[..., 1].reshape(-1, m))
+        result[part] = flat.contrast(x, y).reshape(-1, n, m)
+    return result
+
+
+def _borders(
+    contrast: Float32Array, across: FloatArray, near: BoolArray, level: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Per row: left border, right border, contrast in the middle of the ink run nearest to 0."""
+    inked = contrast > level[:, None]
+    rows = np.arange(len(contrast))
+    columns = np.arange(len(across))[None, :]
+    distance = np.where(inked & near, np.abs(across)[None, :], np.inf)
     middle = distance.argmin(axis=1)
     found = np.isfinite(distance[rows, middle])
-    before = np.maximum.accumulate(np.where(inked, -1, columns[None, :]), axis=1)[rows, middle]
-    after = np.minimum.accumulate(np.where(inked, len(across), columns[None, :])[:, ::-1], axis=1)[
-        :, ::-1
-    ][rows, middle]
-    left = _crossing(contrast, across, rows, before, 1, level)
-    right = _crossing(contrast, across, rows, after, -1, level)
-    offset = np.where(found, (left + right) / 2.0, np.nan)
+    before = np.where(inked | (columns > middle[:, None]), -1, columns).max(axis=1)
+    after = np.where(inked | (columns < middle[:, None]), len(across), columns).min(axis=1)
+    left = np.where(found, _crossing(contrast, across, before, 1, level), np.nan)
+    right = np.where(found, _crossing(contrast, across, after, -1, level), np.nan)
     dark = np.where(found, contrast[rows, middle], 0.0).astype(np.float64)
-    return Cuts(along, offset, np.where(found, left, np.nan), np.where(found, right, np.nan), dark)
+    return left, right, dark
 
 
 def _crossing(
-    contrast: Float32Array, across: FloatArray, rows: NDArray[np.intp], outer: NDArray[np.intp], inward: int, level: float
+    contrast: Float32Array, across: FloatArray, outer: NDArray[np.intp], inward: int, level: FloatArray
 ) -> FloatArray:
     """Where the contrast passes `level` between `outer` (paper) and its neighbour inward (ink)."""
+    rows = np.arange(len(contrast))
     last = len(across) - 1
     beyond = (outer < 0) | (outer > last)
     outside = np.clip(outer, 0, last)
@@ -151,30 +189,65 @@ def _crossing(
     return np.where(beyond, across[outside], crossed)
 
 
-def robust_line(
-    t: FloatArray, y: FloatArray, noise_floor: float, weight: FloatArray | None = None
-) -> tuple[float, float, float, FloatArray]:
-    """Straight line y = a + b t by Tukey's biweight: (a, b, scale of the residuals, weights).
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """Straight lines y = a + b t, robustly fitted, one per row.
 
-    Starts from the Theil-Sen-like line through the medians of the two halves, so that a third of
-    strays on one side cannot capture it.
+    Attributes
+    ----------
+    a, b : (k,)
+    scale : (k,) robust standard deviation of the residuals
+    weight : (k, n) final weights, 0 for strays
     """
-    base = np.ones_like(t) if weight is None else weight
-    middle = np.median(t)
-    low, high = t <= middle, t >= middle
-    t0, t1, y0, y1 = np.median(t[low]), np.median(t[high]), np.median(y[low]), np.median(y[high])
-    b = (y1 - y0) / (t1 - t0) if t1 > t0 else 0.0
-    a = float(np.median(y - b * t))
-    weights, scale = base, noise_floor
-    for _ in range(8):
-        residual = y - a - b * t
-        scale = max(1.4826 * float(np.median(np.abs(residual))), noise_floor)
-        weights = base * np.clip(1.0 - (residual / (_TUKEY * scale)) ** 2, 0.0, None) ** 2
-        total = weights.sum()
-        if total <= 0:
-            break
-        tm, ym = (weights @ t) / total, (weights @ y) / total
-        spread = weights @ (t - tm) ** 2
-        b = float(weights @ ((t - tm) * (y - ym)) / spread) if spread > 0 else 0.0
-        a = float(ym - b * tm)
-    return float(a), float(b), scale, weights
+
+    a: FloatArray
+    b: FloatArray
+    scale: FloatArray
+    weight: FloatArray
+
+
+def robust_lines(t: FloatArray, y: FloatArray, weight: FloatArray, noise_floor: float) -> Lines:
+    """Lines by Tukey's biweight through (k, n) points with prior weights (0 leaves a point out).
+
+    Starts from the line through the medians of the outer thirds, so that strays at one side cannot
+    capture it.
+    """
+    known = (weight > 0) & np.isfinite(y)
+    base = np.where(known, weight, 0.0)
+    y = np.where(known, y, 0.0)
+    a, b = _through_medians(t, y, known)
+    scale = np.full(len(t), noise_floor)
+    weights = base
+    for _ in range(_TUKEY_ROUNDS):
+        residual = y - a[:, None] - b[:, None] * t
+        scale = np.maximum(1.4826 * _row_median(np.abs(residual), known), noise_floor)
+        weights = base * np.clip(1.0 - (residual / (_TUKEY * scale[:, None])) ** 2, 0.0, None) ** 2
+        total = np.maximum(weights.sum(axis=1), 1e-12)
+        tm, ym = (weights * t).sum(axis=1) / total, (weights * y).sum(axis=1) / total
+        dt = t - tm[:, None]
+        spread = np.maximum((weights * dt**2).sum(axis=1), 1e-12)
+        b = (weights * dt * (y - ym[:, None])).sum(axis=1) / spread
+        a = ym - b * tm
+    return Lines(a, b, scale, weights)
+
+
+def _through_medians(t: FloatArray, y: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:
+    order = np.cumsum(known, axis=1)
+    total = order[:, -1:]
+    first, last = known & (order <= (total + 2) // 3), known & (order > total - (total + 2) // 3)
+    t0, t1 = _row_median(t, first), _row_median(t, last)
+    y0, y1 = _row_median(y, first), _row_median(y, last)
+    gap = t1 - t0
+    b = np.where(gap > 0, (y1 - y0) / np.where(gap > 0, gap, 1.0), 0.0)
+    a = _row_median(y - b[:, None] * t, known)
+    return a, b
+
+
+def _row_median(values: FloatArray, known: BoolArray) -> FloatArray:
+    """Median of the known values of each row; 0 for a row of none."""
+    ordered = np.sort(np.where(known, values, np.inf), axis=1)
+    count = known.sum(axis=1)
+    rows = np.arange(len(values))
+    below = ordered[rows, np.maximum(count - 1, 0) // 2]
+    above = ordered[rows, np.minimum(count // 2, values.shape[1] - 1)]
+    return np.where(count > 0, np.where(count % 2 == 1, below, (below + above) / 2.0), 0.0)

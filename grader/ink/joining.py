@@ -3,27 +3,27 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from grader.pixels import BoolArray
 from grader.records import FloatArray
 
-_OFF_PX = 1.5
-"""Pieces this near to one line are of it: 0.25 mm, under the distance of strokes told apart."""
-_GAP_PX = 14.0
 _TURN = 0.16
-"""Least cosine-complement guard: pieces that differ by more than 9 degrees are never joined."""
+"""Pieces that differ by more than 9 degrees are never joined."""
 _ROUNDS = 6
 
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """Strokes at the working resolution: (n, 2, 2) ends and (n,) widths, px."""
+    """Strokes: (n, 2, 2) ends and (n,) widths, px."""
 
     ends: FloatArray
     width: FloatArray
 
 
-def join(ends: FloatArray, width: FloatArray, gap_px: float = _GAP_PX) -> Pieces:
-    """Longest first, take in all free pieces that lie on its line without too large a gap."""
+def join(ends: FloatArray, width: FloatArray, off_px: float, gap_px: float) -> Pieces:
+    """Longest first, take in all free pieces that lie within `off_px` of its line without a gap
+    over `gap_px`."""
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
     free = np.ones(len(ends), dtype=bool)
     joined: list[FloatArray] = []
@@ -31,7 +31,7 @@ def join(ends: FloatArray, width: FloatArray, gap_px: float = _GAP_PX) -> Pieces
     for first in np.argsort(-length):
         if not free[first]:
             continue
-        line, members = _grown(ends, length, free, int(first), gap_px)
+        line, members = _grown(ends, length, free, int(first), (off_px, gap_px))
         free[members] = False
         joined.append(line)
         widths.append(float(np.average(width[members], weights=length[members])))
@@ -41,12 +41,12 @@ def join(ends: FloatArray, width: FloatArray, gap_px: float = _GAP_PX) -> Pieces
 
 
 def _grown(
-    ends: FloatArray, length: FloatArray, free: np.ndarray, first: int, gap_px: float
-) -> tuple[FloatArray, np.ndarray]:
+    ends: FloatArray, length: FloatArray, free: BoolArray, first: int, near: tuple[float, float]
+) -> tuple[FloatArray, NDArray[np.intp]]:
     members = np.array([first])
     line = ends[first]
     for _ in range(_ROUNDS):
-        grown = _on_line(ends, free, line, gap_px)
+        grown = _on_line(ends, free, line, near)
         grown = np.union1d(grown, [first])
         if np.array_equal(grown, members):
             break
@@ -55,8 +55,11 @@ def _grown(
     return line, members
 
 
-def _on_line(ends: FloatArray, free: np.ndarray, line: FloatArray, gap_px: float) -> np.ndarray:
-    """Free pieces near the line and reached from it without a gap over `gap_px`."""
+def _on_line(
+    ends: FloatArray, free: BoolArray, line: FloatArray, nearness: tuple[float, float]
+) -> NDArray[np.intp]:
+    """Free pieces near the line and reached from it without too large a gap."""
+    off_px, gap_px = nearness
     span = line[1] - line[0]
     size = float(np.hypot(*span))
     u = span / size
@@ -66,7 +69,7 @@ def _on_line(ends: FloatArray, free: np.ndarray, line: FloatArray, gap_px: float
     turn = np.abs(d[:, 1] - d[:, 0]) <= _TURN * np.abs(t[:, 1] - t[:, 0])
     # A short line does not know its direction: allow for half a pixel at its ends, growing outward.
     beyond = np.maximum(np.maximum(-t, t - size), 0.0)
-    allowed = _OFF_PX + np.minimum(0.5 * beyond / size, 1.0)
+    allowed = off_px + np.minimum(0.5 * beyond / size, 0.7 * off_px)
     near = np.flatnonzero(free & turn & (np.abs(d) <= allowed).all(axis=1))
     low, high = t[near].min(axis=1), t[near].max(axis=1)
     reach_low, reach_high = 0.0, size

@@ -1,19 +1,17 @@
-"""What is not drawing: the frame, the title block, letters and other marks."""
+"""What is not drawing: the frame and the title block."""
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 
 from grader.pixels import BoolArray
-from grader.records import Box, FloatArray, Sheet, Strokes
+from grader.records import Box, FloatArray, Sheet
 
 _FRAME_MM = 1.5
 _BLOCK_MM = (215.0, 80.0)
 _SQUARE_MM = 0.03
-_RULED_MM = 14.0
+_RULED_MM = 10.0
 _TOUCH_MM = 2.0
-_MARK_MM = (0.5, 9.0)
 
 
 def kept(ends: FloatArray, sheet: Sheet, boxes: Sequence[Box] | None) -> BoolArray:
@@ -55,8 +53,8 @@ def title_block(ends: FloatArray, sheet: Sheet) -> Box | None:
     member[start] = True
     while True:
         touching = np.zeros(len(candidate), dtype=bool)
-        for i in np.flatnonzero(member):
-            touching |= (lows <= highs[i]).all(axis=1) & (highs >= lows[i]).all(axis=1)
+        for row in np.flatnonzero(member):
+            touching |= (lows <= highs[row]).all(axis=1) & (highs >= lows[row]).all(axis=1)
         if (touching == member).all():
             break
         member |= touching
@@ -73,29 +71,3 @@ def _in_box(points: FloatArray, box: Box) -> BoolArray:
     return np.asarray(
         (points[:, 0] >= x) & (points[:, 0] <= x + w) & (points[:, 1] >= y) & (points[:, 1] <= y + h)
     )
-
-
-def mark_boxes(mask: BoolArray, strokes: Strokes, sheet: Sheet, scale: float) -> FloatArray:
-    """(j, 4) boxes x, y, w, h in mm of small pieces of ink that touch no long stroke: letters, digits."""
-    _, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    left, top = stats[1:, cv2.CC_STAT_LEFT].astype(float), stats[1:, cv2.CC_STAT_TOP].astype(float)
-    wide, high = stats[1:, cv2.CC_STAT_WIDTH].astype(float), stats[1:, cv2.CC_STAT_HEIGHT].astype(float)
-    corners = np.stack(
-        [
-            np.column_stack([left + dx * wide, top + dy * high])
-            for dx, dy in ((0, 0), (1, 0), (1, 1), (0, 1))
-        ],
-        axis=1,
-    )
-    full = corners / scale - 0.5
-    points = np.concatenate([full.reshape(-1, 2), np.ones((full.size // 2, 1))], axis=1)
-    mapped = points @ np.linalg.inv(sheet.mm_to_px).T
-    mm = (mapped[:, :2] / mapped[:, 2:]).reshape(-1, 4, 2)
-    low, high_mm = mm.min(axis=1), mm.max(axis=1)
-    size = high_mm - low
-    small = (size.max(axis=1) >= _MARK_MM[0]) & (size.max(axis=1) <= _MARK_MM[1])
-    del strokes
-    x, y, w, h = sheet.drawable_mm
-    inside = (low >= [x, y]).all(axis=1) & (high_mm <= [x + w, y + h]).all(axis=1)
-    chosen = small & inside
-    return np.column_stack([low[chosen], size[chosen]])

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from grader.pixels import BoolArray
 from grader.records import FloatArray, GreyImage
 
 PX_PER_MM = 6.0
@@ -22,6 +22,7 @@ _POLYGON_PX = 1.0
 _LEAST_PX = 5.0
 _SOFTEN_PX = 0.7
 _WIDEST_PX = 12
+_PEN_PX = 2.0
 _BUNDLE = 1.6
 """An ink band this many pens wide is more than one stroke."""
 
@@ -34,16 +35,16 @@ class Seeds:
     ----------
     ends : (n, 2, 2) px on the guessed middle line
     width : (n,) px, the guessed width of the single stroke
+    border : (n, 2) row and column of an ink pixel on the run, telling which piece of ink it is of
     pen_px : usual width of a stroke on the sheet
-    mask : (h, w) bool, ink
-    soft : (h, w) uint8 contrast, softened
+    mask : (h, w) uint8, 1 = ink
     """
 
     ends: FloatArray
     width: FloatArray
+    border: NDArray[np.intp]
     pen_px: float
-    mask: BoolArray
-    soft: GreyImage
+    mask: GreyImage
 
 
 def find_seeds(contrast: GreyImage) -> Seeds:
@@ -51,16 +52,17 @@ def find_seeds(contrast: GreyImage) -> Seeds:
     soft = np.asarray(cv2.GaussianBlur(contrast, (0, 0), _SOFTEN_PX), dtype=np.uint8)
     mask = ink_mask(soft)
     edges = _border_runs(mask)
+    border = edges[:, 0, ::-1].astype(np.intp)
     if len(edges) == 0:
-        return Seeds(np.zeros((0, 2, 2)), np.zeros(0), 2.0, mask > 0, soft)
+        return Seeds(edges, np.zeros(0), border, _PEN_PX, mask)
     inward, width = _band_width(mask, edges)
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
     long_enough = length >= 2.0 * PX_PER_MM
-    pen = _usual(width[long_enough], length[long_enough]) if long_enough.any() else 2.0
+    pen = _usual(width[long_enough], length[long_enough]) if long_enough.any() else _PEN_PX
     single = np.where(width <= _BUNDLE * pen, width, pen)
     # Border pixels are ink: the band's edge lies half a pixel further out.
     shift = (single - 1.0) / 2.0
-    return Seeds(edges + (inward * shift[:, None])[:, None, :], single, pen, mask > 0, soft)
+    return Seeds(edges + (inward * shift[:, None])[:, None, :], single, border, pen, mask)
 
 
 def ink_mask(soft: GreyImage) -> GreyImage:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from grader.pixels import Flat, cut_across, robust_line, shrink
+from grader.pixels import Flat, cut_across, robust_lines, shrink
 from grader.records import FloatArray, GreyImage
 
 _LONG_SIDE_PX = 1400
@@ -18,6 +18,9 @@ _LEAST_SHARE = 0.12
 """Of the image's width or height; the title block's lines are kept too."""
 _STROKE_PX = (0.3, 6.5)
 """Distance of the two borders of a drawn line at the reduced resolution."""
+
+_CUTS = 400
+_LEAST_CUTS = 20
 
 RIDGE = "ridge"
 STEP = "step"
@@ -64,8 +67,9 @@ def long_lines(flat: Flat) -> list[LongLine]:
         chains = {sign: _chains(edges[edges[:, 4] == sign], small.shape, across=across) for sign in (-1, 1)}
         found += _paired(chains, across=across)
     full = [_full_size(line, scale) for line in found]
-    refined = [_refined(flat, line, 1.0 / scale) if line.kind == RIDGE else line for line in full]
-    return sorted(refined, key=lambda line: -line.length * line.inked)
+    steps = [line for line in full if line.kind == STEP]
+    drawn = _refined(flat, [line for line in full if line.kind == RIDGE], 1.0 / scale)
+    return sorted(steps + drawn, key=lambda line: -line.length * line.inked)
 
 
 def _pieces(small: GreyImage) -> FloatArray:
@@ -173,17 +177,23 @@ def _full_size(line: LongLine, scale: float) -> LongLine:
     return LongLine(line.across, line.kind, line.bright, ends, line.inked)
 
 
-def _refined(flat: Flat, line: LongLine, full_per_small: float) -> LongLine:
-    """The line through the middle of the ink, at full resolution."""
-    start, end = line.ends
+def _refined(flat: Flat, lines: list[LongLine], full_per_small: float) -> list[LongLine]:
+    """Drawn lines through the middle of their ink, at full resolution."""
+    if not lines:
+        return []
+    ends = np.stack([line.ends for line in lines])
     reach = 4.0 * full_per_small
-    cuts = cut_across(flat, start, end, reach, 0.6 * reach)
-    width = cuts.right - cuts.left
-    good = np.isfinite(cuts.offset) & (width < 1.8 * np.nanmedian(width))
-    if good.sum() < 20:
-        return line
-    a, b, _, _ = robust_line(cuts.along[good], cuts.offset[good], 0.05)
-    direction = (end - start) / line.length
-    normal = np.array([-direction[1], direction[0]])
-    ends = np.array([start + a * normal, end + (a + b * line.length) * normal])
-    return LongLine(line.across, line.kind, line.bright, ends, float(good.mean()))
+    cuts = cut_across(flat, ends, _CUTS, reach, np.full(len(lines), 0.6 * reach))
+    usual = np.nanmedian(np.where(np.isfinite(cuts.width), cuts.width, 2.0 * reach), axis=1)
+    good = np.isfinite(cuts.width) & (cuts.width < 1.8 * usual[:, None])
+    fit = robust_lines(cuts.along, cuts.offset, good.astype(np.float64), 0.05)
+    refined = []
+    for index, line in enumerate(lines):
+        if good[index].sum() < _LEAST_CUTS:
+            refined.append(line)
+            continue
+        u = (line.ends[1] - line.ends[0]) / line.length
+        shift = fit.a[index] + fit.b[index] * np.array([0.0, line.length])
+        moved = line.ends + shift[:, None] * np.array([-u[1], u[0]])
+        refined.append(LongLine(line.across, line.kind, line.bright, moved, float(good[index].mean())))
+    return refined

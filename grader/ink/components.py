@@ -1,0 +1,82 @@
+"""Connected pieces of ink: which are letters and dust, which can hold strokes."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from grader.ink.seeds import PX_PER_MM, Seeds
+from grader.pixels import BoolArray
+from grader.records import FloatArray, Sheet
+
+_MARK_MM = 8.0
+_LONG_SEED_MM = 4.5
+_LEAST_STROKE_MM = 1.2
+_THIN = 1.7
+_LONE_MM = 6.0
+_NEIGHBOUR_MM = 5.0
+_NEIGHBOURS = 2
+_DUST_MM = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class Components:
+    """Pieces of ink at the working resolution.
+
+    Attributes
+    ----------
+    box_px : (c, 4) left, top, width, height
+    mark : (c,) too small or too crooked to hold a stroke
+    of_seed : (n,) which piece each seed is of
+    """
+
+    box_px: FloatArray
+    mark: BoolArray
+    of_seed: NDArray[np.intp]
+
+
+def find_components(seeds: Seeds) -> Components:
+    """Label the ink and tell marks from what can hold strokes."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(seeds.mask, connectivity=8)
+    box = stats[1:, :4].astype(np.float64)
+    area = stats[1:, cv2.CC_STAT_AREA].astype(np.float64)
+    of_seed = labels[seeds.border[:, 0], seeds.border[:, 1]].astype(np.intp) - 1
+    size = np.hypot(box[:, 2], box[:, 3]) / PX_PER_MM
+    longest = np.zeros(len(box))
+    length = np.hypot(*(seeds.ends[:, 1] - seeds.ends[:, 0]).T) / PX_PER_MM
+    np.maximum.at(longest, of_seed, length)
+    small = (box[:, 2:].max(axis=1) < _MARK_MM * PX_PER_MM) & (longest < _LONG_SEED_MM)
+    thin = area <= _THIN * seeds.pen_px * size * PX_PER_MM
+    stroke_like = thin & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
+    written = small & ~stroke_like & (size > _DUST_MM * 2)
+    text = small & stroke_like & (size < _LONE_MM) & _beside(box, written)
+    return Components(box, (small & ~stroke_like) | text, of_seed)
+
+
+def _beside(box: FloatArray, written: BoolArray) -> BoolArray:
+    """Pieces with at least two letters close by."""
+    centre = (box[:, :2] + box[:, 2:] / 2.0) / PX_PER_MM
+    letters = centre[written]
+    result = np.zeros(len(box), dtype=bool)
+    if len(letters) < _NEIGHBOURS:
+        return result
+    for index, at in enumerate(centre):
+        near = np.hypot(*(letters - at).T) < _NEIGHBOUR_MM
+        result[index] = near.sum() >= _NEIGHBOURS + int(written[index])
+    return result
+
+
+def mark_boxes(components: Components, sheet: Sheet, scale: float) -> FloatArray:
+    """(j, 4) boxes x, y, w, h in sheet mm of the marks inside the frame, dust left out."""
+    left, top, wide, high = components.box_px[components.mark].T
+    steps = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+    corners = np.stack([np.column_stack([left + dx * wide, top + dy * high]) for dx, dy in steps], axis=1)
+    points = np.column_stack([corners.reshape(-1, 2) / scale - 0.5, np.ones(corners.size // 2)])
+    mapped = points @ np.linalg.inv(sheet.mm_to_px).T
+    mm = (mapped[:, :2] / mapped[:, 2:]).reshape(-1, 4, 2)
+    low, far = mm.min(axis=1), mm.max(axis=1)
+    x, y, w, h = sheet.drawable_mm
+    inside = (low >= [x, y]).all(axis=1) & (far <= [x + w, y + h]).all(axis=1)
+    inside &= (far - low).max(axis=1) > _DUST_MM
+    return np.column_stack([low[inside], (far - low)[inside]])
