@@ -1,0 +1,74 @@
+"""Which division of the sheet suits an assignment: its figures' exact extents over all variants."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grader.layout import TEMPLATES, Template
+from grader.records import ACCELERATION_PLAN, MECHANISM
+from reference.assignment import Assignment, Variant
+from reference.construction import Construction, evaluate
+from reference.derivation import construction_of, parameters_of
+
+_MARGIN_MM = 12.0
+"""Around a figure: letters, arrowheads, hatching of the guides."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A template for a page and how well it holds the figures.
+
+    Attributes
+    ----------
+    template : the best of all
+    room : zone over need by figure, the lesser of width and height; below 1 it is too small in some variant
+    need_mm : widest and highest of any variant by figure, margins included
+    """
+
+    template: Template
+    room: dict[str, float]
+    need_mm: dict[str, tuple[float, float]]
+
+
+def construction_for(assignment: Assignment, figures: Sequence[str]) -> Construction:
+    """The construction of an assignment, without accelerations where no figure needs them."""
+    return construction_of(
+        assignment.mechanism(assignment.variants()),
+        accelerations=ACCELERATION_PLAN in figures,
+        plate_by_similarity=assignment.file.plate_images == "similarity",
+    )
+
+
+def extents_mm(assignment: Assignment, figures: Sequence[str], variants: list[Variant]) -> dict[str, tuple[float, float]]:
+    """Largest width and height of each figure over variants, at the assignment's own scales."""
+    scales = assignment.scales(variants)
+    construction = construction_for(assignment, figures)
+    parameters = parameters_of(assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
+    nodes = evaluate(construction, parameters)
+    found: dict[str, tuple[float, float]] = {}
+    for figure in figures:
+        places = np.stack(
+            [np.broadcast_to(nodes[step.node], (len(variants),)) for step in construction.figures[figure]]
+        )
+        found[figure] = (float(np.ptp(places.real, axis=0).max()), float(np.ptp(places.imag, axis=0).max()))
+    return found
+
+
+def best_template(assignment: Assignment, figures: Sequence[str]) -> Fit:
+    """The division with the most room for the figure that has the least; a sketch may be drawn smaller."""
+    extents = extents_mm(assignment, figures, assignment.variants())
+    need = {figure: (wide + 2 * _MARGIN_MM, high + 2 * _MARGIN_MM) for figure, (wide, high) in extents.items()}
+
+    def room(template: Template, figure: str) -> float:
+        _, _, wide, high = template.zones[figure]
+        return min(wide / need[figure][0], high / need[figure][1])
+
+    def worth(template: Template) -> tuple[float, float]:
+        # A plan's scale is the assignment's; the sketch's is often the student's choice.
+        plans = [room(template, figure) for figure in figures if figure != MECHANISM]
+        least = min(min(plans, default=np.inf), 1.0)
+        return (round(least, 6), min(room(template, figure) for figure in figures))
+
+    best = max((template for template in TEMPLATES if template.figures == set(figures)), key=worth)
+    return Fit(best, {figure: room(best, figure) for figure in figures}, need)

@@ -1,0 +1,191 @@
+"""One printed page: head with the student's data and code, zones, boxes for written lengths."""
+
+from dataclasses import dataclass
+
+import segno
+
+from grader.answer_sheet.drawing import GREY, Drawing, runs
+from grader.answer_sheet.words import BOLD, REGULAR, Piece, fitted, number, pieces_of, pieces_width_mm, wrap
+from grader.i18n import N_, Tongue
+from grader.layout import CODE_MM, SCALE_BOXES, Template
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, Identity
+from grader.sheet_code import code_of
+from reference.assignment import Assignment, Variant
+
+FIGURES = {
+    MECHANISM: N_("Mechanism"),
+    VELOCITY_PLAN: N_("Velocity plan"),
+    ACCELERATION_PLAN: N_("Acceleration plan"),
+}
+KINDS = {
+    "all": N_("Mechanism, velocities and accelerations"),
+    "velocity": N_("Velocities"),
+    "acceleration": N_("Accelerations"),
+}
+UNITS = (N_("rev/min"), N_("cm"), N_("°"))
+"""Units of given data beyond those of `grader.i18n`."""
+
+_STUDENT_MM: Box = (39.0, 12.5, 103.0, 36.0)
+_TASK_MM: Box = (159.0, 12.5, 113.0, 36.0)
+_ADVICE_MM: Box = (289.0, 42.0, 118.0, 7.0)
+_TICK_MM = 5.0
+_RULER_MM = (24.0, 291.0, 100.0)
+_PT = 25.4 / 72.0
+
+
+@dataclass(frozen=True, slots=True)
+class PageText:
+    """What is the student's own on a page.
+
+    Attributes
+    ----------
+    sheet, sheets : this page's number among the student's, from 1, and how many there are
+    """
+
+    identity: Identity
+    name: str
+    sheet: int
+    sheets: int
+
+
+def draw_page(
+    drawing: Drawing,
+    assignment: Assignment,
+    text: PageText,
+    template: Template,
+    fields: dict[str, Box],
+    tongue: Tongue,
+) -> None:
+    """Draw a page and end it."""
+    drawing.frame()
+    drawing.markers(template)
+    _code(drawing, text.identity)
+    _student(drawing, assignment, text, tongue)
+    _task(drawing, assignment, text.identity, tongue)
+    _advice(drawing, tongue)
+    for figure, zone in template.zones.items():
+        _zone(drawing, zone, tongue.gettext(FIGURES[figure]))
+    _fields(drawing, assignment, fields, tongue)
+    draw_ruler(drawing, tongue)
+    drawing.next_page()
+
+
+def _code(drawing: Drawing, identity: Identity) -> None:
+    x, y, side, _ = CODE_MM
+    modules = [list(map(bool, row)) for row in segno.make(code_of(identity), error="m", micro=False).matrix]
+    quiet = 4
+    module = side / (len(modules) + 2 * quiet)
+    drawing.cells((x + quiet * module, y + quiet * module), module, runs(modules), 0.0)
+
+
+def _student(drawing: Drawing, assignment: Assignment, text: PageText, tongue: Tongue) -> None:
+    x, y, wide, _ = _STUDENT_MM
+    identity = text.identity
+    size, lines = fitted([assignment.file.title.in_language(tongue.lang)], BOLD, (10.0, 9.0, 8.0), (wide, 9.0))
+    for row, line in enumerate(lines):
+        drawing.text((x, y + 3.5 + row * 1.2 * size * _PT), line, size, BOLD)
+    variant = [f"{label} = {value}" for label, value in (("n", identity.n), (tongue.gettext(N_("position")), identity.position))
+               if value is not None]
+    sheet = tongue.gettext(N_("sheet {number} of {count}")).format(number=text.sheet, count=text.sheets)
+    name = wrap(text.name, BOLD, 12.0, wide)[:1] or [""]
+    drawing.text((x, y + 17.0), name[0], 12.0, BOLD)
+    drawing.text((x, y + 23.0), ",  ".join([identity.student_id, *variant]), 10.0)
+    drawing.text((x, y + 29.0), f"{tongue.gettext(KINDS[identity.kind])}, {sheet}", 9.0)
+
+
+def _task(drawing: Drawing, assignment: Assignment, identity: Identity, tongue: Tongue) -> None:
+    """The task in words at the largest size that leaves room for the data below it."""
+    x, y, wide, high = _TASK_MM
+    data = _given(assignment, Variant(identity.n, identity.position), tongue)
+    for size in (8.5, 8.0, 7.5, 7.0, 6.5, 6.0):
+        step = 1.3 * size * _PT
+        rows = _flow(data, size, wide)
+        if len(wrap(assignment.file.task.in_language(tongue.lang), REGULAR, size, wide)) * step + len(rows) * step <= high:
+            break
+    _, lines = fitted([assignment.file.task.in_language(tongue.lang)], REGULAR, (size,), (wide, high - len(rows) * step))
+    base = y + size * _PT
+    for line in lines:
+        drawing.text((x, base), line, size)
+        base += step
+    base += min(1.0, y + high - base)
+    for row in rows:
+        at = x
+        for datum in row:
+            at = drawing.pieces((at, base), datum, size, BOLD) + _SPACE_MM
+        base += step
+
+
+_SPACE_MM = 3.0
+
+
+def _given(assignment: Assignment, variant: Variant, tongue: Tongue) -> list[tuple[Piece, ...]]:
+    """The given data, each as label = value unit."""
+    values = assignment.values([variant])
+    found = []
+    for datum in assignment.file.given:
+        told = number(float(datum.value(values).reshape(-1)[0]) if hasattr(datum.value(values), "reshape") else float(datum.value(values)), tongue.lang)
+        unit = tongue.unit(datum.unit)
+        gap = "" if unit in {"", "°"} else "\N{NO-BREAK SPACE}"
+        found.append((*pieces_of(datum.label), Piece(f" = {told}{gap}{unit}")))
+    return found
+
+
+def _flow(data: list[tuple[Piece, ...]], size_pt: float, wide_mm: float) -> list[list[tuple[Piece, ...]]]:
+    """Data side by side in as many rows as they need."""
+    rows: list[list[tuple[Piece, ...]]] = []
+    used = wide_mm + 1.0
+    for datum in data:
+        wide = pieces_width_mm(datum, BOLD, size_pt)
+        if used + wide > wide_mm:
+            rows.append([])
+            used = 0.0
+        rows[-1].append(datum)
+        used += wide + _SPACE_MM
+    return rows
+
+
+def _advice(drawing: Drawing, tongue: Tongue) -> None:
+    x, y, wide, high = _ADVICE_MM
+    advice = tongue.gettext(
+        N_("Draw inside the zones. Keep letters 2 mm clear of lines; leave the black squares and the code free.")
+    )
+    size, lines = fitted([advice], REGULAR, (7.0, 6.5, 6.0, 5.5), (wide, high))
+    for row, line in enumerate(lines):
+        drawing.text((x, y + (row + 1) * 1.2 * size * _PT), line, size)
+
+
+def _zone(drawing: Drawing, zone: Box, title: str) -> None:
+    """Ticks just outside the zone's corners: no ink of ours where strokes are looked for."""
+    x, y, w, h = zone
+    for cx, across in ((x - 0.6, 1.0), (x + w + 0.6, -1.0)):
+        for cy, down in ((y - 0.6, 1.0), (y + h + 0.6, -1.0)):
+            drawing.line((cx, cy, cx + across * _TICK_MM, cy), 0.2, GREY)
+            drawing.line((cx, cy, cx, cy + down * _TICK_MM), 0.2, GREY)
+    drawing.text((x + _TICK_MM + 1.5, y - 0.5), title, 6.5, REGULAR, GREY)
+
+
+def _fields(drawing: Drawing, assignment: Assignment, fields: dict[str, Box], tongue: Tongue) -> None:
+    names = assignment.file.names
+    for name, (x, y, w, h) in fields.items():
+        drawing.box((x, y, w, h), 0.25)
+        label = pieces_of(names.get(name, name)) if name not in SCALE_BOXES else _scale_label(names.get(name, name))
+        size = 10.0 if name in SCALE_BOXES else 8.0
+        wide = pieces_width_mm(label, REGULAR, size)
+        drawing.pieces((x - wide - 0.8, y + 0.68 * h), label, size)
+    if len(fields) > len(SCALE_BOXES):
+        drawing.text((39.0, 265.0), tongue.gettext(N_("Lengths measured on the drawing, mm")), 6.5, REGULAR, GREY)
+
+
+def _scale_label(name: str) -> tuple[Piece, ...]:
+    """k with L, v or a below it."""
+    return (Piece(name[:1]), Piece(name[1:], -1), Piece(" =")) if len(name) > 1 else (Piece(f"{name} ="),)
+
+
+def draw_ruler(drawing: Drawing, tongue: Tongue) -> None:
+    """A line of exactly 100 mm below the frame, to see at a glance whether the printer shrank the page."""
+    x, y, long = _RULER_MM
+    drawing.line((x, y, x + long, y), 0.2, GREY)
+    for end in (x, x + long):
+        drawing.line((end, y - 1.2, end, y + 1.2), 0.2, GREY)
+    told = tongue.gettext(N_("This line must measure 100 mm: print at 100 %, without fitting to the page."))
+    drawing.text((x + long + 3.0, y + 0.8), told, 6.5, REGULAR, GREY)

@@ -1,0 +1,129 @@
+"""Answer sheets of a class, and the layout that all of them share."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from grader.answer_sheet.drawing import Drawing
+from grader.answer_sheet.fit import best_template, construction_for
+from grader.answer_sheet.page import PageText, draw_page
+from grader.i18n import tongue
+from grader.layout import MAX_FIELDS, SCALE_BOXES, Layout, PageLayout, Template, field_boxes, marker_places
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, Identity, Problem
+from grader.roster import RosterRow
+from reference.assignment import Assignment, Variant
+from reference.authored import PageTable
+from reference.errors import AuthoredFileError, CallError, Finding
+
+_SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
+
+
+@dataclass(frozen=True, slots=True)
+class Sheets:
+    """A printable document.
+
+    Attributes
+    ----------
+    pdf : the file's bytes
+    layout : what `layout.json` says
+    problems : what the instructor should know: figures that are too large for their zones
+    """
+
+    pdf: bytes
+    layout: Layout
+    problems: tuple[Problem, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _PagePlan:
+    """One page of the assignment: its template and boxes, the same for every student."""
+
+    table: PageTable
+    template: Template
+    fields: dict[str, Box]
+
+
+def make_sheets(assignment: Assignment, rows: Sequence[RosterRow], lang: str = "en", *, roster: str = "roster.csv") -> Sheets:
+    """Answer sheets for every row of a roster: a page per page of the assignment, in the rows' order.
+
+    Arguments
+    ---------
+    rows : their `lang`, where given, goes before `lang`
+    roster : the file's name, for messages
+
+    Raises AuthoredFileError with every row whose n or position does not suit the assignment.
+    """
+    variants = _variants(assignment, rows, roster)
+    plans, problems = _plans(assignment)
+    drawing = Drawing.begin(assignment.file.title.in_language(lang))
+    for row, variant in zip(rows, variants, strict=True):
+        for number, plan in enumerate(plans, start=1):
+            identity = Identity(assignment.id, row.student_id, variant.n, variant.position, plan.table.kind)
+            text = PageText(identity, row.name, number, len(plans))
+            draw_page(drawing, assignment, text, plan.template, plan.fields, tongue(row.lang or lang))
+    return Sheets(drawing.finish(), Layout(pages=[_layout(plan) for plan in plans]), problems)
+
+
+def page_layouts(assignment: Assignment) -> Layout:
+    """The layout of an assignment's pages, without printing any."""
+    return Layout(pages=[_layout(plan) for plan in _plans(assignment)[0]])
+
+
+def _variants(assignment: Assignment, rows: Sequence[RosterRow], roster: str) -> list[Variant]:
+    findings: list[Finding] = []
+    variants: list[Variant] = []
+    for row in rows:
+        try:
+            variants.append(assignment.variant(row.n, row.position))
+        except CallError as error:
+            findings.append(Finding(f"line {row.line}, {row.student_id}", error.message))
+    if findings:
+        raise AuthoredFileError(roster, tuple(findings))
+    return variants
+
+
+def _plans(assignment: Assignment) -> tuple[list[_PagePlan], tuple[Problem, ...]]:
+    plans: list[_PagePlan] = []
+    problems: list[Problem] = []
+    for table in assignment.file.page:
+        figures = list(dict.fromkeys(table.figures))
+        fit = best_template(assignment, figures)
+        names = _written(assignment, figures)
+        if len(names) > MAX_FIELDS:
+            told = f"page {table.kind}: {len(names)} lengths are too many for boxes; none are printed"
+            problems.append(Problem("sheet_boxes", told, str(assignment.path)))
+        problems.extend(_too_small(assignment, table, fit.template, fit.room, fit.need_mm))
+        scales = {_SCALE_OF[figure]: SCALE_BOXES[_SCALE_OF[figure]] for figure in figures}
+        plans.append(_PagePlan(table, fit.template, scales | field_boxes(names)))
+    return plans, tuple(problems)
+
+
+def _written(assignment: Assignment, figures: list[str]) -> tuple[str, ...]:
+    """The vectors whose lengths are written on a page."""
+    construction = construction_for(assignment, figures)
+    return tuple(vector.name for figure in figures for vector in construction.vectors_of(figure))
+
+
+def _too_small(
+    assignment: Assignment,
+    table: PageTable,
+    template: Template,
+    room: dict[str, float],
+    need_mm: dict[str, tuple[float, float]],
+) -> list[Problem]:
+    problems: list[Problem] = []
+    for figure, share in room.items():
+        if share >= 1.0:
+            continue
+        wide, high = need_mm[figure]
+        _, _, zone_wide, zone_high = template.zones[figure]
+        told = (
+            f"page {table.kind}: {figure} needs up to {wide:.0f} x {high:.0f} mm at the assignment's scales,"
+            f" its zone has {zone_wide:.0f} x {zone_high:.0f} mm; draw it {100 * share:.0f} % as large or less"
+        )
+        problems.append(Problem("sheet_zone_small", told, str(assignment.path)))
+    return problems
+
+
+def _layout(plan: _PagePlan) -> PageLayout:
+    zones: dict[str, Box | dict[str, Box]] = dict(plan.template.zones)
+    return PageLayout(kind=plan.table.kind, markers=marker_places(plan.template), zones=zones | {"fields": plan.fields})
