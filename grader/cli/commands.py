@@ -18,11 +18,12 @@ def plan(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan as JSON.")] = False,
     svg: Annotated[Path | None, typer.Option("--svg", help="Draw the plan into this SVG file.")] = None,
+    pdf: Annotated[Path | None, typer.Option("--pdf", help="Draw the plan into this PDF file.")] = None,
 ) -> None:
     """The exact plan of a variant: a table, JSON, or a drawing true to scale."""
     from grader.cli.plans import show_plan
 
-    show_plan(assignment, n, position, crank_mm, as_json=as_json, svg=svg)
+    show_plan(assignment, n, position, crank_mm, as_json=as_json, svg=svg, pdf=pdf)
 
 
 @app.command()

@@ -17,9 +17,16 @@ from reference.plan import Plan, exact_plan
 
 
 def show_plan(
-    name: str, n: int | None, position: int | None, crank_mm: float | None, *, as_json: bool, svg: Path | None
+    name: str,
+    n: int | None,
+    position: int | None,
+    crank_mm: float | None,
+    *,
+    as_json: bool,
+    svg: Path | None,
+    pdf: Path | None,
 ) -> None:
-    """Print the exact plan of a variant, and draw it where a file is named."""
+    """Print the exact plan of a variant, and draw it where files are named."""
     if crank_mm is not None and not 0.0 < crank_mm < 1000.0:
         raise CallError(
             "crank_mm", f"--crank-mm {crank_mm:g}: a length in mm above 0 and below 1000 is needed"
@@ -27,15 +34,26 @@ def show_plan(
     assignment = load_assignment(name)
     variants = [assignment.variant(n, position)]
     plan = exact_plan(assignment, variants, assignment.scales(variants, crank_mm=crank_mm))
-    if svg is not None:
-        sheets = reference_drawing(assignment, plan)
-        write_whole(svg, as_svg([sheet.shapes for sheet in sheets]))
+    _draw(assignment, plan, svg, pdf)
     if as_json:
         typer.echo(plan_document(assignment, plan).model_dump_json(indent=2))
         return
     _print_table(assignment, plan)
+    for file in (svg, pdf):
+        if file is not None:
+            typer.echo(f"Drawn in {file}")
+
+
+def _draw(assignment: Assignment, plan: Plan, svg: Path | None, pdf: Path | None) -> None:
+    if svg is None and pdf is None:
+        return
+    sheets = [sheet.shapes for sheet in reference_drawing(assignment, plan)]
     if svg is not None:
-        typer.echo(f"Drawn in {svg}")
+        write_whole(svg, as_svg(sheets))
+    if pdf is not None:
+        from grader.plan_pdf import pdf as as_pdf
+
+        write_whole(pdf, as_pdf(sheets, f"{assignment.file.title.en}, {plan.variants[0]}"))
 
 
 def _print_table(assignment: Assignment, plan: Plan) -> None:
