@@ -11,8 +11,9 @@ from grader.intake import jpeg, pdf, png, tiff
 from grader.intake.blank import is_blank
 from grader.intake.limits import Door, kind_of
 from grader.records import Page
+from reference.errors import InputFileError
 
-__all__ = ["count_pages", "is_blank", "pages_of"]
+__all__ = ["count_pages", "is_blank", "page_of", "pages_of"]
 
 _DOORS: dict[str, Door] = {"jpeg": jpeg.DOOR, "png": png.DOOR, "tiff": tiff.DOOR, "pdf": pdf.DOOR}
 
@@ -27,7 +28,16 @@ def pages_of(path: Path | str) -> Iterator[Page]:
         damaged. The codes are those of `grader.intake.limits`.
     """
     file = Path(path)
-    yield from _DOORS[kind_of(file)].pages(file)
+    yield from _DOORS[kind_of(file)].pages(file, 1)
+
+
+def page_of(path: Path | str, number: int) -> Page:
+    """One page of a file, from 1, decoding no other. Raises as `pages_of`, and for a number too high."""
+    file = Path(path)
+    page = next(_DOORS[kind_of(file)].pages(file, number), None)
+    if page is None:
+        raise InputFileError("page_missing", f"{file.name}: there is no page {number}; it has {count_pages(file)}")
+    return page
 
 
 def count_pages(path: Path | str) -> int:

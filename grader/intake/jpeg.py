@@ -17,7 +17,9 @@ _HARMLESS = ("extraneous bytes", "Invalid SOS parameters", "unknown Adobe color 
 _CUT_OFF = ("remature end", "exhausted", "mpty input")
 
 
-def _pages(path: Path) -> Iterator[Page]:
+def _pages(path: Path, first: int) -> Iterator[Page]:
+    if first > 1:
+        return
     data = path.read_bytes()
     try:
         with Image.open(io.BytesIO(data)) as image:

@@ -44,7 +44,8 @@ _NAMES = {".jpg": "JPEG", ".jpeg": "JPEG", ".png": "PNG", ".tif": "TIFF", ".tiff
 class Door:
     """How one kind of file is read."""
 
-    pages: Callable[[Path], Iterator[Page]]
+    pages: Callable[[Path, int], Iterator[Page]]
+    """Pages of a file from a number on, counted from 1."""
     count: Callable[[Path], int]
 
 

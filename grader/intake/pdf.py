@@ -21,10 +21,11 @@ _POINTS_PER_INCH = 72.0
 _MM_PER_INCH = 25.4
 
 
-def _pages(path: Path) -> Iterator[Page]:
+def _pages(path: Path, first: int) -> Iterator[Page]:
     with _opened(path) as document:
         check_pages(path, len(document.pages))
-        for number, page in enumerate(document.pages, start=1):
+        for number in range(first, len(document.pages) + 1):
+            page = document.pages[number - 1]
             placement = only_image(page)
             taken = None if placement is None else _taken_out(path, number, placement)
             yield _rendered(path, number) if taken is None else taken

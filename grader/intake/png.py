@@ -16,7 +16,9 @@ _END = b"IEND"
 _END_WITHIN = 64
 
 
-def _pages(path: Path) -> Iterator[Page]:
+def _pages(path: Path, first: int) -> Iterator[Page]:
+    if first > 1:
+        return
     try:
         with Image.open(path) as image:
             check_size(path, 1, *image.size)

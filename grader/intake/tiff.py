@@ -15,10 +15,10 @@ _DECODING = (ValueError, RuntimeError, OSError, KeyError, IndexError, TypeError,
 """What the decoders raise for bad data (imagecodecs' own errors are RuntimeErrors)."""
 
 
-def _pages(path: Path) -> Iterator[Page]:
+def _pages(path: Path, first: int) -> Iterator[Page]:
     with _opened(path) as file:
         check_pages(path, _length(path, file))
-        for number, page in enumerate(file.pages, start=1):
+        for number, page in enumerate(file.pages[first - 1 :], start=first):
             if not isinstance(page, tifffile.TiffPage):
                 raise damaged(path, number, "its directory cannot be read")
             check_size(path, number, page.imagewidth, page.imagelength)
