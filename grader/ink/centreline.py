@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grader.pixels import BoolArray, Cuts, Flat, Lines, cut_across, robust_lines
 from grader.records import FloatArray
@@ -50,7 +51,7 @@ class Fitted:
         span = self.ends[:, 1] - self.ends[:, 0]
         return np.asarray(np.hypot(span[:, 0], span[:, 1]))
 
-    def take(self, which: BoolArray) -> "Fitted":
+    def take(self, which: BoolArray | NDArray[np.intp]) -> "Fitted":
         """The chosen rows."""
         return Fitted(
             self.ends[which], self.width[which], self.noise[which], self.support[which], self.darkness[which]

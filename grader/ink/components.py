@@ -28,11 +28,13 @@ class Components:
     ----------
     box_px : (c, 4) left, top, width, height
     mark : (c,) too small or too crooked to hold a stroke
+    dash : (c,) straight but short and beside letters: a stroke only as part of a dashed line
     of_seed : (n,) which piece each seed is of
     """
 
     box_px: FloatArray
     mark: BoolArray
+    dash: BoolArray
     of_seed: NDArray[np.intp]
 
 
@@ -51,7 +53,7 @@ def find_components(seeds: Seeds) -> Components:
     stroke_like = thin & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
     written = small & ~stroke_like & (size > _DUST_MM * 2)
     text = small & stroke_like & (size < _LONE_MM) & _beside(box, written)
-    return Components(box, (small & ~stroke_like) | text, of_seed)
+    return Components(box, small & ~stroke_like, text, of_seed)
 
 
 def _beside(box: FloatArray, written: BoolArray) -> BoolArray:
@@ -69,7 +71,7 @@ def _beside(box: FloatArray, written: BoolArray) -> BoolArray:
 
 def mark_boxes(components: Components, sheet: Sheet, scale: float) -> FloatArray:
     """(j, 4) boxes x, y, w, h in sheet mm of the marks inside the frame, dust left out."""
-    left, top, wide, high = components.box_px[components.mark].T
+    left, top, wide, high = components.box_px[components.mark | components.dash].T
     steps = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
     corners = np.stack([np.column_stack([left + dx * wide, top + dy * high]) for dx, dy in steps], axis=1)
     points = np.column_stack([corners.reshape(-1, 2) / scale - 0.5, np.ones(corners.size // 2)])

@@ -15,10 +15,16 @@ _ROUNDS = 6
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """Strokes: (n, 2, 2) ends and (n,) widths, px."""
+    """Strokes: (n, 2, 2) ends and (n,) widths, px, and the rows that each was joined from."""
 
     ends: FloatArray
     width: FloatArray
+    members: tuple[NDArray[np.intp], ...]
+
+    def take(self, which: BoolArray) -> "Pieces":
+        """The chosen rows."""
+        chosen = tuple(self.members[row] for row in np.flatnonzero(which))
+        return Pieces(self.ends[which], self.width[which], chosen)
 
 
 def join(ends: FloatArray, width: FloatArray, off_px: float, gap_px: float) -> Pieces:
@@ -28,16 +34,18 @@ def join(ends: FloatArray, width: FloatArray, off_px: float, gap_px: float) -> P
     free = np.ones(len(ends), dtype=bool)
     joined: list[FloatArray] = []
     widths: list[float] = []
+    groups: list[NDArray[np.intp]] = []
     for first in np.argsort(-length):
         if not free[first]:
             continue
         line, members = _grown(ends, length, free, int(first), (off_px, gap_px))
         free[members] = False
         joined.append(line)
+        groups.append(members)
         widths.append(float(np.average(width[members], weights=length[members])))
     if not joined:
-        return Pieces(np.zeros((0, 2, 2)), np.zeros(0))
-    return Pieces(np.stack(joined), np.array(widths))
+        return Pieces(np.zeros((0, 2, 2)), np.zeros(0), ())
+    return Pieces(np.stack(joined), np.array(widths), tuple(groups))
 
 
 def _grown(

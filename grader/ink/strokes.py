@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from grader.ink.centreline import Fitted, fit_centre, standard_errors
-from grader.ink.components import find_components, mark_boxes
+from grader.ink.components import Components, find_components, mark_boxes
+from grader.ink.darkness import split_by_darkness
 from grader.ink.ending import coverage, find_ends
-from grader.ink.joining import join
+from grader.ink.joining import Pieces, join
 from grader.ink.regions import kept
-from grader.ink.seeds import PX_PER_MM, find_seeds
+from grader.ink.seeds import PX_PER_MM, Seeds, find_seeds
 from grader.pixels import BoolArray, Flat
 from grader.records import Box, FloatArray, Sheet, Strokes
 
@@ -19,6 +20,7 @@ _GAP_MM = 2.3
 _FITTED_OFF_MM = 0.16
 _FITTED_GAP_MM = 3.5
 """Gaps of dashed lines, and of lines that stop at a joint's circle and go on behind it."""
+_LEAST_DASHED_MM = 7.0
 _LEAST_MM = 1.0
 _LEAST_SUPPORT = 0.3
 _SAME_MM = 0.2
@@ -33,19 +35,30 @@ def find_strokes(flat: Flat, sheet: Sheet, boxes: Sequence[Box] | None) -> tuple
     components = find_components(seeds)
     full = (seeds.ends + 0.5) / scale - 0.5
     usable = kept(to_mm(sheet, full), sheet, boxes) & ~components.mark[components.of_seed]
-    unit = sheet.px_per_mm
-    pieces = join(full[usable], seeds.width[usable] / scale, _OFF_MM * unit, _GAP_MM * unit)
-    fitted = _settled(flat, pieces.ends, pieces.width, unit)
-    return _records(flat, fitted, sheet), mark_boxes(components, sheet, scale)
+    fitted, merged = _settled(flat, _lines(full, seeds, components, usable, scale), sheet.px_per_mm)
+    return _records(flat, fitted, merged, sheet), mark_boxes(components, sheet, scale)
 
 
-def _settled(flat: Flat, ends: FloatArray, width: FloatArray, unit: float) -> tuple[Fitted, BoolArray]:
+def _lines(full: FloatArray, seeds: Seeds, components: Components, usable: BoolArray, scale: float) -> Pieces:
+    """Seeds joined to lines; short straight letters stay out unless they line up to a dashed line."""
+    unit = PX_PER_MM / scale
+    rows = np.flatnonzero(usable)
+    pieces = join(full[rows], seeds.width[rows] / scale, _OFF_MM * unit, _GAP_MM * unit)
+    dash = components.dash[components.of_seed[rows]]
+    only_dashes = np.array([bool(dash[members].all()) for members in pieces.members], dtype=bool)
+    span = pieces.ends[:, 1] - pieces.ends[:, 0]
+    short = np.hypot(span[:, 0], span[:, 1]) < _LEAST_DASHED_MM * unit
+    return pieces.take(~(only_dashes & short))
+
+
+def _settled(flat: Flat, pieces: Pieces, unit: float) -> tuple[Fitted, BoolArray]:
     """Fit, join what turns out to be one line, find the ends, fit again; no stroke twice."""
-    fitted = _sound(fit_centre(flat, ends, width, unit), unit)
+    fitted = _sound(fit_centre(flat, pieces.ends, pieces.width, unit), unit)
     pieces = join(fitted.ends, fitted.width, _FITTED_OFF_MM * unit, _FITTED_GAP_MM * unit)
     fitted = _sound(fit_centre(flat, pieces.ends, pieces.width, unit), unit)
     grown, merged = find_ends(flat, fitted, unit)
-    fitted = fitted.with_ends(grown)
+    parts, owners = split_by_darkness(flat, fitted.with_ends(grown), unit)
+    fitted, merged = fitted.take(owners).with_ends(parts), merged[owners]
     once = distinct(fitted, unit)
     fitted, merged = fitted.take(once), merged[once]
     final = fit_centre(flat, fitted.ends, fitted.width, unit)
@@ -76,8 +89,7 @@ def distinct(fitted: Fitted, unit: float) -> BoolArray:
     return keep
 
 
-def _records(flat: Flat, found: tuple[Fitted, BoolArray], sheet: Sheet) -> Strokes:
-    fitted, merged = found
+def _records(flat: Flat, fitted: Fitted, merged: BoolArray, sheet: Sheet) -> Strokes:
     unit = sheet.px_per_mm
     across, angle = standard_errors(fitted, unit)
     return Strokes(
