@@ -1,0 +1,193 @@
+"""Registration of a printed answer sheet by its markers.
+
+Markers are found on a reduced picture, their corners refined at full resolution. Their ids say which
+template the page follows, hence where its zones are. Two markers well apart suffice, so that one
+torn off or drawn over is not missed; foreign markers fit no template and register nothing.
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from grader import aruco
+from grader.layout import CALIBRATION, DRAWING_MM, MARKER_CORNERS, PAGE_MM, Template, template_of
+from grader.pixels import BoolArray, shrink
+from grader.records import FloatArray, GreyImage, Page, Problem, Sheet
+from grader.sheet.identity import identify
+from grader.sheet.marker_edges import refine
+from grader.sheet.projection import Projection, fit_projection
+
+_DETECTION_PX = 1600
+"""Long side of the picture on which markers are looked for: on A3 a marker's cell has 7 pixels."""
+_CLOSER_PX = 3200
+"""Second look, for photos in which the sheet is a small part."""
+_LEAST_MARKERS = 2
+_LEAST_APART_MM = 100.0
+_OFF_MM = 1.5
+"""A marker farther off than this from where the others put it is a foreign one."""
+_LEAST_PX_PER_MM = 2.0
+_MAX_RMS_MM = 0.8
+_MAX_SE_MM = 0.6
+_MAX_UNEVEN = 2.5
+"""Largest over smallest scale on the sheet; a photo any more slanted cannot be measured."""
+_PRINTER_SCALE_SE = 0.001
+"""Of printers and paper; the calibration page measures it."""
+_MM_PER_INCH = 25.4
+_SCALE_TOLD = 0.004
+_SCALE_PLAUSIBLE = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """Refined corners of one template's markers, (n, 2) each, and whose they are (n,)."""
+
+    template: Template
+    mm: FloatArray
+    px: FloatArray
+    marker: NDArray[np.intp]
+
+
+def register(page: Page) -> Sheet | None:
+    """The sheet of a printed page; None where its markers are too few, or not ours."""
+    for long_side in (_DETECTION_PX, _CLOSER_PX):
+        seen = _look(page.grey, long_side)
+        if seen is not None:
+            fit = _agreed(seen)
+            if fit is not None:
+                return _sheet(page, seen.template, fit)
+        if long_side >= max(page.grey.shape):
+            break
+    return None
+
+
+def _look(grey: GreyImage, long_side: int) -> _Seen | None:
+    """The markers of the template that most of them belong to."""
+    scale = min(1.0, long_side / max(grey.shape))
+    small = shrink(grey, scale) if scale < 1.0 else grey
+    quads, ids, _ = _detector().detectMarkers(small)
+    if ids is None:
+        return None
+    numbers = [int(number) for number in np.ravel(ids)]
+    once = {number for number, times in Counter(numbers).items() if times == 1}
+    known = [(template_of(number), number, found) for number, found in zip(numbers, quads, strict=True) if number in once]
+    votes = Counter(template.number for template, _, _ in known if template is not None)
+    if not votes or votes.most_common(1)[0][1] < _LEAST_MARKERS:
+        return None
+    chosen = votes.most_common(1)[0][0]
+    ours = [(template, number, found) for template, number, found in known if template is not None and template.number == chosen]
+    # Pixel centres are whole numbers: a reduced pixel's centre lies between the centres it averages.
+    steps = np.array([grey.shape[1] / small.shape[1], grey.shape[0] / small.shape[0]])
+    guesses = np.stack([(found.reshape(4, 2) + 0.5) * steps - 0.5 for _, _, found in ours])
+    corners = refine(grey, guesses)
+    places = np.array([number % len(MARKER_CORNERS) for _, number, _ in ours])
+    owner = np.broadcast_to(places[:, None], corners.seen.shape)
+    return _Seen(ours[0][0], MARKER_CORNERS[places][corners.seen], corners.px[corners.seen], owner[corners.seen])
+
+
+def _detector() -> cv2.aruco.ArucoDetector:
+    settings = cv2.aruco.DetectorParameters()
+    settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
+    settings.adaptiveThreshWinSizeMin = 15
+    settings.adaptiveThreshWinSizeMax = 45
+    settings.adaptiveThreshWinSizeStep = 30
+    settings.minMarkerPerimeterRate = 0.02
+    settings.maxMarkerPerimeterRate = 0.4
+    settings.errorCorrectionRate = 0.3
+    return cv2.aruco.ArucoDetector(aruco.dictionary(), settings)
+
+
+def _agreed(seen: _Seen) -> Projection | None:
+    """The map on which the markers agree, leaving out at most those far off; None if there is none."""
+    keep = np.ones(len(seen.mm), dtype=bool)
+    while True:
+        if len(set(seen.marker[keep])) < _LEAST_MARKERS:
+            return None
+        if np.ptp(seen.mm[keep], axis=0).max() < _LEAST_APART_MM:
+            return None
+        fit = fit_projection(seen.mm[keep], seen.px[keep])
+        if fit.misfit_mm.max() <= _OFF_MM:
+            return fit if _plausible(fit) else None
+        if len(set(seen.marker[keep])) <= _LEAST_MARKERS + 1:
+            return None
+        keep &= seen.marker != _odd_one(seen, keep)
+
+
+def _odd_one(seen: _Seen, keep: BoolArray) -> int:
+    """The marker without which the others agree best."""
+    numbers = sorted(set(seen.marker[keep]))
+    rests = [keep & (seen.marker != number) for number in numbers]
+    rms = [fit_projection(seen.mm[rest], seen.px[rest]).rms_mm for rest in rests]
+    return int(numbers[int(np.argmin(rms))])
+
+
+def _plausible(fit: Projection) -> bool:
+    """Whether a camera or scanner could have made this map, well enough to measure by."""
+    if fit.rms_mm > _MAX_RMS_MM or fit.se_mm(_GRID_MM).max() > _MAX_SE_MM:
+        return False
+    scales = _local_scales(fit.mm_to_px)
+    return bool(scales.min() >= _LEAST_PX_PER_MM and scales.max() / scales.min() <= _MAX_UNEVEN)
+
+
+_GRID_MM = np.stack(
+    np.meshgrid(
+        np.linspace(DRAWING_MM[0], DRAWING_MM[0] + DRAWING_MM[2], 5),
+        np.linspace(DRAWING_MM[1], DRAWING_MM[1] + DRAWING_MM[3], 4),
+    ),
+    axis=-1,
+).reshape(-1, 2)
+
+
+def _local_scales(mm_to_px: FloatArray) -> FloatArray:
+    """px per mm along x and along y at points of the sheet; negative where the sheet is mirrored."""
+    at = _apply(mm_to_px, _GRID_MM)
+    right, down = (_apply(mm_to_px, _GRID_MM + step) - at for step in np.eye(2))
+    side = np.sign(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
+    return np.concatenate([np.hypot(*right.T) * side, np.hypot(*down.T) * side])
+
+
+def _apply(matrix: FloatArray, points: FloatArray) -> FloatArray:
+    mapped = points @ matrix[:, :2].T + matrix[:, 2]
+    return np.asarray(mapped[:, :2] / mapped[:, 2:])
+
+
+def _sheet(page: Page, template: Template, fit: Projection) -> Sheet:
+    middle = np.array(PAGE_MM) / 2.0
+    ends = _apply(fit.mm_to_px, np.array([middle - (50.0, 0.0), middle + (50.0, 0.0)]))
+    right = ends[1] - ends[0]
+    px_per_mm = float(np.sqrt(np.mean(np.abs(_local_scales(fit.mm_to_px)) ** 2)))
+    stretch = fit.se_mm(_GRID_MM).max() / (DRAWING_MM[2] / 2.0)
+    scale_se, problems = _against_resolution(page, px_per_mm)
+    if template is CALIBRATION:
+        problems = (*problems, Problem("calibration_page", "this is the calibration page, not a drawing", page.source))
+    return Sheet(
+        mm_to_px=fit.mm_to_px,
+        page_mm=PAGE_MM,
+        method="markers",
+        px_per_mm=px_per_mm,
+        # Seen with y down, the sheet's x axis points at this angle; turning back by it is counter-clockwise.
+        rotation_deg=float(np.degrees(np.arctan2(right[1], right[0]))) % 360.0 % 360.0,
+        residual_mm=fit.rms_mm,
+        scale_se=float(np.hypot(scale_se, stretch)),
+        drawable_mm=DRAWING_MM,
+        zones=dict(template.zones),
+        identity=identify(page, fit.mm_to_px),
+        problems=problems,
+    )
+
+
+def _against_resolution(page: Page, px_per_mm: float) -> tuple[float, tuple[Problem, ...]]:
+    """Scale error by the stated resolution: a printer that fits pages to its paper shrinks them."""
+    if page.dpi is None:
+        return _PRINTER_SCALE_SE, ()
+    stated = float(np.sqrt(page.dpi[0] * page.dpi[1])) / _MM_PER_INCH
+    off = px_per_mm / stated - 1.0
+    if not _SCALE_TOLD < abs(off) < _SCALE_PLAUSIBLE:
+        return _PRINTER_SCALE_SE, ()
+    told = (
+        f"by the file's resolution the printed sheet has {100 * (1 + off):.1f} % of its size:"
+        " it was printed or copied at another scale, or the resolution is wrong"
+    )
+    return float(np.hypot(_PRINTER_SCALE_SE, off / 2.0)), (Problem("print_scaled", told, page.source),)
