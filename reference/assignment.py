@@ -170,12 +170,15 @@ def load_assignment(name: str | Path) -> Assignment:
 @cache
 def _load(path: Path, _changed_ns: int) -> Assignment:
     file = authored.load(AssignmentFile, path)
-    if isinstance(file.mechanism, MechanismFile):
-        mechanism = file.mechanism
-    else:
-        mechanism = authored.load(MechanismFile, locate("mechanism", file.mechanism, path))
+    source, mechanism = path, file.mechanism
+    if isinstance(mechanism, str):
+        source = locate("mechanism", mechanism, path)
+        mechanism = authored.load(MechanismFile, source)
+    faults = tuple(check_mechanism(mechanism))
+    if faults:
+        raise AuthoredFileError(str(source), faults)
     assignment = Assignment(file, mechanism, path)
-    findings = (*check_mechanism(mechanism), *_check_formulas(assignment))
+    findings = _check_formulas(assignment)
     if findings:
         raise AuthoredFileError(str(path), tuple(findings))
     return assignment

@@ -149,8 +149,7 @@ def _hatching(start: complex, end: complex) -> Iterator[Shape]:
 
 
 def _guide(slider: Slider, figure: _Placed, index: int) -> Iterator[Shape]:
-    angle = np.broadcast_to(slider.guide_rad, (index + 1,))[index]
-    along, at = complex(direction(np.asarray(angle))), figure.nodes[slider.node]
+    along, at = complex(direction(np.asarray(_one(slider.guide_rad, index)))), figure.nodes[slider.node]
     for side in (1, -1):
         start, end = at - 14 * along, at + 14 * along
         offset = 1j * along * 3.0 * side
@@ -249,7 +248,12 @@ def _caption_place(figure: _Placed) -> Point:
 
 
 def _number(values: np.ndarray, index: int) -> str:
-    return f"{float(np.broadcast_to(values, (index + 1,))[index]):.5g}"
+    return f"{_one(values, index):.5g}"
+
+
+def _one(values: np.ndarray, index: int) -> float:
+    """One variant's number, of an array over variants or of a number common to all."""
+    return float(values[index] if np.ndim(values) else values)
 
 
 def _table(assignment: Assignment, plan: Plan, figures: tuple[str, ...], index: int) -> Iterator[Shape]:

@@ -1,0 +1,219 @@
+"""Authored files: every fault at once, each with its path and what would be right."""
+
+import copy
+import os
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from reference.assembly import check_mechanism
+from reference.assignment import built_in, library, load_assignment
+from reference.authored import AssignmentFile, MechanismFile, load, validate
+from reference.errors import AuthoredFileError, CallError, MechanismError
+from reference.plan import exact_plan
+
+
+def table(name: str) -> dict:
+    return tomllib.loads((library() / name).read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def mechanism() -> dict:
+    return copy.deepcopy(table("pump.mechanism.toml"))
+
+
+@pytest.fixture
+def assignment(tmp_path: Path):
+    """Writes an assignment beside a copy of the pump's mechanism, with text replaced."""
+
+    def write(*changes: tuple[str, str], mechanism: tuple[tuple[str, str], ...] = ()) -> Path:
+        for name, edits in (("pump.assignment.toml", changes), ("pump.mechanism.toml", mechanism)):
+            text = (library() / name).read_text(encoding="utf-8")
+            for old, new in edits:
+                assert old in text
+                text = text.replace(old, new, 1)
+            (tmp_path / name).write_text(text, encoding="utf-8")
+        return tmp_path / "pump.assignment.toml"
+
+    return write
+
+
+def findings(model, data) -> dict[str, str]:
+    with pytest.raises(AuthoredFileError) as error:
+        validate(model, data, "the file")
+    assert error.value.exit_status == 2
+    return {finding.path: finding.message for finding in error.value.findings}
+
+
+def test_all_faults_of_a_file_are_told_at_once_each_with_its_path(mechanism):
+    mechanism["crank"]["lenght"] = mechanism["crank"].pop("length")
+    mechanism["length_unit"] = "inch"
+    mechanism["group"][0]["side"] = "above"
+    mechanism["group"][1]["lengths"] = [20]
+    mechanism["group"][2]["guide"]["angle_deg"] = "__import__('os')"
+    mechanism["ground"]["O2"] = [0, True]
+    told = findings(MechanismFile, mechanism)
+    assert set(told) == {
+        "$.crank.length",
+        "$.crank.lenght",
+        "$.length_unit",
+        "$.group[0].side",
+        "$.group[1].lengths",
+        "$.group[2].guide.angle_deg",
+        "$.ground.O2[1]",
+    }
+    assert told["$.crank.length"] == "is missing"
+    assert "did you mean length?" in told["$.crank.lenght"]
+    assert "'left' or 'right'" in told["$.group[0].side"]
+    assert "unknown name __import__" in told["$.group[2].guide.angle_deg"]
+    assert "a number or a formula" in told["$.ground.O2[1]"]
+
+
+def test_a_misspelt_group_type_is_told_with_the_known_ones(mechanism):
+    mechanism["group"][0]["type"] = "RR"
+    (told,) = findings(MechanismFile, mechanism).items()
+    assert told[0] == "$.group[0]"
+    assert "RRP" in told[1]
+
+
+@pytest.mark.parametrize("name", ["o", "n", "1A", "A-B", "", "ABCDE"])
+def test_a_joint_needs_a_name_that_plans_can_carry(mechanism, name):
+    mechanism["group"][0]["node"] = name
+    assert list(findings(MechanismFile, mechanism)) == ["$.group[0].node"]
+
+
+def structure(data: dict) -> dict[str, str]:
+    file = validate(MechanismFile, data, "the file")
+    return {finding.path: finding.message for finding in check_mechanism(file)}
+
+
+def test_an_unknown_joint_is_told_with_those_placed_so_far(mechanism):
+    mechanism["group"][0]["pins"] = ["A", "O3"]
+    told = structure(mechanism)
+    assert told == {"$.group[0].pins[1]": "O3 is not placed above: known so far are A, O1, O2"}
+
+
+def test_a_joint_with_two_places_is_over_constrained(mechanism):
+    mechanism["group"].append(dict(mechanism["group"][2], node="B", pin="C"))
+    assert structure(mechanism) == {"$.group[3].node": "B has a place already: over-constrained"}
+
+
+def test_the_base_of_a_plate_must_be_one_link(mechanism):
+    mechanism["group"][1]["base"] = ["A", "O2"]
+    told = structure(mechanism)
+    assert told == {"$.group[1].base": "must be two joints of link 3 (A, B)"}
+
+
+def test_the_two_pins_of_a_dyad_must_differ(mechanism):
+    mechanism["group"][0]["pins"] = ["A", "A"]
+    assert "two pins must be different" in structure(mechanism)["$.group[0].pins"]
+
+
+def test_the_crank_needs_a_ground_pivot_and_a_new_pin(mechanism):
+    mechanism["crank"]["pivot"] = "O9"
+    mechanism["crank"]["pin"] = "O2"
+    assert {"$.crank.pivot", "$.crank.pin"} <= set(structure(mechanism))
+
+
+def test_letters_that_differ_by_case_alone_are_refused(mechanism):
+    mechanism["group"][2]["node"] = "a"
+    assert any("another case" in message for message in structure(mechanism).values())
+
+
+def test_bad_toml_a_missing_file_and_text_of_another_encoding_are_told(tmp_path):
+    bad, other = tmp_path / "bad.toml", tmp_path / "other.toml"
+    bad.write_text("id = \n", encoding="utf-8")
+    other.write_bytes("title = 'Механизм'".encode("cp1251"))
+    for path, words in (
+        (bad, "is not TOML"),
+        (other, "is not UTF-8"),
+        (tmp_path / "no.toml", "no such file"),
+    ):
+        with pytest.raises(AuthoredFileError, match=words) as error:
+            load(MechanismFile, path)
+        assert str(path) in str(error.value)
+    with pytest.raises(AuthoredFileError, match="cannot be read"):
+        load(MechanismFile, tmp_path)
+
+
+def test_an_unknown_assignment_is_told_with_the_built_in_ones():
+    with pytest.raises(CallError, match="built in are engine, press, pump, pump-230, pump-collinear"):
+        load_assignment("pmup")
+    with pytest.raises(AuthoredFileError, match="no such file"):
+        load_assignment("nowhere/my.assignment.toml")
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_every_built_in_assignment_assembles_for_every_variant(name):
+    assignment = load_assignment(name)
+    plan = exact_plan(assignment, assignment.variants())
+    assert len(plan.variants) == len(assignment.variants())
+
+
+def test_an_edited_copy_beside_its_mechanism_is_an_assignment(assignment):
+    path = assignment(mechanism=(("length = 30\n", "length = 29\n"),))
+    edited = load_assignment(path)
+    assert edited.mechanism([edited.variant(1)]).crank.length_m[0] == 0.29
+
+
+def test_a_group_that_does_not_assemble_is_named_with_its_gap(assignment):
+    edited = load_assignment(assignment(mechanism=(("lengths = [40, 30]", "lengths = [4, 3]"),)))
+    with pytest.raises(
+        MechanismError, match=r"group of B does not assemble.*miss each other by 0\.\d+ m"
+    ) as e:
+        exact_plan(edited, edited.variants())
+    assert e.value.code == "does_not_assemble"
+    assert e.value.exit_status == 3
+
+
+def test_a_slider_that_does_not_reach_its_guide_is_named(assignment):
+    edited = load_assignment(assignment(mechanism=(("through = [0, 0]", "through = [0, -90]"),)))
+    with pytest.raises(MechanismError, match="group of D does not assemble"):
+        exact_plan(edited, edited.variants())
+
+
+def test_names_that_nothing_defines_are_faults_of_the_file(assignment):
+    with pytest.raises(AuthoredFileError, match=r"\$\.variant\.values.*unknown name m"):
+        load_assignment(assignment(('"30 + 2*n"', '"30 + 2*m"')))
+    with pytest.raises(AuthoredFileError, match="unknown name phi_deg"):
+        load_assignment(assignment(("phi_deg =", "angle_deg ="), ('"phi_deg"', '"angle_deg"')))
+
+
+def test_a_fault_of_the_mechanism_names_the_mechanisms_file(assignment):
+    with pytest.raises(AuthoredFileError, match=r"pump\.mechanism\.toml.*\n.*O9 is not placed") as error:
+        load_assignment(assignment(mechanism=(('pins = ["A", "O2"]', 'pins = ["A", "O9"]'),)))
+    assert error.value.file.endswith("pump.mechanism.toml")
+
+
+def test_a_length_that_some_variant_makes_negative_is_a_fault_of_the_file(assignment):
+    with pytest.raises(AuthoredFileError, match="must be a positive length"):
+        load_assignment(assignment(mechanism=(("length = 20", 'length = "20 - n"'),)))
+
+
+def test_an_empty_range_of_variants_is_a_fault_of_the_file(assignment):
+    with pytest.raises(AuthoredFileError, match="range of n or position is empty"):
+        load_assignment(assignment(("from = 1, to = 30", "from = 30, to = 1")))
+
+
+@pytest.mark.parametrize(
+    ("n", "position", "code"), [(None, None, "n_needed"), (31, None, "n_range"), (0, None, "n_range")]
+)
+def test_a_variant_that_there_is_not_is_refused(n, position, code):
+    with pytest.raises(CallError) as error:
+        load_assignment("pump").variant(n, position)
+    assert error.value.code == code
+
+
+def test_a_file_changed_on_disk_is_read_again(assignment):
+    path = assignment()
+    assert len(load_assignment(path).variants()) == 30
+    path.write_text(path.read_text(encoding="utf-8").replace("to = 30", "to = 12"), encoding="utf-8")
+    os.utime(path, ns=(1, 1))
+    assert len(load_assignment(path).variants()) == 12
+
+
+def test_texts_fall_back_to_english():
+    assert load_assignment("pump").file.title.in_language("de").startswith("Pump")
+    assert load_assignment("pump").file.title.in_language("ro").startswith("Mecanism")
+    assert isinstance(load_assignment("pump").file, AssignmentFile)

@@ -1,0 +1,141 @@
+"""The closed form against 50-digit arithmetic by another road, and against what the sources print."""
+
+import numpy as np
+import pytest
+
+from grader.bench.closure import ExactMotion, exact_motion
+from reference.assignment import Assignment, load_assignment
+from reference.plan import Plan, conditioning, exact_plan
+
+SHARE_OF_PLAN = 1e-12
+"""Error allowed, relative to the plan's size: the longest vector of the same plan."""
+LAST_DIGIT_MM = 0.005
+CHECK_VALUE_CM = 0.0005
+REAL_VALUE_MPS = 0.001
+"""Real values are told as segment times the velocity scale rounded to 0.0361 (m/s)/mm."""
+SOURCE_ROUNDING = 0.02
+"""The source rounds on the way, 1.67^2/0.8 = 3.5: its normal components carry up to 2 %."""
+
+BUILT_IN = ["pump", "pump-230", "pump-collinear", "engine", "press"]
+
+
+def solved(name: str) -> tuple[Assignment, Plan, list[ExactMotion]]:
+    assignment = load_assignment(name)
+    variants = assignment.variants()
+    truth = [exact_motion(assignment, variant) for variant in variants]
+    return assignment, exact_plan(assignment, variants), truth
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_every_vector_agrees_with_fifty_digits_by_differentiating_the_closure(name):
+    _, plan, truth = solved(name)
+    for figure in plan.construction.poles:
+        vectors = plan.construction.vectors_of(figure)
+        exact = np.array([[motion.vector(vector) for motion in truth] for vector in vectors])
+        ours = np.array([plan.vectors_si[vector.name] for vector in vectors])
+        size = np.max(np.abs(exact), axis=0)
+        assert len(vectors) > 3
+        assert np.max(np.abs(ours - exact) / size) <= SHARE_OF_PLAN
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_positions_and_angular_rates_agree_with_fifty_digits(name):
+    _, plan, truth = solved(name)
+    size = np.max([np.abs(place) for place in plan.motion.position.values()], axis=0)
+    for joint, place in plan.motion.position.items():
+        exact = np.array([complex(*map(float, motion.position[joint])) for motion in truth])
+        assert np.max(np.abs(place - exact) / size) <= SHARE_OF_PLAN
+    crank = plan.mechanism.crank
+    for rate, values in plan.rates.items():
+        vector = plan.construction.vectors[plan.construction.rates[rate].vector]
+        exact = np.array([motion.rate(vector) for motion in truth])
+        # Relative to the crank's own rate (squared): the size of what turns in this mechanism.
+        reference = np.abs(crank.omega) ** (2 if rate.startswith("epsilon") else 1)
+        assert np.max(np.abs(values - exact) / np.maximum(reference, np.abs(exact))) <= SHARE_OF_PLAN
+
+
+def test_the_press_gives_the_five_printed_segments_to_their_last_digit():
+    press = load_assignment("press")
+    plan = exact_plan(press, [press.variant(None, 1)])
+    printed = {"v_B": 46.40, "v_BA": 47.17, "v_C": 92.80, "v_D": 89.36, "v_DC": 21.61}
+    for vector, segment_mm in printed.items():
+        assert abs(plan.drawn_mm(vector)[0]) == pytest.approx(segment_mm, abs=LAST_DIGIT_MM)
+
+
+def test_the_press_gives_the_real_values_of_the_source():
+    press = load_assignment("press")
+    plan = exact_plan(press, [press.variant(None, 1)])
+    exact = {"v_B": 1.675, "v_BA": 1.703, "v_C": 3.350, "v_D": 3.226, "v_DC": 0.780}
+    for vector, value in exact.items():
+        assert abs(plan.vectors_si[vector][0]) == pytest.approx(value, abs=REAL_VALUE_MPS)
+
+
+def test_the_press_gives_the_printed_normals_within_the_sources_own_rounding():
+    press = load_assignment("press")
+    plan = exact_plan(press, [press.variant(None, 1)])
+    exact = {"a_BA_n": 22.25, "a_B_n": 32.29, "a_DC_n": 16.01}
+    printed = {"a_BA_n": 22.2, "a_B_n": 32.4, "a_DC_n": 15.7}
+    for vector, segment_mm in exact.items():
+        drawn_mm = abs(plan.drawn_mm(vector)[0])
+        assert drawn_mm == pytest.approx(segment_mm, abs=LAST_DIGIT_MM)
+        assert drawn_mm == pytest.approx(printed[vector], rel=SOURCE_ROUNDING)
+
+
+@pytest.mark.parametrize("position", [0, 4])
+def test_at_the_dead_points_of_the_press_the_driven_side_stands_still(position):
+    press = load_assignment("press")
+    plan = exact_plan(press, [press.variant(None, position)])
+    size = plan.size_mm("velocity_plan")[0]
+    for vector in ("v_B", "v_C", "v_D", "v_DC"):
+        assert abs(plan.drawn_mm(vector)[0]) <= SHARE_OF_PLAN * size
+        assert np.isnan(plan.direction_deg(vector)[0])
+    assert abs(plan.drawn_mm("v_BA")[0]) == pytest.approx(50.0, abs=1e-9)
+    assert abs(plan.drawn_mm("a_BA_n")[0]) == pytest.approx(25.0, abs=1e-9)
+    for vector in ("a_B_n", "a_DC_n"):
+        assert abs(plan.drawn_mm(vector)[0]) <= SHARE_OF_PLAN * plan.size_mm("acceleration_plan")[0]
+    a, b = plan.motion.position["A"][0], plan.motion.position["B"][0]
+    assert abs((a.conjugate() * b).imag) <= 1e-12
+
+
+def test_the_pump_has_the_stated_check_values_for_the_first_variant():
+    pump = load_assignment("pump")
+    plan = exact_plan(pump, [pump.variant(1)])
+    told = {"A": 25.441 + 15.898j, "B": -13.497 + 25.053j, "C": 8.732 + 4.907j, "D": -10.657 + 0j}
+    for joint, place_cm in told.items():
+        assert abs(plan.motion.position[joint][0] * 100 - place_cm) <= 2 * CHECK_VALUE_CM
+    assert pump.values([pump.variant(1)])["phi_deg"] == 32
+    assert plan.mechanism.crank.omega[0] == pytest.approx(np.pi * 310 / 30)
+
+
+def test_construction_lines_of_the_pump_never_meet_at_less_than_forty_degrees():
+    for name in ("pump", "pump-230"):
+        pump = load_assignment(name)
+        told = conditioning(exact_plan(pump, pump.variants()))
+        crossings = [values for key, values in told.items() if key.startswith("crossing")]
+        assert crossings
+        assert np.min(crossings) > 38.0
+
+
+def test_the_altitude_method_fits_the_scales_of_the_pump_and_not_those_of_the_press():
+    for name, ratio in (("pump", 1.0), ("press", 5.0 / 9.0)):
+        assignment = load_assignment(name)
+        scales = assignment.scales(assignment.variants())
+        np.testing.assert_allclose(scales.kL * scales.ka / scales.kv**2, ratio, rtol=1e-14)
+
+
+def test_the_crank_of_the_pump_is_drawn_as_long_as_its_velocity_and_acceleration():
+    pump = load_assignment("pump")
+    plan = exact_plan(pump, pump.variants())
+    crank_mm = np.abs(plan.nodes_mm["mechanism"]["A"])
+    np.testing.assert_allclose(np.abs(plan.drawn_mm("v_A")), crank_mm, rtol=1e-13)
+    np.testing.assert_allclose(np.abs(plan.drawn_mm("a_A")), crank_mm, rtol=1e-13)
+
+
+def test_angular_velocities_follow_from_the_drawing_as_the_guide_says():
+    pump = load_assignment("pump")
+    plan = exact_plan(pump, pump.variants())
+    sketch = plan.nodes_mm["mechanism"]
+    from_drawing = (
+        plan.mechanism.crank.omega * np.abs(plan.drawn_mm("v_B")) / np.abs(sketch["B"] - sketch["O2"])
+    )
+    np.testing.assert_allclose(np.abs(plan.rates["omega_2"]), from_drawing, rtol=1e-12)

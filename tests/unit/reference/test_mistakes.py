@@ -1,0 +1,139 @@
+"""Mistakes: each changes what it says it changes, and nothing upstream."""
+
+import numpy as np
+import pytest
+
+from reference.assignment import load_assignment
+from reference.construction import evaluate
+from reference.mistakes import CODES, RPM_FACTOR, Mistake, affected, commit, single_mistakes
+from reference.plan import exact_plan
+
+MOVED_MM = 1e-6
+FIGURES = ["mechanism", "velocity_plan", "acceleration_plan"]
+
+
+def a_plan(name="pump", n=7, position=None):
+    assignment = load_assignment(name)
+    return exact_plan(assignment, [assignment.variant(n, position)])
+
+
+def shifts(plan, mistake):
+    right = evaluate(plan.construction, plan.drawing.parameters)
+    wrong_drawing = commit(mistake, plan.drawing)
+    wrong = evaluate(wrong_drawing.construction, wrong_drawing.parameters)
+    return {node: float(np.max(np.abs(wrong[node] - right[node]))) for node in right}
+
+
+@pytest.mark.parametrize(
+    ("name", "n", "position"), [("pump", 7, None), ("press", None, 1), ("engine", 5, None)]
+)
+@pytest.mark.parametrize("figure", FIGURES)
+def test_every_single_mistake_moves_only_nodes_drawn_from_it_and_its_own(name, n, position, figure):
+    plan = a_plan(name, n, position)
+    offered = list(single_mistakes(plan.drawing, figure))
+    assert offered
+    for mistake in offered:
+        told = affected(mistake, plan.construction)
+        moved = {node for node, shift in shifts(plan, mistake).items() if not shift <= MOVED_MM}
+        assert moved <= told, mistake
+        if mistake.at in {step.node for step in plan.construction.steps}:
+            # A line drawn wrongly may still pass through the node where two links are parallel.
+            assert mistake.at in moved or mistake.code in {"wrong_link", "wrong_intersection"}, mistake
+
+
+def test_a_mistake_at_b_moves_everything_drawn_from_b():
+    plan = a_plan()
+    mistake = Mistake("parallel_for_perpendicular", "b", 0)
+    moved = {node for node, shift in shifts(plan, mistake).items() if shift > MOVED_MM}
+    assert moved == affected(mistake, plan.construction)
+    assert {"b", "c", "d", "b'", "d'"} <= moved
+
+
+def test_every_code_of_the_contract_is_offered_or_can_be_committed():
+    plan = a_plan()
+    offered = {m.code for figure in FIGURES for m in single_mistakes(plan.drawing, figure)}
+    by_hand = {"other_variant", "vector_missing", "labels_swapped", "arithmetic"}
+    assert offered | by_hand == set(CODES)
+    assert not offered & by_hand
+
+
+def test_rpm_for_radians_grows_velocities_once_and_accelerations_twice():
+    plan = a_plan()
+    drawing = commit(Mistake("rpm_not_converted", "velocity_plan", factor=RPM_FACTOR), plan.drawing)
+    right = evaluate(plan.construction, plan.drawing.parameters)
+    wrong = evaluate(drawing.construction, drawing.parameters)
+    for node in ("a", "b", "c", "d"):
+        np.testing.assert_allclose(wrong[node], right[node] * RPM_FACTOR, rtol=1e-9)
+    for node in ("a'", "b'", "c'", "d'"):
+        np.testing.assert_allclose(wrong[node], right[node] * RPM_FACTOR**2, rtol=1e-9)
+
+
+def test_a_missing_normal_component_leaves_its_end_at_its_start():
+    plan = a_plan()
+    drawing = commit(Mistake("normal_missing", "n_BA"), plan.drawing)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    np.testing.assert_allclose(nodes["n_BA"], nodes["a'"], atol=1e-12)
+
+
+def test_a_reversed_normal_component_points_away_from_the_pin():
+    plan = a_plan()
+    drawing = commit(Mistake("normal_reversed", "n_BA"), plan.drawing)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    right = evaluate(plan.construction, plan.drawing.parameters)
+    np.testing.assert_allclose(nodes["n_BA"] - nodes["a'"], right["a'"] - right["n_BA"], atol=1e-12)
+
+
+def test_a_normal_from_the_absolute_velocity_has_that_velocitys_square():
+    plan = a_plan()
+    drawing = commit(Mistake("normal_from_absolute", "n_BA"), plan.drawing)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    length_mm = abs(nodes["n_BA"] - nodes["a'"])[0]
+    known = plan.drawing.parameters
+    expected = abs(plan.vectors_si["v_B"][0]) ** 2 / (known["AB"][0] * known["ka"][0])
+    assert length_mm == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_mirrored_image_lies_on_the_other_side_of_its_base():
+    plan = a_plan()
+    drawing = commit(Mistake("image_mirrored", "c"), plan.drawing)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    right = evaluate(plan.construction, plan.drawing.parameters)
+
+    def side(c):
+        return ((nodes["b"] - nodes["a"]).conjugate() * (c - nodes["a"])).imag[0]
+
+    assert side(nodes["c"]) == pytest.approx(-side(right["c"]), rel=1e-9)
+
+
+def test_the_other_assembly_keeps_the_lengths_of_the_links():
+    plan = a_plan()
+    drawing = commit(Mistake("other_assembly", "B"), plan.drawing)
+    nodes = evaluate(drawing.construction, drawing.parameters, wanted=["B"])
+    right = evaluate(plan.construction, plan.drawing.parameters)
+    for pin in ("A", "O2"):
+        np.testing.assert_allclose(abs(nodes["B"] - nodes[pin]), abs(right["B"] - right[pin]), rtol=1e-12)
+    assert abs(nodes["B"] - right["B"])[0] > 1.0
+
+
+def test_another_students_variant_keeps_the_own_scales():
+    pump = load_assignment("pump")
+    mine, other = a_plan(n=7), a_plan(n=8)
+    drawing = commit(Mistake("other_variant", "n", n=8, parameters=other.drawing.parameters), mine.drawing)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    ratio = other.scales.kv / mine.scales.kv
+    np.testing.assert_allclose(nodes["d"], other.nodes_mm["velocity_plan"]["d"] * ratio, rtol=1e-12)
+    assert pump.id == "pump"
+
+
+def test_a_turned_plan_is_the_right_one_turned():
+    plan = a_plan()
+    drawing = commit(Mistake("figure_rotated", "velocity_plan", quarters=1), plan.drawing)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    for node, place in plan.nodes_mm["velocity_plan"].items():
+        np.testing.assert_allclose(nodes[node], place * 1j, atol=1e-9)
+
+
+def test_a_mistake_that_cannot_be_made_at_a_step_is_refused():
+    plan = a_plan()
+    with pytest.raises(ValueError, match="cannot be made at the step of b"):
+        commit(Mistake("normal_missing", "b"), plan.drawing)
