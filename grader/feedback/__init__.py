@@ -1,0 +1,6 @@
+"""What students and instructors read: sentences, a page per submission, an index of the class."""
+
+from grader.feedback.pages import write_feedback, write_index
+from grader.feedback.sentences import Level, criterion_feedback, mistake_feedback
+
+__all__ = ["Level", "criterion_feedback", "mistake_feedback", "write_feedback", "write_index"]

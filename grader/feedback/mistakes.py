@@ -1,0 +1,108 @@
+"""The mistakes that planmark names: a title, what was done, what to redo.
+
+`%(at)s` is the node, vector, scale or figure where it was made.
+"""
+
+from dataclasses import dataclass
+
+from grader.i18n import N_
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """English texts, keys of the catalogues."""
+
+    title: str
+    what: str
+    redo: str
+
+
+MISTAKES: dict[str, Words] = {
+    "parallel_for_perpendicular": Words(
+        N_("parallel instead of perpendicular"),
+        N_("At %(at)s, a line was drawn along its link instead of perpendicular to it."),
+        N_("Points of one link can only turn about each other: draw the line perpendicular to the link,"
+           " then redo what starts from its end."),
+    ),
+    "wrong_link": Words(
+        N_("line drawn by the wrong link"),
+        N_("At %(at)s, a line was taken perpendicular to another link than its own."),
+        N_("Take the link that joins the two points in the vector's name, and redraw the line by it."),
+    ),
+    "sense_reversed": Words(
+        N_("sense reversed"),
+        N_("At %(at)s, the vector was laid off the wrong way round."),
+        N_("Take its sense from the sense in which the link turns, and lay it off from the same start."),
+    ),
+    "rpm_not_converted": Words(
+        N_("rev/min not converted"),
+        N_("The drawing fits a crank speed that was not converted from rev/min to rad/s."),
+        N_("Compute ω = π·n/30 first, then the velocity and the acceleration of the crank pin,"
+           " then the scales."),
+    ),
+    "scale_wrong": Words(
+        N_("wrong scale"),
+        N_("All lengths that depend on %(at)s are off by one and the same factor."),
+        N_("Compute the scale again as real value divided by drawn length, and use it throughout."),
+    ),
+    "normal_reversed": Words(
+        N_("normal component reversed"),
+        N_("At %(at)s, the normal component was laid off away from the centre of rotation."),
+        N_("A normal component points from the moving point towards the point about which it turns:"
+           " lay it off the other way, then draw the perpendicular through its end."),
+    ),
+    "normal_missing": Words(
+        N_("normal component left out"),
+        N_("At %(at)s, the normal component was left out."),
+        N_("Lay off v²/l along the link first, then draw the perpendicular through its end."),
+    ),
+    "normal_from_absolute": Words(
+        N_("normal component from the absolute velocity"),
+        N_("At %(at)s, the normal component was computed from an absolute velocity."),
+        N_("Use the velocity of one end of the link relative to the other in v²/l."),
+    ),
+    "other_variant": Words(
+        N_("another variant's data"),
+        N_("The drawing fits the data of another variant."),
+        N_("Check your number and the data that belong to it."),
+    ),
+    "other_assembly": Words(
+        N_("mechanism assembled the other way"),
+        N_("At %(at)s, the links were assembled in their other possible position."),
+        N_("Two arcs meet in two points: take the one on the side that the assignment shows,"
+           " and redraw the mechanism and the plans."),
+    ),
+    "image_mirrored": Words(
+        N_("image of the plate mirrored"),
+        N_("At %(at)s, the triangle in the plan is the mirror image of what it should be."),
+        N_("Going round the triangle in the plan and round the plate in the mechanism, the letters must"
+           " follow in the same sense."),
+    ),
+    "wrong_intersection": Words(
+        N_("wrong intersection"),
+        N_("At %(at)s, a line was drawn through the wrong point, and so meets the other one in"
+           " the wrong place."),
+        N_("Draw each line through the end of the vector that comes before it, and take the point where"
+           " these two lines meet."),
+    ),
+    "vector_missing": Words(
+        N_("vector missing"),
+        N_("%(at)s is not drawn."),
+        N_("Complete the plan with it."),
+    ),
+    "labels_swapped": Words(
+        N_("letters swapped"),
+        N_("At %(at)s, letters were swapped."),
+        N_("The lines can stay; put the letters right and compute the values again."),
+    ),
+    "figure_rotated": Words(
+        N_("figure turned"),
+        N_("All of %(at)s is turned by the same angle against the mechanism."),
+        N_("Take the directions of parallels and perpendiculars from the mechanism on the same sheet."),
+    ),
+    "arithmetic": Words(
+        N_("slip in the arithmetic"),
+        N_("The number at %(at)s does not follow from what it was computed from."),
+        N_("Compute it once more; the drawing before it can stay."),
+    ),
+}  # fmt: skip

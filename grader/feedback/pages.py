@@ -1,0 +1,267 @@
+"""The pages: one per submission, one for the class. Self-contained, readable offline and on paper."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from urllib.parse import quote
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from grader.documents import (
+    CriterionDocument,
+    QuantityDocument,
+    ReportDocument,
+    ResultsDocument,
+    ToleranceDocument,
+)
+from grader.feedback import statistics, words
+from grader.feedback.overlay import View, views
+from grader.feedback.mistakes import MISTAKES
+from grader.feedback.problems import problem_sentence, unmatched_sentence
+from grader.feedback.sentences import PLACES, Level, mistake_sentences, place
+from grader.files import write_whole
+from grader.i18n import N_, Tongue, tongue
+from grader.scene import COLOURS, MARKS, Picture
+
+SHEET = N_("the sheet")
+
+_NO_NAMES: Mapping[str, str] = {}
+
+
+def write_feedback(
+    report: ReportDocument,
+    pictures: Sequence[Picture],
+    out_dir: Path,
+    lang: str,
+    level: Level = "full",
+    *,
+    title: str = "",
+    student_name: str = "",
+    names: Mapping[str, str] = _NO_NAMES,
+) -> None:
+    """Write `feedback.html`, `overlay.png` and `overlay_2.png` ... of one submission into a folder.
+
+    Arguments
+    ---------
+    report : its criteria's `feedback` is shown as it stands (see `criterion_feedback`)
+    pictures : of its pages, in order; none for entered measurements
+    level : `full` shows what was expected; `hint` and `symbol` do not
+    title : of the assignment, in the language of the page; its id where empty
+    names : nodes and scales as the assignment's students know them
+
+    Raises OutputError where a file cannot be written.
+    """
+    for index, picture in enumerate(pictures, start=1):
+        write_whole(out_dir / ("overlay.png" if index == 1 else f"overlay_{index}.png"), picture.png)
+    page = feedback_page(
+        report, pictures, lang, level, title=title, student_name=student_name, names=names
+    )
+    write_whole(out_dir / "feedback.html", page)
+
+
+def feedback_page(
+    report: ReportDocument,
+    pictures: Sequence[Picture],
+    lang: str,
+    level: Level = "full",
+    *,
+    title: str = "",
+    student_name: str = "",
+    names: Mapping[str, str] = _NO_NAMES,
+) -> str:
+    """The page of one submission; arguments as of `write_feedback`."""
+    speaker = tongue(lang)
+    return _environment(speaker.lang).get_template("feedback.html").render(
+        report=report,
+        title=title or report.assignment,
+        student_name=student_name,
+        show_expected=level == "full",
+        criteria=[_row(criterion, speaker, level) for criterion in report.criteria],
+        mistakes=_mistakes(report, speaker, names) if level != "symbol" else [],
+        problems=[problem_sentence(problem, speaker) for problem in report.problems],
+        scales=_scales(report, speaker, names),
+        sheets=_sheets(pictures, speaker),
+        score=_score(report, speaker),
+        colours=COLOURS,
+    )  # fmt: skip
+
+
+def write_index(
+    results: ResultsDocument,
+    out_dir: Path,
+    lang: str,
+    *,
+    title: str = "",
+    student_names: Mapping[str, str] = _NO_NAMES,
+) -> None:
+    """Write `index.html`, the class at a glance, into a folder; `student_names` by student_id."""
+    write_whole(out_dir / "index.html", index_page(results, lang, title=title, student_names=student_names))
+
+
+def index_page(
+    results: ResultsDocument, lang: str, *, title: str = "", student_names: Mapping[str, str] = _NO_NAMES
+) -> str:
+    """The class's page."""
+    speaker = tongue(lang)
+    folders = folders_of(results.reports)
+    rows = [
+        {
+            "report": report,
+            "name": student_names.get(report.student_id, ""),
+            "link": f"{quote(folder)}/feedback.html",
+            "score": _score(report, speaker),
+            "problems": [problem_sentence(problem, speaker) for problem in report.problems],
+            "best": report.score if report.score is not None else (report.score_range or (-1.0, -1.0))[0],
+        }
+        for report, folder in zip(results.reports, folders, strict=True)
+    ]
+    return _environment(speaker.lang).get_template("index.html").render(
+        results=results,
+        title=title or results.assignment,
+        rows=rows,
+        has_positions=any(report.position is not None for report in results.reports),
+        has_n=any("n" in report.variant for report in results.reports),
+        unmatched=[unmatched_sentence(one, speaker) for one in results.unmatched],
+        states=statistics.states(results),
+        chart=statistics.distribution_svg(results, speaker),
+        hardest=statistics.hardest(results),
+        commonest=[
+            (MISTAKES[code].title, count) for code, count in statistics.commonest(results) if code in MISTAKES
+        ],
+        colours=COLOURS,
+    )  # fmt: skip
+
+
+def folders_of(reports: Sequence[ReportDocument]) -> list[str]:
+    """Each report's folder below the output folder: the student, with several positions also that."""
+    counts: dict[str, int] = {}
+    for report in reports:
+        counts[report.student_id] = counts.get(report.student_id, 0) + 1
+    return [
+        report.student_id
+        if counts[report.student_id] == 1 or report.position is None
+        else f"{report.student_id}/{report.position}"
+        for report in reports
+    ]
+
+
+@cache
+def _environment(lang: str) -> Environment:
+    speaker = tongue(lang)
+    environment = Environment(
+        loader=PackageLoader("grader.feedback"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        extensions=["jinja2.ext.i18n"],
+    )
+    environment.install_gettext_callables(  # type: ignore[attr-defined]
+        speaker.gettext, speaker.ngettext, newstyle=True
+    )
+    environment.filters["symbols"] = words.symbols
+    environment.filters["points"] = lambda value: speaker.trimmed(value, 2)
+    environment.globals.update(
+        speaker=speaker, verdicts=words.VERDICTS, states_words=words.STATES, state_marks=words.STATE_MARKS,
+        marks=MARKS,
+    )  # fmt: skip
+    return environment
+
+
+# What the templates show ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    criterion: CriterionDocument
+    measured: list[str]
+    expected: list[str]
+    tolerance: list[str]
+
+
+def _row(criterion: CriterionDocument, speaker: Tongue, level: Level) -> _Row:
+    expected = _quantity(criterion.expected, speaker) if level == "full" else []
+    measured = _quantity(criterion.measured, speaker)
+    return _Row(criterion, measured, expected, _tolerance(criterion.tolerance, speaker))
+
+
+def _quantity(quantity: QuantityDocument, speaker: Tongue) -> list[str]:
+    """Length and direction on paper, real value."""
+    parts = []
+    if quantity.length_mm is not None:
+        parts.append(speaker.quantity(quantity.length_mm, 1, "mm"))
+    if quantity.direction_deg is not None:
+        parts.append(f"∠\N{NARROW NO-BREAK SPACE}{speaker.number(quantity.direction_deg, 1)}°")
+    if quantity.value is not None:
+        unit = speaker.unit(quantity.unit or "")
+        parts.append(f"{speaker.significant(quantity.value, 4)}\N{NO-BREAK SPACE}{unit}".rstrip())
+    return parts
+
+
+def _tolerance(tolerance: ToleranceDocument, speaker: Tongue) -> list[str]:
+    parts = []
+    if tolerance.length_mm is not None:
+        parts.append(f"±{speaker.quantity(tolerance.length_mm, 1, 'mm')}")
+    if tolerance.direction_deg is not None:
+        parts.append(f"±{speaker.number(tolerance.direction_deg, 1)}°")
+    return parts
+
+
+def _score(report: ReportDocument, speaker: Tongue) -> str:
+    """The score, the range it lies in, or a dash."""
+    if report.score is not None:
+        return speaker.trimmed(report.score, 2)
+    if report.score_range is None or report.status in {"missing", "unreadable"}:
+        return "–"
+    low, high = (speaker.trimmed(value, 2) for value in report.score_range)
+    return low if low == high else f"{low}…{high}"
+
+
+def _mistakes(
+    report: ReportDocument, speaker: Tongue, names: Mapping[str, str]
+) -> list[dict[str, object]]:
+    titles = {criterion.id: criterion.title for criterion in report.criteria}
+    return [
+        {
+            "title": speaker.gettext(MISTAKES[mistake.code].title),
+            "text": mistake.detail or mistake_sentences(mistake.code, mistake.at, speaker, names),
+            "at": place(mistake.at, speaker, names),
+            "explains": [titles.get(one, one) for one in mistake.explains],
+        }
+        for mistake in report.mistakes
+    ]
+
+
+_SCALE_UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}
+
+
+def _scales(
+    report: ReportDocument, speaker: Tongue, names: Mapping[str, str]
+) -> list[dict[str, str | bool | None]]:
+    def written(value: float | None, unit: str) -> str:
+        if value is None:
+            return "–"
+        return f"{speaker.significant(value, 4)}\N{NO-BREAK SPACE}{speaker.unit(unit)}"
+
+    return [
+        {
+            "name": names.get(name, name),
+            "text": scale.text,
+            "declared": written(scale.declared, _SCALE_UNITS[name]),
+            "used": written(scale.used, _SCALE_UNITS[name]),
+            "assumed": scale.assumed,
+            "refused": scale.refused,
+        }
+        for name, scale in report.scales.items()
+    ]
+
+
+def _sheets(pictures: Sequence[Picture], speaker: Tongue) -> list[tuple[Picture, list[View]]]:
+    captions = {kind: speaker.gettext(text) for kind, text in {**PLACES, "sheet": SHEET}.items()}
+    return [
+        (picture, views(picture, number, captions)) for number, picture in enumerate(pictures, start=1)
+    ]
+
+
+__all__ = ["feedback_page", "folders_of", "index_page", "write_feedback", "write_index"]

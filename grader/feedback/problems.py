@@ -1,0 +1,61 @@
+"""Problems with files and sheets, told in the reader's language."""
+
+from dataclasses import dataclass
+
+from grader.documents import ProblemDocument, UnmatchedDocument
+from grader.i18n import N_, ROOT_LANGUAGE, Tongue
+
+PROBLEMS: dict[str, str] = {
+    "file_missing": N_("The file could not be opened."),
+    "file_empty": N_("The file is empty; hand it in again."),
+    "file_type_unsupported": N_("The file is of a type that is not read: use JPEG, PNG, TIFF or PDF."),
+    "image_too_large": N_("The image is too large; scan at 600 dpi or less."),
+    "image_damaged": N_("The image is damaged; scan or export it again."),
+    "image_truncated": N_("The image is cut off before its end; upload it again."),
+    "pdf_encrypted": N_("The PDF asks for a password; save it without one."),
+    "pdf_damaged": N_("The PDF is damaged; export it again."),
+    "page_missing": N_("The file has no such page."),
+    "pages_none": N_("The document has no pages."),
+    "pages_too_many": N_("The document has too many pages; split it."),
+    "page_blank": N_("The page is blank and was passed over."),
+    "calibration_page": N_("This is the calibration page, not a drawing."),
+    "print_scaled": N_("The sheet was printed or copied at another scale than 1:1."),
+    "resolution_wrong": N_("The resolution that the file states is wrong."),
+    "resolution_assumed": N_("The file states no resolution; a usual one was assumed."),
+    "registration_disagrees": N_("Frame, paper and resolution disagree about the sheet's size."),
+    "paper_assumed": N_("Only the paper's edges give the scale; the paper was taken for A3."),
+    "frame_missing": N_("No drawing frame was found; positions on the sheet are rough."),
+    "upright_unsure": N_("No title block shows which way up the sheet is."),
+    "sheet": N_("The sheet could not be placed: no frame, paper edge or marker was found."),
+}
+"""By code; a code that is not here is told by its own message, in English."""
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A problem as a page shows it: what it is, and the program's own words where they say more."""
+
+    text: str
+    detail: str
+    file: str
+
+
+def problem_sentence(problem: ProblemDocument, speaker: Tongue) -> Told:
+    """A problem of a submission."""
+    return _told(problem.code, problem.message, problem.file or "", speaker)
+
+
+def unmatched_sentence(unmatched: UnmatchedDocument, speaker: Tongue) -> Told:
+    """A page or file that is nobody's."""
+    place = unmatched.file
+    if unmatched.page is not None:
+        place = f"{place}, {speaker.gettext('page')} {unmatched.page}"
+    return _told(unmatched.code, unmatched.message, place, speaker)
+
+
+def _told(code: str, message: str, file: str, speaker: Tongue) -> Told:
+    known = PROBLEMS.get(code)
+    # The English message is the more precise one: no summary is needed before it.
+    if known is None or (speaker.lang == ROOT_LANGUAGE and message):
+        return Told(message or code, "", file)
+    return Told(speaker.gettext(known), message, file)

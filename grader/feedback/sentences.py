@@ -1,0 +1,190 @@
+"""Reasons and mistakes as sentences.
+
+Three levels of telling: ``full`` for instructors, with every number; ``hint``, which says in which way
+something is off without giving the answer away; ``symbol``, which says nothing beside the mark.
+Names of vectors stand in sentences as `v_BA`, `a_BA_n`; pages set them with indices.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+from grader.feedback.mistakes import MISTAKES
+from grader.i18n import N_, Tongue, tongue
+from grader.outcomes import Mistake, Outcome, Param, Reason
+
+Level = Literal["symbol", "hint", "full"]
+
+_NO_NAMES: Mapping[str, str] = {}
+
+HINTS: dict[str, str] = {
+    "right": N_("Right."),
+    "too_long": N_("It is too long."),
+    "too_short": N_("It is too short."),
+    "turned_left": N_("Its direction is off: it is turned too far counter-clockwise."),
+    "turned_right": N_("Its direction is off: it is turned too far clockwise."),
+    "reversed": N_("It points the opposite way."),
+    "should_be_zero": N_("Look at this position of the mechanism again: how large can it be here?"),
+    "too_short_to_judge": N_("It is too short for its direction to be judged; only its length counts."),
+    "value_too_large": N_("The value is too large."),
+    "value_too_small": N_("The value is too small."),
+    "value_reversed": N_("The sign is wrong: counter-clockwise is positive."),
+    "not_measured": N_("Nothing was handed in for it."),
+    "optional": N_("It was not handed in, and is not required."),
+    "unread": N_("It could not be read on the sheet."),
+    "doubtful": N_("It was read with too little certainty."),
+    "near_limit": N_("It lies so near the limit of the tolerance that the scan cannot decide."),
+    "readings_disagree": N_("The drawing and the entered measurement differ."),
+    "follows": N_("It follows rightly from your own earlier work; the earlier mistake is charged once, there."),
+    "scale_refused": N_("The declared scale could not be understood."),
+    "scale_off": N_("The declared scale does not fit the drawing and the data."),
+    "scale_assumed": N_("The scale was not declared; the assignment's own rule was assumed."),
+}
+"""What is said at level `hint`, by code of the reason."""
+
+FULL: dict[str, str] = {
+    "too_long": N_("It is too long by %(off)s (tolerance ±%(tolerance)s)."),
+    "too_short": N_("It is too short by %(off)s (tolerance ±%(tolerance)s)."),
+    "turned_left": N_("It is turned %(off)s too far counter-clockwise (tolerance ±%(tolerance)s)."),
+    "turned_right": N_("It is turned %(off)s too far clockwise (tolerance ±%(tolerance)s)."),
+    "should_be_zero": N_("It is zero in this position of the mechanism; %(measured)s were drawn."),
+    "too_short_to_judge": N_(
+        "It is too short for its direction to be judged (%(length)s, at least %(least)s are needed);"
+        " only its length counts."
+    ),
+    "value_too_large": N_("The value is too large: %(measured)s instead of %(expected)s."),
+    "value_too_small": N_("The value is too small: %(measured)s instead of %(expected)s."),
+    "value_reversed": N_("The sign is wrong: %(measured)s instead of %(expected)s; counter-clockwise is positive."),
+    "unread": N_("It could not be read on the sheet (%(reason)s)."),
+    "doubtful": N_("It was read with too little certainty (%(confidence)s)."),
+    "near_limit": N_(
+        "It lies so near the limit of the tolerance that the scan cannot decide (standard error %(se)s)."
+    ),
+    "readings_disagree": N_("The drawing gives %(first)s, the entered measurement %(second)s."),
+    "scale_refused": N_("The declared scale “%(text)s” could not be understood: %(why)s."),
+    "scale_off": N_("Declared is %(declared)s; the drawing and the data give %(expected)s."),
+    "scale_assumed": N_("The scale was not declared; %(used)s was assumed."),
+}
+"""What is said at level `full` where that differs."""
+
+FOLLOWS: dict[str, str] = {
+    "nodes": N_("It follows rightly from your own earlier points; the earlier mistake is charged once, there."),
+    "scale": N_("It is right at the scale that you used; the scale is charged once, there."),
+    "vector": N_("It follows rightly from your own %(of)s; that mistake is charged once, there."),
+    "value": N_("It follows rightly from your own %(of)s; that mistake is charged once, there."),
+}
+"""Reason `follows`, by what it follows from."""
+
+LEADS: dict[str, str] = {
+    "partial": N_("Nearly right."),
+    "review": N_("A person will look at this."),
+    "not_judged": N_("Not judged."),
+}
+"""What a verdict says before its reasons."""
+
+
+def criterion_feedback(
+    outcome: Outcome, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
+) -> str:
+    """What is to be said to one criterion; empty at level `symbol`.
+
+    `names` renames nodes and scales as the assignment's students know them.
+    """
+    if level == "symbol":
+        return ""
+    speaker = tongue(lang)
+    lead = LEADS.get(outcome.verdict)
+    parts = [speaker.gettext(lead)] if lead else []
+    # A partial verdict may carry "right" for what is right beside what is off: that says nothing.
+    shown = [reason for reason in outcome.reasons if reason.code != "right"] or list(outcome.reasons)
+    parts += [reason_sentence(reason, speaker, level, names) for reason in shown]
+    if outcome.mistake and outcome.verdict in {"none", "partial"} and outcome.mistake in MISTAKES:
+        title = speaker.gettext(MISTAKES[outcome.mistake].title)
+        parts.append(speaker.gettext("Likely cause: %(cause)s.") % {"cause": title})
+    return " ".join(part for part in parts if part)
+
+
+def mistake_feedback(
+    mistake: Mistake, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
+) -> str:
+    """What was done, most likely, and what to redo; empty at level `symbol` and for an unknown code."""
+    if level == "symbol" or mistake.code not in MISTAKES:
+        return ""
+    return mistake_sentences(mistake.code, mistake.at, tongue(lang), names)
+
+
+def mistake_sentences(code: str, at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
+    """What a mistake was and what to redo."""
+    known = MISTAKES[code]
+    where = {"at": place(at, speaker, names)}
+    return f"{speaker.gettext(known.what) % where} {speaker.gettext(known.redo) % where}"
+
+
+PLACES = {
+    "mechanism": N_("the mechanism"),
+    "velocity_plan": N_("the velocity plan"),
+    "acceleration_plan": N_("the acceleration plan"),
+}
+
+
+def place(at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
+    """A node, vector, scale or figure as a sentence names it."""
+    return speaker.gettext(PLACES[at]) if at in PLACES else names.get(at, at)
+
+
+def reason_sentence(
+    reason: Reason, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
+) -> str:
+    """One reason; a code without a sentence is told by its name, so that nothing is lost."""
+    said = _speak(reason.params, speaker, names)
+    if reason.code == "follows":
+        text = FOLLOWS.get(str(reason.params.get("what")), HINTS["follows"])
+        return _fill(speaker.gettext(text), said, speaker.gettext(HINTS["follows"]))
+    hint = speaker.gettext(HINTS[reason.code]) if reason.code in HINTS else reason.code
+    if level == "full" and reason.code in FULL:
+        return _fill(speaker.gettext(FULL[reason.code]), said, hint)
+    return hint
+
+
+def _fill(text: str, said: Mapping[str, str], otherwise: str) -> str:
+    """The text with its numbers, or what needs none where one of them is not known."""
+    try:
+        return text % said
+    except KeyError:
+        return otherwise
+
+
+def _speak(params: Mapping[str, Param], speaker: Tongue, names: Mapping[str, str]) -> dict[str, str]:
+    """Parameters in words: `off_mm` becomes `off`, with its unit."""
+    unit = str(params.get("unit", _unit_of_limit(params)))
+    said: dict[str, str] = {}
+    for key, value in params.items():
+        stem, _, suffix = key.rpartition("_")
+        if isinstance(value, str):
+            said[key] = names.get(value, value)
+        elif suffix in {"mm", "deg"} and stem:
+            said[stem] = _UNIT_WRITERS[suffix](speaker, value)
+        elif key == "confidence":
+            said[key] = f"{speaker.number(100.0 * value, 0)}\N{NO-BREAK SPACE}%"
+        else:
+            said[key] = _real(speaker, value, unit)
+    return said
+
+
+def _unit_of_limit(params: Mapping[str, Param]) -> str:
+    """`near_limit` says what it speaks of instead of a unit."""
+    return {"length": "mm", "direction": "°"}.get(str(params.get("what", "")), "")
+
+
+def _real(speaker: Tongue, value: float, unit: str) -> str:
+    if unit == "mm":
+        return speaker.quantity(value, 2, unit)
+    text = speaker.significant(value, 4)
+    if unit == "°":
+        return f"{text}°"
+    return f"{text}\N{NO-BREAK SPACE}{speaker.unit(unit)}" if unit else text
+
+
+_UNIT_WRITERS: dict[str, Callable[[Tongue, float], str]] = {
+    "mm": lambda speaker, value: speaker.quantity(value, 1, "mm"),
+    "deg": lambda speaker, value: f"{speaker.number(value, 1)}°",
+}
