@@ -22,7 +22,9 @@ class OrderRefused:
         return False
 
 
-def deal(blank: Sequence[bool], rows: Sequence[Row], waiting: Sequence[Row], each: int) -> dict[int, Row] | OrderRefused:
+def deal(
+    blank: Sequence[bool], rows: Sequence[Row], waiting: Sequence[Row], each: int
+) -> dict[int, Row] | OrderRefused:
     """The row of each page, by the page's place in the file from 0; blank pages are dealt to nobody.
 
     Arguments
@@ -35,7 +37,11 @@ def deal(blank: Sequence[bool], rows: Sequence[Row], waiting: Sequence[Row], eac
     if each < 1:
         raise ValueError(f"pages per student must be 1 or more, not {each}")
     for candidates in (rows, waiting):
-        ways = [way for way in (_drawn(blank), _fronts(blank), list(range(len(blank)))) if candidates and way is not None]
+        ways = [
+            way
+            for way in (_drawn(blank), _fronts(blank), list(range(len(blank))))
+            if candidates and way is not None
+        ]
         even = [dict(_dealt(way, candidates, each)) for way in ways if len(way) == each * len(candidates)]
         dealt = [{place: row for place, row in way.items() if not blank[place]} for way in even]
         if dealt and any(way != dealt[0] for way in dealt):

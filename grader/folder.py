@@ -34,7 +34,9 @@ def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[
     none = {path.resolve() for path in (*passed_over, *([roster] if roster else []), folder / "roster.csv")}
     found: list[Path] = []
     for where, folders, files in os.walk(folder):
-        folders[:] = [name for name in folders if not is_tool_file(name) and (Path(where) / name).resolve() not in none]
+        folders[:] = [
+            name for name in folders if not is_tool_file(name) and (Path(where) / name).resolve() not in none
+        ]
         for name in files:
             path = Path(where) / name
             real = path.resolve()

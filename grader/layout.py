@@ -85,23 +85,26 @@ def _cut(box: Box, shares: Iterable[float], *, across: bool) -> list[Box]:
     return [(x, round(y + start, 3), w, size) for start, size in zip(starts, sizes, strict=True)]
 
 
+def _zones(figures: tuple[str, ...], box: Box, shares: tuple[float, ...], across: bool) -> dict[str, Box]:
+    return dict(zip(figures, _cut(box, shares, across=across), strict=True))
+
+
 def _divisions() -> list[dict[str, Box]]:
     """Every division there is. Its place in this list is printed on paper: append, never reorder."""
     m, v, a = MECHANISM, VELOCITY_PLAN, ACCELERATION_PLAN
-    found: list[dict[str, Box]] = [{m: DRAWING_MM}, {v: DRAWING_MM}, {a: DRAWING_MM}]
+    columns, rows = True, False
+    found = [_zones((figure,), DRAWING_MM, (1.0,), columns) for figure in (m, v, a)]
     for plan in (v, a):
-        for share in (0.28, 0.4, 0.5, 0.6, 0.72):
-            found.append(dict(zip((m, plan), _cut(DRAWING_MM, (share, 1 - share), across=True), strict=True)))
-        found.append(dict(zip((m, plan), _cut(DRAWING_MM, (0.5, 0.5), across=False), strict=True)))
-    for share in (0.4, 0.5):
-        found.append(dict(zip((v, a), _cut(DRAWING_MM, (share, 1 - share), across=True), strict=True)))
-    for shares in ((1 / 3, 1 / 3, 1 / 3), (0.4, 0.25, 0.35)):
-        found.append(dict(zip((m, v, a), _cut(DRAWING_MM, shares, across=True), strict=True)))
+        shares = ((share, 1.0 - share) for share in (0.28, 0.4, 0.5, 0.6, 0.72))
+        found.extend(_zones((m, plan), DRAWING_MM, share, columns) for share in shares)
+        found.append(_zones((m, plan), DRAWING_MM, (0.5, 0.5), rows))
+    found.extend(_zones((v, a), DRAWING_MM, (share, 1.0 - share), columns) for share in (0.4, 0.5))
+    found.append(_zones((m, v, a), DRAWING_MM, (1 / 3, 1 / 3, 1 / 3), columns))
+    found.append(_zones((m, v, a), DRAWING_MM, (0.4, 0.25, 0.35), columns))
     for share in (0.35, 0.45, 0.55):
-        left, right = _cut(DRAWING_MM, (share, 1 - share), across=True)
-        for top in (0.4, 0.55):
-            found.append(dict(zip((m, v), _cut(left, (top, 1 - top), across=False), strict=True)) | {a: right})
-        found.append({m: left} | dict(zip((v, a), _cut(right, (0.45, 0.55), across=False), strict=True)))
+        left, right = _cut(DRAWING_MM, (share, 1.0 - share), across=True)
+        found.extend(_zones((m, v), left, (top, 1.0 - top), rows) | {a: right} for top in (0.4, 0.55))
+        found.append({m: left} | _zones((v, a), right, (0.45, 0.55), rows))
     return found
 
 

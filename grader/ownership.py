@@ -190,7 +190,11 @@ def _code_claim(identity: Identity, roster: Roster) -> _Claim:
         for row in roster.rows_of(identity.student_id)
         if identity.position is None or row.position in (None, identity.position)
     )
-    details = [f"{name} {value}" for name, value in (("n", identity.n), ("position", identity.position)) if value is not None]
+    details = [
+        f"{name} {value}"
+        for name, value in (("n", identity.n), ("position", identity.position))
+        if value is not None
+    ]
     return _Claim(How.CODE, rows, "the QR code: " + ", ".join([identity.student_id, *details]))
 
 
@@ -200,7 +204,11 @@ def _order_claims(
     """What the roster's order says of the one class file's pages, by index; else why it says nothing, by file."""
     if each is None:
         return {}, {}
-    named = {page.file for page, claims in zip(pages, certain, strict=True) if any(c.how is How.NAME for c in claims)}
+    named = {
+        page.file
+        for page, claims in zip(pages, certain, strict=True)
+        if any(c.how is How.NAME for c in claims)
+    }
     files = list(dict.fromkeys(page.file for page in pages if page.pages > 1 and page.file not in named))
     if len(files) != 1:
         reason = f"one class file is expected, there are {len(files)}: {', '.join(files)}"
@@ -213,11 +221,17 @@ def _order_claims(
     ]
     rows = [row for row in roster.rows if all(ref.file != file for ref in row.scans)]
     elsewhere = _rows_elsewhere(pages, certain, file)
-    dealt = deal([pages[index].blank for index in indices], rows, [row for row in rows if row.line not in elsewhere], each)
+    dealt = deal(
+        [pages[index].blank for index in indices],
+        rows,
+        [row for row in rows if row.line not in elsewhere],
+        each,
+    )
     if isinstance(dealt, OrderRefused):
         return {}, {file: dealt.reason}
     claims_by_index = {
-        indices[place]: _Claim(How.ORDER, (row,), f"the roster's order: {_who(row)}") for place, row in dealt.items()
+        indices[place]: _Claim(How.ORDER, (row,), f"the roster's order: {_who(row)}")
+        for place, row in dealt.items()
     }
     for index, claim in claims_by_index.items():
         for other in certain[index]:
@@ -258,7 +272,9 @@ def _settle(
         return Problem(code, f"{page}: {message}", page.file)
 
     if identity is not None and identity.assignment != assignment_id:
-        return problem("owner_other_assignment", f"its QR code belongs to {identity.assignment}, not to {assignment_id}")
+        return problem(
+            "owner_other_assignment", f"its QR code belongs to {identity.assignment}, not to {assignment_id}"
+        )
     if not claims:
         if refusal is not None:
             return problem("order_refused", f"the roster's order cannot be used: {refusal}")
@@ -270,7 +286,9 @@ def _settle(
         return problem("owner_disagree", "; ".join(claim.told for claim in claims))
     if len(common) > 1:
         places = ", ".join(str(row.position) for row in common)
-        return problem("owner_ambiguous", f"{common[0].student_id} has the positions {places}; nothing says which")
+        return problem(
+            "owner_ambiguous", f"{common[0].student_id} has the positions {places}; nothing says which"
+        )
     return _owned(page, common[0], claims, problem)
 
 

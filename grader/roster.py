@@ -12,9 +12,13 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from grader.records import Problem
 from reference.errors import AuthoredFileError, Finding
+
+if TYPE_CHECKING:
+    from _csv import Reader
 
 STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 LANGUAGES = ("en", "ro", "ru")
@@ -140,7 +144,7 @@ def delimiter_of(text: str) -> str:
     return ";" if first.count(";") > first.count(",") else ","
 
 
-def _lines(reader: "csv._reader", findings: list[Finding]) -> Iterator[tuple[int, list[str]]]:
+def _lines(reader: "Reader", findings: list[Finding]) -> Iterator[tuple[int, list[str]]]:
     """Numbered lines that are not blank; a line number is that of the record's first line."""
     begin = 1
     while True:
@@ -198,7 +202,9 @@ class _Row:
     def read(self, findings: list[Finding]) -> RosterRow | None:
         """The row, or None with its faults added to `findings`."""
         before = len(findings)
-        if len(self.cells) > len(self.header) and any(cell.strip() for cell in self.cells[len(self.header) :]):
+        if len(self.cells) > len(self.header) and any(
+            cell.strip() for cell in self.cells[len(self.header) :]
+        ):
             advice = f"; quote a field that holds a '{self.delimiter}'"
             told = f"has {len(self.cells)} fields, the first line names {len(self.header)} columns{advice}"
             findings.append(Finding(f"line {self.line}", told))

@@ -58,22 +58,30 @@ class Drawing:
         self.canvas.setStrokeGray(grey)
         self.canvas.rect(x * mm, _up(y + h), w * mm, h * mm)
 
-    def cells(self, corner: tuple[float, float], cell_mm: float, filled: Iterable[tuple[int, int, int]], grey: float) -> None:
+    def cells(
+        self, corner: tuple[float, float], cell_mm: float, filled: Iterable[tuple[int, int, int]], grey: float
+    ) -> None:
         """Rows of filled cells (row, first column, number of columns), as one path without seams."""
         path = self.canvas.beginPath()
         x, y = corner
         for row, first, count in filled:
-            path.rect((x + first * cell_mm) * mm, _up(y + (row + 1) * cell_mm), count * cell_mm * mm, cell_mm * mm)
+            path.rect(
+                (x + first * cell_mm) * mm, _up(y + (row + 1) * cell_mm), count * cell_mm * mm, cell_mm * mm
+            )
         self.canvas.setFillGray(grey)
         self.canvas.drawPath(path, stroke=0, fill=1)
 
-    def text(self, at: tuple[float, float], text: str, size_pt: float, font: str = REGULAR, grey: float = BLACK) -> None:
+    def text(
+        self, at: tuple[float, float], text: str, size_pt: float, font: str = REGULAR, grey: float = BLACK
+    ) -> None:
         """Text whose base line begins at a point."""
         self.canvas.setFillGray(grey)
         self.canvas.setFont(font, size_pt)
         self.canvas.drawString(at[0] * mm, _up(at[1]), text)
 
-    def pieces(self, at: tuple[float, float], pieces: Iterable[Piece], size_pt: float, font: str = REGULAR) -> float:
+    def pieces(
+        self, at: tuple[float, float], pieces: Iterable[Piece], size_pt: float, font: str = REGULAR
+    ) -> float:
         """A name with its indices; gives the x where it ends. An index above stands over one below."""
         x, y = at
         begin, below = x, x
@@ -115,4 +123,4 @@ def runs(rows: Iterable[Iterable[bool]]) -> Iterable[tuple[int, int, int]]:
 
 def _up(y_mm: float) -> float:
     """PDF points from the bottom edge."""
-    return (PAGE_MM[1] - y_mm) * mm
+    return float((PAGE_MM[1] - y_mm) * mm)

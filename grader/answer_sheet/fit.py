@@ -40,7 +40,9 @@ def construction_for(assignment: Assignment, figures: Sequence[str]) -> Construc
     )
 
 
-def extents_mm(assignment: Assignment, figures: Sequence[str], variants: list[Variant]) -> dict[str, tuple[float, float]]:
+def extents_mm(
+    assignment: Assignment, figures: Sequence[str], variants: list[Variant]
+) -> dict[str, tuple[float, float]]:
     """Largest width and height of each figure over variants, at the assignment's own scales."""
     scales = assignment.scales(variants)
     construction = construction_for(assignment, figures)
@@ -58,7 +60,9 @@ def extents_mm(assignment: Assignment, figures: Sequence[str], variants: list[Va
 def best_template(assignment: Assignment, figures: Sequence[str]) -> Fit:
     """The division with the most room for the figure that has the least; a sketch may be drawn smaller."""
     extents = extents_mm(assignment, figures, assignment.variants())
-    need = {figure: (wide + 2 * _MARGIN_MM, high + 2 * _MARGIN_MM) for figure, (wide, high) in extents.items()}
+    need = {
+        figure: (wide + 2 * _MARGIN_MM, high + 2 * _MARGIN_MM) for figure, (wide, high) in extents.items()
+    }
 
     def room(template: Template, figure: str) -> float:
         _, _, wide, high = template.zones[figure]

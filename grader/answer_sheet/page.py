@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 import segno
 
 from grader.answer_sheet.drawing import GREY, Drawing, runs
@@ -81,11 +82,16 @@ def _code(drawing: Drawing, identity: Identity) -> None:
 def _student(drawing: Drawing, assignment: Assignment, text: PageText, tongue: Tongue) -> None:
     x, y, wide, _ = _STUDENT_MM
     identity = text.identity
-    size, lines = fitted([assignment.file.title.in_language(tongue.lang)], BOLD, (10.0, 9.0, 8.0), (wide, 9.0))
+    size, lines = fitted(
+        [assignment.file.title.in_language(tongue.lang)], BOLD, (10.0, 9.0, 8.0), (wide, 9.0)
+    )
     for row, line in enumerate(lines):
         drawing.text((x, y + 3.5 + row * 1.2 * size * _PT), line, size, BOLD)
-    variant = [f"{label} = {value}" for label, value in (("n", identity.n), (tongue.gettext(N_("position")), identity.position))
-               if value is not None]
+    variant = [
+        f"{label} = {value}"
+        for label, value in (("n", identity.n), (tongue.gettext(N_("position")), identity.position))
+        if value is not None
+    ]
     sheet = tongue.gettext(N_("sheet {number} of {count}")).format(number=text.sheet, count=text.sheets)
     name = wrap(text.name, BOLD, 12.0, wide)[:1] or [""]
     drawing.text((x, y + 17.0), name[0], 12.0, BOLD)
@@ -100,9 +106,15 @@ def _task(drawing: Drawing, assignment: Assignment, identity: Identity, tongue: 
     for size in (8.5, 8.0, 7.5, 7.0, 6.5, 6.0):
         step = 1.3 * size * _PT
         rows = _flow(data, size, wide)
-        if len(wrap(assignment.file.task.in_language(tongue.lang), REGULAR, size, wide)) * step + len(rows) * step <= high:
+        if (
+            len(wrap(assignment.file.task.in_language(tongue.lang), REGULAR, size, wide)) * step
+            + len(rows) * step
+            <= high
+        ):
             break
-    _, lines = fitted([assignment.file.task.in_language(tongue.lang)], REGULAR, (size,), (wide, high - len(rows) * step))
+    _, lines = fitted(
+        [assignment.file.task.in_language(tongue.lang)], REGULAR, (size,), (wide, high - len(rows) * step)
+    )
     base = y + size * _PT
     for line in lines:
         drawing.text((x, base), line, size)
@@ -123,7 +135,7 @@ def _given(assignment: Assignment, variant: Variant, tongue: Tongue) -> list[tup
     values = assignment.values([variant])
     found = []
     for datum in assignment.file.given:
-        told = number(float(datum.value(values).reshape(-1)[0]) if hasattr(datum.value(values), "reshape") else float(datum.value(values)), tongue.lang)
+        told = number(float(np.ravel(datum.value(values))[0]), tongue.lang)
         unit = tongue.unit(datum.unit)
         gap = "" if unit in {"", "°"} else "\N{NO-BREAK SPACE}"
         found.append((*pieces_of(datum.label), Piece(f" = {told}{gap}{unit}")))
@@ -147,7 +159,9 @@ def _flow(data: list[tuple[Piece, ...]], size_pt: float, wide_mm: float) -> list
 def _advice(drawing: Drawing, tongue: Tongue) -> None:
     x, y, wide, high = _ADVICE_MM
     advice = tongue.gettext(
-        N_("Draw inside the zones. Keep letters 2 mm clear of lines; leave the black squares and the code free.")
+        N_(
+            "Draw inside the zones. Keep letters 2 mm clear of lines; leave the black squares and the code free."
+        )
     )
     size, lines = fitted([advice], REGULAR, (7.0, 6.5, 6.0, 5.5), (wide, high))
     for row, line in enumerate(lines):
@@ -168,16 +182,22 @@ def _fields(drawing: Drawing, assignment: Assignment, fields: dict[str, Box], to
     names = assignment.file.names
     for name, (x, y, w, h) in fields.items():
         drawing.box((x, y, w, h), 0.25)
-        label = pieces_of(names.get(name, name)) if name not in SCALE_BOXES else _scale_label(names.get(name, name))
+        label = (
+            pieces_of(names.get(name, name))
+            if name not in SCALE_BOXES
+            else _scale_label(names.get(name, name))
+        )
         size = 10.0 if name in SCALE_BOXES else 8.0
         wide = pieces_width_mm(label, REGULAR, size)
         drawing.pieces((x - wide - 0.8, y + 0.68 * h), label, size)
     if len(fields) > len(SCALE_BOXES):
-        drawing.text((39.0, 265.0), tongue.gettext(N_("Lengths measured on the drawing, mm")), 6.5, REGULAR, GREY)
+        drawing.text(
+            (39.0, 265.0), tongue.gettext(N_("Lengths measured on the drawing, mm")), 6.5, REGULAR, GREY
+        )
 
 
 def _scale_label(name: str) -> tuple[Piece, ...]:
-    """k with L, v or a below it."""
+    """The letter k with L, v or a below it."""
     return (Piece(name[:1]), Piece(name[1:], -1), Piece(" =")) if len(name) > 1 else (Piece(f"{name} ="),)
 
 

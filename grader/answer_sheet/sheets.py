@@ -42,7 +42,9 @@ class _PagePlan:
     fields: dict[str, Box]
 
 
-def make_sheets(assignment: Assignment, rows: Sequence[RosterRow], lang: str = "en", *, roster: str = "roster.csv") -> Sheets:
+def make_sheets(
+    assignment: Assignment, rows: Sequence[RosterRow], lang: str = "en", *, roster: str = "roster.csv"
+) -> Sheets:
     """Answer sheets for every row of a roster: a page per page of the assignment, in the rows' order.
 
     Arguments
@@ -97,7 +99,7 @@ def _plans(assignment: Assignment) -> tuple[list[_PagePlan], tuple[Problem, ...]
     return plans, tuple(problems)
 
 
-def _written(assignment: Assignment, figures: list[str]) -> tuple[str, ...]:
+def _written(assignment: Assignment, figures: Sequence[str]) -> tuple[str, ...]:
     """The vectors whose lengths are written on a page."""
     construction = construction_for(assignment, figures)
     return tuple(vector.name for figure in figures for vector in construction.vectors_of(figure))
@@ -126,4 +128,6 @@ def _too_small(
 
 def _layout(plan: _PagePlan) -> PageLayout:
     zones: dict[str, Box | dict[str, Box]] = dict(plan.template.zones)
-    return PageLayout(kind=plan.table.kind, markers=marker_places(plan.template), zones=zones | {"fields": plan.fields})
+    return PageLayout(
+        kind=plan.table.kind, markers=marker_places(plan.template), zones=zones | {"fields": plan.fields}
+    )

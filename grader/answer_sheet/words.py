@@ -26,7 +26,7 @@ def embed_fonts() -> None:
 def width_mm(text: str, font: str, size_pt: float) -> float:
     """How wide a text is printed."""
     embed_fonts()
-    return float(pdfmetrics.stringWidth(text, font, size_pt)) / mm
+    return float(pdfmetrics.stringWidth(text, font, size_pt) / mm)
 
 
 def number(value: float, lang: str) -> str:
@@ -80,13 +80,19 @@ def wrap(text: str, font: str, size_pt: float, wide_mm: float) -> list[str]:
             lines.append(line)
         line = word
         while width_mm(line, font, size_pt) > wide_mm:
-            keep = next(n for n in range(len(line) - 1, 0, -1) if n == 1 or width_mm(line[:n], font, size_pt) <= wide_mm)
+            keep = next(
+                n
+                for n in range(len(line) - 1, 0, -1)
+                if n == 1 or width_mm(line[:n], font, size_pt) <= wide_mm
+            )
             lines.append(line[:keep])
             line = line[keep:]
     return [*lines, line] if line else lines
 
 
-def fitted(texts: list[str], font: str, sizes_pt: tuple[float, ...], box_mm: tuple[float, float]) -> tuple[float, list[str]]:
+def fitted(
+    texts: list[str], font: str, sizes_pt: tuple[float, ...], box_mm: tuple[float, float]
+) -> tuple[float, list[str]]:
     """The largest of some sizes at which paragraphs fit a box, and their lines; cut at the smallest."""
     wide, high = box_mm
     for size in sizes_pt:

@@ -38,7 +38,9 @@ def identify(page: Page, mm_to_px: FloatArray | None = None) -> Identity | None:
 
 def _read(grey: GreyImage) -> set[Identity]:
     """Identities in all codes seen; what is no code of ours is passed over."""
-    codes = zxingcpp.read_barcodes(np.ascontiguousarray(grey), formats=zxingcpp.BarcodeFormat.QRCode)
+    codes = zxingcpp.read_barcodes(
+        np.ascontiguousarray(grey), formats=zxingcpp.BarcodeFormats(zxingcpp.BarcodeFormat.QRCode)
+    )
     identities = (identity_of(code.text) for code in codes)
     return {identity for identity in identities if identity is not None}
 
@@ -55,4 +57,6 @@ def _close_up(grey: GreyImage, mm_to_px: FloatArray) -> GreyImage:
     )
     size = (int((w + 2 * _MARGIN_MM) * _CLOSE_UP_PX_PER_MM), int((h + 2 * _MARGIN_MM) * _CLOSE_UP_PX_PER_MM))
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    return np.asarray(cv2.warpPerspective(grey, mm_to_px @ to_sheet, size, flags=flags, borderValue=255), dtype=np.uint8)
+    return np.asarray(
+        cv2.warpPerspective(grey, mm_to_px @ to_sheet, size, flags=flags, borderValue=255), dtype=np.uint8
+    )

@@ -56,7 +56,9 @@ def refine(grey: GreyImage, guess_px: FloatArray) -> Corners:
     for _ in range(_ROUNDS):
         to_px = np.stack([_square_to(corners) for corners in px])
         offsets, found = _edges(grey, to_px)
-        lines = robust_lines(np.broadcast_to(_T, offsets.shape), offsets, found.astype(np.float64), _NOISE_FLOOR)
+        lines = robust_lines(
+            np.broadcast_to(_T, offsets.shape), offsets, found.astype(np.float64), _NOISE_FLOOR
+        )
         good = (found.mean(axis=1) >= _LEAST_SHARE).reshape(-1, 4)
         a, b = lines.a.reshape(-1, 4), lines.b.reshape(-1, 4)
         seen = good & np.roll(good, 1, axis=1)

@@ -72,19 +72,29 @@ def _look(grey: GreyImage, long_side: int) -> _Seen | None:
         return None
     numbers = [int(number) for number in np.ravel(ids)]
     once = {number for number, times in Counter(numbers).items() if times == 1}
-    known = [(template_of(number), number, found) for number, found in zip(numbers, quads, strict=True) if number in once]
+    known = [
+        (template_of(number), number, found)
+        for number, found in zip(numbers, quads, strict=True)
+        if number in once
+    ]
     votes = Counter(template.number for template, _, _ in known if template is not None)
     if not votes or votes.most_common(1)[0][1] < _LEAST_MARKERS:
         return None
     chosen = votes.most_common(1)[0][0]
-    ours = [(template, number, found) for template, number, found in known if template is not None and template.number == chosen]
+    ours = [
+        (template, number, found)
+        for template, number, found in known
+        if template is not None and template.number == chosen
+    ]
     # Pixel centres are whole numbers: a reduced pixel's centre lies between the centres it averages.
     steps = np.array([grey.shape[1] / small.shape[1], grey.shape[0] / small.shape[0]])
     guesses = np.stack([(found.reshape(4, 2) + 0.5) * steps - 0.5 for _, _, found in ours])
     corners = refine(grey, guesses)
     places = np.array([number % len(MARKER_CORNERS) for _, number, _ in ours])
     owner = np.broadcast_to(places[:, None], corners.seen.shape)
-    return _Seen(ours[0][0], MARKER_CORNERS[places][corners.seen], corners.px[corners.seen], owner[corners.seen])
+    return _Seen(
+        ours[0][0], MARKER_CORNERS[places][corners.seen], corners.px[corners.seen], owner[corners.seen]
+    )
 
 
 def _detector() -> cv2.aruco.ArucoDetector:
@@ -141,7 +151,7 @@ _GRID_MM = np.stack(
 
 
 def _local_scales(mm_to_px: FloatArray) -> FloatArray:
-    """px per mm along x and along y at points of the sheet; negative where the sheet is mirrored."""
+    """Pixels per mm along x and along y at points of the sheet; negative where the sheet is mirrored."""
     at = _apply(mm_to_px, _GRID_MM)
     right, down = (_apply(mm_to_px, _GRID_MM + step) - at for step in np.eye(2))
     side = np.sign(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
@@ -155,13 +165,16 @@ def _apply(matrix: FloatArray, points: FloatArray) -> FloatArray:
 
 def _sheet(page: Page, template: Template, fit: Projection) -> Sheet:
     middle = np.array(PAGE_MM) / 2.0
-    ends = _apply(fit.mm_to_px, np.array([middle - (50.0, 0.0), middle + (50.0, 0.0)]))
+    ends = _apply(fit.mm_to_px, middle + np.array([(-50.0, 0.0), (50.0, 0.0)]))
     right = ends[1] - ends[0]
     px_per_mm = float(np.sqrt(np.mean(np.abs(_local_scales(fit.mm_to_px)) ** 2)))
     stretch = fit.se_mm(_GRID_MM).max() / (DRAWING_MM[2] / 2.0)
     scale_se, problems = _against_resolution(page, px_per_mm)
     if template is CALIBRATION:
-        problems = (*problems, Problem("calibration_page", "this is the calibration page, not a drawing", page.source))
+        problems = (
+            *problems,
+            Problem("calibration_page", "this is the calibration page, not a drawing", page.source),
+        )
     return Sheet(
         mm_to_px=fit.mm_to_px,
         page_mm=PAGE_MM,

@@ -67,7 +67,9 @@ def fit_projection(points_mm: FloatArray, points_px: FloatArray) -> Projection:
     matrix = _matrix(params)
     scale_px = float(np.sqrt(abs(np.linalg.det(matrix[:2, :2])))) / size
     misfit = np.hypot(*(_apply(matrix, unit) - points_px).T) / scale_px
-    to_unit = np.array([[1.0 / size, 0.0, -centre[0] / size], [0.0, 1.0 / size, -centre[1] / size], [0.0, 0.0, 1.0]])
+    to_unit = np.array(
+        [[1.0 / size, 0.0, -centre[0] / size], [0.0, 1.0 / size, -centre[1] / size], [0.0, 0.0, 1.0]]
+    )
     whole = matrix @ to_unit
     rms = float(np.sqrt(np.mean(misfit**2)))
     # A misfit beyond the corners' own error (bent paper, a lens) makes the map less sure by as much.
@@ -106,7 +108,9 @@ def _jacobian(params: FloatArray, unit: FloatArray) -> FloatArray:
     for index, step in enumerate(steps):
         nudge = np.zeros(len(params))
         nudge[index] = step
-        columns.append((_apply(_matrix(params + nudge), unit) - _apply(_matrix(params - nudge), unit)) / (2 * step))
+        columns.append(
+            (_apply(_matrix(params + nudge), unit) - _apply(_matrix(params - nudge), unit)) / (2 * step)
+        )
     return np.stack(columns, axis=2)
 
 
@@ -123,7 +127,11 @@ def _fit(
 
     typical = np.where(np.arange(freedom) < 4, float(np.abs(full[:2]).max()), 1.0)
     found = least_squares(
-        misfit, full, jac=lambda p: _jacobian(p, unit).reshape(-1, freedom) / se_px, x_scale=typical, max_nfev=30
+        misfit,
+        full,
+        jac=lambda p: _jacobian(p, unit).reshape(-1, freedom) / se_px,
+        x_scale=typical,
+        max_nfev=30,
     )
     cov = np.linalg.pinv(found.jac.T @ found.jac)
     return np.asarray(found.x), np.asarray(cov), float(2.0 * found.cost)
