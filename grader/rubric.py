@@ -10,9 +10,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from reference.assignment import locate
+from reference.assignment import Assignment, locate
 from reference.authored import Authored, Identifier, Text, load
 from reference.construction import Construction
+from reference.derivation import construction_of
 from reference.errors import AuthoredFileError, CallError, Finding
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -79,6 +80,9 @@ class RubricFile(Authored):
     least_confidence: Annotated[float, Field(ge=0.0, le=1.0)] = 0.9
     """A reading less certain than this goes to a person."""
     follow_through: bool = True
+    least_followed_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
+    """No credit for what follows from an earlier answer that makes it shorter than this share of the
+    right length: such a follow-through is trivial."""
     criterion: Annotated[list[CriterionTable], Field(min_length=1)]
 
     @property
@@ -110,6 +114,21 @@ def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding
         for key, names in known.items()
         if (name := getattr(criterion, key)) is not None and name not in names
     ]
+
+
+def rubric_of(assignment: Assignment) -> RubricFile:
+    """The rubric of an assignment, held against its mechanism.
+
+    Raises AuthoredFileError with every fault, names that the mechanism does not have among them.
+    """
+    rubric = load_rubric(assignment.file.rubric, beside=assignment.path)
+    mechanism = assignment.mechanism(assignment.variants()[:1])
+    by_similarity = assignment.file.plate_images == "similarity"
+    findings = check_rubric(rubric, construction_of(mechanism, plate_by_similarity=by_similarity))
+    if findings:
+        path = locate("rubric", assignment.file.rubric, assignment.path)
+        raise AuthoredFileError(str(path), tuple(findings))
+    return rubric
 
 
 def load_rubric(name: str | Path, *, beside: Path | None = None) -> RubricFile:

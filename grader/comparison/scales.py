@@ -1,0 +1,169 @@
+"""Declared scales held against the assignment's rule, the drawn crank, v_A and a_A.
+
+A scale is right when it turns what was drawn into what is real: the crank for kL, v_A for kv, a_A
+for ka. Another scale than the assignment proposes is no mistake. Where the drawn vectors follow
+another scale than the declared one, the scale is wrong and the drawing is not.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from grader.comparison.evidence import DrawnVector, Evidence
+from grader.comparison.limits import Limit, Mark, mark
+from grader.comparison.marking import length_tolerance
+from grader.comparison.task import SCALE_NAMES, Task, unit_of
+from grader.outcomes import Reason, UsedScale
+from grader.quantities import ByRule, Refused, parse_scale
+from grader.rubric import ToleranceTable
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """One scale, settled.
+
+    Attributes
+    ----------
+    used : as declared and as used, for the report
+    other : the scale that the drawing follows instead, where it contradicts the one used
+    mark : on what was declared; None where nothing was declared or nothing can contradict it
+    reasons : remarks beside the mark's
+    """
+
+    used: UsedScale
+    other: float | None
+    mark: Mark | None
+    reasons: tuple[Reason, ...] = ()
+
+
+def settle(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> dict[str, Scale]:
+    """The three scales, in the order in which each may follow from those before."""
+    settled: dict[str, Scale] = {}
+    for name in SCALE_NAMES:
+        settled[name] = _settle_one(task, evidence, name, declared.get(name), settled)
+    return settled
+
+
+def used_scales(settled: Mapping[str, Scale]) -> dict[str, float]:
+    """The scales used for marking."""
+    return {name: scale.used.used for name, scale in settled.items()}
+
+
+def followed_scales(settled: Mapping[str, Scale]) -> dict[str, float]:
+    """The scales that the drawing follows."""
+    return {name: scale.other or scale.used.used for name, scale in settled.items()}
+
+
+def _settle_one(
+    task: Task, evidence: Evidence, name: str, text: str | None, before: Mapping[str, Scale]
+) -> Scale:
+    rule = _by_rule(task, evidence, name, before)
+    parsed = None
+    if text is not None and text.strip():
+        units = task.assignment.file.scales.bare_units
+        bare = next((unit for scale, unit in units.items() if scale == name), None)
+        parsed = parse_scale(name, text, bare_unit=bare)
+    if parsed is None:
+        used = UsedScale(None, None, rule, assumed=True)
+        return Scale(used, _contradiction(task, evidence, name, rule), None, (_assumed(name, rule),))
+    if isinstance(parsed, Refused):
+        used = UsedScale(text, None, rule, assumed=True, refused=parsed.why)
+        reason = Reason("scale_refused", {"text": text or "", "why": parsed.why})
+        open_mark = Mark("none", "none", "full", (reason,))
+        return Scale(used, _contradiction(task, evidence, name, rule), open_mark)
+    if isinstance(parsed, ByRule):
+        known = {"omega": task.omega, **followed_scales(before)}
+        value = parsed.per_mm(known)
+    else:
+        value = parsed.per_mm
+    return _hold_declared(task, evidence, name, UsedScale(text, value, value, assumed=False), rule)
+
+
+def _assumed(name: str, rule: float) -> Reason:
+    return Reason("scale_assumed", {"used": rule, "unit": unit_of(name)})
+
+
+def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Scale]) -> float:
+    """The assignment's rule; a length scale from the drawn crank where that was read."""
+    known = followed_scales(before)
+    if name == "kL" and evidence.crank_mm is not None:
+        return task.crank_m / evidence.crank_mm[0]
+    found = task.assignment.scales([task.variant], **known)
+    return float(getattr(found, name)[0])
+
+
+# What the drawing says ----------------------------------------------------------------------------
+
+
+def _witness(task: Task, evidence: Evidence, name: str) -> tuple[float, float, float] | None:
+    """What is known of a scale: real value, drawn millimetres, standard error."""
+    if name == "kL":
+        return None if evidence.crank_mm is None else (task.crank_m, *evidence.crank_mm)
+    vector = f"{name[1]}_{task.pin}"
+    drawn = evidence.vector(vector)
+    if vector not in task.real or drawn is None or drawn.length_mm <= 0.0:
+        return None
+    return abs(task.real[vector]), drawn.length_mm, drawn.se_mm
+
+
+def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> float | None:
+    """The scale that the drawing follows, where more of it fits that one than the one used."""
+    witness = _witness(task, evidence, name)
+    if witness is None or name == "kL":
+        return None
+    real, drawn_mm, _ = witness
+    other = real / drawn_mm
+    tolerance = task.rubric.tolerance
+    if abs(drawn_mm - real / used) <= length_tolerance(tolerance, real / used):
+        return None
+    return other if _fitting(task, evidence, name, other) > _fitting(task, evidence, name, used) else None
+
+
+def _fitting(task: Task, evidence: Evidence, name: str, scale: float) -> int:
+    """How many drawn vectors beside the one of the crank have the right length at a scale."""
+    vectors = [v for v in task.construction.vectors.values() if v.scale == name]
+    known = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != f"{name[1]}_{task.pin}"]
+    return sum(
+        _fits(drawn, abs(task.real[vector]) / scale, task.rubric.tolerance)
+        for vector, drawn in known
+        if drawn is not None
+    )
+
+
+def _fits(drawn: DrawnVector, expected_mm: float, tolerance: ToleranceTable) -> bool:
+    is_telling = expected_mm > tolerance.length_mm and drawn.length_mm > tolerance.length_mm
+    return is_telling and abs(drawn.length_mm - expected_mm) <= length_tolerance(tolerance, expected_mm)
+
+
+# Declared scales ----------------------------------------------------------------------------------
+
+
+def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, rule: float) -> Scale:
+    """A declared scale against what was drawn, or against the rule where nothing was."""
+    tolerance = task.rubric.tolerance
+    is_rule = abs(scale.used - rule) <= tolerance.scale_relative * rule
+    remarks = () if is_rule else (_off("scale_off", name, scale.used, rule),)
+    witness = _witness(task, evidence, name)
+    if witness is None:
+        return Scale(scale, None, mark([]) if is_rule else None, remarks)
+    real, drawn_mm, se_mm = witness
+    fits_drawn = abs(real / scale.used - drawn_mm) <= length_tolerance(tolerance, real / scale.used)
+    if fits_drawn:
+        return Scale(scale, None, mark([]), remarks)
+    other = _contradiction(task, evidence, name, scale.used)
+    if name == "kL":
+        other = real / drawn_mm
+    elif other is None and not is_rule:
+        # Nothing else tells: a drawing that follows the rule where the declaration does not.
+        follows_rule = abs(real / rule - drawn_mm) <= length_tolerance(tolerance, real / rule)
+        other = real / drawn_mm if follows_rule else None
+    if other is None:
+        return Scale(scale, None, mark([]), remarks)
+    allowed = length_tolerance(tolerance, drawn_mm)
+    off = abs(real / scale.used - drawn_mm)
+    reason = _off("scale_off", name, scale.used, other)
+    limit = Limit("scale", off, allowed, se_mm, tolerance.partial_factor, reason)
+    return Scale(scale, other, mark([limit]))
+
+
+def _off(code: str, name: str, declared: float, expected: float) -> Reason:
+    return Reason(code, {"declared": declared, "expected": expected, "unit": unit_of(name)})
