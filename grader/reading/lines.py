@@ -1,0 +1,135 @@
+"""Strokes as lines in the complex plane, y up, ready to be compared with vectors.
+
+Pieces that lie on one line with a gap between them are offered joined as well as apart: whether
+they are one vector or two in a row is for the figure to say.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grader.records import FloatArray, Ink
+from reference.geometry import ComplexArray
+
+LEAST_MM = 1.2
+"""Shorter strokes are left out: dots, serifs, sides of arrowheads."""
+SE_OFFSET_MM = 0.04
+"""No line of ink is known better: paper and pen are not ideal."""
+SE_END_MM = 0.35
+JOIN_OFF_MM = 0.45
+JOIN_GAP_MM = 14.0
+JOIN_TURN_RAD = 0.03
+
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """Strokes (and joined strokes), a row each; complex millimetres, y up.
+
+    Attributes
+    ----------
+    start, end : the two ends
+    along : unit vector from start to end
+    length : mm
+    se_offset, se_angle, se_end : standard errors across (mm), of direction (rad), of the ends (mm)
+    darkness, width : means over the stroke
+    members : (n, 2) the strokes it is made of, by their number; the same twice for a single one
+    """
+
+    start: ComplexArray
+    end: ComplexArray
+    along: ComplexArray
+    length: FloatArray
+    se_offset: FloatArray
+    se_angle: FloatArray
+    se_end: FloatArray
+    darkness: FloatArray
+    width: FloatArray
+    members: IntArray
+
+    def __len__(self) -> int:
+        return len(self.length)
+
+    @property
+    def middle(self) -> ComplexArray:
+        """Midpoints."""
+        return np.asarray((self.start + self.end) / 2.0)
+
+    def take(self, chosen: BoolArray | IntArray) -> "Lines":
+        """Some of the rows; `members` keep their numbers."""
+        return Lines(*(getattr(self, name)[chosen] for name in self.__slots__))
+
+
+def lines_of(ink: Ink) -> Lines:
+    """The strokes of a sheet as lines, with joined ones added."""
+    strokes = ink.strokes
+    ends = strokes.ends[..., 0] - 1j * strokes.ends[..., 1]
+    ends = ends.reshape(-1, 2)
+    kept = np.abs(ends[:, 1] - ends[:, 0]) >= LEAST_MM
+    number = np.flatnonzero(kept)
+    length = np.abs(ends[kept, 1] - ends[kept, 0])
+    single = Lines(
+        start=ends[kept, 0],
+        end=ends[kept, 1],
+        along=(ends[kept, 1] - ends[kept, 0]) / length,
+        length=length,
+        se_offset=np.maximum(strokes.se_offset[kept], SE_OFFSET_MM),
+        se_angle=np.maximum(strokes.se_angle[kept], SE_OFFSET_MM / length),
+        se_end=np.maximum(strokes.se_end[kept].max(axis=1, initial=0.0), SE_END_MM),
+        darkness=strokes.darkness[kept],
+        width=strokes.width[kept],
+        members=np.column_stack([number, number]),
+    )
+    return _with_joined(single)
+
+
+def _with_joined(single: Lines) -> Lines:
+    """Add, for every two strokes on one line, the stroke from the one's far end to the other's."""
+    first, second = _in_line(single)
+    if not len(first):
+        return single
+    ends = np.stack([single.start[first], single.end[first], single.start[second], single.end[second]])
+    along = single.along[first]
+    place = (ends * np.conj(along)).real
+    lowest, highest = place.argmin(axis=0), place.argmax(axis=0)
+    pick = np.arange(len(first))
+    start, end = ends[lowest, pick], ends[highest, pick]
+    length = np.abs(end - start)
+    joined = Lines(
+        start=start,
+        end=end,
+        along=(end - start) / length,
+        length=length,
+        se_offset=np.maximum(single.se_offset[first], single.se_offset[second]),
+        se_angle=SE_OFFSET_MM / length + np.maximum(single.se_offset[first], single.se_offset[second]) / length,
+        se_end=np.maximum(single.se_end[first], single.se_end[second]),
+        darkness=np.minimum(single.darkness[first], single.darkness[second]),
+        width=np.minimum(single.width[first], single.width[second]),
+        members=np.column_stack([single.members[first, 0], single.members[second, 0]]),
+    )
+    return Lines(*(np.concatenate([getattr(single, name), getattr(joined, name)]) for name in Lines.__slots__))
+
+
+def _in_line(single: Lines) -> tuple[IntArray, IntArray]:
+    """Pairs of strokes, each over 4 mm, that continue one another."""
+    long = np.flatnonzero(single.length >= 4.0)
+    start, end, along = single.start[long], single.end[long], single.along[long]
+    turn = np.abs((along[:, None] * np.conj(along[None, :])).imag)
+    near = turn < JOIN_TURN_RAD + np.minimum(JOIN_OFF_MM / single.length[long], 0.05)[None, :]
+    relative_start = (start[None, :] - start[:, None]) * np.conj(along[:, None])
+    relative_end = (end[None, :] - start[:, None]) * np.conj(along[:, None])
+    off = np.maximum(np.abs(relative_start.imag), np.abs(relative_end.imag))
+    low = np.minimum(relative_start.real, relative_end.real)
+    high = np.maximum(relative_start.real, relative_end.real)
+    gap = np.maximum(low - single.length[long][:, None], -high)
+    shorter = single.length[long][None, :] <= single.length[long][:, None]
+    # Contained pieces add nothing; the longer stroke's line decides, the shorter must lie on it.
+    beyond = np.maximum(high - single.length[long][:, None], -low)
+    pairs = near & shorter & (off < JOIN_OFF_MM) & (gap < JOIN_GAP_MM) & (beyond > 1.0)
+    np.fill_diagonal(pairs, val=False)
+    first, second = np.nonzero(pairs)
+    keep = (single.length[long][first] != single.length[long][second]) | (first < second)
+    return long[first[keep]], long[second[keep]]

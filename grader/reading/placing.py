@@ -1,0 +1,163 @@
+"""Where a figure may lie: its longest edges laid on strokes, each place then judged by all its edges."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grader.reading.expected import Expected
+from grader.reading.lines import Lines
+from grader.records import FloatArray
+from reference.geometry import ComplexArray
+
+OFF_MM = 1.6
+"""How far strokes may lie off a figure that is laid roughly."""
+OFF_PER_MM = 0.03
+"""And further, the further from where it was laid on."""
+HIGHEST_WEIGHT_MM = 40.0
+LEAST_EDGE_MM = 8.0
+OVERRUN_MM = 25.0
+PROPOSING_EDGES = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A figure's origin on the sheet (complex mm), size relative to what is expected, turn, and score 0..1."""
+
+    at: complex
+    size: float
+    turn_rad: float
+    score: float
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """Where to look.
+
+    Attributes
+    ----------
+    turns_rad : turns of the whole figure to try
+    give_rad : freedom about each
+    sizes : sizes to try; 0 stands for "as long as the stroke"
+    smallest, largest : bounds of free sizes
+    short_mm : how much shorter a stroke may be than its edge (links stop at joint circles)
+    """
+
+    turns_rad: tuple[float, ...] = (0.0,)
+    give_rad: float = float(np.radians(3.0))
+    sizes: tuple[float, ...] = (1.0,)
+    smallest: float = 0.3
+    largest: float = 3.0
+    short_mm: float = 3.0
+
+
+def places(expected: Expected, lines: Lines, search: Search, count: int = 3) -> list[Place]:
+    """The best places of a figure among the strokes, best first."""
+    proposed = _proposals(expected, lines, search)
+    if not len(proposed):
+        return []
+    scores = _scores(expected, lines, proposed)
+    return _apart(proposed, scores, float(np.abs(expected.at).max()), count)
+
+
+def _proposals(expected: Expected, lines: Lines, search: Search) -> FloatArray:
+    """(m, 4) origin x, y, size, turn."""
+    found: list[FloatArray] = []
+    for tail, head in _longest(expected):
+        span = head - tail
+        # A stroke has no sense: it may lie either way.
+        for start, end in ((lines.start, lines.end), (lines.end, lines.start)):
+            turn_all = np.angle((end - start) / span)
+            for turn in search.turns_rad:
+                off = np.abs(np.angle(np.exp(1j * (turn_all - turn))))
+                turned = np.flatnonzero(off < search.give_rad)
+                for size in search.sizes:
+                    found.extend(
+                        _laid(tail, span, start[turned], end[turned], turn_all[turned], size, search)
+                    )
+    return np.concatenate(found) if found else np.zeros((0, 4))
+
+
+def _longest(expected: Expected) -> list[tuple[complex, complex]]:
+    ends = [(complex(expected.at[edge.tail]), complex(expected.at[edge.head])) for edge in expected.edges]
+    ends = [pair for pair in ends if np.isfinite(pair[0] + pair[1]) and abs(pair[1] - pair[0]) >= LEAST_EDGE_MM]
+    return sorted(ends, key=lambda pair: -abs(pair[1] - pair[0]))[:PROPOSING_EDGES]
+
+
+def _laid(  # noqa: PLR0913 - one argument per thing that is fixed
+    tail: complex, span: complex, start: ComplexArray, end: ComplexArray, turn: FloatArray,
+    size: float, search: Search,
+) -> list[FloatArray]:
+    """Origins with the edge's tail on the stroke's start, and with its head on the stroke's end."""
+    drawn = np.abs(end - start)
+    if size > 0.0:
+        wanted = size * abs(span)
+        fits = (drawn > wanted * 0.9 - search.short_mm) & (drawn < wanted * 1.1 + OVERRUN_MM)
+        sizes = np.full(int(fits.sum()), size)
+    else:
+        sizes = drawn / abs(span)
+        fits = (sizes > search.smallest) & (sizes < search.largest)
+        sizes = sizes[fits]
+    start, end, turn = start[fits], end[fits], turn[fits]
+    spin = sizes * np.exp(1j * turn)
+    by_tail = start - spin * tail
+    by_head = end - spin * (tail + span)
+    return [np.column_stack([at.real, at.imag, sizes, turn]) for at in (by_tail, by_head)]
+
+
+def _scores(expected: Expected, lines: Lines, proposed: FloatArray) -> FloatArray:
+    """Share of the figure's edges (by length, capped) that have a stroke, for every proposal."""
+    origin = proposed[:, 0] + 1j * proposed[:, 1]
+    spin = proposed[:, 2] * np.exp(1j * proposed[:, 3])
+    total, weights = np.zeros(len(proposed)), np.zeros(len(proposed))
+    for edge in expected.edges:
+        tail, head = (origin + spin * expected.at[node] for node in (edge.tail, edge.head))
+        size = np.abs(head - tail)
+        if not np.isfinite(size).all():
+            continue
+        weight = np.minimum(size, HIGHEST_WEIGHT_MM) * (size > 2.0)  # noqa: PLR2004 - below, no direction
+        reach = OFF_MM + OFF_PER_MM * np.maximum(np.abs(tail - origin), np.abs(head - origin))
+        total += weight * best_support(lines, tail, head, reach)
+        weights += weight
+    return np.asarray(total / np.maximum(weights, 1e-9))
+
+
+def best_support(lines: Lines, tail: ComplexArray, head: ComplexArray, sigma: FloatArray) -> FloatArray:
+    """How well the best stroke lies under each segment, 0..1. Arguments: segments (m,), sigma mm (m,)."""
+    support = np.zeros(len(tail))
+    for first in range(0, len(tail), 512):
+        part = slice(first, first + 512)
+        from_start = (tail[part, None] - lines.start) * np.conj(lines.along)
+        to_end = (head[part, None] - lines.start) * np.conj(lines.along)
+        off2 = from_start.imag**2 + to_end.imag**2
+        low = np.minimum(from_start.real, to_end.real)
+        high = np.maximum(from_start.real, to_end.real)
+        shared = np.minimum(high, lines.length) - np.maximum(low, 0.0)
+        span = np.maximum(high - low, 1e-6)
+        true_span = np.abs(head[part] - tail[part])[:, None]
+        share = np.clip(shared / np.maximum(true_span, span), 0.0, 1.0)
+        fit = np.exp(-0.5 * off2 / sigma[part, None] ** 2) * share
+        support[part] = fit.max(axis=1, initial=0.0)
+    return support
+
+
+def _apart(proposed: FloatArray, scores: FloatArray, radius: float, count: int) -> list[Place]:
+    """The best proposals that are not the same place again."""
+    chosen: list[int] = []
+    origin = proposed[:, 0] + 1j * proposed[:, 1]
+    spin = proposed[:, 2] * np.exp(1j * proposed[:, 3])
+    for index in np.argsort(-scores):
+        moved = [abs(origin[index] - origin[one]) + radius * abs(spin[index] - spin[one]) for one in chosen]
+        if all(distance > 4.0 for distance in moved):  # noqa: PLR2004 - mm, less is the same place
+            chosen.append(int(index))
+        if len(chosen) == count:
+            break
+    return [
+        Place(complex(origin[one]), float(proposed[one, 2]), float(proposed[one, 3]), float(scores[one]))
+        for one in chosen
+    ]
+
+
+def best_of(found: Sequence[Place]) -> Place | None:
+    """The highest score."""
+    return max(found, key=lambda place: place.score, default=None)

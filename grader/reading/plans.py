@@ -1,0 +1,204 @@
+"""A velocity or acceleration plan: the hypotheses of how it was drawn, held against the strokes."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grader.reading.expected import Edge, Expected, Hand, Slack, expect, vectors_of
+from grader.reading.fitting import Fit, fit_nodes
+from grader.reading.lines import Lines
+from grader.reading.matching import BEAM, Ends, Explanation, explain
+from grader.reading.placing import Place, Search, places
+from reference.construction import Construction, Given, Normal
+from reference.geometry import ComplexArray
+from reference.mistakes import Drawing, Mistake, commit, single_mistakes
+
+HAND = Hand()
+PLAN_ENDS = Ends()
+QUARTERS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
+COST_OF_TURN = 6.0
+COST_OF_SIZE = 4.0
+COST_OF_MISTAKE = 8.0
+SAME_SIZE = 0.06
+POOR = 0.7
+"""A plan supported over less of its length may be another one, drawn with a mistake."""
+BEAM_OF_MISTAKES = 4
+SMALLEST_MM, LARGEST_MM = 20.0, 280.0
+"""Of a plan's longest vector: what fits on a sheet and can be measured."""
+LEAST_LAID_MM = 4.0
+OF_THE_WHOLE = {"figure_rotated", "scale_wrong", "rpm_not_converted", "vector_missing"}
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """One way in which the plan may have been drawn.
+
+    Attributes
+    ----------
+    label : for people
+    drawing : the construction as this student would follow it
+    absent : nodes that are not drawn then, with the reason
+    cost : nats, how unlikely before looking
+    """
+
+    label: str
+    drawing: Drawing
+    absent: Mapping[str, str]
+    cost: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A plan as read under its best hypothesis.
+
+    Attributes
+    ----------
+    hypothesis, place : how it was drawn and where
+    found, fit : strokes by vector, and nodes
+    score : log likelihood ratio less costs
+    rivals : other explanations, best first
+    lines : the strokes that `found` counts in
+    """
+
+    hypothesis: Hypothesis
+    place: Place
+    found: Explanation
+    fit: Fit
+    score: float
+    lines: Lines
+    rivals: tuple["Plan", ...] = ()
+
+    @property
+    def refined(self) -> Place:
+        """Where the plan lies by its strokes: pole as fitted; size and turn of all nodes together."""
+        return replace(self.place, at=complex(self.fit.at[0]))
+
+
+def regular(drawing: Drawing, figure: str) -> list[Hypothesis]:
+    """As it should be: by perpendiculars throughout, and with plates by similarity."""
+    by_similarity = similar(drawing.construction, figure)
+    told = [Hypothesis("as constructed", drawing, {}, 0.0)]
+    if by_similarity is not None:
+        changed, absent = by_similarity
+        told.append(Hypothesis("plates by similarity", Drawing(changed, drawing.parameters), absent, 0.7))
+    return told
+
+
+def mistaken(drawing: Drawing, figure: str) -> Iterator[Hypothesis]:
+    """Every single mistake in either form; the search for its place turns and scales it anyway."""
+    for base in regular(drawing, figure):
+        for mistake in single_mistakes(base.drawing, figure):
+            if mistake.code in OF_THE_WHOLE:
+                continue
+            gone = dict(base.absent)
+            if mistake.code == "normal_missing":
+                gone[mistake.at] = "not drawn: normal component left out"
+            if mistake.at in base.absent:
+                continue
+            try:
+                changed = commit(mistake, base.drawing)
+            except ValueError:
+                continue
+            yield Hypothesis(_told(mistake), changed, gone, base.cost + COST_OF_MISTAKE)
+
+
+def _told(mistake: Mistake) -> str:
+    return " ".join([mistake.code, mistake.at, *mistake.other])
+
+
+def similar(construction: Construction, figure: str) -> tuple[Construction, dict[str, str]] | None:
+    """The construction with every plate's image by similarity, and the nodes that vanish."""
+    steps = {step.node: step for step in construction.figures[figure]}
+    changed, absent = construction, {}
+    for node, image in construction.images.items():
+        if node not in steps or steps[node] == image:
+            continue
+        changed = changed.with_step(image)
+        for vector in construction.vectors_of(figure):
+            tail = steps.get(vector.tail)
+            if vector.head == node and isinstance(tail, Given) and isinstance(tail.length, Normal):
+                absent[vector.tail] = f"not drawn: {node} found by similarity"
+    return None if changed is construction else (changed, absent)
+
+
+def find_plan(
+    lines: Lines, drawing: Drawing, figure: str, given: Mapping[str, ComplexArray], *, thorough: bool = True
+) -> Plan | None:
+    """The plan of one figure among the strokes of a sheet.
+
+    Arguments
+    ---------
+    drawing : construction and parameters of the student's variant
+    given : nodes already read (mechanism, velocity plan), complex mm, y up
+    thorough : try mistakes as well
+    """
+    plans: list[Plan] = []
+    for hypothesis in regular(drawing, figure):
+        expected = _expected(hypothesis, figure, given)
+        if expected is not None:
+            plans.extend(_read(hypothesis, expected, place, lines) for place in _laid(expected, lines))
+    if not plans:
+        return None
+    plans.sort(key=lambda plan: -plan.score)
+    if thorough:
+        plans.extend(_with_mistakes(plans[:2], drawing, figure, lines, given))
+    plans.sort(key=lambda plan: -plan.score)
+    return replace(plans[0], rivals=tuple(plans[1:16]))
+
+
+def _with_mistakes(
+    bases: list[Plan], drawing: Drawing, figure: str, lines: Lines, given: Mapping[str, ComplexArray]
+) -> Iterator[Plan]:
+    """The same plan with a mistake made, where its regular form was found; elsewhere if that is poor."""
+    poor = bases[0].place.score < POOR
+    for hypothesis in mistaken(drawing, figure):
+        expected = _expected(hypothesis, figure, given)
+        if expected is None:
+            continue
+        for place in _laid(expected, lines, count=1) if poor else [bases[0].refined]:
+            yield _read(hypothesis, expected, place, lines, beam=BEAM_OF_MISTAKES)
+
+
+def _expected(
+    hypothesis: Hypothesis, figure: str, given: Mapping[str, ComplexArray]
+) -> Expected | None:
+    edges = vectors_of(hypothesis.drawing.construction, figure, hypothesis.absent)
+    expected = expect(hypothesis.drawing, figure, given, HAND, edges)
+    return expected if np.isfinite(expected.at).all() else None
+
+
+def _laid(expected: Expected, lines: Lines, count: int = 3) -> list[Place]:
+    largest = max(abs(expected.at[edge.head] - expected.at[edge.tail]) for edge in expected.edges)
+    if largest < 1e-6:  # noqa: PLR2004 - nothing to lay
+        return []
+    bounds = {"smallest": SMALLEST_MM / largest, "largest": LARGEST_MM / largest}
+    search = Search(turns_rad=QUARTERS, sizes=(1.0, 0.0), **bounds)
+    long = lines.take(lines.length > LEAST_LAID_MM)
+    return places(expected, long, search, count=count)
+
+
+def _read(
+    hypothesis: Hypothesis, expected: Expected, place: Place, lines: Lines, beam: int = BEAM
+) -> Plan:
+    known = abs(np.log(place.size)) < SAME_SIZE
+    slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03 if known else 0.08)
+    placed = expected.placed(place.at, place.size, place.turn_rad, slack)
+    around = lines.take(_near(lines, placed))
+    found = explain(placed, around, PLAN_ENDS, beam)[0]
+    cost = hypothesis.cost + (0.0 if known else COST_OF_SIZE)
+    cost += 0.0 if abs(place.turn_rad) < np.pi / 4 else COST_OF_TURN
+    return Plan(hypothesis, place, found, fit_nodes(found, around), found.score - cost, around)
+
+
+def _near(lines: Lines, placed: Expected) -> np.ndarray:
+    margin = 12.0
+    low = complex(placed.at.real.min() - margin, placed.at.imag.min() - margin)
+    high = complex(placed.at.real.max() + margin, placed.at.imag.max() + margin)
+    middle = lines.middle
+    return np.asarray(
+        (middle.real > low.real) & (middle.imag > low.imag) & (middle.real < high.real) & (middle.imag < high.imag)
+    )
+
+
+__all__ = ["Edge", "Hypothesis", "Plan", "find_plan"]

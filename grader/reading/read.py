@@ -1,0 +1,177 @@
+"""From strokes to named figures, sheet by sheet; a student's sheets are read together."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from grader.reading.figures import figure_of_plan, figure_of_sketch
+from grader.reading.lines import Lines, lines_of
+from grader.reading.plans import Plan, find_plan
+from grader.reading.sketch import Sketch, drawings, find_sketch
+from grader.records import (
+    ACCELERATION_PLAN,
+    MECHANISM,
+    VELOCITY_PLAN,
+    Figure,
+    Ink,
+    Reading,
+    Sheet,
+    Unread,
+)
+from reference.assignment import Assignment, Scales, Variant
+from reference.geometry import ComplexArray
+from reference.mistakes import Drawing
+
+LEAST_SKETCH = 15.0
+LEAST_PLAN = 12.0
+"""Nats: what less is explained by may be chance."""
+
+Given = dict[str, ComplexArray]
+
+
+@dataclass(slots=True)
+class _Page:
+    """What is found on one sheet so far."""
+
+    lines: Lines
+    sheet: Sheet
+    sketch: Sketch | None = None
+    plans: dict[str, Plan] = field(default_factory=dict)
+
+
+def read_figures(  # noqa: PLR0913 - what is known of the drawing
+    inks: Sequence[Ink],
+    sheets: Sequence[Sheet],
+    assignment: Assignment,
+    variant: Variant | None,
+    scales: Scales | None,
+    wanted: Collection[str],
+) -> list[Reading]:
+    """Name what was drawn on a student's sheets.
+
+    Arguments
+    ---------
+    inks, sheets : one each per sheet, in order
+    variant : the student's own, None where not known; the drawing may follow another one
+    scales : as declared, None where not; the drawing may follow others
+    wanted : names of vectors (and nodes) asked for: each is in a figure or in `unread` of one reading
+
+    Returns one Reading per sheet.
+    """
+    pages = [_Page(lines_of(ink), sheet) for ink, sheet in zip(inks, sheets, strict=True)]
+    own, others = _drawings(assignment, variant, scales)
+    for page in pages:
+        sketch = find_sketch(page.lines, own, others)
+        if sketch is not None and sketch.found.score >= LEAST_SKETCH:
+            page.sketch = sketch
+    drawing = own[0]
+    velocity = _find(pages, drawing, VELOCITY_PLAN, {})
+    known = {} if velocity is None else _nodes(velocity)
+    paced = drawing if velocity is None else _paced(drawing, velocity)
+    if _asks_accelerations(wanted, drawing):
+        _find(pages, paced, ACCELERATION_PLAN, known)
+    return _readings(pages, drawing, wanted)
+
+
+def _drawings(
+    assignment: Assignment, variant: Variant | None, scales: Scales | None
+) -> tuple[list[Drawing], list[Drawing]]:
+    """The student's own drawing (any variant's, when it is not known), and other students'."""
+    everybody = assignment.variants()
+    if variant is None:
+        return drawings(assignment, everybody, scales), []
+    others = [one for one in everybody if one != variant]
+    return drawings(assignment, [variant], scales), drawings(assignment, others, None)
+
+
+def _asks_accelerations(wanted: Collection[str], drawing: Drawing) -> bool:
+    vectors = drawing.construction.vectors
+    return not wanted or any(name in vectors and vectors[name].scale == "ka" for name in wanted)
+
+
+def _given(page: _Page, pages: Sequence[_Page]) -> Given:
+    """The joints as drawn: on the same sheet, else on the student's other one; none to take the exact."""
+    for one in (page, *pages):
+        if one.sketch is not None:
+            names = one.sketch.found.expected.names
+            return {name: np.asarray(at) for name, at in zip(names, one.sketch.fit.at, strict=True)}
+    return {}
+
+
+def _turned(page: _Page, pages: Sequence[_Page], drawing: Drawing) -> Drawing:
+    """The drawing with guides turned as the sketch is."""
+    turn = next((one.sketch.turn_rad for one in (page, *pages) if one.sketch is not None), 0.0)
+    return Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(turn)})
+
+
+def _find(pages: Sequence[_Page], drawing: Drawing, figure: str, known: Mapping[str, ComplexArray]) -> Plan | None:
+    """The plan on the sheet that explains it best, kept there."""
+    best: tuple[Plan, _Page] | None = None
+    for page in pages:
+        given = {**_given(page, pages), **known}
+        plan = find_plan(page.lines, _turned(page, pages, drawing), figure, given, thorough=False)
+        if plan is not None and (best is None or plan.score > best[0].score):
+            best = plan, page
+    if best is None:
+        return None
+    page = best[1]
+    given = {**_given(page, pages), **known}
+    plan = find_plan(page.lines, _turned(page, pages, drawing), figure, given)
+    if plan is None or plan.score < LEAST_PLAN:
+        return None
+    page.plans[figure] = plan
+    return plan
+
+
+def _nodes(plan: Plan) -> Given:
+    return {name: np.asarray(at) for name, at in zip(plan.found.expected.names, plan.fit.at, strict=True)}
+
+
+def _paced(drawing: Drawing, velocity: Plan) -> Drawing:
+    """The drawing at the velocity scale that the drawn plan follows, whatever was declared."""
+    at = dict(zip(velocity.found.expected.names, velocity.fit.at, strict=True))
+    vectors = [v for v in drawing.construction.vectors_of(VELOCITY_PLAN) if v.name in drawing.parameters]
+    for vector in vectors:
+        real = float(np.ravel(drawing.parameters[vector.name])[0])
+        drawn = abs(at[vector.head] - at[vector.tail])
+        if drawn > 1.0 and real:
+            return Drawing(drawing.construction, {**drawing.parameters, "kv": np.array([abs(real) / drawn])})
+    return drawing
+
+
+def _readings(pages: Sequence[_Page], drawing: Drawing, wanted: Collection[str]) -> list[Reading]:
+    """One Reading per sheet; what is nowhere is unread on the sheet where its figure is, else on the last."""
+    readings = []
+    named: set[str] = set()
+    for page in pages:
+        figures: dict[str, Figure] = {}
+        unread: list[Unread] = []
+        if page.sketch is not None:
+            figures[MECHANISM] = figure_of_sketch(page.sketch)
+        for figure, plan in page.plans.items():
+            figures[figure], missing = figure_of_plan(plan, figure)
+            unread.extend(one for one in missing if not wanted or one.name in wanted)
+        named.update(name for one in figures.values() for name in (*one.nodes, *one.vectors))
+        named.update(one.name for one in unread)
+        readings.append(Reading(figures, tuple(unread)))
+    nowhere = _nowhere(drawing, wanted, named)
+    if nowhere and readings:
+        last = readings[-1]
+        readings[-1] = Reading(last.figures, (*last.unread, *nowhere), last.problems)
+    return readings
+
+
+def _nowhere(drawing: Drawing, wanted: Collection[str], named: set[str]) -> list[Unread]:
+    told = {VELOCITY_PLAN: "velocity plan", ACCELERATION_PLAN: "acceleration plan"}
+    missing = []
+    for name in wanted:
+        if name in named:
+            continue
+        vector = drawing.construction.vectors.get(name)
+        if vector is None:
+            missing.append(Unread(name, "it is no vector or node of this assignment"))
+            continue
+        figure = VELOCITY_PLAN if vector.scale == "kv" else ACCELERATION_PLAN
+        missing.append(Unread(name, f"no {told[figure]} was found on the sheets"))
+    return missing
