@@ -190,18 +190,15 @@ def _code_claim(identity: Identity, roster: Roster) -> _Claim:
         for row in roster.rows_of(identity.student_id)
         if identity.position is None or row.position in (None, identity.position)
     )
-    details = [
-        f"{name} {value}"
-        for name, value in (("n", identity.n), ("position", identity.position))
-        if value is not None
-    ]
+    numbers = (("n", identity.n), ("position", identity.position))
+    details = [f"{name} {value}" for name, value in numbers if value is not None]
     return _Claim(How.CODE, rows, "the QR code: " + ", ".join([identity.student_id, *details]))
 
 
 def _order_claims(
     pages: Sequence[PageSource], roster: Roster, certain: Sequence[Sequence[_Claim]], each: int | None
 ) -> tuple[dict[int, _Claim], dict[str, str]]:
-    """What the roster's order says of the one class file's pages, by index; else why it says nothing, by file."""
+    """What the roster's order says of the one class file's pages, by index; or why not, by file."""
     if each is None:
         return {}, {}
     named = {

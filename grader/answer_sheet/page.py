@@ -28,6 +28,9 @@ UNITS = (N_("rev/min"), N_("cm"), N_("°"))
 
 _STUDENT_MM: Box = (39.0, 12.5, 103.0, 36.0)
 _TASK_MM: Box = (159.0, 12.5, 113.0, 36.0)
+_ADVICE = N_(
+    "Draw inside the zones. Keep letters 2 mm clear of lines; leave the black squares and the code free."
+)
 _ADVICE_MM: Box = (289.0, 42.0, 118.0, 7.0)
 _TICK_MM = 5.0
 _RULER_MM = (24.0, 291.0, 100.0)
@@ -49,24 +52,31 @@ class PageText:
     sheets: int
 
 
+@dataclass(frozen=True, slots=True)
+class PageForm:
+    """What is alike on a page for every student: its template, and the boxes to write in by name."""
+
+    template: Template
+    fields: dict[str, Box]
+
+
 def draw_page(
     drawing: Drawing,
     assignment: Assignment,
     text: PageText,
-    template: Template,
-    fields: dict[str, Box],
+    form: PageForm,
     tongue: Tongue,
 ) -> None:
     """Draw a page and end it."""
     drawing.frame()
-    drawing.markers(template)
+    drawing.markers(form.template)
     _code(drawing, text.identity)
     _student(drawing, assignment, text, tongue)
     _task(drawing, assignment, text.identity, tongue)
     _advice(drawing, tongue)
-    for figure, zone in template.zones.items():
+    for figure, zone in form.template.zones.items():
         _zone(drawing, zone, tongue.gettext(FIGURES[figure]))
-    _fields(drawing, assignment, fields, tongue)
+    _fields(drawing, assignment, form.fields, tongue)
     draw_ruler(drawing, tongue)
     drawing.next_page()
 
@@ -158,11 +168,7 @@ def _flow(data: list[tuple[Piece, ...]], size_pt: float, wide_mm: float) -> list
 
 def _advice(drawing: Drawing, tongue: Tongue) -> None:
     x, y, wide, high = _ADVICE_MM
-    advice = tongue.gettext(
-        N_(
-            "Draw inside the zones. Keep letters 2 mm clear of lines; leave the black squares and the code free."
-        )
-    )
+    advice = tongue.gettext(_ADVICE)
     size, lines = fitted([advice], REGULAR, (7.0, 6.5, 6.0, 5.5), (wide, high))
     for row, line in enumerate(lines):
         drawing.text((x, y + (row + 1) * 1.2 * size * _PT), line, size)
@@ -182,11 +188,8 @@ def _fields(drawing: Drawing, assignment: Assignment, fields: dict[str, Box], to
     names = assignment.file.names
     for name, (x, y, w, h) in fields.items():
         drawing.box((x, y, w, h), 0.25)
-        label = (
-            pieces_of(names.get(name, name))
-            if name not in SCALE_BOXES
-            else _scale_label(names.get(name, name))
-        )
+        shown = names.get(name, name)
+        label = _scale_label(shown) if name in SCALE_BOXES else pieces_of(shown)
         size = 10.0 if name in SCALE_BOXES else 8.0
         wide = pieces_width_mm(label, REGULAR, size)
         drawing.pieces((x - wide - 0.8, y + 0.68 * h), label, size)

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from grader.answer_sheet.drawing import Drawing
-from grader.answer_sheet.fit import best_template, construction_for
-from grader.answer_sheet.page import PageText, draw_page
+from grader.answer_sheet.fit import Fit, best_template, construction_for
+from grader.answer_sheet.page import PageForm, PageText, draw_page
 from grader.i18n import tongue
-from grader.layout import MAX_FIELDS, SCALE_BOXES, Layout, PageLayout, Template, field_boxes, marker_places
+from grader.layout import MAX_FIELDS, SCALE_BOXES, Layout, PageLayout, field_boxes, marker_places
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, Identity, Problem
 from grader.roster import RosterRow
 from reference.assignment import Assignment, Variant
@@ -38,8 +38,7 @@ class _PagePlan:
     """One page of the assignment: its template and boxes, the same for every student."""
 
     table: PageTable
-    template: Template
-    fields: dict[str, Box]
+    form: PageForm
 
 
 def make_sheets(
@@ -61,7 +60,7 @@ def make_sheets(
         for number, plan in enumerate(plans, start=1):
             identity = Identity(assignment.id, row.student_id, variant.n, variant.position, plan.table.kind)
             text = PageText(identity, row.name, number, len(plans))
-            draw_page(drawing, assignment, text, plan.template, plan.fields, tongue(row.lang or lang))
+            draw_page(drawing, assignment, text, plan.form, tongue(row.lang or lang))
     return Sheets(drawing.finish(), Layout(pages=[_layout(plan) for plan in plans]), problems)
 
 
@@ -93,9 +92,9 @@ def _plans(assignment: Assignment) -> tuple[list[_PagePlan], tuple[Problem, ...]
         if len(names) > MAX_FIELDS:
             told = f"page {table.kind}: {len(names)} lengths are too many for boxes; none are printed"
             problems.append(Problem("sheet_boxes", told, str(assignment.path)))
-        problems.extend(_too_small(assignment, table, fit.template, fit.room, fit.need_mm))
+        problems.extend(_too_small(assignment, table, fit))
         scales = {_SCALE_OF[figure]: SCALE_BOXES[_SCALE_OF[figure]] for figure in figures}
-        plans.append(_PagePlan(table, fit.template, scales | field_boxes(names)))
+        plans.append(_PagePlan(table, PageForm(fit.template, scales | field_boxes(names))))
     return plans, tuple(problems)
 
 
@@ -105,29 +104,21 @@ def _written(assignment: Assignment, figures: Sequence[str]) -> tuple[str, ...]:
     return tuple(vector.name for figure in figures for vector in construction.vectors_of(figure))
 
 
-def _too_small(
-    assignment: Assignment,
-    table: PageTable,
-    template: Template,
-    room: dict[str, float],
-    need_mm: dict[str, tuple[float, float]],
-) -> list[Problem]:
+def _too_small(assignment: Assignment, table: PageTable, fit: Fit) -> list[Problem]:
     problems: list[Problem] = []
-    for figure, share in room.items():
+    for figure, share in fit.room.items():
         if share >= 1.0:
             continue
-        wide, high = need_mm[figure]
-        _, _, zone_wide, zone_high = template.zones[figure]
+        wide, high = fit.need_mm[figure]
+        _, _, zone_wide, zone_high = fit.template.zones[figure]
         told = (
             f"page {table.kind}: {figure} needs up to {wide:.0f} x {high:.0f} mm at the assignment's scales,"
-            f" its zone has {zone_wide:.0f} x {zone_high:.0f} mm; draw it {100 * share:.0f} % as large or less"
+            f" its zone has {zone_wide:.0f} x {zone_high:.0f} mm; it fits at {100 * share:.0f} % of that size"
         )
         problems.append(Problem("sheet_zone_small", told, str(assignment.path)))
     return problems
 
 
 def _layout(plan: _PagePlan) -> PageLayout:
-    zones: dict[str, Box | dict[str, Box]] = dict(plan.template.zones)
-    return PageLayout(
-        kind=plan.table.kind, markers=marker_places(plan.template), zones=zones | {"fields": plan.fields}
-    )
+    zones: dict[str, Box | dict[str, Box]] = {**plan.form.template.zones, "fields": plan.form.fields}
+    return PageLayout(kind=plan.table.kind, markers=marker_places(plan.form.template), zones=zones)

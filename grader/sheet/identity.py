@@ -26,7 +26,8 @@ def identify(page: Page, mm_to_px: FloatArray | None = None) -> Identity | None:
         found = _read(_close_up(page.grey, mm_to_px))
         if found:
             return found.pop() if len(found) == 1 else None
-    for long_side in _LONG_SIDES_PX:
+    # On a page that is not known to be a printed sheet a closer look would cost more than it finds.
+    for long_side in _LONG_SIDES_PX if mm_to_px is not None else _LONG_SIDES_PX[:1]:
         scale = long_side / max(page.grey.shape)
         found = _read(shrink(page.grey, scale) if scale < 1.0 else page.grey)
         if found:

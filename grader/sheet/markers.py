@@ -13,7 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader import aruco
-from grader.layout import CALIBRATION, DRAWING_MM, MARKER_CORNERS, PAGE_MM, Template, template_of
+from grader.layout import (
+    CALIBRATION,
+    DRAWING_MM,
+    MARKER_CORNERS,
+    MARKERS_PER_TEMPLATE,
+    PAGE_MM,
+    Template,
+    template_of,
+)
 from grader.pixels import BoolArray, shrink
 from grader.records import FloatArray, GreyImage, Page, Problem, Sheet
 from grader.sheet.identity import identify
@@ -53,47 +61,45 @@ class _Seen:
 def register(page: Page) -> Sheet | None:
     """The sheet of a printed page; None where its markers are too few, or not ours."""
     for long_side in (_DETECTION_PX, _CLOSER_PX):
-        seen = _look(page.grey, long_side)
-        if seen is not None:
-            fit = _agreed(seen)
-            if fit is not None:
-                return _sheet(page, seen.template, fit)
+        quads = _quads(page.grey, long_side)
+        if not quads:
+            return None
+        seen = _seen(page.grey, quads)
+        fit = None if seen is None else _agreed(seen)
+        if seen is not None and fit is not None:
+            return _sheet(page, seen.template, fit)
         if long_side >= max(page.grey.shape):
             break
     return None
 
 
-def _look(grey: GreyImage, long_side: int) -> _Seen | None:
-    """The markers of the template that most of them belong to."""
-    scale = min(1.0, long_side / max(grey.shape))
-    small = shrink(grey, scale) if scale < 1.0 else grey
-    quads, ids, _ = _detector().detectMarkers(small)
-    if ids is None:
-        return None
-    numbers = [int(number) for number in np.ravel(ids)]
-    once = {number for number, times in Counter(numbers).items() if times == 1}
-    known = [
-        (template_of(number), number, found)
-        for number, found in zip(numbers, quads, strict=True)
-        if number in once
-    ]
-    votes = Counter(template.number for template, _, _ in known if template is not None)
-    if not votes or votes.most_common(1)[0][1] < _LEAST_MARKERS:
-        return None
-    chosen = votes.most_common(1)[0][0]
-    ours = [
-        (template, number, found)
-        for template, number, found in known
-        if template is not None and template.number == chosen
-    ]
+def _quads(grey: GreyImage, long_side: int) -> dict[int, FloatArray]:
+    """Rough corners (4, 2) in full pixels of the markers whose ids are in use and seen once."""
+    small = shrink(grey, min(1.0, long_side / max(grey.shape)))
+    corners, ids, _ = _detector().detectMarkers(small)
+    numbers = [] if ids is None else [int(number) for number in np.ravel(ids)]
     # Pixel centres are whole numbers: a reduced pixel's centre lies between the centres it averages.
     steps = np.array([grey.shape[1] / small.shape[1], grey.shape[0] / small.shape[0]])
-    guesses = np.stack([(found.reshape(4, 2) + 0.5) * steps - 0.5 for _, _, found in ours])
-    corners = refine(grey, guesses)
-    places = np.array([number % len(MARKER_CORNERS) for _, number, _ in ours])
+    return {
+        number: (quad.reshape(4, 2) + 0.5) * steps - 0.5
+        for number, quad in zip(numbers, corners, strict=True)
+        if numbers.count(number) == 1 and template_of(number) is not None
+    }
+
+
+def _seen(grey: GreyImage, quads: dict[int, FloatArray]) -> _Seen | None:
+    """The refined markers of the template that most of them belong to."""
+    votes = Counter(number // MARKERS_PER_TEMPLATE for number in quads)
+    chosen, count = votes.most_common(1)[0]
+    template = template_of(chosen * MARKERS_PER_TEMPLATE)
+    if template is None or count < _LEAST_MARKERS:
+        return None
+    ours = [number for number in sorted(quads) if number in template.marker_ids]
+    corners = refine(grey, np.stack([quads[number] for number in ours]))
+    places = np.array(ours) - template.marker_ids.start
     owner = np.broadcast_to(places[:, None], corners.seen.shape)
     return _Seen(
-        ours[0][0], MARKER_CORNERS[places][corners.seen], corners.px[corners.seen], owner[corners.seen]
+        template, MARKER_CORNERS[places][corners.seen], corners.px[corners.seen], owner[corners.seen]
     )
 
 
