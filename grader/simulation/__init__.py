@@ -1,0 +1,46 @@
+"""Simulated students, pens and scanners, with the truth of what was drawn.
+
+``simulate(assignment, variant, seed, settings)`` gives a student's sheets as images with their
+truth; ``any_settings(seed)`` draws a student of a mixed class by lot. The same seed gives the same
+drawing whatever the scanner: hand, page, pen and scanner have random streams of their own.
+"""
+
+from grader.simulation.settings import (
+    CAREFUL,
+    CLEAN_SCAN,
+    PERFECT,
+    SLOPPY,
+    TYPICAL,
+    Hand,
+    PageStyle,
+    PenStyle,
+    Scan,
+    Settings,
+    Student,
+    any_settings,
+)
+from grader.simulation.student import PrintedSheet, SimulatedSheet, measured_by, simulate
+from grader.simulation.storing import blank_back, encoded, write_pdf, write_truth
+
+__all__ = [
+    "CAREFUL",
+    "CLEAN_SCAN",
+    "PERFECT",
+    "SLOPPY",
+    "TYPICAL",
+    "Hand",
+    "PageStyle",
+    "PenStyle",
+    "PrintedSheet",
+    "Scan",
+    "Settings",
+    "SimulatedSheet",
+    "Student",
+    "any_settings",
+    "blank_back",
+    "encoded",
+    "measured_by",
+    "simulate",
+    "write_pdf",
+    "write_truth",
+]

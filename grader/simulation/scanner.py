@@ -1,0 +1,251 @@
+"""A drawn sheet as a scanner, a copier or a phone sees it: light, paper, ink, noise.
+
+Ink is rendered on the final pixel grid (`raster`), so that nothing is resampled afterwards; what is
+blurred is blurred symmetrically. Faults of the paper (grain, dust, folds, smudges) are made at a
+lower resolution where their sharpness does not matter.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from grader.records import FloatArray, GreyImage
+from grader.simulation.raster import render
+from grader.simulation.settings import Colour, PenStyle, Scan
+from grader.simulation.sketch import MAIN_LAYER, PLAN_LAYER, PRINT_LAYER
+from grader.simulation.strokes import Rng, Stroke
+from grader.simulation.view import View
+
+Float32Array = NDArray[np.float32]
+_TONER: Colour = (22, 22, 24)
+_COARSE = 8
+"""Pixels per sample of the soft faults (light, smudges, folds)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Background:
+    """A printed sheet: (h, w) uint8 at `px_per_mm`, covering the whole page from its top left corner."""
+
+    grey: GreyImage
+    px_per_mm: float
+
+
+def digitise(
+    strokes: Sequence[Stroke], pens: PenStyle, scan: Scan, view: View, rng: Rng, background: Background | None
+) -> NDArray[np.uint8]:
+    """The stored image: (h, w) grey, (h, w, 3) RGB, or for one bit (h, w) of 0 and 255."""
+    light = _light(scan, view, rng, pens.smudges)
+    mask = _paper_mask(view, scan)
+    inks = _inks(strokes, pens, view, rng)
+    printed = None if background is None else _printed(background, view)
+    ghost = _show_through(strokes, view, scan)
+    channels = range(3) if scan.mode == "colour" else (None,)
+    planes = []
+    for channel in channels:
+        plane = np.full(view.size, _of(scan.paper, channel), np.float32)
+        if printed is not None:
+            plane *= printed
+        if ghost is not None:
+            plane *= ghost
+        for cover, colour in inks:
+            plane *= 1.0 - cover * np.float32(1.0 - _of(colour, channel) / 255.0)
+        bed = np.float32(_of(scan.bed, channel))
+        plane = bed + (plane - bed) * mask if mask is not None else plane
+        plane *= light
+        planes.append(_sensed(plane, scan, rng))
+    image = planes[0] if len(planes) == 1 else np.dstack(planes)
+    return _one_bit(image, scan, rng) if scan.mode == "bilevel" else image
+
+
+def _of(colour: Colour, channel: int | None) -> float:
+    """One channel of a colour, or its luminance."""
+    if channel is None:
+        return 0.299 * colour[0] + 0.587 * colour[1] + 0.114 * colour[2]
+    return float(colour[channel])
+
+
+# Ink ----------------------------------------------------------------------------------------------
+
+
+def _inks(
+    strokes: Sequence[Stroke], pens: PenStyle, view: View, rng: Rng
+) -> list[tuple[Float32Array, Colour]]:
+    """Coverage 0..1 and colour of each layer that is on the sheet."""
+    colours: Mapping[str, Colour] = {
+        MAIN_LAYER: pens.colour, PLAN_LAYER: pens.plan_colour or pens.colour, PRINT_LAYER: _TONER
+    }
+    inks = []
+    for layer, colour in colours.items():
+        own = [stroke for stroke in strokes if stroke.layer == layer]
+        if own:
+            cover = render(own, view.to_px, view.size).astype(np.float32) / np.float32(255.0)
+            if layer != PRINT_LAYER and pens.grain > 0:
+                _grain(cover, pens.grain, view.px_per_mm, rng)
+            inks.append((cover, colour))
+    return inks
+
+
+def _grain(cover: Float32Array, amount: float, px_per_mm: float, rng: Rng) -> None:
+    """Graphite catches on the paper's tooth: speckle of about a tenth of a millimetre, in place."""
+    side = 512
+    tile = rng.standard_normal((side, side)).astype(np.float32)
+    sigma = max(0.4, 0.06 * px_per_mm)
+    tile = cv2.GaussianBlur(tile, (0, 0), sigma)
+    tile *= np.float32(amount) / tile.std()
+    where = np.flatnonzero(cover)
+    rows, columns = np.divmod(where, cover.shape[1])
+    flat = cover.reshape(-1)
+    speckle = 1.0 + tile[rows % side, columns % side]
+    flat[where] = np.clip(flat[where] * speckle, 0.0, 1.0)
+
+
+def _printed(background: Background, view: View) -> Float32Array:
+    """The printed sheet's brightness 0..1 on the view's grid."""
+    scale = min(1.0, view.px_per_mm / background.px_per_mm)
+    page = background.grey
+    if scale < 1.0:
+        size = (round(page.shape[1] * scale), round(page.shape[0] * scale))
+        page = np.asarray(cv2.resize(page, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    pitch = np.array([page.shape[1] / background.grey.shape[1], page.shape[0] / background.grey.shape[0]])
+    pitch = pitch * background.px_per_mm
+    height, width = view.size
+    result = np.empty(view.size, np.float32)
+    for top in range(0, height, 256):
+        rows = np.arange(top, min(top + 256, height))
+        x, y = np.meshgrid(np.arange(width, dtype=float), rows.astype(float))
+        source = view.to_mm(np.column_stack([x.ravel(), y.ravel()])) * pitch - 0.5
+        maps = [source[:, k].astype(np.float32).reshape(x.shape) for k in (0, 1)]
+        result[rows] = cv2.remap(page, maps[0], maps[1], cv2.INTER_LINEAR, borderValue=255)
+    return result / np.float32(255.0)
+
+
+def _show_through(strokes: Sequence[Stroke], view: View, scan: Scan) -> Float32Array | None:
+    """Another drawing on the back, faint, mirrored and blurred."""
+    if scan.show_through <= 0.0:
+        return None
+    back = [Stroke(414.0 - np.conj(s.points), s.width, s.dark, s.layer) for s in strokes[::2]]
+    small = (view.size[0] // 3, view.size[1] // 3)
+    cover = render(back, lambda xy: (view.to_px(xy) + 0.5) / 3.0 - 0.5, small)
+    blurred = cv2.GaussianBlur(cover, (0, 0), max(0.6, 0.12 * view.px_per_mm))
+    full = cv2.resize(blurred, (view.size[1], view.size[0]), interpolation=cv2.INTER_LINEAR)
+    return 1.0 - full.astype(np.float32) * np.float32(scan.show_through / 255.0)
+
+
+# Paper and light ----------------------------------------------------------------------------------
+
+
+def _outline(view: View) -> FloatArray:
+    """The paper's outline in pixels, fine enough for a bent edge."""
+    x0, y0, x1, y1 = view.paper_mm
+    corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
+    share = np.linspace(0.0, 1.0, 24, endpoint=False)[:, None]
+    edges = [p + (q - p) * share for p, q in zip(corners[:-1], corners[1:], strict=True)]
+    return view.to_px(np.concatenate(edges))
+
+
+def _paper_mask(view: View, scan: Scan) -> Float32Array | None:
+    """1 on the paper, 0 on the bed (and through punched holes); None where the paper fills the image."""
+    height, width = view.size
+    polygon = np.round(_outline(view) * 16).astype(np.int32)
+    mask = np.zeros((height, width), np.uint8)
+    cv2.fillPoly(mask, [polygon], 255, lineType=cv2.LINE_AA, shift=4)
+    if scan.punched:
+        for y in (108.5, 188.5):
+            angles = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+            rim = np.column_stack([12.0 + 2.9 * np.cos(angles), y + 2.9 * np.sin(angles)])
+            hole = np.round(view.to_px(rim) * 16).astype(np.int32)
+            cv2.fillPoly(mask, [hole], 0, lineType=cv2.LINE_AA, shift=4)
+    if mask.min() == 255:
+        return None
+    return np.asarray(mask.astype(np.float32) / np.float32(255.0))
+
+
+def _light(scan: Scan, view: View, rng: Rng, smudges: int) -> Float32Array:
+    """Illumination with folds, smudges, shadows and the paper's edge, about 1."""
+    height, width = (max(2, side // _COARSE) for side in view.size)
+    y, x = np.mgrid[0:height, 0:width].astype(np.float32)
+    u, v = x / width - 0.5, y / height - 0.5
+    tilt = rng.normal(0.0, 0.5, 5) * scan.shading
+    light = 1.0 + tilt[0] * u + tilt[1] * v - abs(tilt[2]) * (u * u + v * v) * 2 + tilt[3] * np.sin(3 * u + 6 * tilt[4])
+    if scan.shadow > 0:
+        light *= _hand_shadow(u, v, scan.shadow, rng)
+    xy_mm = view.to_mm(np.column_stack([x.ravel(), y.ravel()]).astype(float) * _COARSE).astype(np.float32)
+    mx, my = xy_mm[:, 0].reshape(x.shape), xy_mm[:, 1].reshape(x.shape)
+    if scan.fold:
+        for at, along in ((rng.normal(210, 4), mx), (rng.normal(148.5, 4), my)):
+            distance = (along - np.float32(at)) / 1.6
+            light *= 1.0 - 0.07 * distance * np.exp(-0.5 * distance**2) - 0.03 * np.exp(-2 * distance**2)
+    for _ in range(smudges):
+        light *= _smudge(mx, my, rng)
+    if scan.device != "phone":
+        inside = np.minimum.reduce([mx, 420 - mx, my, 297 - my])
+        light *= 1.0 - 0.25 * np.exp(-(((inside + 1.2) / 0.9) ** 2))
+    full = cv2.resize(light.astype(np.float32), (view.size[1], view.size[0]), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(full, dtype=np.float32)
+
+
+def _hand_shadow(u: Float32Array, v: Float32Array, depth: float, rng: Rng) -> Float32Array:
+    """The soft-edged shadow of a phone and an arm over part of the sheet."""
+    angle, at = rng.uniform(0, 2 * np.pi), rng.uniform(-0.15, 0.35)
+    distance = u * np.cos(angle) + v * np.sin(angle) - at + 0.08 * np.sin(5 * (u - v) + rng.uniform(0, 6))
+    return np.asarray(1.0 - depth / (1.0 + np.exp(-distance / rng.uniform(0.01, 0.06))), dtype=np.float32)
+
+
+def _smudge(mx: Float32Array, my: Float32Array, rng: Rng) -> Float32Array:
+    x, y, angle = rng.uniform(40, 380), rng.uniform(30, 260), rng.uniform(0, np.pi)
+    along = (mx - x) * np.cos(angle) + (my - y) * np.sin(angle)
+    across = -(mx - x) * np.sin(angle) + (my - y) * np.cos(angle)
+    blob = np.exp(-0.5 * ((along / rng.uniform(6, 25)) ** 2 + (across / rng.uniform(2, 7)) ** 2))
+    return np.asarray(1.0 - rng.uniform(0.01, 0.06) * blob, dtype=np.float32)
+
+
+# Sensor -------------------------------------------------------------------------------------------
+
+
+def _sensed(plane: Float32Array, scan: Scan, rng: Rng) -> GreyImage:
+    """Dust, blur, grain and noise, then eight bits."""
+    _dust(plane, scan, rng)
+    if scan.blur_px > 0:
+        plane = cv2.GaussianBlur(plane, (0, 0), scan.blur_px)
+    spread = float(np.hypot(scan.noise, scan.tint_grain))
+    if spread > 0:
+        plane = plane + _noise(plane.shape, spread, rng)
+    return np.asarray(np.clip(plane + np.float32(0.5), 0.0, 255.0).astype(np.uint8))
+
+
+def _noise(shape: tuple[int, ...], spread: float, rng: Rng) -> Float32Array:
+    """Gaussian noise, a large tile of it laid at random."""
+    side = 1499
+    tile = rng.standard_normal((side, side), dtype=np.float32) * np.float32(spread)
+    repeats = (shape[0] // side + 1, shape[1] // side + 1)
+    return np.asarray(np.tile(tile, repeats)[: shape[0], : shape[1]])
+
+
+def _dust(plane: Float32Array, scan: Scan, rng: Rng) -> None:
+    """Specks and hairs, dark or bright, in place."""
+    height, width = plane.shape
+    pitch = scan.dpi / 25.4
+    for _ in range(scan.dust):
+        x, y = rng.uniform(0, width), rng.uniform(0, height)
+        value = float(rng.choice([60.0, 120.0, 180.0, 252.0]))
+        radius = max(0.5, rng.exponential(0.12) * pitch)
+        if rng.random() < 0.15:
+            bend = rng.normal(0, 0.4, 2)
+            angle = rng.uniform(0, 2 * np.pi) + np.cumsum(rng.normal(0, 0.25, 24)) + bend[0]
+            path = np.array([x, y]) + np.cumsum(np.column_stack([np.cos(angle), np.sin(angle)]), axis=0) * 0.15 * pitch
+            cv2.polylines(plane, [np.round(path * 16).astype(np.int32)], False, value, 1, cv2.LINE_AA, 4)
+        else:
+            cv2.circle(plane, (round(x * 16), round(y * 16)), round(radius * 16), value, -1, cv2.LINE_AA, 4)
+
+
+def _one_bit(image: GreyImage, scan: Scan, rng: Rng) -> GreyImage:
+    """A copier's threshold, with a ragged edge and pepper."""
+    level = rng.uniform(0.68, 0.82) * 0.96 * _of(scan.paper, None)
+    ragged = image.astype(np.float32) + _noise(image.shape, 7.0, rng)
+    bits = np.where(ragged > level, 255, 0).astype(np.uint8)
+    pepper = rng.integers(0, bits.size, int(rng.uniform(0, 8e-6) * bits.size))
+    bits.reshape(-1)[pepper] = 0
+    return bits
