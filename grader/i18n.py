@@ -55,14 +55,16 @@ class Tongue:
 
     def number(self, value: float, decimals: int) -> str:
         """A number with so many decimals and the language's decimal mark; no grouping, no minus zero."""
-        rounded = round(value, decimals) + 0.0
-        pattern = "0." + "0" * decimals if decimals else "0"
-        return format_decimal(rounded, format=pattern, locale=self.lang).replace("-", "−")
+        return self._written(value, decimals, "0." + "0" * decimals if decimals else "0")
 
     def trimmed(self, value: float, decimals: int) -> str:
         """A number with at most so many decimals: 2, 2.5, 0.25."""
-        pattern = "0." + "#" * decimals
-        return format_decimal(round(value, decimals) + 0.0, format=pattern, locale=self.lang).replace("-", "−")
+        return self._written(value, decimals, "0." + "#" * decimals)
+
+    def _written(self, value: float, decimals: int, pattern: str) -> str:
+        # Adding zero turns minus zero into zero.
+        rounded = round(value, decimals) + 0.0
+        return format_decimal(rounded, format=pattern, locale=self.lang).replace("-", "−")
 
     def significant(self, value: float, digits: int = 3) -> str:
         """A number with so many significant digits; large whole numbers keep all of theirs."""

@@ -4,6 +4,7 @@ Pixels of the output: sheet point (x, y) mm lies at (x s - 0.5, y s - 0.5) from 
 top left pixel, s = width / paper's width.
 """
 
+import itertools
 import math
 from collections.abc import Mapping
 
@@ -139,7 +140,7 @@ def _grey(image: NDArray[np.generic]) -> GreyImage:
 
 def paint(scan: GreyImage, scene: Scene) -> ColourImage:
     """The scene drawn on a scan that shows exactly its page; (h, w, 3) uint8, blue green red."""
-    image = cv2.cvtColor(scan, cv2.COLOR_GRAY2BGR)
+    image: ColourImage = np.asarray(cv2.cvtColor(scan, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     px_per_mm = scan.shape[1] / scene.page_mm[0]
     brush = _Brush(image.copy(), px_per_mm)
     for ghost in scene.ghosts:
@@ -198,7 +199,7 @@ class _Brush:
         """✓ ✗ ~ ? → – as strokes: the drawing font has no such letters."""
         for stroke in _MARK_STROKES[verdict]:
             points = [(centre[0] + 0.95 * px, centre[1] + 0.95 * py) for px, py in stroke]
-            for start, end in zip(points, points[1:], strict=False):
+            for start, end in itertools.pairwise(points):
                 self.line(start, end, (255, 255, 255), 0.42, None)
 
     def name(self, name: str, at: XY, colour: Colour) -> None:
