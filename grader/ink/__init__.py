@@ -1,15 +1,21 @@
 """Pixels to strokes in millimetres: straight strokes, circles, arrowheads, marks and an ink map.
 
-Strokes are looked for at about 6 px/mm and fitted at full resolution. The frame and the title block
-are told apart and left out.
+Ink is looked for at about 6 px/mm and strokes are fitted at full resolution. The frame and the title
+block are told apart and left out.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from grader.ink.arrowheads import find_arrowheads
+from grader.ink.circles import arcs, find_circles, led_to
+from grader.ink.components import find_components, mark_boxes
+from grader.ink.hatching import boxes_around, hatching
 from grader.ink.inkmap import ink_map
-from grader.ink.strokes import find_strokes
+from grader.ink.regions import field_of
+from grader.ink.seeds import PX_PER_MM, find_seeds
+from grader.ink.strokes import find_strokes, take
 from grader.pixels import flatten
 from grader.records import Box, Ink, Page, Sheet
 
@@ -24,5 +30,16 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     boxes : where to look, in sheet mm; all of `sheet.drawable_mm` by default
     """
     flat = flatten(page.grey)
-    strokes, marks = find_strokes(flat, sheet, boxes)
-    return Ink(strokes, np.zeros((0, 3)), np.zeros((0, 3)), marks, ink_map(flat, sheet))
+    scale = min(1.0, PX_PER_MM / sheet.px_per_mm)
+    seeds = find_seeds(flat.reduced(scale))
+    components = find_components(seeds)
+    field = field_of(seeds, sheet, scale, boxes)
+    strokes = find_strokes(flat, seeds, components, field)
+    circles = find_circles(flat, seeds, components, field)
+    circles = circles[led_to(circles, strokes)]
+    strokes = take(strokes, ~arcs(strokes, circles))
+    hatched = hatching(strokes)
+    marks = np.concatenate([mark_boxes(components, field), boxes_around(strokes, hatched)])
+    strokes = take(strokes, ~hatched)
+    arrowheads = find_arrowheads(flat, strokes, sheet.mm_to_px)
+    return Ink(strokes, circles, arrowheads, marks, ink_map(flat, sheet))

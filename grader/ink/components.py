@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from grader.ink.regions import Field, to_mm
 from grader.ink.seeds import PX_PER_MM, Seeds
 from grader.pixels import BoolArray
-from grader.records import FloatArray, Sheet
+from grader.records import FloatArray
 
 _MARK_MM = 8.0
 _LONG_SEED_MM = 4.5
@@ -69,16 +70,12 @@ def _beside(box: FloatArray, written: BoolArray) -> BoolArray:
     return result
 
 
-def mark_boxes(components: Components, sheet: Sheet, scale: float) -> FloatArray:
-    """(j, 4) boxes x, y, w, h in sheet mm of the marks inside the frame, dust left out."""
+def mark_boxes(components: Components, field: Field) -> FloatArray:
+    """(j, 4) boxes x, y, w, h in sheet mm of the marks in the field, dust left out."""
     left, top, wide, high = components.box_px[components.mark | components.dash].T
     steps = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
     corners = np.stack([np.column_stack([left + dx * wide, top + dy * high]) for dx, dy in steps], axis=1)
-    points = np.column_stack([corners.reshape(-1, 2) / scale - 0.5, np.ones(corners.size // 2)])
-    mapped = points @ np.linalg.inv(sheet.mm_to_px).T
-    mm = (mapped[:, :2] / mapped[:, 2:]).reshape(-1, 4, 2)
+    mm = to_mm(field.sheet, corners / field.scale - 0.5)
     low, far = mm.min(axis=1), mm.max(axis=1)
-    x, y, w, h = sheet.drawable_mm
-    inside = (low >= [x, y]).all(axis=1) & (far <= [x + w, y + h]).all(axis=1)
-    inside &= (far - low).max(axis=1) > _DUST_MM
+    inside = field.holds((low + far) / 2.0) & ((far - low).max(axis=1) > _DUST_MM)
     return np.column_stack([low[inside], (far - low)[inside]])

@@ -38,6 +38,7 @@ class Seeds:
     border : (n, 2) row and column of an ink pixel on the run, telling which piece of ink it is of
     pen_px : usual width of a stroke on the sheet
     mask : (h, w) uint8, 1 = ink
+    soft : (h, w) uint8 contrast, softened
     """
 
     ends: FloatArray
@@ -45,6 +46,7 @@ class Seeds:
     border: NDArray[np.intp]
     pen_px: float
     mask: GreyImage
+    soft: GreyImage
 
 
 def find_seeds(contrast: GreyImage) -> Seeds:
@@ -54,7 +56,7 @@ def find_seeds(contrast: GreyImage) -> Seeds:
     edges = _border_runs(mask)
     border = edges[:, 0, ::-1].astype(np.intp)
     if len(edges) == 0:
-        return Seeds(edges, np.zeros(0), border, _PEN_PX, mask)
+        return Seeds(edges, np.zeros(0), border, _PEN_PX, mask, soft)
     inward, width = _band_width(mask, edges)
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
     long_enough = length >= 2.0 * PX_PER_MM
@@ -62,7 +64,7 @@ def find_seeds(contrast: GreyImage) -> Seeds:
     single = np.where(width <= _BUNDLE * pen, width, pen)
     # Border pixels are ink: the band's edge lies half a pixel further out.
     shift = (single - 1.0) / 2.0
-    return Seeds(edges + (inward * shift[:, None])[:, None, :], single, border, pen, mask)
+    return Seeds(edges + (inward * shift[:, None])[:, None, :], single, border, pen, mask, soft)
 
 
 def ink_mask(soft: GreyImage) -> GreyImage:

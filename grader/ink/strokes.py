@@ -1,18 +1,18 @@
 """Straight strokes of a sheet, from seeds to millimetres."""
 
-from collections.abc import Sequence
+from dataclasses import fields
 
 import numpy as np
 
 from grader.ink.centreline import Fitted, fit_centre, standard_errors
-from grader.ink.components import Components, find_components, mark_boxes
+from grader.ink.components import Components
 from grader.ink.darkness import split_by_darkness
 from grader.ink.ending import coverage, find_ends
 from grader.ink.joining import Pieces, join
-from grader.ink.regions import kept
-from grader.ink.seeds import PX_PER_MM, Seeds, find_seeds
+from grader.ink.regions import Field, to_mm
+from grader.ink.seeds import PX_PER_MM, Seeds
 from grader.pixels import BoolArray, Flat
-from grader.records import Box, FloatArray, Sheet, Strokes
+from grader.records import FloatArray, Sheet, Strokes
 
 _OFF_MM = 0.25
 """Pieces this near to one line are of it; strokes further apart are told apart."""
@@ -28,15 +28,18 @@ _SE_END_MM = 0.2
 _SE_MERGED_MM = 1.0
 
 
-def find_strokes(flat: Flat, sheet: Sheet, boxes: Sequence[Box] | None) -> tuple[Strokes, FloatArray]:
-    """(strokes, mark boxes) in sheet millimetres."""
-    scale = min(1.0, PX_PER_MM / sheet.px_per_mm)
-    seeds = find_seeds(flat.reduced(scale))
-    components = find_components(seeds)
-    full = (seeds.ends + 0.5) / scale - 0.5
-    usable = kept(to_mm(sheet, full), sheet, boxes) & ~components.mark[components.of_seed]
-    fitted, merged = _settled(flat, _lines(full, seeds, components, usable, scale), sheet.px_per_mm)
-    return _records(flat, fitted, merged, sheet), mark_boxes(components, sheet, scale)
+def find_strokes(flat: Flat, seeds: Seeds, components: Components, field: Field) -> Strokes:
+    """Straight strokes in the field, in sheet millimetres."""
+    full = (seeds.ends + 0.5) / field.scale - 0.5
+    usable = field.holds(to_mm(field.sheet, full.mean(axis=1))) & ~components.mark[components.of_seed]
+    pieces = _lines(full, seeds, components, usable, field.scale)
+    fitted, merged = _settled(flat, pieces, field.sheet.px_per_mm)
+    return _records(flat, fitted, merged, field.sheet)
+
+
+def take(strokes: Strokes, which: BoolArray) -> Strokes:
+    """The chosen strokes."""
+    return Strokes(*(getattr(strokes, one.name)[which] for one in fields(Strokes)))
 
 
 def _lines(full: FloatArray, seeds: Seeds, components: Components, usable: BoolArray, scale: float) -> Pieces:
@@ -101,10 +104,3 @@ def _records(flat: Flat, fitted: Fitted, merged: BoolArray, sheet: Sheet) -> Str
         coverage=coverage(flat, fitted, unit),
         darkness=fitted.darkness,
     )
-
-
-def to_mm(sheet: Sheet, ends: FloatArray) -> FloatArray:
-    """(n, 2, 2) ends from pixels to sheet millimetres."""
-    points = np.column_stack([ends.reshape(-1, 2), np.ones(ends.size // 2)])
-    mapped = points @ np.linalg.inv(sheet.mm_to_px).T
-    return np.asarray((mapped[:, :2] / mapped[:, 2:]).reshape(-1, 2, 2))

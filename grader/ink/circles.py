@@ -1,0 +1,196 @@
+"""Small circles: joints and pivots, poles; found by where the borders' normals meet."""
+
+import cv2
+import numpy as np
+
+from grader.ink.components import Components
+from grader.ink.regions import Field, to_mm
+from grader.ink.seeds import PX_PER_MM, Seeds
+from grader.pixels import BoolArray, Flat
+from grader.records import FloatArray, Strokes
+
+_RADIUS_MM = (0.6, 3.4)
+_CELL_PX = 2
+_VOTES = 0.3
+"""Share of a full circle of the least radius whose normals must meet."""
+_MOST = 250
+_ANGLES = 72
+_ROUNDS = 3
+_RADIAL_MM = np.arange(0.3, 4.0, 0.07)
+_ROUND_MM = 0.11
+_DRAWN = 0.75
+"""Share of the circle that is inked and round, but for where strokes cross it."""
+_DRAWN_ALONE = 0.5
+_THICK = 0.7
+_POINTS_TO_MM = 0.35
+_LEADS_TO_MM = 1.5
+_LEAST_LINK_MM = 4.0
+_HOLLOW = 0.55
+_HOLLOW_AT = 0.55
+_EDGE_BYTES = 12.0
+_ARC_MM = 0.45
+
+
+def find_circles(flat: Flat, seeds: Seeds, components: Components, field: Field) -> FloatArray:
+    """(m, 3) x, y, r in sheet mm of rings drawn over at least 60 % and hollow inside.
+
+    Rings that are part of a letter are left out.
+    """
+    unit = field.sheet.px_per_mm
+    guesses = (_meeting_points(seeds, field.mask(seeds.mask.shape)) + 0.5) / field.scale - 0.5
+    if len(guesses) == 0:
+        return np.zeros((0, 3))
+    rings = _distinct(_refined(flat, guesses, unit))
+    rings = rings[~_in_letter(rings, components, field.scale)]
+    return np.column_stack([to_mm(field.sheet, rings[:, :2]), rings[:, 2] / unit])
+
+
+def led_to(circles: FloatArray, strokes: Strokes) -> BoolArray:
+    """Which circles a stroke of 4 mm or more leads to or through: joints and poles, not letters."""
+    span = strokes.ends[:, 1] - strokes.ends[:, 0]
+    length = np.hypot(span[:, 0], span[:, 1])
+    rows = np.flatnonzero(length >= _LEAST_LINK_MM)
+    result = np.zeros(len(circles), dtype=bool)
+    for index, (x, y, radius) in enumerate(circles):
+        relative = np.array([x, y]) - strokes.ends[rows, 0]
+        u = span[rows] / length[rows, None]
+        along = (relative * u).sum(axis=1)
+        off = np.abs(relative[:, 0] * u[:, 1] - relative[:, 1] * u[:, 0])
+        reach = radius + _LEADS_TO_MM
+        on = (along > -reach) & (along < length[rows] + reach)
+        result[index] = bool((on & (off < _POINTS_TO_MM * radius + 0.2)).any())
+    return result
+
+
+def arcs(strokes: Strokes, circles: FloatArray) -> BoolArray:
+    """Which strokes are short chords along a circle, pieces of its ring."""
+    result = np.zeros(len(strokes), dtype=bool)
+    middle = strokes.ends.mean(axis=1)
+    length = np.hypot(*(strokes.ends[:, 1] - strokes.ends[:, 0]).T)
+    for x, y, radius in circles:
+        away = np.hypot(strokes.ends[..., 0] - x, strokes.ends[..., 1] - y)
+        near = np.abs(away - radius).max(axis=1) < _ARC_MM
+        centred = np.abs(np.hypot(middle[:, 0] - x, middle[:, 1] - y) - radius) < _ARC_MM
+        result |= near & centred & (length < 1.5 * radius)
+    return result
+
+
+def _meeting_points(seeds: Seeds, where: BoolArray) -> FloatArray:
+    """(g, 2) working pixels where many normals of ink borders meet."""
+    soft = seeds.soft
+    border = (seeds.mask > 0) & where & (cv2.erode(seeds.mask, np.ones((3, 3), np.uint8)) == 0)
+    row, column = np.nonzero(border)
+    gx = cv2.Sobel(soft, cv2.CV_32F, 1, 0, scale=0.25)[row, column]
+    gy = cv2.Sobel(soft, cv2.CV_32F, 0, 1, scale=0.25)[row, column]
+    size = np.hypot(gx, gy)
+    strong = size > _EDGE_BYTES
+    row, column, gx, gy = row[strong], column[strong], gx[strong] / size[strong], gy[strong] / size[strong]
+    reach = np.arange(_RADIUS_MM[0] * PX_PER_MM, _RADIUS_MM[1] * PX_PER_MM, 1.0)
+    reach = np.concatenate([reach, -reach])
+    high, wide = soft.shape[0] // _CELL_PX + 1, soft.shape[1] // _CELL_PX + 1
+    x = ((column[:, None] + reach[None, :] * gx[:, None]) / _CELL_PX).astype(np.intp)
+    y = ((row[:, None] + reach[None, :] * gy[:, None]) / _CELL_PX).astype(np.intp)
+    inside = (x >= 0) & (y >= 0) & (x < wide) & (y < high)
+    votes = np.bincount((y * wide + x)[inside], minlength=high * wide).reshape(high, wide).astype(np.float32)
+    votes = cv2.boxFilter(votes, -1, (3, 3), normalize=False)
+    full = 2.0 * 2.0 * np.pi * _RADIUS_MM[0] * PX_PER_MM * 3.0 * _CELL_PX
+    peak = (votes == cv2.dilate(votes, np.ones((5, 5), np.uint8))) & (votes > _VOTES * full)
+    at = np.argwhere(peak)
+    order = np.argsort(-votes[at[:, 0], at[:, 1]])[:_MOST]
+    return (at[order][:, ::-1] + 0.5) * _CELL_PX
+
+
+def _refined(flat: Flat, centres: FloatArray, px_per_mm: float) -> FloatArray:
+    """Circles fitted to the middle of their rings at full resolution, those that fail left out."""
+    radial = _RADIAL_MM * px_per_mm
+    radius = np.zeros(len(centres))
+    sound = np.ones(len(centres), dtype=bool)
+    for round_number in range(_ROUNDS):
+        polar = _polar(flat, centres, radial)
+        inked = polar > 0.5 * np.quantile(polar, 0.97, axis=(1, 2))[:, None, None]
+        ring = inked.mean(axis=1)
+        if round_number == 0:
+            radius = radial[_best_ring(ring)]
+        middle, good, crossed = _ring_middle(polar, inked, radial, radius, px_per_mm)
+        centres, radius, rms = _circle_fit(centres, middle, good)
+        drawn = good.sum(axis=1) / np.maximum(_ANGLES - crossed.sum(axis=1), 1)
+        last = round_number == _ROUNDS - 1
+        sound &= (drawn >= (_DRAWN if last else 0.5)) & (good.mean(axis=1) >= (_DRAWN_ALONE if last else 0.35))
+        sound &= rms < (_ROUND_MM if last else 2.0 * _ROUND_MM) * px_per_mm
+    inner = np.take_along_axis(
+        inked.mean(axis=1), np.searchsorted(radial, _HOLLOW_AT * radius).clip(0, len(radial) - 1)[:, None], axis=1
+    )[:, 0]
+    sound &= (inner < _HOLLOW) & (radius > _RADIUS_MM[0] * px_per_mm) & (radius < _RADIUS_MM[1] * px_per_mm)
+    return np.column_stack([centres, radius])[sound]
+
+
+def _polar(flat: Flat, centres: FloatArray, radial: FloatArray) -> FloatArray:
+    """(g, angles, radii) contrast around each centre."""
+    angle = np.arange(_ANGLES) * (2.0 * np.pi / _ANGLES)
+    x = centres[:, 0, None, None] + np.cos(angle)[None, :, None] * radial[None, None, :]
+    y = centres[:, 1, None, None] + np.sin(angle)[None, :, None] * radial[None, None, :]
+    shape = x.shape
+    return flat.contrast(x.reshape(-1, len(radial)), y.reshape(-1, len(radial))).reshape(shape)
+
+
+def _best_ring(ring: FloatArray) -> np.ndarray:
+    """Index of the radius that is inked all round while half of it is not."""
+    inner = ring[:, (np.arange(ring.shape[1]) * 0.6).astype(int)]
+    score = ring - 0.7 * inner
+    low = int(np.searchsorted(_RADIAL_MM, _RADIUS_MM[0]))
+    score[:, :low] = -1.0
+    return np.asarray(score.argmax(axis=1))
+
+
+def _ring_middle(
+    polar: FloatArray, inked: BoolArray, radial: FloatArray, radius: FloatArray, px_per_mm: float
+) -> tuple[FloatArray, BoolArray, BoolArray]:
+    """((g, angles) distance of the ring's ink near the radius, where there is such ink, and where a
+    stroke along the ray hides it)."""
+    near = np.abs(radial[None, :] - radius[:, None]) <= 0.45 * px_per_mm
+    here = inked & near[:, None, :]
+    weight = polar * here
+    total = weight.sum(axis=2)
+    middle = (weight * radial[None, None, :]).sum(axis=2) / np.maximum(total, 1e-6)
+    crossed = here.sum(axis=2) > _THICK * near.sum(axis=1)[:, None]
+    good = (total > 0) & ~crossed & (np.abs(middle - radius[:, None]) < 0.3 * px_per_mm)
+    return middle, good, crossed
+
+
+def _circle_fit(
+    centres: FloatArray, middle: FloatArray, good: BoolArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """New (centres, radii, rms) by linear least squares: distance = r + dx cos + dy sin."""
+    angle = np.arange(_ANGLES) * (2.0 * np.pi / _ANGLES)
+    basis = np.column_stack([np.ones(_ANGLES), np.cos(angle), np.sin(angle)])
+    weight = good.astype(np.float64)
+    normal = np.einsum("ga,ai,aj->gij", weight, basis, basis) + 1e-6 * np.eye(3)
+    right = np.einsum("ga,ai->gi", weight * np.where(good, middle, 0.0), basis)
+    solved = np.linalg.solve(normal, right[..., None])[..., 0]
+    residual = np.where(good, middle - solved @ basis.T, 0.0)
+    rms = np.sqrt((residual**2).sum(axis=1) / np.maximum(weight.sum(axis=1), 1.0))
+    return centres + solved[:, 1:], solved[:, 0], rms
+
+
+def _distinct(rings: FloatArray) -> FloatArray:
+    keep: list[FloatArray] = []
+    for ring in rings:
+        if all(np.hypot(*(ring[:2] - other[:2])) > 0.5 * max(ring[2], other[2]) for other in keep):
+            keep.append(ring)
+    return np.array(keep).reshape(-1, 3)
+
+
+def _in_letter(rings: FloatArray, components: Components, scale: float) -> BoolArray:
+    """Rings whose piece of ink is a letter: small, and larger than the ring."""
+    box = components.box_px[components.mark]
+    size = box[:, 2:].max(axis=1)
+    result = np.zeros(len(rings), dtype=bool)
+    for index, (x, y, radius) in enumerate(rings * scale):
+        inside = (
+            (box[:, 0] <= x - 0.7 * radius)
+            & (box[:, 1] <= y - 0.7 * radius)
+            & (box[:, 0] + box[:, 2] >= x + 0.7 * radius)
+            & (box[:, 1] + box[:, 3] >= y + 0.7 * radius)
+        )
+        result[index] = bool((inside & (size > 2.0 * radius + 1.3 * PX_PER_MM)).any())
+    return result
