@@ -62,5 +62,3 @@ NumberOption = Annotated[
 ]
 PositionOption = Annotated[int | None, typer.Option("--position", help="The position, where there are some.")]
 LanguageOption = Annotated[str, typer.Option("--lang", help="Language of feedback: en, ro or ru.")]
-
-from grader.cli import commands  # noqa: E402, F401 - registers the commands on the application above
