@@ -13,19 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.outcomes import Outcome
-from grader.records import FloatArray, GreyImage, Page, Reading, Sheet
+from grader.records import Box, FloatArray, GreyImage, Page, Reading, Sheet
 from grader.scene import (
     ARROW_WIDTH_MM,
-    BADGE_MM,
     COLOURS,
     DASH_MM,
     GHOST_COLOUR,
+    NODE_COLOUR,
     XY,
     Arrow,
     Dot,
     Ghost,
+    Label,
     Picture,
     Scene,
+    labels_of,
     scene_of,
 )
 from reference.construction import Vector
@@ -151,8 +153,8 @@ def paint(scan: GreyImage, scene: Scene) -> ColourImage:
         brush.dot(dot)
     blended = np.asarray(cv2.addWeighted(brush.image, OPACITY, image, 1.0 - OPACITY, 0.0), dtype=np.uint8)
     labels = _Brush(blended, px_per_mm)
-    for arrow in scene.arrows:
-        labels.label(arrow)
+    for label in labels_of(scene.arrows, (0.0, 0.0, *scene.page_mm)):
+        labels.label(label)
     return labels.image
 
 
@@ -171,29 +173,27 @@ class _Brush:
         colour = _bgr(COLOURS[arrow.verdict])
         if arrow.length < LEAST_ARROW_MM:
             return
-        self.line(arrow.tail, arrow.neck, colour, ARROW_WIDTH_MM, DASH_MM if arrow.doubtful else None)
-        self.fill(arrow.head, colour)
+        self.line(arrow.tail, arrow.neck(), colour, ARROW_WIDTH_MM, DASH_MM if arrow.doubtful else None)
+        self.fill(arrow.head(), colour)
 
     def ghost(self, ghost: Ghost) -> None:
         self.line(ghost.tail, ghost.tip, _bgr(GHOST_COLOUR), 0.4, (0.9, 0.9))
         self.ring(ghost.tip, 0.9, _bgr(GHOST_COLOUR), 0.3)
 
     def dot(self, dot: Dot) -> None:
-        colour = _bgr(COLOURS["review"] if dot.doubtful else "#24303c")
+        colour = _bgr(COLOURS["review"] if dot.doubtful else NODE_COLOUR)
         self.ring(dot.at, 0.8, colour, 0.3)
 
-    def label(self, arrow: Arrow) -> None:
-        """The mark in a filled disc, the name beside it on white."""
-        x, y, width, height = arrow.label
-        colour = _bgr(COLOURS[arrow.verdict])
-        box = ((x, y), (x + width, y), (x + width, y + height), (x, y + height))
-        self._tint(box)
-        if arrow.leader is not None:
-            self.line(*arrow.leader, colour, 0.2, None)
-        centre = (x + BADGE_MM / 2 + 0.1, y + height / 2)
-        self.disc(centre, BADGE_MM / 2 - 0.15, colour)
-        self.mark(arrow.verdict, centre)
-        self.name(arrow.name, (x + BADGE_MM + 0.6, y + height - 1.2), colour)
+    def label(self, label: Label) -> None:
+        """The mark in a filled disc, the name beside it on a whitened ground."""
+        colour = _bgr(COLOURS[label.arrow.verdict])
+        self._whiten(label.box)
+        if label.leader is not None:
+            self.line(*label.leader, colour, 0.2, None)
+        centre, radius = label.badge
+        self.disc(centre, radius, colour)
+        self.mark(label.arrow.verdict, centre)
+        self.name(label.arrow.name, label.foot, colour)
 
     def mark(self, verdict: str, centre: XY) -> None:
         """✓ ✗ ~ ? → – as strokes: the drawing font has no such letters."""
@@ -245,9 +245,10 @@ class _Brush:
         radius = round(radius_mm * self.px_per_mm * 2**FRACTION_BITS)
         cv2.circle(self.image, self._fixed(at), radius, colour, -1, cv2.LINE_AA, FRACTION_BITS)
 
-    def _tint(self, box: tuple[XY, ...]) -> None:
+    def _whiten(self, box: Box) -> None:
         """Whiten the ground of a label, leaving the drawing faintly visible."""
-        (x0, y0), (x1, y1) = self.to_px(box[0]), self.to_px(box[2])
+        x0, y0 = self.to_px((box[0], box[1]))
+        x1, y1 = self.to_px((box[0] + box[2], box[1] + box[3]))
         rows = slice(max(0, round(y0)), max(0, round(y1) + 1))
         columns = slice(max(0, round(x0)), max(0, round(x1) + 1))
         part = self.image[rows, columns]

@@ -5,7 +5,7 @@ Right and wrong differ by colour *and* by mark, doubtful ones are dashed: nothin
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.outcomes import Outcome
@@ -45,6 +45,7 @@ ARROWHEAD_MM = (3.2, 1.0)
 DASH_MM = (2.2, 1.5)
 """Of doubtful arrows: dash, gap."""
 GHOST_COLOUR = "#7d8590"
+NODE_COLOUR = "#24303c"
 LEADER_FROM_MM = 3.0
 """A label farther than this from its arrow gets a thin line to it."""
 
@@ -54,29 +55,26 @@ class Arrow:
     """A named vector as read; `verdict` is `not_judged` where the rubric does not ask for it."""
 
     name: str
+    figure: str
     tail: XY
     tip: XY
     verdict: str
     doubtful: bool
-    label: Box
-    """Where its name and mark stand."""
 
     @property
     def length(self) -> float:
         """Millimetres."""
         return math.dist(self.tail, self.tip)
 
-    @property
-    def neck(self) -> XY:
+    def neck(self, size: float = 1.0) -> XY:
         """Where the shaft ends and the head begins."""
-        head = min(ARROWHEAD_MM[0], 0.45 * self.length)
+        head = min(ARROWHEAD_MM[0] * size, 0.45 * self.length)
         share = 1.0 - head / self.length if self.length > 0.0 else 1.0
         return _between(self.tail, self.tip, share)
 
-    @property
-    def head(self) -> tuple[XY, XY, XY]:
+    def head(self, size: float = 1.0) -> tuple[XY, XY, XY]:
         """The three corners of the arrowhead."""
-        neck, half = self.neck, ARROWHEAD_MM[1] / ARROWHEAD_MM[0]
+        neck, half = self.neck(size), ARROWHEAD_MM[1] / ARROWHEAD_MM[0]
         across = (-(self.tip[1] - neck[1]) * half, (self.tip[0] - neck[0]) * half)
         return (
             self.tip,
@@ -84,13 +82,33 @@ class Arrow:
             (neck[0] - across[0], neck[1] - across[1]),
         )
 
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """Where an arrow's mark and name stand; `size` as of `labels_of`."""
+
+    arrow: Arrow
+    box: Box
+    size: float
+
+    @property
+    def badge(self) -> tuple[XY, float]:
+        """Centre and radius of the disc with the mark."""
+        x, y, _width, height = self.box
+        return (x + self.size * (BADGE_MM / 2 + 0.1), y + height / 2), self.size * (BADGE_MM / 2 - 0.15)
+
+    @property
+    def foot(self) -> XY:
+        """Where the name's line begins."""
+        return (self.box[0] + self.size * (BADGE_MM + 0.6), self.box[1] + self.box[3] - self.size * 1.25)
+
     @property
     def leader(self) -> tuple[XY, XY] | None:
         """From a label that stands apart to its arrow."""
-        x, y, width, height = self.label
-        middle = _between(self.tail, self.tip, 0.55)
+        x, y, width, height = self.box
+        middle = _between(self.arrow.tail, self.arrow.tip, 0.55)
         near = (min(max(middle[0], x), x + width), min(max(middle[1], y), y + height))
-        return (near, middle) if math.dist(near, middle) > LEADER_FROM_MM else None
+        return (near, middle) if math.dist(near, middle) > self.size * LEADER_FROM_MM else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,14 +168,14 @@ def scene_of(
     show_expected: bool,
 ) -> Scene:
     """The scene of one sheet's reading; `outcomes` by vector name."""
-    bare = list(_bare_arrows(reading, vectors, outcomes))
+    arrows = list(_arrows(reading, vectors, outcomes))
     dots = tuple(
         Dot(name, _xy(node.at), node.confidence < LEAST_SURE)
         for figure in reading.figures.values()
         for name, node in figure.nodes.items()
     )
-    ghosts = tuple(_ghosts(bare, outcomes)) if show_expected else ()
-    return Scene(page_mm, tuple(_with_labels(bare, page_mm)), ghosts, dots)
+    ghosts = tuple(_ghosts(arrows, outcomes)) if show_expected else ()
+    return Scene(page_mm, tuple(arrows), ghosts, dots)
 
 
 def _xy(at: complex) -> XY:
@@ -168,10 +186,9 @@ def _between(start: XY, end: XY, share: float) -> XY:
     return (start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1]))
 
 
-def _bare_arrows(
+def _arrows(
     reading: Reading, vectors: Mapping[str, Vector], outcomes: Mapping[str, Outcome]
 ) -> Iterator[Arrow]:
-    """Arrows without places for their labels."""
     for kind, figure in reading.figures.items():
         if kind == MECHANISM:
             continue
@@ -183,7 +200,7 @@ def _bare_arrows(
             verdict = "not_judged" if outcome is None else outcome.verdict
             tail, tip = _xy(figure.nodes[ends.tail].at), _xy(figure.nodes[ends.head].at)
             doubtful = verdict == "review" or read.confidence < LEAST_SURE
-            yield Arrow(name, tail, tip, verdict, doubtful, (0.0, 0.0, 0.0, 0.0))
+            yield Arrow(name, kind, tail, tip, verdict, doubtful)
 
 
 def _ghosts(arrows: list[Arrow], outcomes: Mapping[str, Outcome]) -> Iterator[Ghost]:
@@ -203,41 +220,45 @@ def _ghosts(arrows: list[Arrow], outcomes: Mapping[str, Outcome]) -> Iterator[Gh
 # Labels: beside their arrow, clear of other arrows and labels where there is room ------------------
 
 
-def _with_labels(arrows: list[Arrow], page_mm: XY) -> Iterator[Arrow]:
+def labels_of(arrows: Sequence[Arrow], within: Box, size: float = 1.0) -> list[Label]:
+    """A place for each arrow's mark and name; `size` 1 suits a whole sheet, less a close-up."""
     taken: list[Box] = []
+    labels = []
     for arrow in sorted(arrows, key=lambda one: -one.length):
-        box = min(
-            _places(arrow, page_mm), key=lambda place: _crowding(place[1], taken, arrows, arrow) + place[0]
-        )[1]
+        others = [other for other in arrows if other is not arrow]
+        _cost, box = min(
+            (far + _crowding(box, taken, others) / size**2, box) for far, box in _places(arrow, within, size)
+        )
         taken.append(box)
-        yield Arrow(arrow.name, arrow.tail, arrow.tip, arrow.verdict, arrow.doubtful, box)
+        labels.append(Label(arrow, box, size))
+    return labels
 
 
-def label_width_mm(name: str) -> float:
-    """Room for the mark and the name."""
-    return BADGE_MM + 0.8 + LETTER_MM * len(name.replace("_", ""))
-
-
-def _places(arrow: Arrow, page_mm: XY) -> Iterator[tuple[float, Box]]:
+def _places(arrow: Arrow, within: Box, size: float) -> Iterator[tuple[float, Box]]:
     """Places for a label with how far-fetched each is."""
-    width, height = label_width_mm(arrow.name), LABEL_HEIGHT_MM + 0.6
+    letters = len(arrow.name.replace("_", ""))
+    width, height = size * (BADGE_MM + 0.8 + LETTER_MM * letters), size * (LABEL_HEIGHT_MM + 0.6)
     length = max(arrow.length, 1e-6)
     along = ((arrow.tip[0] - arrow.tail[0]) / length, (arrow.tip[1] - arrow.tail[1]) / length)
     across = (-along[1], along[0])
     reach = abs(across[0]) * width / 2 + abs(across[1]) * height / 2
     for share in (0.55, 0.4, 0.7, 0.25, 0.85):
+        middle = _between(arrow.tail, arrow.tip, share)
         for gap in (1.2, 3.5, 7.0, 12.0, 18.0):
             for side in (1.0, -1.0):
-                x = arrow.tail[0] + share * length * along[0] + side * (reach + gap) * across[0]
-                y = arrow.tail[1] + share * length * along[1] + side * (reach + gap) * across[1]
-                x = min(max(x, width / 2 + 1), page_mm[0] - width / 2 - 1)
-                y = min(max(y, height / 2 + 1), page_mm[1] - height / 2 - 1)
-                yield gap * 0.5 + abs(share - 0.55), (x - width / 2, y - height / 2, width, height)
+                off = side * (reach + size * gap)
+                x = _inside(middle[0] + off * across[0] - width / 2, within[0], within[2] - width)
+                y = _inside(middle[1] + off * across[1] - height / 2, within[1], within[3] - height)
+                yield 0.5 * gap + abs(share - 0.55), (x, y, width, height)
 
 
-def _crowding(box: Box, taken: list[Box], arrows: list[Arrow], own: Arrow) -> float:
+def _inside(at: float, start: float, room: float) -> float:
+    return min(max(at, start + 0.5), start + max(room, 1.0) - 0.5)
+
+
+def _crowding(box: Box, taken: list[Box], arrows: list[Arrow]) -> float:
     overlaps = sum(_overlap(box, other) for other in taken)
-    crossed = sum(_length_inside(box, arrow) for arrow in arrows if arrow is not own)
+    crossed = sum(_length_inside(box, arrow) for arrow in arrows)
     return 4.0 * overlaps + 2.0 * crossed
 
 
