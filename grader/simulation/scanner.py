@@ -42,6 +42,7 @@ def digitise(
     inks = _inks(strokes, pens, view, rng)
     printed = None if background is None else _printed(background, view)
     ghost = _show_through(strokes, view, scan)
+    specks = _dust(scan, view.size, rng)
     channels = range(3) if scan.mode == "colour" else (None,)
     planes = []
     for channel in channels:
@@ -55,7 +56,7 @@ def digitise(
         bed = np.float32(_of(scan.bed, channel))
         plane = bed + (plane - bed) * mask if mask is not None else plane
         plane *= light
-        planes.append(_sensed(plane, scan, rng))
+        planes.append(_sensed(plane, scan, rng, specks))
     image = planes[0] if len(planes) == 1 else np.dstack(planes)
     return _one_bit(image, scan, rng) if scan.mode == "bilevel" else image
 
@@ -205,11 +206,26 @@ def _smudge(mx: Float32Array, my: Float32Array, rng: Rng) -> Float32Array:
 # Sensor -------------------------------------------------------------------------------------------
 
 
-def _sensed(plane: Float32Array, scan: Scan, rng: Rng) -> GreyImage:
+@dataclass(frozen=True, slots=True)
+class _Speck:
+    """A speck or hair on the glass: points in pixels (a speck has one), radius, brightness."""
+
+    points: FloatArray
+    radius_px: float
+    value: float
+
+
+def _sensed(plane: Float32Array, scan: Scan, rng: Rng, specks: Sequence[_Speck]) -> GreyImage:
     """Dust, blur, grain and noise, then eight bits."""
-    _dust(plane, scan, rng)
+    for speck in specks:
+        fixed = np.round(speck.points * 16).astype(np.int32)
+        if len(fixed) > 1:
+            cv2.polylines(plane, [fixed], False, speck.value, 1, cv2.LINE_AA, 4)
+        else:
+            x, y = (int(v) for v in fixed[0])
+            cv2.circle(plane, (x, y), round(speck.radius_px * 16), speck.value, -1, cv2.LINE_AA, 4)
     if scan.blur_px > 0:
-        plane = cv2.GaussianBlur(plane, (0, 0), scan.blur_px)
+        plane = np.asarray(cv2.GaussianBlur(plane, (0, 0), scan.blur_px), dtype=np.float32)
     spread = float(np.hypot(scan.noise, scan.tint_grain))
     if spread > 0:
         plane = plane + _noise(plane.shape, spread, rng)
@@ -224,21 +240,20 @@ def _noise(shape: tuple[int, ...], spread: float, rng: Rng) -> Float32Array:
     return np.asarray(np.tile(tile, repeats)[: shape[0], : shape[1]])
 
 
-def _dust(plane: Float32Array, scan: Scan, rng: Rng) -> None:
-    """Specks and hairs, dark or bright, in place."""
-    height, width = plane.shape
+def _dust(scan: Scan, size: tuple[int, int], rng: Rng) -> list[_Speck]:
+    """Specks and hairs, dark or bright."""
     pitch = scan.dpi / 25.4
+    specks = []
     for _ in range(scan.dust):
-        x, y = rng.uniform(0, width), rng.uniform(0, height)
+        place = rng.uniform(0.0, 1.0, 2) * np.array([size[1], size[0]])
         value = float(rng.choice([60.0, 120.0, 180.0, 252.0]))
-        radius = max(0.5, rng.exponential(0.12) * pitch)
+        points = place[None, :]
         if rng.random() < 0.15:
-            bend = rng.normal(0, 0.4, 2)
-            angle = rng.uniform(0, 2 * np.pi) + np.cumsum(rng.normal(0, 0.25, 24)) + bend[0]
-            path = np.array([x, y]) + np.cumsum(np.column_stack([np.cos(angle), np.sin(angle)]), axis=0) * 0.15 * pitch
-            cv2.polylines(plane, [np.round(path * 16).astype(np.int32)], False, value, 1, cv2.LINE_AA, 4)
-        else:
-            cv2.circle(plane, (round(x * 16), round(y * 16)), round(radius * 16), value, -1, cv2.LINE_AA, 4)
+            angle = rng.uniform(0, 2 * np.pi) + np.cumsum(rng.normal(0, 0.25, 24))
+            steps = np.column_stack([np.cos(angle), np.sin(angle)])
+            points = place + np.cumsum(steps, axis=0) * 0.15 * pitch
+        specks.append(_Speck(points, max(0.5, float(rng.exponential(0.12)) * pitch), value))
+    return specks
 
 
 def _one_bit(image: GreyImage, scan: Scan, rng: Rng) -> GreyImage:

@@ -21,6 +21,8 @@ from grader.simulation.view import view_of
 from reference.assignment import Assignment, Variant
 
 _FRAME_GAP_MM = 4.0
+_SHRINK = (1.0, 0.9, 0.8, 0.66, 0.5, 0.4)
+"""Lengths of the crank tried, as shares of the one wished for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +80,7 @@ def simulate(
     chosen = settings or Settings()
     if printed is not None:
         chosen = replace(chosen, student=replace(chosen.student, sheets=1 if "all" in printed else 2))
-    task = task_of(assignment, variant, chosen.student, np.random.default_rng([seed, 0]))
-    drawn = draw(task, chosen.hand, chosen.student, np.random.default_rng([seed, 1]))
-    drawn = tuple(one for sheet in drawn for one in _fitting(sheet, chosen, seed, printed))
+    task, drawn, chosen = _drawn_to_fit(assignment, variant, seed, chosen, printed)
     sheets = []
     for index, sheet in enumerate(drawn):
         rng = np.random.default_rng([seed, 2, index])
@@ -91,20 +91,44 @@ def simulate(
     return sheets
 
 
-def _fitting(
+def _drawn_to_fit(
+    assignment: Assignment, variant: Variant, seed: int, settings: Settings,
+    printed: Mapping[str, PrintedSheet] | None,
+) -> tuple[Task, list[DrawnSheet], Settings]:
+    """The student's figures at the largest scale tried at which they go on the paper.
+
+    Where none does, the sheets are split.
+    """
+    proposed = float(assignment.scales([variant]).kL[0])
+    crank = float(assignment.mechanism([variant]).crank.length_m.reshape(-1)[0])
+    wished = settings.student.crank_mm or crank / proposed
+    for share in _SHRINK:
+        tried = settings.student if share == 1.0 else replace(settings.student, crank_mm=round(wished * share))
+        chosen = replace(settings, student=tried)
+        task = task_of(assignment, variant, tried, np.random.default_rng([seed, 0]))
+        drawn = draw(task, settings.hand, tried, np.random.default_rng([seed, 1]))
+        if all(_fits(sheet, chosen, seed, printed) for sheet in drawn):
+            return task, list(drawn), chosen
+    return task, [one for sheet in drawn for one in _split(sheet)], chosen
+
+
+def _fits(
     sheet: DrawnSheet, settings: Settings, seed: int, printed: Mapping[str, PrintedSheet] | None
-) -> list[DrawnSheet]:
-    """The sheet, or as many as its figures need."""
-    if printed is not None or _layout(sheet, settings, np.random.default_rng([seed, 4])) is not None:
-        return [sheet]
-    if len(sheet.figures) == 1:
-        return [sheet]
+) -> bool:
+    if printed is None:
+        return _layout(sheet, settings, np.random.default_rng([seed, 4])) is not None
+    zones = printed[sheet.kind].zones
+    sizes = ((zones[f.name], *figures.extent(f.nodes)) for f in sheet.figures)
+    return all((high - low).real < zone[2] - 8 and (high - low).imag < zone[3] - 8 for zone, low, high in sizes)
+
+
+def _split(sheet: DrawnSheet) -> list[DrawnSheet]:
+    """The mechanism with the velocity plan, the acceleration plan apart."""
     if sheet.kind != "all":
-        return [DrawnSheet(sheet.kind, (figure,)) for figure in sheet.figures]
+        return [sheet]
     first = tuple(f for f in sheet.figures if f.name in {MECHANISM, VELOCITY})
     rest = tuple(f for f in sheet.figures if f not in first)
-    split = [DrawnSheet("velocity", first), DrawnSheet("acceleration", rest)]
-    return [one for part in split for one in _fitting(part, settings, seed, printed)]
+    return [DrawnSheet("velocity", first), DrawnSheet("acceleration", rest)]
 
 
 def _layout(sheet: DrawnSheet, settings: Settings, rng: Rng) -> dict[str, complex] | None:

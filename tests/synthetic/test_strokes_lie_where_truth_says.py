@@ -1,0 +1,88 @@
+"""The renderer is held against the truth it writes: ink's centre of mass across a stroke."""
+
+import numpy as np
+import pytest
+
+from grader.simulation import CAREFUL, CLEAN_SCAN, PERFECT, PenStyle, Scan, Settings, simulate
+from grader.simulation.raster import render
+from grader.simulation.strokes import Pen, straight
+from grader.simulation.view import view_of
+from reference.assignment import load_assignment
+
+RENDER_ERROR_MM = 0.01  # what sampling by whole pixels leaves of a centre of mass at 150 dpi
+SCAN_ERROR_MM = 0.02
+
+
+def centre_line_error_mm(image, p_px, q_px, px_per_mm):
+    """Offset of the ink's centre of mass from the line p q, at the line's two thirds, millimetres."""
+    along = (q_px - p_px) / np.hypot(*(q_px - p_px))
+    normal = np.array([-along[1], along[0]])
+    rows, columns = np.indices(image.shape)
+    t = (columns - p_px[0]) * along[0] + (rows - p_px[1]) * along[1]
+    across = (columns - p_px[0]) * normal[0] + (rows - p_px[1]) * normal[1]
+    length = np.hypot(*(q_px - p_px))
+    near = (t > 0.1 * length) & (t < 0.9 * length) & (np.abs(across) < 1.2 * px_per_mm)
+    ink = image[near].astype(float)
+    fit = np.polyfit(t[near], across[near], 1, w=np.sqrt(ink))
+    return np.abs(np.polyval(fit, [0.1 * length, 0.9 * length])).max() / px_per_mm
+
+
+@pytest.mark.parametrize("dpi", [150.0, 300.0])
+@pytest.mark.parametrize("angle_deg", [0.0, 0.7, 31.0, 45.0, 88.0, 90.0, 133.0])
+def test_a_ruled_stroke_lies_on_its_line(dpi, angle_deg):
+    pitch = dpi / 25.4
+    p = 21.37 - 20.11j
+    q = p + 17.0 * np.exp(1j * np.radians(-angle_deg))
+    if q.real < 2:
+        q, p = q + 20, p + 20
+    stroke = straight(np.random.default_rng(1), Pen("main", 0.43, 0.8, 0.0, 0.0), p, q)
+    image = render([stroke], lambda xy: xy * pitch - 0.5, (int(45 * pitch), int(45 * pitch)))
+    ends = [np.array([z.real, -z.imag]) * pitch - 0.5 for z in (p, q)]
+    assert centre_line_error_mm(image, *ends, pitch) < RENDER_ERROR_MM
+
+
+@pytest.mark.parametrize(
+    "scan",
+    [
+        Scan(dpi=150.0, skew_deg=2.0, noise=0.0, tint_grain=0.0, dust=0, shading=0.0, quarter_turns=1),
+        Scan(device="phone", dpi=120.0, mode="colour", tilt_deg=8.0, lens_k1=0.03, noise=0.0, dust=0),
+    ],
+    ids=["a skewed sheet on its side", "a phone with a lens"],
+)
+def test_a_scanned_vector_lies_where_truth_says(scan):
+    pen = PenStyle(wobble_mm=0.0, pressure=0.0, grain=0.0, smudges=0, erased=0.0, construction_lines=0.0,
+                   arrow="none")
+    assignment = load_assignment("pump")
+    sheet = simulate(assignment, assignment.variant(12), 3, Settings(hand=CAREFUL, pen=pen, scan=scan))[0]
+    image = sheet.image if sheet.image.ndim == 2 else sheet.image[..., 1]
+    line = np.array(sheet.truth["figures"]["velocity_plan"]["vectors"]["v_BA"]["line_mm"])
+    view = view_of(scan, np.random.default_rng([3, 3, 0]))
+    p, q = view.to_px(line)
+    low = np.floor(np.minimum(p, q)).astype(int) - 20
+    high = np.ceil(np.maximum(p, q)).astype(int) + 20
+    window = 255 - image[low[1] : high[1], low[0] : high[0]]
+    window = np.where(window > 60, window, 0)
+    # Letters and neighbours beside the stroke are kept out by a narrow band.
+    error = narrow_error_mm(window, p - low, q - low, sheet.truth["px_per_mm"])
+    assert error < SCAN_ERROR_MM
+
+
+def narrow_error_mm(image, p_px, q_px, px_per_mm):
+    along = (q_px - p_px) / np.hypot(*(q_px - p_px))
+    normal = np.array([-along[1], along[0]])
+    rows, columns = np.indices(image.shape)
+    t = (columns - p_px[0]) * along[0] + (rows - p_px[1]) * along[1]
+    across = (columns - p_px[0]) * normal[0] + (rows - p_px[1]) * normal[1]
+    near = (t > 0.3 * np.hypot(*(q_px - p_px))) & (t < 0.7 * np.hypot(*(q_px - p_px)))
+    near &= np.abs(across) < 0.45 * px_per_mm
+    return abs(np.average(across[near], weights=image[near].astype(float) + 1e-9)) / px_per_mm
+
+
+def test_a_perfect_hand_on_a_clean_scanner_draws_the_exact_plan():
+    assignment = load_assignment("pump")
+    settings = Settings(hand=PERFECT, scan=CLEAN_SCAN)
+    sheet = simulate(assignment, assignment.variant(5), 9, settings)[0]
+    for name in ("velocity_plan", "acceleration_plan"):
+        for vector in sheet.truth["figures"][name]["vectors"].values():
+            assert vector["length_mm"] == pytest.approx(vector["intended"]["length_mm"], abs=2e-4)
+            assert vector["direction_deg"] == pytest.approx(vector["intended"]["direction_deg"], abs=2e-3)
