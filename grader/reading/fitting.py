@@ -12,7 +12,10 @@ from reference.geometry import ComplexArray
 ROUNDS = 5
 LEAST_REDRAW_MM = 0.12
 MOST_REDRAW_MM = 0.6
-END_MM = 0.5
+END_MM = 0.4
+END_REACH_MM = 4.0
+RUN_ON = 0.25
+"""Density of ends run on past their node, relative to that of ends at it."""
 LOOSE_MM = 6.0
 """Standard error of the belief that keeps unseen nodes from running away: it decides nothing else."""
 
@@ -35,27 +38,33 @@ class Fit:
 
 
 def fit_nodes(found: Explanation, lines: Lines, end_mm: float = END_MM) -> Fit:
-    """Weighted least squares over all strokes taken, repeated with large misfits held back."""
+    """Weighted least squares over all strokes taken, repeated with large misfits held back.
+
+    A stroke's end that lies near its node may be the node or a line run on past it: it counts by the
+    probability of the former, given where the node now is.
+    """
     expected = found.expected
     redraw = 0.3
     at = expected.at.copy()
-    weights: FloatArray | None = None
-    design, values, sigma, is_end = _observations(found, lines, at, redraw, end_mm)
     cov = np.eye(2 * len(at)) * LOOSE_MM**2
     for _ in range(ROUNDS):
         design, values, sigma, is_end = _observations(found, lines, at, redraw, end_mm)
-        scaled = values / sigma
-        weights = np.where(np.abs(scaled) <= 2.0, 1.0, 2.0 / np.maximum(np.abs(scaled), 1e-9))  # noqa: PLR2004
-        weights = np.where(is_end, weights**2, weights)
+        scaled = np.abs(values / sigma)
+        weights = np.where(is_end, _end_weight(scaled), np.minimum(1.0, 2.0 / np.maximum(scaled, 1e-9)))
         rows = design * (np.sqrt(weights) / sigma)[:, None]
-        loose = np.eye(2 * len(at)) / LOOSE_MM**2
+        normal = rows.T @ rows + np.eye(2 * len(at)) / LOOSE_MM**2
+        cov = np.asarray(np.linalg.inv(normal), dtype=np.float64)
         prior = _pairs(expected.at - at) / LOOSE_MM**2
-        normal = rows.T @ rows + loose
-        cov = np.linalg.inv(normal)
         step = cov @ (rows.T @ (values * np.sqrt(weights) / sigma) + prior)
         at = at + step[0::2] + 1j * step[1::2]
         redraw = _redraw(found, lines, at, design.shape)
     return Fit(at, cov, redraw, _residuals(found, lines, at))
+
+
+def _end_weight(scaled: FloatArray) -> FloatArray:
+    """Probability that an end this many standard errors off its node is meant to be at it."""
+    at_node = np.exp(-0.5 * scaled**2)
+    return np.asarray(at_node / (at_node + RUN_ON))
 
 
 def _pairs(values: ComplexArray) -> FloatArray:
@@ -81,8 +90,8 @@ def _observations(
             values.append(-off.imag)
             sigmas.append(np.sqrt(loose**2 + lines.se_offset[row] ** 2 + (lines.se_angle[row] * off.real) ** 2))
             of_end.append(False)
-            if found.ended[index, slot]:
-                end = min((lines.start[row], lines.end[row]), key=lambda point: abs(point - at[node]))
+            end = min((lines.start[row], lines.end[row]), key=lambda point: abs(point - at[node]))
+            if not found.shared[index] and abs(end - at[node]) < END_REACH_MM:
                 h = np.zeros(2 * len(at))
                 h[2 * node : 2 * node + 2] = (along.real, along.imag)
                 rows.append(h)

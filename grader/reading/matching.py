@@ -6,6 +6,7 @@ other nodes through their covariance (a Kalman update). Scores are log likelihoo
 stroke being there by chance, so that explanations with different numbers of strokes compare.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,8 +68,13 @@ class _Choice:
     ended: tuple[bool, bool]
 
 
-def explain(expected: Expected, lines: Lines, ends: Ends, beam: int = BEAM) -> list[Explanation]:
-    """The best explanations of a placed figure, best first."""
+def explain(
+    expected: Expected, lines: Lines, ends: Ends, beam: int = BEAM, kept: Mapping[int, int] | None = None
+) -> list[Explanation]:
+    """The best explanations of a placed figure, best first.
+
+    Arguments: `kept` are edges whose strokes are settled already (rows of `lines`, -1 for none).
+    """
     edges = expected.edges
     start = Explanation(
         expected,
@@ -78,10 +84,14 @@ def explain(expected: Expected, lines: Lines, ends: Ends, beam: int = BEAM) -> l
         0.0,
     )
     states = [start]
-    for edge in _most_telling_first(expected):
+    settled = kept or {}
+    order = _most_telling_first(expected)
+    for edge in (*(one for one in order if one in settled), *(one for one in order if one not in settled)):
         choices = [
             choice for index, state in enumerate(states) for choice in _choices(state, index, edge, lines, ends)
         ]
+        if edge in settled:
+            choices = [one for one in choices if one.row == settled[edge]] or choices
         choices.sort(key=lambda choice: -choice.score)
         states = _distinct([_taken(states[c.state], edge, c, lines, ends) for c in choices[: 2 * beam]], beam)
     return states

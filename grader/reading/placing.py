@@ -18,6 +18,9 @@ HIGHEST_WEIGHT_MM = 40.0
 LEAST_EDGE_MM = 8.0
 OVERRUN_MM = 25.0
 PROPOSING_EDGES = 4
+SHORT_LIST = 60
+SPECK_MM = 2.0
+"""Shorter edges have no direction to speak of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +59,18 @@ def places(expected: Expected, lines: Lines, search: Search, count: int = 3) -> 
     proposed = _proposals(expected, lines, search)
     if not len(proposed):
         return []
-    scores = _scores(expected, lines, proposed)
+    # The longest edges, on long strokes alone, leave few proposals for a look at everything.
+    rough = _scores(expected, lines, proposed, _longest(expected))
+    proposed = proposed[np.argsort(-rough)[:SHORT_LIST]]
+    scores = _scores(expected, lines, proposed, list(range(len(expected.edges))))
     return _apart(proposed, scores, float(np.abs(expected.at).max()), count)
 
 
 def _proposals(expected: Expected, lines: Lines, search: Search) -> FloatArray:
     """(m, 4) origin x, y, size, turn."""
     found: list[FloatArray] = []
-    for tail, head in _longest(expected):
+    for edge in _longest(expected):
+        tail, head = (complex(expected.at[end]) for end in (expected.edges[edge].tail, expected.edges[edge].head))
         span = head - tail
         # A stroke has no sense: it may lie either way.
         for start, end in ((lines.start, lines.end), (lines.end, lines.start)):
@@ -78,10 +85,16 @@ def _proposals(expected: Expected, lines: Lines, search: Search) -> FloatArray:
     return np.concatenate(found) if found else np.zeros((0, 4))
 
 
-def _longest(expected: Expected) -> list[tuple[complex, complex]]:
-    ends = [(complex(expected.at[edge.tail]), complex(expected.at[edge.head])) for edge in expected.edges]
-    ends = [pair for pair in ends if np.isfinite(pair[0] + pair[1]) and abs(pair[1] - pair[0]) >= LEAST_EDGE_MM]
-    return sorted(ends, key=lambda pair: -abs(pair[1] - pair[0]))[:PROPOSING_EDGES]
+def _longest(expected: Expected) -> list[int]:
+    """The longest edges, by their place in the list, each in a direction of its own."""
+    span = np.array([expected.at[edge.head] - expected.at[edge.tail] for edge in expected.edges])
+    size = np.where(np.isfinite(span), np.abs(span), 0.0)
+    chosen: list[int] = []
+    for edge in np.argsort(-size):
+        if size[edge] < LEAST_EDGE_MM or len(chosen) == PROPOSING_EDGES:
+            break
+        chosen.append(int(edge))
+    return chosen
 
 
 def _laid(  # noqa: PLR0913 - one argument per thing that is fixed
@@ -105,19 +118,20 @@ def _laid(  # noqa: PLR0913 - one argument per thing that is fixed
     return [np.column_stack([at.real, at.imag, sizes, turn]) for at in (by_tail, by_head)]
 
 
-def _scores(expected: Expected, lines: Lines, proposed: FloatArray) -> FloatArray:
+def _scores(expected: Expected, lines: Lines, proposed: FloatArray, edges: Sequence[int]) -> FloatArray:
     """Share of the figure's edges (by length, capped) that have a stroke, for every proposal."""
     origin = proposed[:, 0] + 1j * proposed[:, 1]
     spin = proposed[:, 2] * np.exp(1j * proposed[:, 3])
     total, weights = np.zeros(len(proposed)), np.zeros(len(proposed))
-    for edge in expected.edges:
+    for edge in (expected.edges[index] for index in edges):
         tail, head = (origin + spin * expected.at[node] for node in (edge.tail, edge.head))
         size = np.abs(head - tail)
         if not np.isfinite(size).all():
             continue
-        weight = np.minimum(size, HIGHEST_WEIGHT_MM) * (size > 2.0)  # noqa: PLR2004 - below, no direction
+        weight = np.minimum(size, HIGHEST_WEIGHT_MM) * (size > SPECK_MM)
         reach = OFF_MM + OFF_PER_MM * np.maximum(np.abs(tail - origin), np.abs(head - origin))
-        total += weight * best_support(lines, tail, head, reach)
+        long = lines.take(lines.length > 0.3 * size.min())
+        total += weight * best_support(long, tail, head, reach)
         weights += weight
     return np.asarray(total / np.maximum(weights, 1e-9))
 

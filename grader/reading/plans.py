@@ -1,6 +1,6 @@
 """A velocity or acceleration plan: the hypotheses of how it was drawn, held against the strokes."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,9 +10,9 @@ from grader.reading.fitting import Fit, fit_nodes
 from grader.reading.lines import Lines
 from grader.reading.matching import BEAM, Ends, Explanation, explain
 from grader.reading.placing import Place, Search, places
-from reference.construction import Construction, Given, Normal
+from reference.construction import Construction, Given, Normal, ancestors
 from reference.geometry import ComplexArray
-from reference.mistakes import Drawing, Mistake, commit, single_mistakes
+from reference.mistakes import Drawing, Mistake, affected, commit, single_mistakes
 
 HAND = Hand()
 PLAN_ENDS = Ends()
@@ -27,6 +27,13 @@ BEAM_OF_MISTAKES = 4
 SMALLEST_MM, LARGEST_MM = 20.0, 280.0
 """Of a plan's longest vector: what fits on a sheet and can be measured."""
 LEAST_LAID_MM = 4.0
+LEFT_OUT = "not drawn: normal component left out"
+LEAST_SEEN_MM = 2.5
+RIVALS = 25
+ALTERNATIVES = 4
+NEARLY = 8.0
+"""Nats: explanations of one place that are worse by more are no rivals."""
+ASTRAY_MM = 0.8
 OF_THE_WHOLE = {"figure_rotated", "scale_wrong", "rpm_not_converted", "vector_missing"}
 
 
@@ -85,7 +92,7 @@ def regular(drawing: Drawing, figure: str) -> list[Hypothesis]:
     return told
 
 
-def mistaken(drawing: Drawing, figure: str) -> Iterator[Hypothesis]:
+def mistaken(drawing: Drawing, figure: str) -> Iterator[tuple[Hypothesis, Mistake]]:
     """Every single mistake in either form; the search for its place turns and scales it anyway."""
     for base in regular(drawing, figure):
         for mistake in single_mistakes(base.drawing, figure):
@@ -93,14 +100,14 @@ def mistaken(drawing: Drawing, figure: str) -> Iterator[Hypothesis]:
                 continue
             gone = dict(base.absent)
             if mistake.code == "normal_missing":
-                gone[mistake.at] = "not drawn: normal component left out"
+                gone[mistake.at] = LEFT_OUT
             if mistake.at in base.absent:
                 continue
             try:
                 changed = commit(mistake, base.drawing)
             except ValueError:
                 continue
-            yield Hypothesis(_told(mistake), changed, gone, base.cost + COST_OF_MISTAKE)
+            yield Hypothesis(_told(mistake), changed, gone, base.cost + COST_OF_MISTAKE), mistake
 
 
 def _told(mistake: Mistake) -> str:
@@ -122,50 +129,90 @@ def similar(construction: Construction, figure: str) -> tuple[Construction, dict
     return None if changed is construction else (changed, absent)
 
 
-def find_plan(
-    lines: Lines, drawing: Drawing, figure: str, given: Mapping[str, ComplexArray], *, thorough: bool = True
-) -> Plan | None:
-    """The plan of one figure among the strokes of a sheet.
+def regular_plans(
+    lines: Lines, drawing: Drawing, figure: str, given: Mapping[str, ComplexArray]
+) -> list[Plan]:
+    """The plan of one figure among the strokes of a sheet as it should be drawn, best first.
 
     Arguments
     ---------
     drawing : construction and parameters of the student's variant
     given : nodes already read (mechanism, velocity plan), complex mm, y up
-    thorough : try mistakes as well
     """
     plans: list[Plan] = []
     for hypothesis in regular(drawing, figure):
         expected = _expected(hypothesis, figure, given)
         if expected is not None:
-            plans.extend(_read(hypothesis, expected, place, lines) for place in _laid(expected, lines))
+            for place in _laid(expected, lines):
+                plans.extend(_read(hypothesis, expected, place, lines))
+    return sorted(plans, key=lambda plan: -plan.score)
+
+
+def best_plan(
+    plans: list[Plan], lines: Lines, drawing: Drawing, figure: str, given: Mapping[str, ComplexArray]
+) -> Plan | None:
+    """The best of the regular plans and of the same with a mistake made; the others are its rivals."""
     if not plans:
         return None
-    plans.sort(key=lambda plan: -plan.score)
-    if thorough:
-        plans.extend(_with_mistakes(plans[:2], drawing, figure, lines, given))
-    plans.sort(key=lambda plan: -plan.score)
-    return replace(plans[0], rivals=tuple(plans[1:16]))
+    everything = [*plans, *_with_mistakes(plans, drawing, figure, lines, given)]
+    everything.sort(key=lambda plan: -plan.score)
+    return replace(everything[0], rivals=tuple(everything[1:RIVALS]))
 
 
 def _with_mistakes(
     bases: list[Plan], drawing: Drawing, figure: str, lines: Lines, given: Mapping[str, ComplexArray]
 ) -> Iterator[Plan]:
     """The same plan with a mistake made, where its regular form was found; elsewhere if that is poor."""
-    poor = bases[0].place.score < POOR
-    for hypothesis in mistaken(drawing, figure):
+    best = bases[0]
+    poor = best.place.score < POOR
+    suspect = None if poor else _suspects(best)
+    for hypothesis, mistake in mistaken(drawing, figure):
+        if suspect is not None and mistake.at not in suspect:
+            continue
         expected = _expected(hypothesis, figure, given)
         if expected is None:
             continue
-        for place in _laid(expected, lines, count=1) if poor else [bases[0].refined]:
-            yield _read(hypothesis, expected, place, lines, beam=BEAM_OF_MISTAKES)
+        if poor:
+            for place in _laid(expected, lines, count=1):
+                yield from _read(hypothesis, expected, place, lines, BEAM_OF_MISTAKES)
+        else:
+            moved = affected(mistake, hypothesis.drawing.construction)
+            yield from _read(hypothesis, expected, best.refined, lines, BEAM_OF_MISTAKES, (best, moved))
+
+
+def _suspects(plan: Plan) -> frozenset[str]:
+    """The nodes at which a mistake could explain what the regular form does not."""
+    names = plan.found.expected.names
+    odd: set[str] = set()
+    for index, edge in enumerate(plan.found.expected.edges):
+        size = abs(plan.fit.at[edge.head] - plan.fit.at[edge.tail])
+        unseen = size > LEAST_SEEN_MM and (plan.found.stroke[index] < 0 or plan.found.shared[index])
+        astray = np.nanmax(np.abs(plan.fit.residual_mm[index])) > ASTRAY_MM if plan.found.stroke[index] >= 0 else False
+        if unseen or astray:
+            odd.update((names[edge.tail], names[edge.head]))
+    return ancestors(plan.hypothesis.drawing.construction, odd)
 
 
 def _expected(
     hypothesis: Hypothesis, figure: str, given: Mapping[str, ComplexArray]
 ) -> Expected | None:
-    edges = vectors_of(hypothesis.drawing.construction, figure, hypothesis.absent)
+    edges = vectors_of(_tied(hypothesis), figure, hypothesis.absent)
     expected = expect(hypothesis.drawing, figure, given, HAND, edges)
     return expected if np.isfinite(expected.at).all() else None
+
+
+def _tied(hypothesis: Hypothesis) -> Construction:
+    """Vectors that would start from a normal component left out start where it would have started."""
+    construction = hypothesis.drawing.construction
+    vectors = dict(construction.vectors)
+    for node, reason in hypothesis.absent.items():
+        step = construction.step(node)
+        if reason != LEFT_OUT or not isinstance(step, Given):
+            continue
+        for name, vector in vectors.items():
+            if vector.tail == node:
+                vectors[name] = replace(vector, tail=step.start)
+    return replace(construction, vectors=vectors)
 
 
 def _laid(expected: Expected, lines: Lines, count: int = 3) -> list[Place]:
@@ -179,16 +226,45 @@ def _laid(expected: Expected, lines: Lines, count: int = 3) -> list[Place]:
 
 
 def _read(
-    hypothesis: Hypothesis, expected: Expected, place: Place, lines: Lines, beam: int = BEAM
-) -> Plan:
+    hypothesis: Hypothesis,
+    expected: Expected,
+    place: Place,
+    lines: Lines,
+    beam: int = BEAM,
+    base: tuple[Plan, Collection[str]] | None = None,
+) -> list[Plan]:
+    """The best explanations of a plan laid at a place: several, where they are nearly as good."""
     known = abs(np.log(place.size)) < SAME_SIZE
     slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03 if known else 0.08)
     placed = expected.placed(place.at, place.size, place.turn_rad, slack)
     around = lines.take(_near(lines, placed))
-    found = explain(placed, around, PLAN_ENDS, beam)[0]
+    kept = None if base is None else _kept(*base, placed, around)
+    explained = explain(placed, around, PLAN_ENDS, beam, kept)
     cost = hypothesis.cost + (0.0 if known else COST_OF_SIZE)
     cost += 0.0 if abs(place.turn_rad) < np.pi / 4 else COST_OF_TURN
-    return Plan(hypothesis, place, found, fit_nodes(found, around), found.score - cost, around)
+    return [
+        Plan(hypothesis, place, found, fit_nodes(found, around), found.score - cost, around)
+        for found in explained[:ALTERNATIVES]
+        if found.score > explained[0].score - NEARLY
+    ]
+
+
+def _kept(base: Plan, moved: Collection[str], placed: Expected, lines: Lines) -> dict[int, int]:
+    """The strokes of vectors that a mistake does not touch, as rows of `lines`."""
+    row_of = {tuple(pair): row for row, pair in enumerate(lines.members.tolist())}
+    by_name = {edge.name: index for index, edge in enumerate(base.found.expected.edges)}
+    kept = {}
+    for index, edge in enumerate(placed.edges):
+        touched = {placed.names[edge.tail], placed.names[edge.head]} & set(moved)
+        known = by_name.get(edge.name)
+        if touched or known is None:
+            continue
+        row = int(base.found.stroke[known])
+        if row < 0:
+            kept[index] = -1
+        elif tuple(base.lines.members[row]) in row_of:
+            kept[index] = row_of[tuple(base.lines.members[row])]
+    return kept
 
 
 def _near(lines: Lines, placed: Expected) -> np.ndarray:
@@ -201,4 +277,4 @@ def _near(lines: Lines, placed: Expected) -> np.ndarray:
     )
 
 
-__all__ = ["Edge", "Hypothesis", "Plan", "find_plan"]
+__all__ = ["Edge", "Hypothesis", "Plan", "best_plan", "regular_plans"]

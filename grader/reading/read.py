@@ -7,7 +7,7 @@ import numpy as np
 
 from grader.reading.figures import figure_of_plan, figure_of_sketch
 from grader.reading.lines import Lines, lines_of
-from grader.reading.plans import Plan, find_plan
+from grader.reading.plans import Plan, best_plan, regular_plans
 from grader.reading.sketch import Sketch, drawings, find_sketch
 from grader.records import (
     ACCELERATION_PLAN,
@@ -107,17 +107,16 @@ def _turned(page: _Page, pages: Sequence[_Page], drawing: Drawing) -> Drawing:
 
 def _find(pages: Sequence[_Page], drawing: Drawing, figure: str, known: Mapping[str, ComplexArray]) -> Plan | None:
     """The plan on the sheet that explains it best, kept there."""
-    best: tuple[Plan, _Page] | None = None
+    best: tuple[_Page, Given, list[Plan]] | None = None
     for page in pages:
         given = {**_given(page, pages), **known}
-        plan = find_plan(page.lines, _turned(page, pages, drawing), figure, given, thorough=False)
-        if plan is not None and (best is None or plan.score > best[0].score):
-            best = plan, page
+        plans = regular_plans(page.lines, _turned(page, pages, drawing), figure, given)
+        if plans and (best is None or plans[0].score > best[2][0].score):
+            best = page, given, plans
     if best is None:
         return None
-    page = best[1]
-    given = {**_given(page, pages), **known}
-    plan = find_plan(page.lines, _turned(page, pages, drawing), figure, given)
+    page, given, plans = best
+    plan = best_plan(plans, page.lines, _turned(page, pages, drawing), figure, given)
     if plan is None or plan.score < LEAST_PLAN:
         return None
     page.plans[figure] = plan
