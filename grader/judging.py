@@ -1,9 +1,13 @@
 """Judging one submission: comparison, diagnosis and scoring in their order, and the report of it."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from grader.comparison import Submission, Task, compare, task_of
+import numpy as np
+
+from grader.comparison import Comparison, Submission, Task, compare, task_of
+from grader.diagnosis import Case, Observed, diagnose, wrong_scale
 from grader.documents import (
     CriterionDocument,
     MistakeDocument,
@@ -21,6 +25,7 @@ from grader.records import Problem
 from grader.rubric import RubricFile
 from grader.scoring import score
 from reference.assignment import Assignment, Variant
+from reference.mistakes import Drawing
 
 __all__ = ["Submission", "Task", "judge", "report_of", "task_of", "unjudged_report"]
 
@@ -28,13 +33,62 @@ __all__ = ["Submission", "Task", "judge", "report_of", "task_of", "unjudged_repo
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission)
-    mistakes: tuple[Mistake, ...] = ()
+    mistakes = (*_wrong_scales(comparison), *diagnose(_case(task, comparison)))
     outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
 
 
+def _case(task: Task, comparison: Comparison) -> Case:
+    """The drawing to explain, at the scales that it follows."""
+    scales = {name: np.asarray(scale) for name, scale in comparison.followed.items()}
+    drawing = Drawing(task.construction, {**task.parameters, **scales})
+    vectors = {one.id: one.vector for one in task.rubric.criterion}
+    observed = []
+    for outcome in comparison.outcomes:
+        name = vectors[outcome.criterion]
+        drawn = comparison.evidence.vector(name) if name else None
+        if name is None or drawn is None or outcome.tolerance.length_mm is None:
+            continue
+        turn = outcome.tolerance.direction_deg
+        observed.append(
+            Observed(
+                criterion=outcome.criterion,
+                vector=name,
+                length_mm=drawn.length_mm,
+                direction_rad=drawn.direction_rad,
+                allowed_mm=outcome.tolerance.length_mm,
+                allowed_rad=None if turn is None else math.radians(turn),
+                is_lost=outcome.verdict in {"none", "partial", "follow_through"},
+            )
+        )
+    return Case(drawing, observed, task.assignment, task.variant)
+
+
+def _wrong_scales(comparison: Comparison) -> tuple[Mistake, ...]:
+    """Declared scales that the drawing contradicts, and the criteria that they explain."""
+    found = []
+    for name, scale in comparison.scales.items():
+        followed = comparison.followed[name]
+        if scale.declared is None or followed == scale.used:
+            continue
+        explains = [one.criterion for one in comparison.outcomes if _hangs_on_scale(one, name)]
+        found.append(wrong_scale(name, scale.declared, followed, explains))
+    return tuple(found)
+
+
+def _hangs_on_scale(outcome: Outcome, scale: str) -> bool:
+    """Whether a criterion lost by a scale, or is right only by the scale that the drawing follows."""
+    by_scale = any(
+        one.code == "follows" and one.params.get("what") == "scale" and one.params.get("of") == scale
+        for one in outcome.reasons
+    )
+    return by_scale or (outcome.name == scale and outcome.verdict in {"none", "partial"})
+
+
 def _with_mistake(outcome: Outcome, mistakes: Sequence[Mistake]) -> Outcome:
     """The outcome with the code of the mistake that explains its loss."""
+    if outcome.verdict not in {"none", "partial"}:
+        return outcome
     found = next((one.code for one in mistakes if outcome.criterion in one.explains), None)
     return replace(outcome, mistake=found) if found and outcome.mistake is None else outcome
 

@@ -20,6 +20,8 @@ class Comparison:
 
     outcomes: tuple[Outcome, ...]
     scales: Mapping[str, UsedScale]
+    followed: Mapping[str, float]
+    """The scales that the drawing follows, where they contradict those used."""
     evidence: Evidence
 
 
@@ -28,11 +30,14 @@ def compare(task: Task, submission: Submission) -> Comparison:
     evidence = gather(task, submission)
     settled = settle(task, evidence, submission.declared)
     session = _Session(task, evidence, settled, used_scales(settled), followed_scales(settled))
+    # What was drawn contradicts a scale that nobody declared, or that nobody understood.
+    session.doubtful.update(name for name, scale in settled.items() if scale.other and scale.used.assumed)
     order = [*settled, *task.construction.vectors, *task.construction.rates]
     criteria = sorted(task.rubric.criterion, key=lambda criterion: order.index(criterion.name))
     found = {criterion.id: session.outcome(criterion) for criterion in criteria}
     outcomes = tuple(found[criterion.id] for criterion in task.rubric.criterion)
-    return Comparison(outcomes, {name: scale.used for name, scale in settled.items()}, evidence)
+    scales = {name: scale.used for name, scale in settled.items()}
+    return Comparison(outcomes, scales, session.followed, evidence)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,8 +208,7 @@ class _Session:
             for one in expectations(task, self.evidence, name, self.used, self.followed):
                 candidate = self.allowed(one.relies_on, against(one.vector))
                 if verdicts.is_better(candidate, mark):
-                    follows = Reason("follows", {"what": one.what, "of": one.of or self.named(one)})
-                    mark = verdicts.the_better(candidate, original, follows)
+                    mark = verdicts.the_better(candidate, original, *self.why(one))
                     chosen, followed = one.vector, True
         self.remember(task.construction.vectors[name].head, mark)
         return mark, chosen, followed
@@ -225,6 +229,12 @@ class _Session:
             self.doubtful.add(name)
         elif mark.level != "full":
             self.charged.add(name)
+
+    def why(self, one: Expectation) -> tuple[Reason, ...]:
+        """What an expectation follows from, and that its scale is not known where it is not."""
+        follows = Reason("follows", {"what": one.what, "of": one.of or self.named(one)})
+        assumed = self.settled[one.of].reasons if one.what == "scale" and one.of in self.doubtful else ()
+        return (*assumed, follows)
 
     def named(self, one: Expectation) -> str:
         """The last vector charged that an expectation relies on, or the mechanism."""

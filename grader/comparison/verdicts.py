@@ -29,13 +29,13 @@ def is_better(mark: Mark, other: Mark) -> bool:
     return rank(mark) > rank(other)
 
 
-def the_better(mark: Mark, other: Mark, reason: Reason) -> Mark:
-    """Two marks of which the better counts; the reasons are those of `other`, after `reason`."""
+def the_better(mark: Mark, other: Mark, *reasons: Reason) -> Mark:
+    """Two marks of which the better counts; the reasons are those of `other`, after `reasons`."""
     return Mark(
         better((mark.level, other.level)),
         better((mark.worst, other.worst)),
         better((mark.best, other.best)),
-        (reason, *other.reasons),
+        (*reasons, *other.reasons),
     )
 
 
