@@ -15,7 +15,7 @@ from grader.records import Figure, Problem, Reading, ReadNode, ReadVector, Sheet
 STAGES = ("decode", "sheet", "ink", "reading")
 
 
-def reading_document(  # noqa: PLR0913 - a page, what was made of it, and how long it took
+def reading_document(  # noqa: PLR0913, PLR0917 - a page, what was made of it, and how long it took
     source: str,
     page: int,
     student_id: str | None,
@@ -31,7 +31,7 @@ def reading_document(  # noqa: PLR0913 - a page, what was made of it, and how lo
         page=page,
         student_id=student_id,
         sheet=None if sheet is None else _sheet(sheet),
-        figures={name: _figure(figure) for name, figure in reading.figures.items()},  # type: ignore[misc]
+        figures={name: _figure(figure) for name, figure in reading.figures.items()},
         unread=[UnreadDocument(name=one.name, reason=one.reason) for one in reading.unread],
         problems=[problem_document(problem) for problem in (*sheet_problems, *reading.problems)],
         timing_ms=TimingDocument(**timing, total=sum(timing.values())),

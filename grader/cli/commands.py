@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.app import AssignmentArgument, NumberOption, PositionOption, app
+from grader.cli.app import AssignmentArgument, LanguageOption, NumberOption, PositionOption, app
 
 
 @app.command()
@@ -34,3 +34,124 @@ def schema(name: Annotated[str, typer.Argument(help="report, results, reading, m
     from grader import documents
 
     typer.echo(json.dumps(documents.schema(name), indent=2, ensure_ascii=False))
+
+
+FolderArgument = Annotated[Path, typer.Argument(help="The folder with what was handed in.")]
+RosterOption = Annotated[Path | None, typer.Option("--roster", help="The class: roster.csv.")]
+JobsOption = Annotated[int | None, typer.Option("--jobs", min=1, help="Processes; all processors if absent.")]
+
+
+@app.command()
+def grade(
+    folder: FolderArgument,
+    assignment: Annotated[str, typer.Option("--assignment", help="A built-in name or a .toml file.")],
+    out: Annotated[Path, typer.Option("--out", help="The folder for the results.")],
+    roster: RosterOption = None,
+    pages_per_student: Annotated[
+        int | None, typer.Option("--pages-per-student", help="Of one class file, in the roster's order.")
+    ] = None,
+    jobs: JobsOption = None,
+    lang: LanguageOption = "en",
+) -> None:
+    """Grade a folder of scans (JPEG, PNG, TIFF, PDF) and measurement files (CSV, JSON)."""
+    from grader.cli.grading import grade_folder
+
+    open_ends = grade_folder(
+        folder, assignment, out, roster=roster, pages_per_student=pages_per_student, jobs=jobs, lang=lang
+    )
+    raise typer.Exit(1 if open_ends else 0)
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option("--out", help="The folder for the results.")] = Path("planmark-demo"),
+    jobs: JobsOption = None,
+    lang: LanguageOption = "en",
+) -> None:
+    """Grade the bundled samples, scans and entered measurements, and say where to look."""
+    from grader.cli.grading import demo as run_demo
+
+    run_demo(out, lang, jobs)
+
+
+@app.command()
+def read(
+    scans: Annotated[list[Path], typer.Argument(help="Scans of one student's sheets.")],
+    assignment: Annotated[str, typer.Option("--assignment", help="A built-in name or a .toml file.")],
+    n: NumberOption = None,
+    position: PositionOption = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the readings as JSON.")] = False,
+) -> None:
+    """What is read on scans, with standard errors; no grading."""
+    from grader.cli.grading import read_scans
+
+    raise typer.Exit(1 if read_scans(scans, assignment, n, position, as_json=as_json) else 0)
+
+
+@app.command()
+def sheet(
+    assignment: AssignmentArgument,
+    out: Annotated[Path, typer.Option("--out", help="The PDF file to write.")],
+    roster: RosterOption = None,
+    layout: Annotated[
+        Path | None, typer.Option("--layout", help="Write where everything is, as JSON.")
+    ] = None,
+    lang: LanguageOption = "en",
+    calibration: Annotated[
+        bool, typer.Option("--calibration", help="Print the page that measures printer and scanner instead.")
+    ] = False,
+) -> None:
+    """Printable A3 answer sheets of a class: markers, QR code, data, zones."""
+    from grader.cli.sheets import print_sheets
+
+    print_sheets(assignment, roster, out, layout, lang, calibration=calibration)
+
+
+@app.command()
+def match(
+    folder: FolderArgument,
+    assignment: Annotated[str, typer.Option("--assignment", help="A built-in name or a .toml file.")],
+    roster: Annotated[Path, typer.Option("--roster", help="The class: roster.csv.")],
+    out: Annotated[Path, typer.Option("--out", help="The draft of the roster to write, a CSV file.")],
+    pages_per_student: Annotated[int | None, typer.Option("--pages-per-student")] = None,
+    lang: LanguageOption = "en",
+) -> None:
+    """Draft the roster's `scans` where nothing says whose page is whose, with a contact sheet."""
+    from grader.cli.sheets import draft_matches
+
+    raise typer.Exit(1 if draft_matches(folder, assignment, roster, out, pages_per_student, lang) else 0)
+
+
+@app.command()
+def export(
+    results: Annotated[Path, typer.Argument(metavar="OUT", help="The folder that `planmark grade` wrote.")],
+    to: Annotated[str, typer.Option("--to", help="csv or moodle.")],
+    file: Annotated[
+        Path | None, typer.Option("--file", help="The file to write; OUT/export-TO.csv if absent.")
+    ] = None,
+    roster: RosterOption = None,
+    worksheet: Annotated[
+        Path | None,
+        typer.Option("--worksheet", help="Moodle's downloaded offline grading worksheet, to fill in."),
+    ] = None,
+    identity: Annotated[
+        str,
+        typer.Option("--identity", help="How Moodle's gradebook knows users: idnumber, email, username, id."),
+    ] = "idnumber",
+    item: Annotated[str, typer.Option("--item", help="The grade item's name.")] = "",
+    position: PositionOption = None,
+    combine: Annotated[
+        str | None, typer.Option("--combine", help="Of several positions: sum or mean.")
+    ] = None,
+    maximum: Annotated[float | None, typer.Option("--maximum", help="The grade item's maximum.")] = None,
+    rescale: Annotated[bool, typer.Option("--rescale", help="Convert points to that maximum.")] = False,
+    lang: LanguageOption = "en",
+) -> None:
+    """Write the results for a learning platform, validated before anything is written."""
+    from grader.cli.exporting import export_results
+
+    open_ends = export_results(
+        results, to, file, roster=roster, worksheet=worksheet, identity=identity, item=item,
+        position=position, combine=combine, maximum=maximum, rescale=rescale, lang=lang,
+    )  # fmt: skip
+    raise typer.Exit(1 if open_ends else 0)

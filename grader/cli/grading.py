@@ -1,0 +1,176 @@
+"""``planmark grade``, ``planmark demo`` and ``planmark read``."""
+
+import json
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from grader.batch import Batch, grade, needs_person
+from grader.batch import Progress as Tell
+from grader.documents import ReadingDocument, ResultsDocument
+from grader.i18n import LANGUAGES
+from grader.intake import count_pages
+from grader.pipeline import Place, Seen, documents_of, read, see
+from grader.rubric import check_rubric, load_rubric
+from grader.samples_folder import samples_folder
+from reference.assignment import Assignment, Variant, load_assignment
+from reference.derivation import construction_of
+from reference.errors import AuthoredFileError, CallError, InputFileError
+
+SHOWN = 12
+
+
+def grade_folder(
+    folder: Path,
+    name: str,
+    out: Path,
+    *,
+    roster: Path | None,
+    pages_per_student: int | None,
+    jobs: int | None,
+    lang: str,
+) -> bool:
+    """Grade a folder and tell what came of it; whether anything is left for a person."""
+    check_language(lang)
+    if pages_per_student is not None and pages_per_student < 1:
+        raise CallError("pages_per_student", "--pages-per-student must be 1 or more")
+    assignment = load_assignment(name)
+    rubric = load_rubric(assignment.file.rubric, beside=assignment.path)
+    findings = check_rubric(rubric, construction_of(assignment.mechanism(assignment.variants()[:1])))
+    if findings:
+        raise AuthoredFileError(f"rubric {rubric.id}", tuple(findings))
+    batch = Batch(
+        assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1, lang
+    )
+    with _progress() as tell:
+        results = grade(batch, tell)
+    _tell(results, out)
+    return needs_person(results)
+
+
+def check_language(lang: str) -> None:
+    """Refuse a language that there is no feedback in."""
+    if lang not in LANGUAGES:
+        raise CallError("unknown_language", f"--lang {lang}: known are {', '.join(LANGUAGES)}")
+
+
+@contextmanager
+def _progress() -> Iterator[Tell]:
+    columns = (TextColumn("{task.description:>8}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        tasks: dict[str, TaskID] = {}
+
+        def tell(what: str, done: int, total: int) -> None:
+            if what not in tasks:
+                tasks[what] = bar.add_task(what, total=total)
+            bar.update(tasks[what], completed=done, total=total)
+
+        yield tell
+
+
+def _tell(results: ResultsDocument, out: Path) -> None:
+    states = Counter(report.status for report in results.reports)
+    told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
+    typer.echo(f"{len(results.reports)} submissions: {told or 'none'}")
+    lines = [
+        f"  {one.file}{'' if one.page is None else f'#{one.page}'}: {one.message}"
+        for one in results.unmatched
+    ]
+    lines += [
+        f"  {report.student_id}: {report.status.replace('_', ' ')}"
+        + "".join(f"; {problem.message}" for problem in report.problems[:1])
+        for report in results.reports
+        if report.status != "graded"
+    ]
+    if lines:
+        typer.echo("A person must look at:")
+        for line in lines[:SHOWN]:
+            typer.echo(line)
+        if len(lines) > SHOWN:
+            typer.echo(f"  ... and {len(lines) - SHOWN} more, all in {out / 'index.html'}")
+    typer.echo(f"Look at {out / 'index.html'}; for programs there is {out / 'results.json'}")
+
+
+def demo(out: Path, lang: str, jobs: int | None) -> None:
+    """Grade the bundled samples."""
+    for name in ("pump", "press"):
+        typer.echo(f"Grading the {name} class of the samples")
+        folder = samples_folder() / name
+        grade_folder(folder, name, out / name, roster=None, pages_per_student=None, jobs=jobs, lang=lang)
+
+
+def read_scans(
+    scans: Sequence[Path], name: str, n: int | None, position: int | None, *, as_json: bool
+) -> bool:
+    """Read pages without grading; whether anything is doubtful or unread."""
+    assignment = load_assignment(name)
+    variant = _variant(assignment, n, position)
+    seen = [see(place) for path in scans for place in _places(path)]
+    rubric = load_rubric(assignment.file.rubric, beside=assignment.path)
+    readings = read(seen, assignment, variant, {}, rubric.vectors)
+    documents = documents_of(seen, readings, None)
+    documents = [_identified(document, one) for document, one in zip(documents, seen, strict=True)]
+    if as_json:
+        typer.echo(json.dumps([document.model_dump(mode="json") for document in documents], indent=2))
+    else:
+        for document in documents:
+            _print_reading(document)
+    return any(not document.figures or document.unread or _doubtful(document) for document in documents)
+
+
+def _variant(assignment: Assignment, n: int | None, position: int | None) -> Variant | None:
+    """The variant, None where n or position is left open: any of them may then have been drawn."""
+    spec = assignment.file.variant
+    if (spec.n is not None and n is None) or (spec.position is not None and position is None):
+        if n is not None and spec.n is not None and n not in spec.n.values:
+            return assignment.variant(n, position)
+        return None
+    return assignment.variant(n, position)
+
+
+def _places(path: Path) -> list[Place]:
+    try:
+        return [Place(path, page, path.name) for page in range(1, count_pages(path) + 1)]
+    except InputFileError as error:
+        if error.code == "file_missing":
+            raise
+        return [Place(path, 1, path.name)]
+
+
+def _identified(document: ReadingDocument, one: Seen) -> ReadingDocument:
+    identity = None if one.sheet is None else one.sheet.identity
+    return document if identity is None else document.model_copy(update={"student_id": identity.student_id})
+
+
+def _doubtful(document: ReadingDocument) -> bool:
+    return any(
+        vector.confidence < 0.9 for figure in document.figures.values() for vector in figure.vectors.values()
+    )
+
+
+def _print_reading(document: ReadingDocument) -> None:
+    from rich.table import Table
+
+    console = Console()
+    console.print(f"[bold]{document.source}[/bold], page {document.page}", highlight=False)
+    for problem in document.problems:
+        console.print(f"  {problem.code}: {problem.message}", highlight=False, markup=False)
+    for name, figure in document.figures.items():
+        table = Table(name.replace("_", " "), box=None, header_style="bold")
+        for heading in ("length mm", "±", "direction deg", "±", "confidence"):
+            table.add_column(heading, justify="right")
+        for vector, one in figure.vectors.items():
+            length = "-" if one.length_mm is None else f"{one.length_mm:.2f}"
+            direction = "-" if one.direction_deg is None else f"{one.direction_deg:.2f}"
+            se_deg = "-" if one.se_deg is None else f"{one.se_deg:.2f}"
+            table.add_row(vector, length, f"{one.se_mm:.2f}", direction, se_deg, f"{one.confidence:.2f}")
+        if figure.vectors:
+            console.print(table)
+    for gap in document.unread:
+        console.print(f"  {gap.name}: unread, {gap.reason}", highlight=False, markup=False)

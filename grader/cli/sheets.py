@@ -1,0 +1,71 @@
+"""``planmark sheet`` and ``planmark match``."""
+
+from pathlib import Path
+
+import typer
+
+from grader.answer_sheet import make_calibration, make_sheets
+from grader.cli.grading import check_language
+from grader.contact_sheet import contact_sheet, thumbnail
+from grader.files import write_whole
+from grader.folder import submissions
+from grader.intake import page_of
+from grader.matching import SURE, draft_csv, suggest
+from grader.measurements import names_of
+from grader.roster import read_roster
+from grader.survey import survey
+from reference.assignment import load_assignment
+from reference.errors import CallError, InputFileError
+
+
+def print_sheets(
+    name: str, roster: Path | None, out: Path, layout: Path | None, lang: str, *, calibration: bool
+) -> None:
+    """Write the PDF of a class's answer sheets, and where everything is on them."""
+    check_language(lang)
+    if calibration:
+        sheets = make_calibration(lang)
+    elif roster is None:
+        raise CallError("roster_needed", "answer sheets need --roster: a sheet carries its student's code")
+    else:
+        students = read_roster(roster)
+        sheets = make_sheets(load_assignment(name), students.rows, lang, roster=students.file)
+    write_whole(out, sheets.pdf)
+    typer.echo(f"{out}: to be printed on A3 at 100 %, not fitted to the page")
+    if layout is not None:
+        write_whole(layout, sheets.layout.model_dump_json(indent=2))
+        typer.echo(f"{layout}: where markers, zones and boxes are")
+    for problem in sheets.problems:
+        typer.echo(f"note: {problem.message}", err=True)
+
+
+def draft_matches(
+    folder: Path, name: str, roster_file: Path, out: Path, pages_per_student: int | None, lang: str
+) -> bool:
+    """Write the draft of the roster and its contact sheet; whether anything needs to be checked."""
+    check_language(lang)
+    if not folder.is_dir():
+        raise CallError("folder_missing", f"{folder}: there is no such folder")
+    assignment, roster = load_assignment(name), read_roster(roster_file)
+    names = names_of(assignment)
+    files = {path.relative_to(folder).as_posix(): path for path in submissions(folder, roster_file, (out,))}
+    sources = [source for file, path in files.items() for source in survey(path, file, names).pages]
+    draft = suggest(sources, roster, assignment, pages_per_student=pages_per_student)
+    entries = []
+    for suggestion in draft.suggestions:
+        source = suggestion.source
+        try:
+            page = page_of(files[source.file], source.page)
+        except InputFileError as error:
+            typer.echo(f"{source}: {error.message}", err=True)
+            continue
+        entries.append((suggestion, thumbnail(page.grey)))
+    sheet = out.with_suffix(".html")
+    write_whole(out, draft_csv(roster, draft))
+    write_whole(sheet, contact_sheet(entries, lang))
+    open_ends = sum(not suggestion.sure for suggestion in draft.suggestions)
+    typer.echo(
+        f"{out}: a draft, {open_ends} of {len(draft.suggestions)} pages to be checked ({SURE} = certain)"
+    )
+    typer.echo(f"Look at {sheet}, correct the column `scans`, then grade with --roster {out}")
+    return open_ends > 0
