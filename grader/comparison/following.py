@@ -7,7 +7,7 @@ on a line through the pole, and the scale that the drawing follows.
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,7 +54,7 @@ def expectations(
             for one in _from_own(task, evidence, vector, followed)
         )
     for one in found:
-        if not _is_trivial(task, name, one.vector, used):
+        if not _is_trivial(task, name, one.vector, (used, followed)):
             yield one
 
 
@@ -66,12 +66,12 @@ def _from_own(
             yield one
 
 
-def _is_trivial(task: Task, name: str, expected: complex, used: Mapping[str, float]) -> bool:
+def _is_trivial(task: Task, name: str, expected: complex, scales: Iterable[Mapping[str, float]]) -> bool:
     """Near zero, without a solution, or far shorter than the right one: nothing is left to show."""
     if not cmath.isfinite(expected):
         return True
-    least = task.rubric.least_followed_share * abs(task.drawn(name, used))
-    return abs(expected) < max(task.rubric.tolerance.least_mm, least)
+    right = min(abs(task.drawn(name, one)) for one in scales)
+    return abs(expected) < max(task.rubric.tolerance.least_mm, task.rubric.least_followed_share * right)
 
 
 def _from_nodes(
