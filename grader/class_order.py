@@ -1,8 +1,9 @@
 """One class file dealt out in the roster's order, so many pages to each student.
 
 The pages carry no names here, so that one missing sheet would shift everybody behind it: the order
-is used only where the numbers of pages come out even, and where no other way of counting them that
-comes out even says otherwise.
+is used only where the numbers of pages come out even. Pages that are drawn on are counted first;
+where they are too few (a student handed in an empty sheet) all sheets are, or all fronts of a duplex
+scan.
 """
 
 from collections.abc import Sequence
@@ -36,18 +37,12 @@ def deal(
     """
     if each < 1:
         raise ValueError(f"pages per student must be 1 or more, not {each}")
+    ways = (_drawn(blank), list(range(len(blank))), _fronts(blank))
     for candidates in (rows, waiting):
-        ways = [
-            way
-            for way in (_drawn(blank), _fronts(blank), list(range(len(blank))))
-            if candidates and way is not None
-        ]
-        even = [dict(_dealt(way, candidates, each)) for way in ways if len(way) == each * len(candidates)]
-        dealt = [{place: row for place, row in way.items() if not blank[place]} for way in even]
-        if dealt and any(way != dealt[0] for way in dealt):
-            return OrderRefused("passing over blank pages and counting all sheets give different owners")
-        if dealt:
-            return dealt[0]
+        for places in ways:
+            if candidates and len(places) == each * len(candidates):
+                dealt = zip(places, (row for row in candidates for _ in range(each)), strict=True)
+                return {place: row for place, row in dealt if not blank[place]}
     drawn = len(_drawn(blank))
     return OrderRefused(
         f"{drawn} pages that are not blank cannot be {each} for each of {len(rows)} lines of the roster;"
@@ -60,12 +55,6 @@ def _drawn(blank: Sequence[bool]) -> list[int]:
     return [place for place, empty in enumerate(blank) if not empty]
 
 
-def _fronts(blank: Sequence[bool]) -> list[int] | None:
-    """Places of the fronts of a duplex scan whose backs are all blank; None for anything else."""
-    if len(blank) % 2 or not all(blank[1::2]) or not blank:
-        return None
-    return list(range(0, len(blank), 2))
-
-
-def _dealt(places: list[int], rows: Sequence[Row], each: int) -> list[tuple[int, Row]]:
-    return [(place, rows[index // each]) for index, place in enumerate(places)]
+def _fronts(blank: Sequence[bool]) -> list[int]:
+    """Places of the fronts of a duplex scan whose backs are all blank; none for anything else."""
+    return list(range(0, len(blank), 2)) if len(blank) % 2 == 0 and all(blank[1::2]) else []

@@ -67,16 +67,17 @@ def suggest(
     crank_deg : the crank's direction as drawn, counter-clockwise, where it could be read
     pages_per_student : how many pages each student has, if the file is in the roster's order
     """
-    each = pages_per_student or _pages_each(pages, roster)
-    known = assign_pages(pages, roster, assignment.id, pages_per_student=each)
-    certain = {owned.source: _certain(owned, roster) for owned in known.owned}
+    known = assign_pages(pages, roster, assignment.id, pages_per_student=pages_per_student)
+    settled = {owned.source: _certain(owned, roster) for owned in known.owned}
     reasons = {loose.source: loose.problem for loose in known.unmatched}
-    taken = {suggestion.row.line for suggestion in certain.values() if suggestion.row is not None}
+    if pages_per_student is None:
+        settled |= _by_likely_order(pages, roster, assignment, settled)
+    taken = {suggestion.row.line for suggestion in settled.values() if suggestion.row is not None}
     angles = _crank_angles(roster, assignment)
     found: list[Suggestion] = []
     for page in pages:
-        if page in certain:
-            found.append(certain[page])
+        if page in settled:
+            found.append(settled[page])
         elif page in reasons:
             contested = reasons[page].code in {"owner_disagree", "owner_other_assignment"}
             by_crank = None if contested else _by_crank(page, (crank_deg or {}).get(page), roster, angles)
@@ -127,11 +128,21 @@ def _by_crank(
     return Suggestion(page, near[0], told, sure=False)
 
 
-def _pages_each(pages: Sequence[PageSource], roster: Roster) -> int | None:
-    """How many pages each student would have, where those of the class files come out even."""
+def _by_likely_order(
+    pages: Sequence[PageSource],
+    roster: Roster,
+    assignment: Assignment,
+    settled: Mapping[PageSource, Suggestion],
+) -> dict[PageSource, Suggestion]:
+    """The roster's order, where the pages of one class file come out even and no code speaks against it."""
     drawn = sum(page.pages > 1 and not page.blank for page in pages)
     each, rest = divmod(drawn, max(len(roster.rows), 1))
-    return each if each and not rest else None
+    if not each or rest:
+        return {}
+    dealt = assign_pages(pages, roster, assignment.id, pages_per_student=each)
+    if any(loose.problem.code in {"owner_disagree", "order_refused"} for loose in dealt.unmatched):
+        return {}
+    return {owned.source: _certain(owned, roster) for owned in dealt.owned if owned.source not in settled}
 
 
 def _open(page: PageSource, roster: Roster, taken: set[int], problem: Problem) -> Suggestion:

@@ -124,7 +124,7 @@ def parse_roster(text: str, file: str = "roster.csv") -> Roster:
             findings.append(Finding("line 2", "there are no students below the line of column names"))
     if findings:
         raise AuthoredFileError(file, tuple(findings))
-    return Roster(file, tuple(rows), tuple(_passed_over(header, file)))
+    return Roster(file, tuple(rows), (*_passed_over(header, file), *_alike(rows, file)))
 
 
 def _text_of(path: Path) -> str:
@@ -188,6 +188,15 @@ def _passed_over(header: list[str], file: str) -> Iterator[Problem]:
     if unknown:
         message = f"columns without meaning here are passed over: {', '.join(unknown)}"
         yield Problem("roster_columns", message, file)
+
+
+def _alike(rows: list[RosterRow], file: str) -> Iterator[Problem]:
+    """Folders of results are named by the ids: where case does not count, two of them would be one."""
+    spelled: dict[str, str] = {}
+    for student in dict.fromkeys(row.student_id for row in rows):
+        other = spelled.setdefault(student.lower(), student)
+        if other != student:
+            yield Problem("roster_ids_alike", f"{other} and {student} differ in case only", file)
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,9 +289,8 @@ def parse_scan(text: str) -> ScanRef | str:
 
 
 def _check_together(rows: list[RosterRow]) -> Iterator[Finding]:
-    """Faults between lines: a student twice, a file of two students, ids that only case tells apart."""
+    """Faults between lines: a student twice, positions missing, a file of two students."""
     first: dict[tuple[str, int | None], int] = {}
-    spelled: dict[str, RosterRow] = {}
     for row in rows:
         key = (row.student_id, row.position)
         if key in first:
@@ -290,10 +298,6 @@ def _check_together(rows: list[RosterRow]) -> Iterator[Finding]:
             told = f"{row.student_id}{where} is on line {first[key]} already"
             yield Finding(f"line {row.line}, student_id", told)
         first.setdefault(key, row.line)
-        other = spelled.setdefault(row.student_id.lower(), row)
-        if other.student_id != row.student_id:
-            told = f"{row.student_id} and {other.student_id} (line {other.line}) differ in case only"
-            yield Finding(f"line {row.line}, student_id", told)
     yield from _check_positions(rows)
     yield from _check_scans(rows)
 

@@ -15,8 +15,9 @@ from grader.records import FloatArray
 _POINT_SE_MM = 0.02
 """Of a corner found at 150 dpi or better; printers and paper do no better."""
 _WORTH = 12.0
-"""Fall of chi squared for each further parameter that makes it worth having."""
+"""Fall of chi squared for each of two further parameters that makes them worth having."""
 _FREEDOMS = (4, 6, 8)
+_LEAST_POINTS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +28,9 @@ class Projection:
     ----------
     mm_to_px : (3, 3), last element 1
     rms_mm : root mean square misfit of the points
-    worst_mm : (n,) misfit of each point
+    misfit_mm : (n,) misfit of each point
     cov : covariance of the parameters, see `_matrix`
-    params, freedom : the parameters fitted
+    params : the parameters fitted, 4, 6 or 8
     centre, size : of the points, mm, by which parameters are made alike
     """
 
@@ -51,18 +52,19 @@ class Projection:
 
 def fit_projection(points_mm: FloatArray, points_px: FloatArray) -> Projection:
     """The plainest map that explains the points (n, 2), n >= 4."""
+    if len(points_mm) < _LEAST_POINTS:
+        raise ValueError(f"at least {_LEAST_POINTS} points are expected, not {len(points_mm)}")
     centre, size = points_mm.mean(axis=0), float(np.ptp(points_mm, axis=0).max()) / 2.0
     unit = (points_mm - centre) / size
     params = _similarity(unit, points_px)
-    best: tuple[FloatArray, FloatArray, float] | None = None
-    for freedom in _FREEDOMS:
-        if 2 * len(unit) < freedom:
-            break
+    params, cov, chi2 = _fit(params[: _FREEDOMS[0]], _FREEDOMS[0], unit, points_px, size)
+    best = params, cov, chi2
+    for freedom in _FREEDOMS[1:]:
         params, cov, chi2 = _fit(params[:freedom], freedom, unit, points_px, size)
-        if best is None or best[2] - chi2 > _WORTH * 2:
+        # The misfit that is left says how good the corners are where they are worse than usual.
+        noise = max(1.0, chi2 / max(2 * len(unit) - freedom, 1))
+        if best[2] - chi2 > 2 * _WORTH * noise:
             best = params, cov, chi2
-    if best is None:
-        raise ValueError(f"at least 4 points are expected, not {len(unit)}")
     params, cov, _ = best
     matrix = _matrix(params)
     scale_px = float(np.sqrt(abs(np.linalg.det(matrix[:2, :2])))) / size

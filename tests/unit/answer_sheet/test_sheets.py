@@ -1,0 +1,251 @@
+import json
+
+import cv2
+import numpy as np
+import pypdfium2
+import pytest
+
+from grader.answer_sheet import calibration_segments, make_calibration, make_sheets, page_layouts
+from grader.answer_sheet.fit import best_template, extents_mm
+from grader.answer_sheet.words import number, pieces_of, width_mm, wrap
+from grader.layout import FRAME_MM, MARKER_CORNERS, PAGE_MM, SCALE_BOXES, TEMPLATES, Layout, field_boxes
+from grader.roster import RosterRow
+from reference.assignment import built_in, load_assignment
+from reference.errors import AuthoredFileError
+
+A3_POINTS = (420.0 / 25.4 * 72.0, 297.0 / 25.4 * 72.0)
+QUIET_MM = 2.0
+"""White around a marker: a cell's width."""
+ANA = RosterRow("s07", "Ana Țîrlea", 7, line=2)
+
+
+def boxes_of(page):
+    figures = {name: box for name, box in page.zones.items() if name != "fields"}
+    return {**figures, **page.zones["fields"]}
+
+
+def overlap(first, second, gap=0.0):
+    (x, y, w, h), (u, v, s, t) = first, second
+    return x - gap < u + s and u - gap < x + w and y - gap < v + t and v - gap < y + h
+
+
+def text_of(pdf, page=0):
+    return pypdfium2.PdfDocument(pdf)[page].get_textpage().get_text_range()
+
+
+def rows_for(assignment, **more):
+    variant = assignment.variants()[0]
+    return [RosterRow("s07", "Ana", variant.n, variant.position, line=2, **more)]
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_every_built_in_assignment_has_true_size_sheets_a_page_for_each_drawing(name):
+    assignment = load_assignment(name)
+    sheets = make_sheets(assignment, rows_for(assignment))
+    document = pypdfium2.PdfDocument(sheets.pdf)
+    assert len(document) == len(assignment.file.page) == len(sheets.layout.pages)
+    assert all(page.get_size() == pytest.approx(A3_POINTS, abs=0.01) for page in document)
+    assert [page.kind for page in sheets.layout.pages] == [table.kind for table in assignment.file.page]
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_markers_zones_and_boxes_lie_inside_the_frame_and_clear_of_each_other(name):
+    x, y, w, h = FRAME_MM
+    for page in page_layouts(load_assignment(name)).pages:
+        boxes = list(boxes_of(page).values())
+        squares = [(*marker.corners_mm[0], 12.0, 12.0) for marker in page.markers]
+        for box in [*boxes, *squares]:
+            assert box[0] > x
+            assert box[1] > y
+            assert box[0] + box[2] < x + w
+            assert box[1] + box[3] < y + h
+        for index, box in enumerate(boxes):
+            assert not any(overlap(box, other) for other in boxes[index + 1 :])
+            assert not any(overlap(box, square, QUIET_MM) for square in squares)
+
+
+def test_the_layout_is_told_as_the_contract_says():
+    told = json.loads(make_sheets(load_assignment("pump"), [ANA]).layout.model_dump_json())
+    assert told["page_mm"] == [420, 297]
+    velocity, acceleration = told["pages"]
+    assert (velocity["kind"], acceleration["kind"]) == ("velocity", "acceleration")
+    assert len(velocity["markers"]) == 8
+    assert set(velocity["markers"][0]) == {"id", "corners_mm"}
+    assert set(velocity["zones"]) == {"mechanism", "velocity_plan", "fields"}
+    assert {"kL", "kv", "v_A", "v_DC"} <= set(velocity["zones"]["fields"])
+    assert {"kL", "ka", "a_BA_n"} <= set(acceleration["zones"]["fields"])
+    assert (
+        Layout.model_validate(told).model_dump() == Layout.model_validate_json(json.dumps(told)).model_dump()
+    )
+
+
+def test_what_is_printed_is_where_the_layout_says():
+    sheets = make_sheets(load_assignment("pump"), [ANA])
+    image = pypdfium2.PdfDocument(sheets.pdf)[0].render(scale=10 / (72 / 25.4), grayscale=True).to_numpy()
+    grey = image.reshape(image.shape[:2])
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_250))
+    corners, ids, _ = detector.detectMarkers(np.ascontiguousarray(grey))
+    found = {
+        int(number): quad.reshape(4, 2) / 10.0 for number, quad in zip(ids.ravel(), corners, strict=True)
+    }
+    places = {marker.id: np.array(marker.corners_mm) for marker in sheets.layout.pages[0].markers}
+    assert found.keys() == places.keys()
+    assert all(np.abs(found[number] - places[number]).max() < 0.2 for number in places)
+    for x, y, w, h in (box for name, box in sheets.layout.pages[0].zones.items() if name != "fields"):
+        inside = grey[int(y * 10) : int((y + h) * 10), int(x * 10) : int((x + w) * 10)]
+        assert inside.min() == 255
+
+
+def test_boxes_to_write_in_are_drawn_where_the_layout_says():
+    sheets = make_sheets(load_assignment("pump"), [ANA])
+    image = pypdfium2.PdfDocument(sheets.pdf)[0].render(scale=10 / (72 / 25.4), grayscale=True).to_numpy()
+    grey = image.reshape(image.shape[:2])
+    for x, y, w, h in sheets.layout.pages[0].zones["fields"].values():
+        inside = grey[
+            int((y + 0.4) * 10) : int((y + h - 0.4) * 10), int((x + 0.4) * 10) : int((x + w - 0.4) * 10)
+        ]
+        assert inside.min() == 255
+        assert grey[round((y + h / 2) * 10), round(x * 10) - 1 : round(x * 10) + 2].min() < 100
+
+
+def test_the_students_data_are_printed_in_words():
+    text = text_of(make_sheets(load_assignment("pump"), [ANA]).pdf)
+    for told in ("Ana Țîrlea", "s07", "n = 7", "44°", "370 rev/min", "sheet 1 of 2", "Determine graphically"):
+        assert told in text.replace("\r\n", " ").replace("\N{NO-BREAK SPACE}", " "), told
+
+
+def test_a_student_reads_the_task_in_the_language_on_the_roster():
+    assignment = load_assignment("press")
+    text = text_of(make_sheets(assignment, rows_for(assignment, lang="ru"), "en").pdf)
+    assert "Постройте механизм" in text
+    assert "6,01582" in text
+
+
+def test_names_that_the_assignment_changes_are_printed_so():
+    assignment = load_assignment("press")
+    assert "μ" in text_of(make_sheets(assignment, rows_for(assignment)).pdf)
+
+
+def test_every_row_that_does_not_suit_the_assignment_is_told():
+    rows = [RosterRow("s1", n=None, line=2), RosterRow("s2", n=3, line=3), RosterRow("s3", n=99, line=4)]
+    with pytest.raises(AuthoredFileError) as caught:
+        make_sheets(load_assignment("pump"), rows, roster="class.csv")
+    assert [finding.path for finding in caught.value.findings] == ["line 2, s1", "line 4, s3"]
+    assert "class.csv" in str(caught.value)
+
+
+def test_the_same_input_gives_the_same_file():
+    assignment = load_assignment("pump")
+    assert make_sheets(assignment, [ANA]).pdf == make_sheets(assignment, [ANA]).pdf
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_a_figure_that_does_not_fit_its_zone_is_told_and_no_other(name):
+    assignment = load_assignment(name)
+    told = {
+        (p.message.split(":")[0].removeprefix("page "), p.message.split()[2])
+        for p in make_sheets(assignment, rows_for(assignment)).problems
+    }
+    expected = set()
+    for table in assignment.file.page:
+        template = best_template(assignment, table.figures).template
+        for figure, (wide, high) in extents_mm(assignment, table.figures, assignment.variants()).items():
+            _, _, zone_wide, zone_high = template.zones[figure]
+            if wide + 24.0 > zone_wide or high + 24.0 > zone_high:
+                expected.add((table.kind, figure))
+    assert told == expected
+
+
+def test_the_templates_numbers_are_what_printed_sheets_rely_on():
+    # Printed sheets outlive the program: a number must always mean the same division.
+    assert TEMPLATES[4].zones == {
+        "mechanism": (23.0, 51.0, 152.0, 212.0),
+        "velocity_plan": (179.0, 51.0, 228.0, 212.0),
+    }
+    assert TEMPLATES[11].zones == {
+        "mechanism": (23.0, 51.0, 190.0, 212.0),
+        "acceleration_plan": (217.0, 51.0, 190.0, 212.0),
+    }
+    assert TEMPLATES[27].zones["acceleration_plan"] == (236.0, 148.6, 171.0, 114.4)
+    assert len(TEMPLATES) == 28
+
+
+@pytest.mark.parametrize("template", TEMPLATES, ids=lambda template: str(template.number))
+def test_the_zones_of_a_template_do_not_meet(template):
+    boxes = list(template.zones.values())
+    assert not any(overlap(box, other) for index, box in enumerate(boxes) for other in boxes[index + 1 :])
+
+
+@pytest.mark.parametrize("count", [0, 1, 9, 10, 24, 25, 45, 60])
+def test_boxes_for_lengths_are_as_many_as_asked_and_stay_apart(count):
+    boxes = list(field_boxes(tuple(map(str, range(count)))).values())
+    assert len(boxes) == count
+    assert not any(overlap(box, other) for index, box in enumerate(boxes) for other in boxes[index + 1 :])
+    squares = [(*corners[0], 12.0, 12.0) for corners in MARKER_CORNERS.tolist()]
+    assert not any(overlap(box, square, QUIET_MM) for box in boxes for square in squares)
+    assert not any(overlap(box, scale) for box in boxes for scale in SCALE_BOXES.values())
+
+
+def test_more_lengths_than_there_is_room_for_get_no_boxes():
+    assert field_boxes(tuple(map(str, range(61)))) == {}
+
+
+def test_the_calibration_page_has_its_segments_inside_the_page():
+    segments = calibration_segments()
+    assert segments.min() > 20.0
+    assert (segments.max(axis=(0, 1)) < np.array(PAGE_MM) - 20.0).all()
+    sheets = make_calibration("ro")
+    assert len(pypdfium2.PdfDocument(sheets.pdf)) == 1
+    assert sheets.layout.pages[0].kind == "calibration"
+
+
+def test_the_segments_of_the_calibration_page_are_inked_from_end_to_end_and_not_beyond():
+    image = (
+        pypdfium2.PdfDocument(make_calibration().pdf)[0]
+        .render(scale=10 / (72 / 25.4), grayscale=True)
+        .to_numpy()
+    )
+    grey = image.reshape(image.shape[:2])
+    for start, end in calibration_segments():
+        along = (end - start) / np.hypot(*(end - start))
+        for place, dark in (
+            (start + 0.3 * along, True),
+            (end - 0.3 * along, True),
+            (start - along, False),
+            (end + along, False),
+        ):
+            column, row = (place * 10 - 0.5).round().astype(int)
+            assert (grey[row, column] < 128) == dark
+
+
+def test_indices_are_set_below_and_above():
+    assert [(p.text, p.height) for p in pieces_of("a_BA_n")] == [("a", 0), ("BA", -1), ("n", 1)]
+    assert [(p.text, p.height) for p in pieces_of("O1A = O2B")] == [
+        ("O", 0),
+        ("1", -1),
+        ("A = O", 0),
+        ("2", -1),
+        ("B", 0),
+    ]
+    assert [(p.text, p.height) for p in pieces_of("φ")] == [("φ", 0)]
+
+
+@pytest.mark.parametrize(
+    ("value", "lang", "told"),
+    [
+        (1350.0, "en", "1350"),
+        (6.015817, "ru", "6,01582"),
+        (0.3, "ro", "0,3"),
+        (1234567.0, "en", "1234567"),
+        (0.00002, "en", "0.00002"),
+    ],
+)
+def test_data_are_written_as_people_write_them(value, lang, told):
+    assert number(value, lang) == told
+
+
+def test_lines_are_never_wider_than_the_box():
+    text = "Определите графически скорость и ускорение поршня " + "W" * 80
+    lines = wrap(text, "DejaVuSansCondensed", 8.0, 60.0)
+    assert all(width_mm(line, "DejaVuSansCondensed", 8.0) <= 60.0 for line in lines)
+    assert "".join(lines).replace(" ", "") == text.replace(" ", "")

@@ -1,0 +1,142 @@
+import pytest
+
+from grader.roster import ScanRef, parse_roster, parse_scan, read_roster
+from reference.errors import AuthoredFileError
+
+
+def faults(text: str) -> list[str]:
+    with pytest.raises(AuthoredFileError) as caught:
+        parse_roster(text)
+    return [str(finding) for finding in caught.value.findings]
+
+
+def test_a_line_becomes_a_row_with_what_it_says_and_no_more():
+    roster = parse_roster(
+        "student_id,name,n,position,email,kL,kv,ka,lang,scans\n"
+        's07,"Pop, Ana",7,,ana@example.org,1:5,0.185 (m/s)/mm,,ro,class.pdf#3;class.pdf#4;extra.jpg\n'
+    )
+    (row,) = roster.rows
+    assert (row.student_id, row.name, row.n, row.position) == ("s07", "Pop, Ana", 7, None)
+    assert row.scales == {"kL": "1:5", "kv": "0.185 (m/s)/mm"}
+    assert row.scans == (ScanRef("class.pdf", 3), ScanRef("class.pdf", 4), ScanRef("extra.jpg"))
+    assert (row.lang, row.line) == ("ro", 2)
+
+
+def test_the_columns_may_stand_in_any_order_and_blank_lines_do_not_count():
+    roster = parse_roster("\nname,n,student_id\n\nAna,7,s07\n,,\nIon,,s08\n")
+    assert [(row.student_id, row.name, row.n) for row in roster.rows] == [
+        ("s07", "Ana", 7),
+        ("s08", "Ion", None),
+    ]
+
+
+def test_a_semicolon_separated_file_has_decimal_commas_and_quotes_several_scans():
+    roster = parse_roster('student_id;name;n;kv;scans\ns1;A;7,0;0,036 (м/с)/мм;"a.pdf#1;b.jpg"\n')
+    (row,) = roster.rows
+    assert row.n == 7
+    assert row.scales["kv"] == "0,036 (м/с)/мм"
+    assert row.scans == (ScanRef("a.pdf", 1), ScanRef("b.jpg"))
+
+
+def test_a_byte_order_mark_and_windows_line_ends_are_no_part_of_the_data(tmp_path):
+    path = tmp_path / "roster.csv"
+    path.write_bytes("\ufeffstudent_id,name\r\ns1,Ștefania\r\n".encode())
+    (row,) = read_roster(path).rows
+    assert (row.student_id, row.name) == ("s1", "Ștefania")
+
+
+def test_all_faults_are_told_at_once_each_with_its_line():
+    told = faults(
+        "student_id,name,n,position,lang,scans\n"
+        "s 1,A,7.5,,xx,a.pdf#0\n"
+        "s2,B,7,two,,a.pdf#1\n"
+        ",C,,,,\n"
+        "../x,D,,,,\n"
+    )
+    assert [fault.split(":")[0] for fault in told] == [
+        "line 2, student_id",
+        "line 2, n",
+        "line 2, lang",
+        "line 2, scans",
+        "line 3, position",
+        "line 4, student_id",
+        "line 5, student_id",
+    ]
+
+
+def test_line_numbers_count_the_lines_of_the_file_even_within_quotes():
+    (fault,) = faults('student_id,name\ns1,"two\nlines"\n\ns 2,B\n')
+    assert fault.startswith("line 5, student_id: 's 2'")
+
+
+@pytest.mark.parametrize("student", ["..", ".", "a/b", "a\\b", "ș1", "a" * 65, "s1;s2", "s#1", "s\u20071"])
+def test_a_student_id_that_could_not_name_a_folder_everywhere_is_refused(student):
+    assert any("student_id" in fault for fault in faults(f'student_id,name\n"{student}",A\n'))
+
+
+def test_a_student_twice_in_one_position_is_a_fault_and_in_two_positions_is_none():
+    (fault,) = faults("student_id,name,position\ns1,A,1\ns1,A,2\ns1,A,1\n")
+    assert fault == "line 4, student_id: s1 in position 1 is on line 2 already"
+    assert len(parse_roster("student_id,name,position\ns1,A,1\ns1,A,2\n").rows_of("s1")) == 2
+
+
+def test_a_student_on_two_lines_needs_a_position_on_each():
+    (fault,) = faults("student_id,name,position\ns1,A,1\ns1,A,\n")
+    assert fault.startswith("line 3, position")
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), [("c.pdf#1", "c.pdf#1"), ("c.pdf", "c.pdf#2"), ("c.pdf#2", "c.pdf")]
+)
+def test_a_page_cannot_belong_to_two_students(first, second):
+    (fault,) = faults(f"student_id,name,scans\ns1,A,{first}\ns2,B,{second}\n")
+    assert fault.startswith("line 3, scans")
+
+
+def test_a_misspelt_column_is_a_fault_and_a_foreign_one_is_passed_over_and_told():
+    (fault,) = faults("student_id,name,postion\ns1,A,1\n")
+    assert "did you mean position" in fault
+    roster = parse_roster("student_id,name,group\ns1,A,131\n")
+    assert [problem.code for problem in roster.problems] == ["roster_columns"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "\n\n", "name\nA\n", "student_id\ns1\n", "student_id,name\n", "student_id,name,n,n\ns1,A,1,2\n"],
+)
+def test_a_file_that_is_no_roster_is_refused(text):
+    assert faults(text)
+
+
+def test_an_unclosed_quote_is_told_with_the_line_where_it_opens():
+    (fault,) = faults('student_id,name\ns1,A\ns2,"B\ns3,C\n')
+    assert fault.startswith("line 3")
+
+
+def test_too_many_fields_are_told_with_the_likely_reason():
+    (fault,) = faults("student_id;name;scans\ns1;A;a.pdf#1;b.jpg\n")
+    assert "quote a field" in fault
+
+
+def test_a_file_in_another_encoding_is_refused_with_advice(tmp_path):
+    path = tmp_path / "roster.csv"
+    path.write_bytes("student_id,name\ns1,Пётр\n".encode("cp1251"))
+    with pytest.raises(AuthoredFileError, match="UTF-8"):
+        read_roster(path)
+
+
+def test_a_missing_file_is_told(tmp_path):
+    with pytest.raises(AuthoredFileError, match="cannot be read"):
+        read_roster(tmp_path / "none.csv")
+
+
+def test_a_hash_may_be_part_of_a_file_name():
+    assert parse_scan("lab#2.pdf") == ScanRef("lab#2.pdf")
+    assert parse_scan("lab#2.pdf#3") == ScanRef("lab#2.pdf", 3)
+    assert isinstance(parse_scan("#3"), str)
+    assert isinstance(parse_scan("lab.pdf#3-4"), str)
+
+
+def test_ids_that_only_case_tells_apart_are_told():
+    roster = parse_roster("student_id,name\ns1,A\nS1,B\n")
+    assert [problem.code for problem in roster.problems] == ["roster_ids_alike"]

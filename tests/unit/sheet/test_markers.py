@@ -1,0 +1,200 @@
+"""Printed sheets rasterised, degraded, and registered: the truth is known exactly."""
+
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pypdfium2
+import pytest
+
+from grader.answer_sheet import make_calibration, make_sheets
+from grader.intake import pages_of
+from grader.layout import MARKER_CORNERS, TEMPLATES
+from grader.records import Identity, Page
+from grader.roster import RosterRow
+from grader.sheet.markers import register
+from reference.assignment import load_assignment
+
+REAL = Path(__file__).resolve().parents[4] / "shared" / "real"
+CLEAN_MM, HARD_MM = 0.02, 0.08
+"""Bounds on the place of any point of the drawing area: a clean scan; one marker pair, 150 dpi."""
+STUDENT = Identity("pump", "s07", 7, None, "velocity")
+GRID_MM = np.stack(np.meshgrid(np.linspace(23, 407, 7), np.linspace(51, 263, 5)), axis=-1).reshape(-1, 2)
+
+
+@cache
+def printed(dpi, page=0):
+    """The printed sheet's pixels and the true map from millimetres."""
+    pdf = make_sheets(load_assignment("pump"), [RosterRow("s07", "Ana", 7)]).pdf
+    return rasterised(pdf, dpi, page)
+
+
+def rasterised(pdf, dpi, page=0):
+    image = pypdfium2.PdfDocument(pdf)[page].render(scale=dpi / 72, grayscale=True).to_numpy()
+    grey = np.ascontiguousarray(image.reshape(image.shape[:2]))
+    high, wide = grey.shape
+    return grey, np.array([[wide / 420.0, 0.0, -0.5], [0.0, high / 297.0, -0.5], [0.0, 0.0, 1.0]])
+
+
+def apply(matrix, points):
+    mapped = np.c_[points, np.ones(len(points))] @ matrix.T
+    return mapped[:, :2] / mapped[:, 2:]
+
+
+def off_mm(sheet, truth):
+    """Largest distance on paper between where points are and where the sheet says."""
+    return np.hypot(*(apply(np.linalg.inv(truth), apply(sheet.mm_to_px, GRID_MM)) - GRID_MM).T).max()
+
+
+def scanned(grey, *, blur=0.7, noise=5.0, quality=80):
+    soft = cv2.GaussianBlur(grey, (0, 0), blur)
+    noisy = np.clip(soft + np.random.default_rng(1).normal(0.0, noise, grey.shape), 0, 255).astype(np.uint8)
+    return cv2.imdecode(
+        cv2.imencode(".jpg", noisy, [cv2.IMWRITE_JPEG_QUALITY, quality])[1], cv2.IMREAD_GRAYSCALE
+    )
+
+
+def warped(grey, matrix, background=255):
+    size = grey.shape[1], grey.shape[0]
+    return cv2.warpPerspective(grey, matrix, size, flags=cv2.INTER_LINEAR, borderValue=background)
+
+
+def without(grey, truth, markers):
+    """The page with markers torn off."""
+    torn = grey.copy()
+    for marker in markers:
+        cv2.fillConvexPoly(torn, apply(truth, MARKER_CORNERS[marker]).round().astype(np.int32), 190)
+    return torn
+
+
+@pytest.mark.parametrize("dpi", [150, 300])
+def test_a_scanned_sheet_is_placed_to_a_few_hundredths_of_a_millimetre(dpi):
+    grey, truth = printed(dpi)
+    sheet = register(Page("s.jpg", 1, scanned(grey), (dpi, dpi)))
+    assert off_mm(sheet, truth) < CLEAN_MM
+    assert sheet.method == "markers"
+    assert sheet.identity == STUDENT
+    assert sheet.problems == ()
+    assert sheet.px_per_mm == pytest.approx(dpi / 25.4, rel=1e-3)
+
+
+def test_the_markers_say_where_the_zones_are():
+    layout = make_sheets(load_assignment("pump"), [RosterRow("s07", "Ana", 7)]).layout
+    for number, page in enumerate(layout.pages):
+        sheet = register(Page("s.jpg", 1, printed(150, number)[0]))
+        assert sheet.zones == {name: zone for name, zone in page.zones.items() if name != "fields"}
+        assert sheet.identity.kind == page.kind
+
+
+@pytest.mark.parametrize("turns", range(4))
+def test_any_of_the_four_turns_is_seen(turns):
+    grey, truth = printed(150)
+    high, wide = grey.shape
+    turn = {
+        0: np.eye(3),
+        1: np.array([[0.0, 1, 0], [-1, 0, wide - 1], [0, 0, 1]]),
+        2: np.array([[-1.0, 0, wide - 1], [0, -1, high - 1], [0, 0, 1]]),
+        3: np.array([[0.0, -1, high - 1], [1, 0, 0], [0, 0, 1]]),
+    }[turns]
+    sheet = register(Page("s.jpg", 1, np.ascontiguousarray(np.rot90(grey, turns))))
+    assert off_mm(sheet, turn @ truth) < CLEAN_MM
+    # Turning back what was turned counter-clockwise by `turns` quarters makes it upright.
+    assert (sheet.rotation_deg + 90.0 * turns + 1.0) % 360.0 == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("angle_deg", [-2.0, 0.7, 5.0])
+def test_a_skewed_sheet_is_followed(angle_deg):
+    grey, truth = printed(150)
+    centre = (grey.shape[1] / 2, grey.shape[0] / 2)
+    skew = np.vstack([cv2.getRotationMatrix2D(centre, angle_deg, 0.95), [0, 0, 1]])
+    sheet = register(Page("s.jpg", 1, scanned(warped(grey, skew))))
+    assert off_mm(sheet, skew @ truth) < HARD_MM
+    assert (sheet.rotation_deg + angle_deg + 180.0) % 360.0 == pytest.approx(180.0, abs=0.02)
+
+
+@pytest.mark.parametrize("slant", [0.05, 0.12])
+def test_a_slanted_photo_is_followed(slant):
+    grey, truth = printed(150)
+    high, wide = grey.shape
+    corners = np.array([[0, 0], [wide, 0], [wide, high], [0, high]], np.float32)
+    moved = (
+        corners * 0.8
+        + np.array([wide, high]) * 0.1
+        + np.array([[slant, 0], [-slant, 0], [0, 0], [0, -slant]]) * wide
+    )
+    photo = cv2.getPerspectiveTransform(corners, moved.astype(np.float32))
+    sheet = register(Page("s.jpg", 1, scanned(warped(grey, photo, background=90))))
+    assert off_mm(sheet, photo @ truth) < HARD_MM
+
+
+@pytest.mark.parametrize("torn", [(0,), (3, 4), (0, 3, 4, 7), (0, 1, 2, 3, 4, 5), (1, 2, 3, 4, 5, 6)])
+def test_a_torn_marker_is_not_missed(torn):
+    grey, truth = printed(150)
+    sheet = register(Page("s.jpg", 1, scanned(without(grey, truth, torn))))
+    assert off_mm(sheet, truth) < HARD_MM
+    assert sheet.identity == STUDENT
+
+
+def test_strokes_across_markers_do_not_move_the_sheet():
+    grey, truth = printed(150)
+    drawn = grey.copy()
+    for start, end in (((20, 12), (300, 22)), ((27, 5), (27, 290)), ((390, 275), (415, 279))):
+        ends = apply(truth, np.array([start, end])).round().astype(int).tolist()
+        cv2.line(drawn, ends[0], ends[1], 60, 4)
+    assert off_mm(register(Page("s.jpg", 1, drawn)), truth) < HARD_MM
+
+
+@pytest.mark.parametrize("torn", [range(8), range(7), (0, 1, 2, 3, 4, 5, 7)])
+def test_fewer_than_two_markers_register_nothing(torn):
+    grey, truth = printed(150)
+    assert register(Page("s.jpg", 1, without(grey, truth, torn))) is None
+
+
+def test_a_bilevel_copy_is_placed():
+    grey, truth = printed(300)
+    copied = np.where(scanned(grey, noise=25.0) > 110, 255, 0).astype(np.uint8)
+    assert off_mm(register(Page("s.png", 1, copied)), truth) < HARD_MM
+
+
+def test_markers_of_a_foreign_page_register_nothing():
+    foreign = np.full((1754, 2481), 255, np.uint8)
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_250)
+    for number, (x, y) in enumerate([(100, 100), (2200, 150), (150, 1500), (2200, 1500)]):
+        marker = cv2.aruco.generateImageMarker(dictionary, TEMPLATES[3].marker_ids[number], 150)
+        foreign[y : y + 150, x : x + 150] = marker
+    assert register(Page("s.jpg", 1, foreign)) is None
+
+
+def test_a_mirrored_sheet_registers_nothing():
+    assert register(Page("s.jpg", 1, np.ascontiguousarray(printed(150)[0][:, ::-1]))) is None
+
+
+def test_a_sheet_printed_too_small_is_told_and_its_lengths_are_less_sure():
+    grey, truth = printed(150)
+    shrink = np.diag([0.97, 0.97, 1.0])
+    sheet = register(Page("s.jpg", 1, warped(grey, shrink), (150.0, 150.0)))
+    assert [problem.code for problem in sheet.problems] == ["print_scaled"]
+    assert sheet.scale_se > 0.01
+    assert off_mm(sheet, shrink @ truth) < HARD_MM
+
+
+def test_a_resolution_that_is_plainly_wrong_says_nothing_about_the_print():
+    assert register(Page("s.jpg", 1, printed(150)[0], (72.0, 72.0))).problems == ()
+
+
+def test_the_calibration_page_is_told_from_a_drawing():
+    sheet = register(Page("c.jpg", 1, rasterised(make_calibration().pdf, 150)[0]))
+    assert [problem.code for problem in sheet.problems] == ["calibration_page"]
+
+
+def test_pictures_of_other_things_register_nothing():
+    if not REAL.is_dir():
+        pytest.skip("no foreign pictures beside the project")
+    for name in (
+        "omrchecker/sheet1.jpg",
+        "omrchecker/IMG_20201116_143512.jpg",
+        "noteshrink/graph-paper-pencil-only.jpg",
+    ):
+        for page in pages_of(REAL / name):
+            assert register(page) is None
