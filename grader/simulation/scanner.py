@@ -112,6 +112,16 @@ def _printed(background: Background, view: View) -> Float32Array:
         page = np.asarray(cv2.resize(page, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     pitch = np.array([page.shape[1] / background.grey.shape[1], page.shape[0] / background.grey.shape[0]])
     pitch = pitch * background.px_per_mm
+    if view.k1 == 0.0:
+        to_page = np.array([[pitch[0], 0.0, -0.5], [0.0, pitch[1], -0.5], [0.0, 0.0, 1.0]])
+        warp = view.homography @ np.linalg.inv(to_page)
+        seen = cv2.warpPerspective(page, warp, view.size[::-1], flags=cv2.INTER_LINEAR, borderValue=255)
+        return np.asarray(seen.astype(np.float32) / np.float32(255.0))
+    return _through_lens(page, pitch, view)
+
+
+def _through_lens(page: GreyImage, pitch: FloatArray, view: View) -> Float32Array:
+    """The page's brightness looked up for every pixel, some rows at a time."""
     height, width = view.size
     result = np.empty(view.size, np.float32)
     for top in range(0, height, 256):
@@ -120,7 +130,7 @@ def _printed(background: Background, view: View) -> Float32Array:
         source = view.to_mm(np.column_stack([x.ravel(), y.ravel()])) * pitch - 0.5
         maps = [source[:, k].astype(np.float32).reshape(x.shape) for k in (0, 1)]
         result[rows] = cv2.remap(page, maps[0], maps[1], cv2.INTER_LINEAR, borderValue=255)
-    return result / np.float32(255.0)
+    return np.asarray(result / np.float32(255.0))
 
 
 def _show_through(strokes: Sequence[Stroke], view: View, scan: Scan) -> Float32Array | None:

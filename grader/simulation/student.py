@@ -153,7 +153,7 @@ def _drawn_out(
     writing = any_handwriting(np.random.default_rng([rng.integers(1 << 30)]))
     sketch = Sketch(rng, settings.hand, settings.pen, settings.page, writing)
     written: dict[str, str] = {}
-    frame, taken, room = None, [], (20.0, 20.0, 380.0, 257.0)
+    frame, filled = None, {}
     if printed is None:
         frame = page.draw_frame(sketch)
         room, taken = _room(settings)
@@ -169,9 +169,10 @@ def _drawn_out(
         velocities = next((f.nodes for f in sheet.figures if f.name == VELOCITY), {})
         page.write_block(sketch, wording.calculations(task, settings.page, velocities), room, boxes)
     elif printed is not None:
-        _fill_fields(sketch, task, printed[sheet.kind].fields, written)
+        filled = _fill_fields(sketch, task, sheet.figures, printed[sheet.kind].fields, written)
     told = truth.drawing_truth(task, sheet, sketch, origins, missing)
     told["scales"]["written"] = written
+    told["fields"] = filled
     return sketch, told, frame
 
 
@@ -203,14 +204,25 @@ def _figures(
     return missing
 
 
-def _fill_fields(sketch: Sketch, task: Task, fields: Mapping[str, Box], written: dict[str, str]) -> None:
-    """The scales written into the printed boxes."""
+def _fill_fields(
+    sketch: Sketch, task: Task, drawn: tuple[DrawnFigure, ...], fields: Mapping[str, Box], written: dict[str, str]
+) -> dict[str, str]:
+    """The scales and the measured lengths written into the printed boxes; what was written, by box."""
+    texts = {}
+    for name in task.declared:
+        texts[name] = wording.scale_text(name, task.declared[name], task, sketch.page, sketch.rng).split("= ")[-1]
+    for figure in drawn:
+        for vector in task.wrong.construction.vectors_of(figure.name):
+            length = abs(figure.nodes[vector.head] - figure.nodes[vector.tail]) + sketch.rng.normal(0.0, 0.2)
+            texts[vector.name] = wording.number(max(0.0, round(2.0 * length) / 2.0), sketch.page)
+    filled = {}
     for name, (x, y, w, h) in fields.items():
-        if name in task.declared:
-            text = wording.scale_text(name, task.declared[name], task, sketch.page, sketch.rng).split("= ")[-1]
-            height = min(0.5 * h, 1.5 * w / max(1, len(text)))
-            sketch.text(complex(x + 1.5, -y - h / 2 - 0.4 * height), text, height, names=name)
-            written[name] = wording.plain(text)
+        if name in texts:
+            height = min(0.5 * h, 1.5 * w / max(1, len(texts[name])), 4.5)
+            sketch.text(complex(x + 1.5, -y - h / 2 - 0.4 * height), texts[name], height, names=name)
+            filled[name] = wording.plain(texts[name])
+    written.update({name: text for name, text in filled.items() if name in task.declared})
+    return filled
 
 
 def _scanned(
