@@ -10,14 +10,16 @@ _LONG_ALIKE_DEG = 5.0
 _SHORT_MM = 6.0
 _APART_MM = (0.5, 6.0)
 _LEAST_ALIKE = 4
+_LEAST_LONG = 6
+"""A slider, its guide and a link along it make five level lines."""
 _LONGEST_MM = 60.0
 _RATIO = 2.5
 _WEIGHT_RATIO = 1.35
 
 
 def hatching(strokes: Strokes) -> BoolArray:
-    """Which strokes are hatching: at least five parallel ones of like length, each within 6 mm of the
-    next, side by side. A plan has no such family."""
+    """Which strokes are hatching: at least five short or seven long parallel ones of like length, each within
+    6 mm of the next, side by side. A plan has no such family."""
     span = strokes.ends[:, 1] - strokes.ends[:, 0]
     length = np.hypot(span[:, 0], span[:, 1])
     rows = np.flatnonzero(length < _LONGEST_MM)
@@ -29,7 +31,8 @@ def hatching(strokes: Strokes) -> BoolArray:
     linked &= np.maximum(weight[:, None], weight[None, :]) < _WEIGHT_RATIO * np.minimum(weight[:, None], weight[None, :])
     between = (linked & (aside > 0)).any(axis=1) & (linked & (aside < 0)).any(axis=1)
     # The last of a family may be the link or the side that runs along it: short ones alone are safe.
-    result[rows] = (_family_size(linked) > _LEAST_ALIKE) & (between | (length[rows] < _SHORT_MM))
+    family, short = _family_size(linked), length[rows] < _SHORT_MM
+    result[rows] = np.where(short, family > _LEAST_ALIKE, (family > _LEAST_LONG) & between)
     return result
 
 

@@ -6,16 +6,23 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from grader.ink.joining import join
 from grader.ink.seeds import Seeds
 from grader.pixels import BoolArray
 from grader.records import Box, FloatArray, Sheet
 
 _FRAME_MM = 1.5
 _BLOCK_MM = (215.0, 80.0)
-_SQUARE = 0.03
-_RULED_MM = 10.0
-_TOUCH_MM = 2.0
-_LEAST_LINES = 3
+_SQUARE = 0.05
+_PIECE_MM = 3.0
+_RULED_MM = 6.0
+_OFF_MM = 0.5
+_BROKEN_MM = 16.0
+"""Letters that touch a ruled line break its border this far."""
+_MEET_MM = 4.0
+_REACH_MM = 18.0
+_EDGE_MM = 2.5
+_LEAST_LINES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,37 +73,42 @@ def field_of(seeds: Seeds, sheet: Sheet, scale: float, boxes: Sequence[Box] | No
 
 
 def title_block(ends: FloatArray, sheet: Sheet) -> Box | None:
-    """The grid of ruled lines at the bottom right, from pieces of lines (n, 2, 2) mm; None without one."""
+    """The ruled table at the bottom right, from pieces of lines (n, 2, 2) mm; None without one.
+
+    Its top line runs to the right side and its left line to the bottom, and the two meet: a plan
+    drawn close by is not taken in.
+    """
+    lines = _ruled(ends, sheet)
+    if len(lines) < _LEAST_LINES:
+        return None
+    low, high = lines.min(axis=1), lines.max(axis=1)
+    level = (high - low)[:, 0] > (high - low)[:, 1]
+    right, bottom = high.max(axis=0)
+    tops = lines[level & (high[:, 0] > right - _REACH_MM)]
+    lefts = lines[~level & (high[:, 1] > bottom - _REACH_MM)]
+    best: Box | None = None
+    for top in tops:
+        for left in lefts:
+            x, y = float(left[:, 0].mean()), float(top[:, 1].mean())
+            meets = abs(top[:, 0].min() - x) < _MEET_MM and abs(left[:, 1].min() - y) < _MEET_MM
+            inside = level & (low[:, 1] > y + _MEET_MM / 2.0) & (low[:, 0] > x - _MEET_MM)
+            large = best is None or (right - x) * (bottom - y) > best[2] * best[3]
+            if meets and large and inside.any():
+                best = (x - 1.0, y - 1.0, sheet.page_mm[0] - x + 1.0, sheet.page_mm[1] - y + 1.0)
+    return best
+
+
+def _ruled(ends: FloatArray, sheet: Sheet) -> FloatArray:
+    """(m, 2, 2) level and upright lines near the bottom right corner, pieces joined."""
     right, bottom = sheet.page_mm
     span = np.abs(ends[:, 1] - ends[:, 0])
-    length = span.max(axis=1)
     low, high = ends.min(axis=1), ends.max(axis=1)
-    ruled = (span.min(axis=1) < np.maximum(_SQUARE * length, 0.3)) & (length >= _RULED_MM)
+    ruled = (span.min(axis=1) < np.maximum(_SQUARE * span.max(axis=1), 0.2)) & (span.max(axis=1) >= _PIECE_MM)
     ruled &= (low[:, 0] > right - _BLOCK_MM[0]) & (low[:, 1] > bottom - _BLOCK_MM[1])
-    x, y, w, h = sheet.drawable_mm
-    ruled &= (high[:, 0] < x + w + _TOUCH_MM) & (high[:, 1] < y + h + _TOUCH_MM)
-    rows = np.flatnonzero(ruled)
-    if len(rows) < _LEAST_LINES:
-        return None
-    rows = rows[_connected(low[rows] - _TOUCH_MM, high[rows] + _TOUCH_MM)]
-    level = span[rows, 0] > span[rows, 1]
-    if level.sum() < _LEAST_LINES - 1 or (~level).sum() < 1:
-        return None
-    x0, y0 = low[rows].min(axis=0) - 1.0
-    return (float(x0), float(y0), right - float(x0), bottom - float(y0))
-
-
-def _connected(low: FloatArray, high: FloatArray) -> BoolArray:
-    """Which boxes hang together with the one furthest to the bottom right."""
-    member = np.zeros(len(low), dtype=bool)
-    member[int(np.argmax(high.sum(axis=1)))] = True
-    while True:
-        touching = member.copy()
-        for row in np.flatnonzero(member):
-            touching |= (low <= high[row]).all(axis=1) & (high >= low[row]).all(axis=1)
-        if (touching == member).all():
-            return member
-        member = touching
+    ruled &= (high[:, 0] < right - _EDGE_MM) & (high[:, 1] < bottom - _EDGE_MM)
+    lines = join(ends[ruled], np.ones(int(ruled.sum())), _OFF_MM, _BROKEN_MM).ends
+    size = np.abs(lines[:, 1] - lines[:, 0]).max(axis=1)
+    return lines[size >= _RULED_MM]
 
 
 def _in_box(points: FloatArray, box: Box) -> BoolArray:
