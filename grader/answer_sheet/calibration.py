@@ -12,7 +12,7 @@ from grader.records import FloatArray
 
 _PEN_MM = 0.3
 _ADVICE = N_(
-    "Calibration page of planmark. Print it at 100 % on A3, scan it as the drawings will be scanned, and let"
+    "Calibration page of planmark. Print it on A3 at 100 %, scan it as the drawings will be scanned, and let"
     " planmark read it: the segments are known, so their errors are the printer's and the scanner's."
 )
 _LENGTHS_MM = (5.0, 10.0, 20.0, 40.0, 80.0)

@@ -30,8 +30,8 @@ CLOSE_UP_BELOW = 0.55
 """A plan smaller than this share of the sheet is worth a close-up."""
 WIDE_TO_HIGH = (1.3, 1.9)
 """Aspects of close-ups that sit well on a page."""
-SIZE_PER_MM = 0.0062
-"""Size of marks and letters by the width of what is shown: legible on a page as wide as a hand."""
+SIZE_PER_MM = {0: 0.0062, 1: 0.0075, 2: 0.0105}
+"""Size of marks and letters by the width shown, for the whole sheet and for one or two close-ups in a row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,11 +58,14 @@ def views(picture: Picture, number: int, captions: Mapping[str, str]) -> list[Vi
         for figure in (VELOCITY_PLAN, ACCELERATION_PLAN)
         if (box := _close_up([arrow for arrow in scene.arrows if arrow.figure == figure], scene)) is not None
     }
-    whole = _svg((0.0, 0.0, width, height), image, scene, captions["sheet"], without=set(close_ups))
+    whole = _svg(
+        (0.0, 0.0, width, height), image, scene, captions["sheet"], SIZE_PER_MM[0], without=set(close_ups)
+    )
+    share = SIZE_PER_MM[len(close_ups)]
     return [
         View("sheet", captions["sheet"], whole),
         *(
-            View(figure, captions[figure], _svg(box, again, _part(scene, figure), captions[figure]))
+            View(figure, captions[figure], _svg(box, again, _part(scene, figure), captions[figure], share))
             for figure, box in close_ups.items()
         ),
     ]
@@ -73,10 +76,15 @@ def _part(scene: Scene, figure: str) -> Scene:
 
 
 def _svg(
-    box: Box, image: Markup, scene: Scene, caption: str, without: AbstractSet[str] = frozenset()
+    box: Box,
+    image: Markup,
+    scene: Scene,
+    caption: str,
+    size_per_mm: float,
+    without: AbstractSet[str] = frozenset(),
 ) -> Markup:
     """One look; arrows of figures that have a close-up of their own go `without` names there."""
-    size = min(max(SIZE_PER_MM * box[2], 0.3), 1.7)
+    size = min(max(size_per_mm * box[2], 0.3), 1.7)
     labels = labels_of([arrow for arrow in scene.arrows if arrow.figure not in without], box, size)
     shapes = (
         *(_ghost(ghost, size) for ghost in scene.ghosts),

@@ -78,7 +78,7 @@ def feedback_page(
         student_name=student_name,
         show_expected=level == "full",
         criteria=[_row(criterion, speaker, level) for criterion in report.criteria],
-        mistakes=_mistakes(report, speaker, names) if level != "symbol" else [],
+        mistakes=_mistakes(report, speaker, level, names),
         problems=[problem_sentence(problem, speaker) for problem in report.problems],
         scales=_scales(report, speaker, names),
         sheets=_sheets(pictures, speaker),
@@ -140,8 +140,8 @@ def folders_of(reports: Sequence[ReportDocument]) -> list[str]:
         counts[report.student_id] = counts.get(report.student_id, 0) + 1
     return [
         report.student_id
-        if counts[report.student_id] == 1 or report.position is None
-        else f"{report.student_id}/{report.position}"
+        if counts[report.student_id] == 1
+        else f"{report.student_id}/{'unknown' if report.position is None else report.position}"
         for report in reports
     ]
 
@@ -161,6 +161,7 @@ def _environment(lang: str) -> Environment:
         speaker.gettext, speaker.ngettext, newstyle=True
     )
     environment.filters["symbols"] = words.symbols
+    environment.filters["first_up"] = lambda text: text[:1].upper() + text[1:]
     environment.filters["points"] = lambda value: speaker.trimmed(value, 2)
     environment.globals.update(
         speaker=speaker, verdicts=words.VERDICTS, states_words=words.STATES, state_marks=words.STATE_MARKS,
@@ -188,11 +189,12 @@ def _row(criterion: CriterionDocument, speaker: Tongue, level: Level) -> _Row:
 
 def _quantity(quantity: QuantityDocument, speaker: Tongue) -> list[str]:
     """Length and direction on paper, real value."""
-    parts = []
+    drawn = []
     if quantity.length_mm is not None:
-        parts.append(speaker.quantity(quantity.length_mm, 1, "mm"))
+        drawn.append(speaker.quantity(quantity.length_mm, 1, "mm"))
     if quantity.direction_deg is not None:
-        parts.append(f"∠\N{NARROW NO-BREAK SPACE}{speaker.number(quantity.direction_deg, 1)}°")
+        drawn.append(f"∠\N{NARROW NO-BREAK SPACE}{speaker.number(quantity.direction_deg, 1)}°")
+    parts = [" ".join(drawn)] if drawn else []
     if quantity.value is not None:
         unit = speaker.unit(quantity.unit or "")
         parts.append(f"{speaker.significant(quantity.value, 4)}\N{NO-BREAK SPACE}{unit}".rstrip())
@@ -200,12 +202,12 @@ def _quantity(quantity: QuantityDocument, speaker: Tongue) -> list[str]:
 
 
 def _tolerance(tolerance: ToleranceDocument, speaker: Tongue) -> list[str]:
-    parts = []
+    drawn = []
     if tolerance.length_mm is not None:
-        parts.append(f"±{speaker.quantity(tolerance.length_mm, 1, 'mm')}")
+        drawn.append(f"±{speaker.quantity(tolerance.length_mm, 1, 'mm')}")
     if tolerance.direction_deg is not None:
-        parts.append(f"±{speaker.number(tolerance.direction_deg, 1)}°")
-    return parts
+        drawn.append(f"±{speaker.number(tolerance.direction_deg, 1)}°")
+    return [" ".join(drawn)] if drawn else []
 
 
 def _score(report: ReportDocument, speaker: Tongue) -> str:
@@ -215,17 +217,20 @@ def _score(report: ReportDocument, speaker: Tongue) -> str:
     if report.score_range is None or report.status in {"missing", "unreadable"}:
         return "–"
     low, high = (speaker.trimmed(value, 2) for value in report.score_range)
-    return low if low == high else f"{low}…{high}"
+    return low if low == high else f"{low}–{high}"
 
 
 def _mistakes(
-    report: ReportDocument, speaker: Tongue, names: Mapping[str, str]
+    report: ReportDocument, speaker: Tongue, level: Level, names: Mapping[str, str]
 ) -> list[dict[str, object]]:
+    if level == "symbol":
+        return []
     titles = {criterion.id: criterion.title for criterion in report.criteria}
     return [
         {
             "title": speaker.gettext(MISTAKES[mistake.code].title),
-            "text": mistake.detail or mistake_sentences(mistake.code, mistake.at, speaker, names),
+            "text": mistake_sentences(mistake.code, mistake.at, speaker, names),
+            "detail": mistake.detail if level == "full" else "",
             "at": place(mistake.at, speaker, names),
             "explains": [titles.get(one, one) for one in mistake.explains],
         }

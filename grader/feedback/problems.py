@@ -26,7 +26,22 @@ PROBLEMS: dict[str, str] = {
     "paper_assumed": N_("Only the paper's edges give the scale; the paper was taken for A3."),
     "frame_missing": N_("No drawing frame was found; positions on the sheet are rough."),
     "upright_unsure": N_("No title block shows which way up the sheet is."),
-    "sheet": N_("The sheet could not be placed: no frame, paper edge or marker was found."),
+    "sheet_refused": N_("The sheet could not be placed: no frame, paper edge or marker settles it."),
+    "nothing_handed_in": N_("Nothing was handed in."),
+    "nothing_read": N_("No figure of this assignment could be read on the pages handed in."),
+    "variant_unknown": N_("Nothing says this student's number or position; add it to the roster."),
+    "scale_refused": N_("A declared scale could not be understood."),
+    "measurements_twice": N_("There are several sets of measurements; only the first one counts."),
+    "measurements_unmatched": N_("These measurements are of nobody on the roster."),
+    "owner_unknown": N_("Nothing says whose page this is."),
+    "owner_disagree": N_("Sources disagree about whose page this is."),
+    "owner_not_listed": N_("The page names a student who is not on the roster."),
+    "owner_ambiguous": N_("The student has several positions, and nothing says which one this is."),
+    "owner_other_assignment": N_("The page belongs to another assignment."),
+    "order_refused": N_("The roster's order cannot be used for these pages."),
+    "scan_missing": N_("A scan that the roster names is not there."),
+    "process_ended": N_("Processing ended unexpectedly; grade again."),
+    "internal_error": N_("This could not be processed because of an error in the program."),
 }
 """By code; a code that is not here is told by its own message, in English."""
 

@@ -100,7 +100,8 @@ def distribution_svg(results: ResultsDocument, speaker: Tongue) -> Markup:
         )
         if count:
             parts.append(Markup('<text x="{}" y="{:.1f}">{}</text>').format(x + 14, 95 - height, count))
-        parts.append(Markup('<text class="axis" x="{}" y="114">{}</text>').format(x + 14, label))
+        parts.append(Markup('<text class="axis" x="{}" y="115">{}</text>').format(x - 3, 10 * index))
+    parts.append(Markup('<text class="axis" x="343" y="115">100</text>'))
     summary = speaker.gettext("Scores in per cent of the maximum: how many students in each tenth.")
     return Markup(
         '<svg class="chart" viewBox="0 0 352 122" role="img" aria-label="{}">{}'
