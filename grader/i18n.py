@@ -1,10 +1,12 @@
-"""Languages of what students and instructors read: English, Romanian, Russian.
+r"""Languages of what students and instructors read: English, Romanian, Russian.
 
 English texts stand in the code and are the keys; `locale/<lang>/LC_MESSAGES/planmark.po` holds the
-other languages. After a text has changed (`docs/translating.md` says the same)::
+other languages. After a text has changed (more in `docs/translating.md`)::
 
-    pybabel extract -F grader/locale/babel.cfg -k N_ -o grader/locale/planmark.pot --no-location .
-    pybabel update -D planmark -i grader/locale/planmark.pot -d grader/locale --no-fuzzy-matching
+    pybabel extract -F grader/locale/babel.cfg -k N_ --no-location --sort-output --no-wrap \
+        -o grader/locale/planmark.pot .
+    pybabel update -D planmark -i grader/locale/planmark.pot -d grader/locale \
+        --no-fuzzy-matching --no-wrap --ignore-obsolete
     pybabel compile -D planmark -d grader/locale
 """
 
