@@ -1,0 +1,219 @@
+"""Make the bundled classes: scans, entered measurements, rosters, and the truth of what was drawn.
+
+    python samples/make_samples.py [FOLDER]
+
+Everything follows from the seeds below; FOLDER is this folder by default.
+"""
+
+import csv
+import json
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grader.answer_sheet import make_sheets
+from grader.roster import RosterRow
+from grader.simulation import (
+    CAREFUL,
+    TYPICAL,
+    PageStyle,
+    Scan,
+    Settings,
+    SimulatedSheet,
+    Student,
+    blank_back,
+    measured_by,
+    simulate,
+    write_pdf,
+    write_truth,
+)
+from grader.simulation.printing import printed_sheets
+from grader.simulation.settings import PENS
+from reference.assignment import Assignment, load_assignment
+
+QUIET = Scan(dpi=150.0, dpi_tag=150.0, noise=1.0, tint_grain=0.5, jpeg_quality=62, dust=8)
+"""A good flatbed, frugal with bytes."""
+COPY = replace(QUIET, mode="bilevel", container="tif", dpi=300.0, dpi_tag=300.0, device="copier", dust=30)
+PHOTO = replace(QUIET, device="phone", mode="colour", dpi=170.0, dpi_tag=72.0, tilt_deg=4.0, lens_k1=0.012,
+                shading=0.15, shadow=0.15, bed=(128, 96, 66), skew_deg=1.0)
+WRITTEN_ONLY = replace(QUIET, dpi=20.0, dpi_tag=20.0)
+"""For students who hand in numbers: the drawing stays at home."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pupil:
+    """One line of the roster and what this student hands in."""
+
+    number: int
+    variant: int
+    settings: Settings
+    seed: int
+    hands_in: frozenset[str] = field(default=frozenset({"scans"}))
+    """Of scans, class pdf, answer sheet, csv, json, nothing."""
+
+    @property
+    def student_id(self) -> str:
+        """The id: s01, s02, ..."""
+        return f"s{self.number:02d}"
+
+
+def told(
+    pen: str, student: Student | None = None, scan: Scan = QUIET, *, careful: bool = True, **page: Any
+) -> Settings:
+    """A student's settings in one line."""
+    style = PageStyle(**{"language": "ro", "letter_mm": 4.2, **page})
+    return Settings(CAREFUL if careful else TYPICAL, student or Student(), PENS[pen], style, scan)
+
+
+SCANS, PDF, SHEET = frozenset({"scans"}), frozenset({"class pdf"}), frozenset({"answer sheet"})
+CSV, JSON, NOTHING = frozenset({"csv"}), frozenset({"json"}), frozenset[str]()
+TWO = Student(sheets=2)
+
+PUMP = [
+    Pupil(1, 7, told("fine pencil", TWO, replace(QUIET, dpi=200.0, dpi_tag=200.0)), 11, SCANS | CSV),
+    Pupil(2, 12, told("soft pencil", Student(sheets=2, mistakes=("normal_reversed",)), careful=False), 12),
+    Pupil(3, 3, told("ink", Student(sheets=2, ka_ratio=1.25), COPY, frame_by="print"), 13),
+    Pupil(4, 18, told("fine pencil"), 14, PDF),
+    Pupil(5, 24, told("soft pencil", Student(sheets=2, mistakes=("wrong_link",))), 15, PDF),
+    Pupil(6, 9, told("fine pencil", TWO), 16, SHEET),
+    Pupil(7, 15, told("ballpoint", TWO, PHOTO), 17),
+    Pupil(8, 21, told("fine pencil", TWO, WRITTEN_ONLY), 18, JSON),
+    Pupil(9, 27, told("fine pencil", Student(mistakes=("normal_missing",)), WRITTEN_ONLY), 19, CSV),
+    Pupil(10, 30, told("fine pencil"), 20, NOTHING),
+]
+PRESS = [
+    Pupil(1, 1, told("fine pencil", TWO, language="ru", frame="gost"), 31, SCANS | CSV),
+    Pupil(2, 2, told("ink", TWO, replace(COPY, container="png", dpi=200.0, dpi_tag=200.0),
+                     language="ru", frame="gost", frame_by="print", title_block="form"), 32),
+    Pupil(3, 3, told("soft pencil", Student(sheets=2, mistakes=("wrong_link",)),
+                     replace(QUIET, quarter_turns=2), language="ru"), 33),
+    Pupil(4, 5, told("fine pencil", TWO, WRITTEN_ONLY, language="ru"), 34, CSV),
+    Pupil(5, 0, told("fine pencil", TWO, WRITTEN_ONLY, language="ru"), 35, CSV),
+]
+
+
+def make_class(assignment: Assignment, pupils: Iterable[Pupil], folder: Path, delimiter: str) -> None:
+    """All files of one class."""
+    folder.mkdir(parents=True, exist_ok=True)
+    truths: list[dict[str, Any]] = []
+    roster: list[dict[str, Any]] = []
+    numbers: list[dict[str, Any]] = []
+    pdf_pages: list[tuple[SimulatedSheet, str]] = []
+    for pupil in pupils:
+        sheets = sheets_of(assignment, pupil)
+        line = roster_line(pupil, sheets)
+        if "class pdf" in pupil.hands_in:
+            first = 2 * len(pdf_pages) + 1
+            line["scans"] = ";".join(f"class.pdf#{first + 2 * k}" for k in range(len(sheets)))
+            pdf_pages += [(sheet, pupil.student_id) for sheet in sheets]
+        if pupil.hands_in & {"scans", "answer sheet"}:
+            save(sheets, pupil, folder)
+        if pupil.hands_in & {"scans", "answer sheet", "class pdf"}:
+            truths += [sheet.truth for sheet in sheets]
+        measured = measured_line(pupil, sheets)
+        if "csv" in pupil.hands_in:
+            numbers.append(measured)
+        if "json" in pupil.hands_in:
+            write_json(folder / f"{pupil.student_id}.json", measured)
+        roster.append(line)
+    if pdf_pages:
+        write_class_pdf(folder / "class.pdf", [sheet for sheet, _ in pdf_pages])
+    write_csv(folder / "roster.csv", roster, ",")
+    write_csv(folder / "measurements.csv", numbers, delimiter)
+    write_truth(folder / "truth.jsonl", truths)
+
+
+def sheets_of(assignment: Assignment, pupil: Pupil) -> list[SimulatedSheet]:
+    """The student's sheets, on printed paper where the student got some."""
+    by_position = assignment.file.variant.position is not None
+    variant = assignment.variant(None, pupil.variant) if by_position else assignment.variant(pupil.variant)
+    printed = None
+    if "answer sheet" in pupil.hands_in:
+        row = RosterRow(pupil.student_id, f"Student {pupil.number}", variant.n, variant.position)
+        document = make_sheets(assignment, [row], "ro")
+        printed = printed_sheets(document.pdf, document.layout)
+    return simulate(assignment, variant, pupil.seed, pupil.settings, student_id=pupil.student_id, printed=printed)
+
+
+def save(sheets: list[SimulatedSheet], pupil: Pupil, folder: Path) -> None:
+    """The student's scans as files of their own."""
+    for number, sheet in enumerate(sheets, start=1):
+        name = pupil.student_id if len(sheets) == 1 else f"{pupil.student_id}_{number}"
+        sheet.save(folder / name)
+        sheet.truth["page"] = 1
+
+
+def write_class_pdf(path: Path, sheets: list[SimulatedSheet]) -> None:
+    """One PDF, straight from the copier: every sheet with its blank back."""
+    rng = np.random.default_rng(5)
+    pages = []
+    for index, sheet in enumerate(sheets):
+        scan = sheet.settings.scan
+        pages += [(sheet.image, scan.dpi, 0), (blank_back(scan, sheet.image.shape[:2], rng), scan.dpi, 0)]
+        sheet.truth.update({"file": path.name, "page": 2 * index + 1})
+    write_pdf(path, pages, quality=QUIET.jpeg_quality)
+
+
+UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
+
+
+def scales_of(sheets: list[SimulatedSheet]) -> dict[str, str]:
+    """The scales as declared, with their units."""
+    declared = sheets[0].truth["scales"]["declared"]
+    return {name: f"{declared[name]:.6g} {unit}" for name, unit in UNITS.items()}
+
+
+def variant_columns(sheets: list[SimulatedSheet]) -> dict[str, Any]:
+    """n and position, blank where the assignment has none."""
+    truth = sheets[0].truth
+    return {key: "" if truth[key] is None else truth[key] for key in ("n", "position")}
+
+
+def roster_line(pupil: Pupil, sheets: list[SimulatedSheet]) -> dict[str, Any]:
+    """The student's line of the roster."""
+    scales = scales_of(sheets) if pupil.hands_in else dict.fromkeys(UNITS, "")
+    return {"student_id": pupil.student_id, "name": f"Student {pupil.number}", **variant_columns(sheets),
+            **scales, "scans": ""}
+
+
+def measured_line(pupil: Pupil, sheets: list[SimulatedSheet]) -> dict[str, Any]:
+    """What the student measured on the drawing, to half a millimetre."""
+    measured = measured_by(sheets, np.random.default_rng([pupil.seed, 9]), spread_mm=0.15)
+    return {"student_id": pupil.student_id, **variant_columns(sheets), **scales_of(sheets), **measured}
+
+
+def write_csv(path: Path, lines: list[dict[str, Any]], delimiter: str) -> None:
+    """A table with the columns of all lines; decimal commas where semicolons part them."""
+    columns = list(dict.fromkeys(name for line in lines for name in line))
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, delimiter=delimiter, lineterminator="\n")
+        writer.writerow(columns)
+        for line in lines:
+            cells = [str(line.get(name, "")) for name in columns]
+            writer.writerow([c.replace(".", ",") if delimiter == ";" and c[:1].isdigit() else c for c in cells])
+
+
+def write_json(path: Path, line: dict[str, Any]) -> None:
+    """One student's measurements as JSON."""
+    taken = {"student_id", "n", "position", *UNITS}
+    lengths = {name: value for name, value in line.items() if name not in taken and not name.endswith("_deg")}
+    directions = {name.removesuffix("_deg"): value for name, value in line.items() if name.endswith("_deg")}
+    document: dict[str, Any] = {
+        "student_id": line["student_id"], "n": line["n"], "scales": {name: line[name] for name in UNITS},
+        "segments_mm": lengths, "directions_deg": directions, "values": {},
+    }
+    path.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+
+
+def main(folder: Path) -> None:
+    """Both classes."""
+    make_class(load_assignment("pump"), PUMP, folder / "pump", ",")
+    make_class(load_assignment("press"), PRESS, folder / "press", ";")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parent)
