@@ -24,14 +24,15 @@ def figure_of_plan(plan: Plan, figure: str) -> tuple[Figure, list[Unread]]:
     """Nodes and vectors of a plan; what is not drawn, with the reason."""
     del figure
     names = plan.found.expected.names
-    sure = _node_confidence(plan)
+    fit = plan.fit
+    sure = _node_confidence(plan, fit)
     absent = dict(plan.hypothesis.absent)
     nodes = {
-        name: _node(plan.fit, index, float(sure[index]))
+        name: _node(fit, index, float(sure[index]))
         for index, name in enumerate(names)
-        if name not in absent and np.isfinite(plan.fit.at[index])
+        if name not in absent and np.isfinite(fit.at[index])
     }
-    vectors, unread = _vectors(plan, sure)
+    vectors, unread = _vectors(plan, fit, sure)
     unread.extend(Unread(name, reason) for name, reason in absent.items())
     for vector in plan.hypothesis.drawing.construction.vectors_of(figure_name(plan)):
         gone = next((absent[end] for end in (vector.head, vector.tail) if end in absent), None)
@@ -49,23 +50,23 @@ def _node(fit: Fit, index: int, sure: float) -> ReadNode:
     return ReadNode(complex(fit.at[index]), fit.cov[2 * index : 2 * index + 2, 2 * index : 2 * index + 2], sure)
 
 
-def _node_confidence(plan: Plan) -> FloatArray:
+def _node_confidence(plan: Plan, fit: Fit) -> FloatArray:
     names = plan.found.expected.names
     rivals = [
-        confidence.Rival(dict(zip(other.found.expected.names, other.fit.at, strict=True)), other.score)
+        confidence.Rival(dict(zip(other.found.expected.names, other.found.expected.at, strict=True)), other.score)
         for other in plan.rivals
     ]
-    named = confidence.of_names(names, plan.fit.at, plan.score, rivals)
-    placed = confidence.of_places(plan.fit)
+    named = confidence.of_names(names, plan.found.expected.at, plan.score, rivals)
+    placed = confidence.of_places(fit)
     support = min(1.0, max(0.0, (plan.place.score - 0.3) / 0.4))
     return np.asarray(np.minimum(named * placed * support, confidence.HIGHEST))
 
 
-def _vectors(plan: Plan, sure: FloatArray) -> tuple[dict[str, ReadVector], list[Unread]]:
+def _vectors(plan: Plan, fit: Fit, sure: FloatArray) -> tuple[dict[str, ReadVector], list[Unread]]:
     vectors: dict[str, ReadVector] = {}
     unread: list[Unread] = []
     for index, edge in enumerate(plan.found.expected.edges):
-        span = complex(plan.fit.at[edge.head] - plan.fit.at[edge.tail])
+        span = complex(fit.at[edge.head] - fit.at[edge.tail])
         ends = f"{plan.found.expected.names[edge.tail]} and {plan.found.expected.names[edge.head]}"
         if plan.found.stroke[index] < 0 and abs(span) > LEAST_VECTOR_MM:
             unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
@@ -73,7 +74,7 @@ def _vectors(plan: Plan, sure: FloatArray) -> tuple[dict[str, ReadVector], list[
         sureness = float(min(sure[edge.tail], sure[edge.head]))
         if plan.found.shared[index]:
             sureness = min(sureness, confidence.SHARED_STROKE)
-        vectors[edge.name] = _vector(plan.fit, edge.tail, edge.head, span, sureness)
+        vectors[edge.name] = _vector(fit, edge.tail, edge.head, span, sureness)
     return vectors, unread
 
 

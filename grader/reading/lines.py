@@ -16,7 +16,7 @@ LEAST_MM = 1.2
 """Shorter strokes are left out: dots, serifs, sides of arrowheads."""
 SE_OFFSET_MM = 0.04
 """No line of ink is known better: paper and pen are not ideal."""
-SE_END_MM = 0.35
+SE_END_MM = 0.2
 JOIN_OFF_MM = 0.45
 JOIN_GAP_MM = 14.0
 JOIN_TURN_RAD = 0.03
@@ -34,7 +34,8 @@ class Lines:
     start, end : the two ends
     along : unit vector from start to end
     length : mm
-    se_offset, se_angle, se_end : standard errors across (mm), of direction (rad), of the ends (mm)
+    se_offset, se_angle : standard errors across (mm) and of direction (rad)
+    se_end : (n, 2) standard errors along, of start and end (mm)
     darkness, width : means over the stroke
     members : (n, 2) the strokes it is made of, by their number; the same twice for a single one
     """
@@ -58,6 +59,12 @@ class Lines:
         """Midpoints."""
         return np.asarray((self.start + self.end) / 2.0)
 
+    def nearer_end(self, row: int, to: complex) -> tuple[complex, float]:
+        """The end of one line that is nearer to a point, and its standard error along the line."""
+        ends = (complex(self.start[row]), complex(self.end[row]))
+        side = int(abs(ends[1] - to) < abs(ends[0] - to))
+        return ends[side], float(self.se_end[row, side])
+
     def take(self, chosen: BoolArray | IntArray) -> "Lines":
         """Some of the rows; `members` keep their numbers."""
         return Lines(*(getattr(self, name)[chosen] for name in self.__slots__))
@@ -67,7 +74,7 @@ def lines_of(ink: Ink) -> Lines:
     """The strokes of a sheet as lines, with joined ones added."""
     strokes = ink.strokes
     ends = strokes.ends[..., 0] - 1j * strokes.ends[..., 1]
-    ends = ends.reshape(-1, 2)
+    ends = _without_caps(ends.reshape(-1, 2), strokes.width)
     kept = np.abs(ends[:, 1] - ends[:, 0]) >= LEAST_MM
     number = np.flatnonzero(kept)
     length = np.abs(ends[kept, 1] - ends[kept, 0])
@@ -78,12 +85,20 @@ def lines_of(ink: Ink) -> Lines:
         length=length,
         se_offset=np.maximum(strokes.se_offset[kept], SE_OFFSET_MM),
         se_angle=np.maximum(strokes.se_angle[kept], SE_OFFSET_MM / length),
-        se_end=np.maximum(strokes.se_end[kept].max(axis=1, initial=0.0), SE_END_MM),
+        se_end=np.maximum(strokes.se_end[kept], SE_END_MM),
         darkness=strokes.darkness[kept],
         width=strokes.width[kept],
         members=np.column_stack([number, number]),
     )
     return _with_joined(single)
+
+
+def _without_caps(ends: ComplexArray, width: FloatArray) -> ComplexArray:
+    """Ends half a pen's width shorter: ink goes on that far beyond where the pen stopped."""
+    span = ends[:, 1] - ends[:, 0]
+    length = np.maximum(np.abs(span), 1e-9)
+    cap = np.minimum(0.5 * width, 0.25 * length) * span / length
+    return np.column_stack([ends[:, 0] + cap, ends[:, 1] - cap])
 
 
 def _with_joined(single: Lines) -> Lines:
@@ -97,6 +112,7 @@ def _with_joined(single: Lines) -> Lines:
     lowest, highest = place.argmin(axis=0), place.argmax(axis=0)
     pick = np.arange(len(first))
     start, end = ends[lowest, pick], ends[highest, pick]
+    errors = np.concatenate([single.se_end[first].T, single.se_end[second].T])
     length = np.abs(end - start)
     joined = Lines(
         start=start,
@@ -105,7 +121,7 @@ def _with_joined(single: Lines) -> Lines:
         length=length,
         se_offset=np.maximum(single.se_offset[first], single.se_offset[second]),
         se_angle=SE_OFFSET_MM / length + np.maximum(single.se_offset[first], single.se_offset[second]) / length,
-        se_end=np.maximum(single.se_end[first], single.se_end[second]),
+        se_end=np.column_stack([errors[lowest, pick], errors[highest, pick]]),
         darkness=np.minimum(single.darkness[first], single.darkness[second]),
         width=np.minimum(single.width[first], single.width[second]),
         members=np.column_stack([single.members[first, 0], single.members[second, 0]]),

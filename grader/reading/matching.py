@@ -23,6 +23,8 @@ GATE = 18.0
 FIELD_MM = 150.0
 """Side of the field in which other strokes lie by chance."""
 INVISIBLE_MM = 0.8
+RUN_ON_FAR = 4e-4
+"""Density per mm of ends anywhere: the stroke goes on as another edge, or as a line drawn through."""
 SHARED_RADIUS2_MM2 = 1.0
 """Two edges share one stroke where their lines lie within about half a millimetre of each other."""
 
@@ -31,12 +33,12 @@ SHARED_RADIUS2_MM2 = 1.0
 class Ends:
     """How strokes end at nodes: log densities (per mm) of an end at, beyond and short of its node."""
 
-    at_mm: float = 0.45
-    at_share: float = 0.5
-    beyond_mm: float = 5.0
-    beyond_share: float = 0.42
-    short_mm: float = 2.0
-    short_share: float = 0.08
+    at_mm: float = 0.3
+    at_share: float = 0.57
+    beyond_mm: float = 3.0
+    beyond_share: float = 0.36
+    short_mm: float = 1.5
+    short_share: float = 0.07
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +135,7 @@ def _choices(state: Explanation, index: int, edge: int, lines: Lines, ends: Ends
     own = -0.5 * distance[near] - 0.5 * log_det[near] - np.log(2 * np.pi) - np.log(chance) + gains
     wide_distance, wide_log_det = _mahalanobis(off, spread + 0.3**2 * np.eye(2))
     density = np.exp(-0.5 * (wide_distance + wide_log_det)) / (2 * np.pi)
-    both = np.log(np.minimum(1.0, density * SHARED_RADIUS2_MM2) + 1e-12) - 1.0 + np.minimum(gains, 0.0)
+    both = np.log(np.minimum(1.0, density * SHARED_RADIUS2_MM2) + 1e-12) - 1.0
     gains = state.score + np.where(shared, both, own)
     for place, row in enumerate(near):
         at_ends = (False, False) if shared[place] else (bool(ended[place, 0]), bool(ended[place, 1]))
@@ -189,10 +191,13 @@ def _ends(
     gaps[:, 1] -= size
     direction = np.column_stack([along.real, along.imag])
     total, ended = np.zeros(len(kept)), np.zeros((len(kept), 2), dtype=bool)
+    forward = (lines.along[kept] * np.conj(along)).real > 0
+    own = lines.se_end[kept]
+    errors = np.where(forward[:, None], own, own[:, ::-1])
     for slot, node in enumerate((tail, head)):
         block = expected.cov[2 * node : 2 * node + 2, 2 * node : 2 * node + 2]
         variance = np.einsum("si,ij,sj->s", direction, block, direction)
-        variance += lines.se_end[kept] ** 2 + ends.at_mm**2
+        variance += errors[:, slot] ** 2 + ends.at_mm**2
         score, ended[:, slot] = _end_score(gaps[:, slot], variance, ends)
         total += score
     return total, ended, kept
@@ -206,7 +211,7 @@ def _end_score(gap: FloatArray, variance: FloatArray, ends: Ends) -> tuple[Float
     reach = np.where(gap > 0, ends.beyond_mm, ends.short_mm)
     share = np.where(gap > 0, ends.beyond_share, ends.short_share)
     off = share * np.exp(-np.maximum(np.abs(gap) - sigma, 0.0) / reach) / (reach + sigma)
-    return np.asarray(np.log(100.0 * (at + off + 1e-9))), np.asarray(at > 2.0 * off)
+    return np.asarray(np.log(100.0 * (at + off + RUN_ON_FAR))), np.asarray(at > 2.0 * off)
 
 
 def _taken(state: Explanation, edge: int, choice: _Choice, lines: Lines, ends: Ends) -> Explanation:
@@ -240,11 +245,10 @@ def _updated(expected: Expected, edge: int, choice: _Choice, lines: Lines, ends:
     for slot, node in enumerate((tail, head)):
         if not choice.ended[slot]:
             continue
-        candidates = (lines.start[row], lines.end[row])
-        end = min(candidates, key=lambda point: abs(point - expected.at[node]))
+        end, error = lines.nearer_end(row, complex(expected.at[node]))
         h = np.zeros(count)
         h[2 * node : 2 * node + 2] = (along.real, along.imag)
-        noise[len(rows), len(rows)] = lines.se_end[row] ** 2 + ends.at_mm**2
+        noise[len(rows), len(rows)] = error**2 + ends.at_mm**2
         rows.append(h)
         values.append(((end - expected.at[node]) * np.conj(along)).real)
     design, innovation = np.array(rows), np.array(values)

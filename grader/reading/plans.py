@@ -71,15 +71,19 @@ class Plan:
     hypothesis: Hypothesis
     place: Place
     found: Explanation
-    fit: Fit
     score: float
     lines: Lines
     rivals: tuple["Plan", ...] = ()
 
     @property
+    def fit(self) -> Fit:
+        """The nodes by the strokes alone."""
+        return fit_nodes(self.found, self.lines)
+
+    @property
     def refined(self) -> Place:
         """Where the plan lies by its strokes: pole as fitted; size and turn of all nodes together."""
-        return replace(self.place, at=complex(self.fit.at[0]))
+        return replace(self.place, at=complex(self.found.expected.at[0]))
 
 
 def regular(drawing: Drawing, figure: str) -> list[Hypothesis]:
@@ -164,8 +168,9 @@ def _with_mistakes(
 ) -> Iterator[Plan]:
     """The same plan with a mistake made, where its regular form was found; elsewhere if that is poor."""
     best = bases[0]
+    fit = best.fit
     poor = best.place.score < POOR
-    suspect = None if poor else _suspects(best)
+    suspect = None if poor else _suspects(best, fit)
     for hypothesis, mistake in mistaken(drawing, figure):
         if suspect is not None and mistake.at not in suspect:
             continue
@@ -180,14 +185,15 @@ def _with_mistakes(
             yield from _read(hypothesis, expected, best.refined, lines, BEAM_OF_MISTAKES, (best, moved))
 
 
-def _suspects(plan: Plan) -> frozenset[str]:
+def _suspects(plan: Plan, fit: Fit) -> frozenset[str]:
     """The nodes at which a mistake could explain what the regular form does not."""
     names = plan.found.expected.names
     odd: set[str] = set()
     for index, edge in enumerate(plan.found.expected.edges):
-        size = abs(plan.fit.at[edge.head] - plan.fit.at[edge.tail])
+        size = abs(fit.at[edge.head] - fit.at[edge.tail])
         unseen = size > LEAST_SEEN_MM and (plan.found.stroke[index] < 0 or plan.found.shared[index])
-        astray = np.nanmax(np.abs(plan.fit.residual_mm[index])) > ASTRAY_MM if plan.found.stroke[index] >= 0 else False
+        off = fit.residual_mm[index]
+        astray = bool(np.isfinite(off).all() and np.abs(off).max() > ASTRAY_MM)
         if unseen or astray:
             odd.update((names[edge.tail], names[edge.head]))
     return ancestors(plan.hypothesis.drawing.construction, odd)
@@ -243,7 +249,7 @@ def _read(
     cost = hypothesis.cost + (0.0 if known else COST_OF_SIZE)
     cost += 0.0 if abs(place.turn_rad) < np.pi / 4 else COST_OF_TURN
     return [
-        Plan(hypothesis, place, found, fit_nodes(found, around), found.score - cost, around)
+        Plan(hypothesis, place, found, found.score - cost, around)
         for found in explained[:ALTERNATIVES]
         if found.score > explained[0].score - NEARLY
     ]

@@ -35,6 +35,7 @@ class _Page:
     """What is found on one sheet so far."""
 
     lines: Lines
+    ink: Ink
     sheet: Sheet
     sketch: Sketch | None = None
     plans: dict[str, Plan] = field(default_factory=dict)
@@ -59,16 +60,16 @@ def read_figures(  # noqa: PLR0913 - what is known of the drawing
 
     Returns one Reading per sheet.
     """
-    pages = [_Page(lines_of(ink), sheet) for ink, sheet in zip(inks, sheets, strict=True)]
+    pages = [_Page(lines_of(ink), ink, sheet) for ink, sheet in zip(inks, sheets, strict=True)]
     own, others = _drawings(assignment, variant, scales)
     for page in pages:
-        sketch = find_sketch(page.lines, own, others)
-        if sketch is not None and sketch.found.score >= LEAST_SKETCH:
+        sketch = find_sketch(page.lines, page.ink.circles, own, others)
+        if sketch is not None and sketch.score >= LEAST_SKETCH:
             page.sketch = sketch
     drawing = own[0]
     velocity = _find(pages, drawing, VELOCITY_PLAN, {})
     known = {} if velocity is None else _nodes(velocity)
-    paced = drawing if velocity is None else _paced(drawing, velocity)
+    paced = drawing if velocity is None else _paced(drawing, known)
     if _asks_accelerations(wanted, drawing):
         _find(pages, paced, ACCELERATION_PLAN, known)
     return _readings(pages, drawing, wanted)
@@ -101,7 +102,7 @@ def _given(page: _Page, pages: Sequence[_Page]) -> Given:
 
 def _turned(page: _Page, pages: Sequence[_Page], drawing: Drawing) -> Drawing:
     """The drawing with guides turned as the sketch is."""
-    turn = next((one.sketch.turn_rad for one in (page, *pages) if one.sketch is not None), 0.0)
+    turn = next((one.sketch.guide_turn_rad for one in (page, *pages) if one.sketch is not None), 0.0)
     return Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(turn)})
 
 
@@ -127,13 +128,12 @@ def _nodes(plan: Plan) -> Given:
     return {name: np.asarray(at) for name, at in zip(plan.found.expected.names, plan.fit.at, strict=True)}
 
 
-def _paced(drawing: Drawing, velocity: Plan) -> Drawing:
+def _paced(drawing: Drawing, at: Given) -> Drawing:
     """The drawing at the velocity scale that the drawn plan follows, whatever was declared."""
-    at = dict(zip(velocity.found.expected.names, velocity.fit.at, strict=True))
     vectors = [v for v in drawing.construction.vectors_of(VELOCITY_PLAN) if v.name in drawing.parameters]
     for vector in vectors:
         real = float(np.ravel(drawing.parameters[vector.name])[0])
-        drawn = abs(at[vector.head] - at[vector.tail])
+        drawn = abs(complex(at[vector.head] - at[vector.tail]))
         if drawn > 1.0 and real:
             return Drawing(drawing.construction, {**drawing.parameters, "kv": np.array([abs(real) / drawn])})
     return drawing

@@ -1,7 +1,7 @@
 """The mechanism sketch: which strokes are its links, where its joints are, how it is turned."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +10,9 @@ from grader.reading.fitting import Fit, fit_nodes
 from grader.reading.lines import Lines
 from grader.reading.matching import Ends, Explanation, explain
 from grader.reading.placing import Place, Search, places
+from grader.records import FloatArray
 from reference.assignment import Assignment, Scales, Variant
+from reference.construction import ArcAndLine
 from reference.derivation import construction_of, parameters_of
 from reference.mistakes import Drawing, commit, single_mistakes
 
@@ -19,6 +21,15 @@ SURE = 0.8
 LINK_ENDS = Ends(at_mm=1.5, at_share=0.7, beyond_mm=4.0, beyond_share=0.15, short_mm=3.0, short_share=0.15)
 """Links stop at joint circles, short of the joint by the circle's radius."""
 HAND = Hand(angle_rad=float(np.radians(0.6)), length_mm=0.8, shift_mm=0.5)
+COST_OF_OTHER = 8.0
+WORTH_OF_CIRCLE = 3.0
+UPRIGHT_RAD = float(np.radians(2.0))
+GUIDE_DOUBT_MM = 8.0
+GUIDE_REACH_MM = 8.0
+GUIDE_LEAST_MM = 12.0
+GUIDE_TILT_RAD = float(np.radians(2.5))
+LEAST_RADIUS_MM, LARGEST_RADIUS_MM = 0.4, 4.0
+NEAR_CIRCLE_MM = 1.5
 ANY_TURN = tuple(float(np.radians(angle)) for angle in range(0, 360, 5))
 
 
@@ -30,15 +41,19 @@ class Sketch:
     ----------
     drawing : the construction and parameters of the variant that the sketch follows
     found, fit : its strokes and its joints
-    turn_rad : how the sketch as a whole is turned
+    turn_rad : how the sketch as a whole is turned, by its joints
+    guide_turn_rad : how its guides are turned, by the guides where they are drawn
     place : where it was laid
+    score : nats for it: strokes, circles, less what is unlikely beforehand
     """
 
     drawing: Drawing
     found: Explanation
     fit: Fit
     turn_rad: float
+    guide_turn_rad: float
     place: Place
+    score: float
 
 
 def drawings(assignment: Assignment, variants: list[Variant], scales: Scales | None) -> list[Drawing]:
@@ -53,7 +68,9 @@ def drawings(assignment: Assignment, variants: list[Variant], scales: Scales | N
     return result
 
 
-def find_sketch(lines: Lines, own: list[Drawing], others: list[Drawing]) -> Sketch | None:
+def find_sketch(
+    lines: Lines, circles: FloatArray, own: list[Drawing], others: list[Drawing]
+) -> Sketch | None:
     """The sketch that explains most strokes: the student's own variant first, then others."""
     best: list[tuple[float, Drawing, Place]] = []
     upright = Search(sizes=(1.0, 0.0), smallest=0.4, largest=2.0)
@@ -67,9 +84,9 @@ def find_sketch(lines: Lines, own: list[Drawing], others: list[Drawing]) -> Sket
         turned = Search(turns_rad=ANY_TURN, give_rad=float(np.radians(2.5)), sizes=(1.0,))
         best.extend(_laid(own[0], long, turned, 0.05))
     best.sort(key=lambda one: -one[0])
-    read = [_read(drawing, place, lines) for _, drawing, place in best[:5]]
-    good = [sketch for sketch in read if sketch is not None]
-    return max(good, key=lambda sketch: sketch.found.score, default=None)
+    read = [_read(drawing, place, lines, circles) for _, drawing, place in best[:5]]
+    regular = {id(drawing.construction) for drawing in own}
+    return max(read, key=lambda one: one.score - COST_OF_OTHER * (id(one.drawing.construction) not in regular), default=None)
 
 
 def _top(best: list[tuple[float, Drawing, Place]]) -> float:
@@ -95,7 +112,7 @@ def _laid(drawing: Drawing, lines: Lines, search: Search, cost: float) -> list[t
     ]
 
 
-def _read(drawing: Drawing, place: Place, lines: Lines) -> Sketch | None:
+def _read(drawing: Drawing, place: Place, lines: Lines, circles: FloatArray) -> Sketch:
     slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03)
     expected = _expected(drawing).placed(place.at, place.size, place.turn_rad, slack)
     reach = 30.0
@@ -103,12 +120,43 @@ def _read(drawing: Drawing, place: Place, lines: Lines) -> Sketch | None:
     around = lines.take(near & (lines.length > 4.0))  # noqa: PLR2004 - mm
     found = explain(expected, around, LINK_ENDS)[0]
     fit = fit_nodes(found, around, end_mm=1.5)
+    centres = _centres(fit, circles)
+    fit = fit_nodes(found, around, end_mm=1.5, centres=centres)
     exact = _expected(drawing).at
     turn = float(np.angle(np.sum((fit.at - fit.at.mean()) * np.conj(exact - exact.mean()))))
-    return Sketch(drawing, found, fit, turn, place)
+    score = found.score + WORTH_OF_CIRCLE * len(centres)
+    return Sketch(drawing, found, fit, turn, _guide_turn(drawing, found, fit, lines, turn), place, score)
 
 
-def without(lines: Lines, sketch: Sketch) -> Lines:
-    """The strokes that are no link of the sketch."""
-    del sketch
-    return replace(lines)
+def _guide_turn(drawing: Drawing, found: Explanation, fit: Fit, lines: Lines, turn: float) -> float:
+    """The mean turn of strokes along the guides near their joints; upright where none is seen."""
+    turns, weights = [0.0 if abs(turn) < UPRIGHT_RAD else turn], [GUIDE_DOUBT_MM]
+    for node, step in zip(found.expected.names, drawing.construction.figures["mechanism"], strict=True):
+        if not isinstance(step, ArcAndLine):
+            continue
+        joint = complex(fit.at[found.expected.names.index(node)])
+        angle = float(np.ravel(drawing.parameters[f"angle {step.guide}"])[0]) + turns[0]
+        off = (lines.along * np.exp(-1j * angle)) ** 2
+        tilt = np.angle(off) / 2.0
+        from_joint = (joint - lines.start) * np.conj(lines.along)
+        near = (np.abs(from_joint.imag) < GUIDE_REACH_MM) & (lines.length > GUIDE_LEAST_MM)
+        near &= (from_joint.real > -GUIDE_REACH_MM) & (from_joint.real < lines.length + GUIDE_REACH_MM)
+        for row in np.flatnonzero(near & (np.abs(tilt) < GUIDE_TILT_RAD)):
+            turns.append(turns[0] + float(tilt[row]))
+            weights.append(float(lines.length[row]))
+    return float(np.average(turns, weights=weights))
+
+
+def _centres(fit: Fit, circles: FloatArray) -> dict[int, complex]:
+    """Circles that stand for joints: the nearest one to each, where it is near enough."""
+    centres: dict[int, complex] = {}
+    round_ones = circles[(circles[:, 2] > LEAST_RADIUS_MM) & (circles[:, 2] < LARGEST_RADIUS_MM)]
+    at = round_ones[:, 0] - 1j * round_ones[:, 1]
+    for node, joint in enumerate(fit.at):
+        if not len(at):
+            break
+        nearest = int(np.argmin(np.abs(at - joint)))
+        spread = float(np.sqrt(np.trace(fit.cov[2 * node : 2 * node + 2, 2 * node : 2 * node + 2])))
+        if abs(at[nearest] - joint) < NEAR_CIRCLE_MM + 2.0 * min(spread, 1.0):
+            centres[node] = complex(at[nearest])
+    return centres
