@@ -43,15 +43,19 @@ class Flat:
     step: tuple[float, float]
 
     def contrast(self, x: FloatArray, y: FloatArray) -> Float32Array:
-        """Darkness against the paper at points given in pixels, 0 = paper .. 1 = black."""
-        mapped = np.asarray(x, dtype=np.float32), np.asarray(y, dtype=np.float32)
-        ink = cv2.remap(self.grey, *mapped, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        at = (mapped[0] + 0.5) / np.float32(self.step[0]) - np.float32(0.5), (
-            mapped[1] + 0.5
-        ) / np.float32(self.step[1]) - np.float32(0.5)
-        level = cv2.remap(self.paper, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        share = ink.astype(np.float32) / np.maximum(level, 1).astype(np.float32)
-        return np.asarray(np.clip(1.0 - share, 0.0, 1.0), dtype=np.float32)
+        """Darkness against the paper at points (r, m) given in pixels, 0 = paper .. 1 = black.
+
+        The paper's brightness is taken once for each row, at its middle: a row spans millimetres.
+        """
+        middle = x.shape[1] // 2
+        level = self._paper_at(x[:, middle], y[:, middle])
+        share = _sampled(self.grey, x, y) / np.maximum(level, np.float32(1.0))[:, None]
+        return np.clip(np.float32(1.0) - share, np.float32(0.0), np.float32(1.0))
+
+    def _paper_at(self, x: FloatArray, y: FloatArray) -> Float32Array:
+        """(r,) brightness of the paper at points given in pixels."""
+        reduced = (x + 0.5) / self.step[0] - 0.5, (y + 0.5) / self.step[1] - 0.5
+        return _sampled(self.paper, reduced[0][:, None], reduced[1][:, None])[:, 0]
 
     def reduced(self, scale: float) -> GreyImage:
         """Contrast of the whole page at `scale` times its resolution, 0 = paper .. 255 = black."""
@@ -144,15 +148,21 @@ def cut_across(  # noqa: PLR0913
 def _contrast_across(flat: Flat, middle: FloatArray, normal: FloatArray, across: FloatArray) -> Float32Array:
     """(k, n, m) contrast at `middle` (k, n, 2) moved along `normal` (k, 2) by `across` (m,)."""
     k, n, _ = middle.shape
-    m = len(across)
-    result = np.empty((k, n, m), dtype=np.float32)
-    rows = max(1, _REMAP_ROWS // n)
-    for first in range(0, k, rows):
-        part = slice(first, first + rows)
-        at = middle[part, :, None, :] + across[None, None, :, None] * normal[part, None, None, :]
-        x = np.ascontiguousarray(at[..., 0].reshape(-1, m))
-        y = np.ascontiguousarray(at[..., 1].reshape(-1, m))
-        result[part] = flat.contrast(x, y).reshape(-1, n, m)
+    centre, aside, step = (array.astype(np.float32) for array in (middle, normal, across))
+    x = centre[:, :, 0, None] + (aside[:, 0, None] * step[None, :])[:, None, :]
+    y = centre[:, :, 1, None] + (aside[:, 1, None] * step[None, :])[:, None, :]
+    return flat.contrast(x.reshape(k * n, -1), y.reshape(k * n, -1)).reshape(k, n, -1)
+
+
+def _sampled(image: GreyImage, x: FloatArray | Float32Array, y: FloatArray | Float32Array) -> Float32Array:
+    """Bilinear values of an image at (r, m) points, in blocks that a remap can take."""
+    x, y = np.ascontiguousarray(x, dtype=np.float32), np.ascontiguousarray(y, dtype=np.float32)
+    result = np.empty(x.shape, dtype=np.float32)
+    for first in range(0, len(x), _REMAP_ROWS):
+        part = slice(first, first + _REMAP_ROWS)
+        result[part] = cv2.remap(
+            image, x[part], y[part], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
     return result
 
 

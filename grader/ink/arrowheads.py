@@ -121,7 +121,9 @@ def _barb(runs: FloatArray, clear_of_others: BoolArray, clear: FloatArray) -> Fl
     """(k, 2) length and angle in degrees of the barb on one side; zeros for none, or where another
     stroke not known of spoils the side."""
     sideways = np.sin(np.radians(_ANGLE_DEG))[None, :]
-    barb = (runs >= _BARB_MM[0]) & (runs <= _BARB_MM[1]) & (runs * sideways >= clear[:, None]) & clear_of_others
+    barb = (
+        (runs >= _BARB_MM[0]) & (runs <= _BARB_MM[1]) & (runs * sideways >= clear[:, None]) & clear_of_others
+    )
     spoiled = ((runs > _BARB_MM[1]) & clear_of_others).any(axis=1)
     length = np.where(barb, runs, 0.0).max(axis=1)
     longest = barb & (runs >= 0.8 * length[:, None])
@@ -194,5 +196,7 @@ def barbs(strokes: Strokes, heads: FloatArray) -> BoolArray:
         sign = np.where(near == 0, 1.0, -1.0)
         angle = np.arctan2(-sign * span[:, 1], sign * span[:, 0]) - (direction + np.pi)
         turn = np.abs((angle + np.pi) % (2.0 * np.pi) - np.pi)
-        result |= (away.min(axis=1) < 1.0) & (length < 5.0) & (turn > np.radians(7.0)) & (turn < np.radians(40.0))
+        result |= (
+            (away.min(axis=1) < 1.0) & (length < 5.0) & (turn > np.radians(7.0)) & (turn < np.radians(40.0))
+        )
     return result

@@ -115,10 +115,14 @@ def _refined(flat: Flat, centres: FloatArray, px_per_mm: float) -> FloatArray:
         centres, radius, rms = _circle_fit(centres, middle, good)
         drawn = good.sum(axis=1) / np.maximum(_ANGLES - crossed.sum(axis=1), 1)
         last = round_number == _ROUNDS - 1
-        sound &= (drawn >= (_DRAWN if last else 0.5)) & (good.mean(axis=1) >= (_DRAWN_ALONE if last else 0.35))
+        sound &= (drawn >= (_DRAWN if last else 0.5)) & (
+            good.mean(axis=1) >= (_DRAWN_ALONE if last else 0.35)
+        )
         sound &= rms < (_ROUND_MM if last else 2.0 * _ROUND_MM) * px_per_mm
     inner = np.take_along_axis(
-        inked.mean(axis=1), np.searchsorted(radial, _HOLLOW_AT * radius).clip(0, len(radial) - 1)[:, None], axis=1
+        inked.mean(axis=1),
+        np.searchsorted(radial, _HOLLOW_AT * radius).clip(0, len(radial) - 1)[:, None],
+        axis=1,
     )[:, 0]
     sound &= (inner < _HOLLOW) & (radius > _RADIUS_MM[0] * px_per_mm) & (radius < _RADIUS_MM[1] * px_per_mm)
     return np.column_stack([centres, radius])[sound]

@@ -81,7 +81,12 @@ def _last_own(state: FloatArray) -> tuple[FloatArray, BoolArray]:
 def coverage(flat: Flat, fitted: Fitted, px_per_mm: float, count: int = 100) -> FloatArray:
     """(k,) share of each stroke's length that is inked."""
     cuts = cut_across(
-        flat, fitted.ends, count, float(fitted.width.max(initial=1.0)), 0.4 * fitted.width, _INKED * fitted.darkness
+        flat,
+        fitted.ends,
+        count,
+        float(fitted.width.max(initial=1.0)),
+        0.4 * fitted.width,
+        _INKED * fitted.darkness,
     )
     del px_per_mm
     return np.asarray(np.isfinite(cuts.left).mean(axis=1), dtype=np.float64)

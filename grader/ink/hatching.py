@@ -28,7 +28,9 @@ def hatching(strokes: Strokes) -> BoolArray:
         return result
     weight = (strokes.width * strokes.darkness)[rows]
     linked, aside = _linked(strokes.ends[rows], length[rows])
-    linked &= np.maximum(weight[:, None], weight[None, :]) < _WEIGHT_RATIO * np.minimum(weight[:, None], weight[None, :])
+    linked &= np.maximum(weight[:, None], weight[None, :]) < _WEIGHT_RATIO * np.minimum(
+        weight[:, None], weight[None, :]
+    )
     between = (linked & (aside > 0)).any(axis=1) & (linked & (aside < 0)).any(axis=1)
     # The last of a family may be the link or the side that runs along it: short ones alone are safe.
     family, short = _family_size(linked), length[rows] < _SHORT_MM
@@ -48,7 +50,11 @@ def _linked(ends: FloatArray, length: FloatArray) -> tuple[BoolArray, FloatArray
     apart = middle[None, :] - middle[:, None]
     along = np.abs((apart * u[:, None]).sum(axis=2))
     aside = apart[..., 0] * u[:, None, 1] - apart[..., 1] * u[:, None, 0]
-    beside = (np.abs(aside) > _APART_MM[0]) & (np.abs(aside) < _APART_MM[1]) & (along < 0.5 * (length[:, None] + length[None, :]))
+    beside = (
+        (np.abs(aside) > _APART_MM[0])
+        & (np.abs(aside) < _APART_MM[1])
+        & (along < 0.5 * (length[:, None] + length[None, :]))
+    )
     longer = np.maximum(length[:, None], length[None, :])
     linked = (sine < limit) & beside & (longer < _RATIO * shorter)
     return linked & linked.T, aside

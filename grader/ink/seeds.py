@@ -18,6 +18,8 @@ _FAINT = 20
 """Of 255: fainter than a construction line drawn with a hard pencil is paper."""
 _PEAK_WINDOW_PX = 7
 _HALF = 0.5
+_DARK = 0.62
+_DARK_QUANTILE = 0.85
 _POLYGON_PX = 1.0
 _LEAST_PX = 5.0
 _SOFTEN_PX = 0.7
@@ -53,18 +55,49 @@ def find_seeds(contrast: GreyImage) -> Seeds:
     """Straight runs of at least 0.8 mm along the borders of the ink."""
     soft = np.asarray(cv2.GaussianBlur(contrast, (0, 0), _SOFTEN_PX), dtype=np.uint8)
     mask = ink_mask(soft)
+    first = _runs_of(mask)
+    # Vectors drawn dark over faint construction lines show their own borders only in the dark.
+    second = _runs_of(mask & dark_mask(soft, mask), first.pen_px)
+    return Seeds(
+        np.concatenate([first.ends, second.ends]),
+        np.concatenate([first.width, second.width]),
+        np.concatenate([first.border, second.border]),
+        first.pen_px,
+        mask,
+        soft,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Runs:
+    ends: FloatArray
+    width: FloatArray
+    border: NDArray[np.intp]
+    pen_px: float
+
+
+def _runs_of(mask: GreyImage, pen_px: float | None = None) -> _Runs:
+    """Straight runs of the borders of a mask, moved to the middle of their strokes."""
     edges = _border_runs(mask)
     border = edges[:, 0, ::-1].astype(np.intp)
     if len(edges) == 0:
-        return Seeds(edges, np.zeros(0), border, _PEN_PX, mask, soft)
+        return _Runs(edges, np.zeros(0), border, _PEN_PX if pen_px is None else pen_px)
     inward, width = _band_width(mask, edges)
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
     long_enough = length >= 2.0 * PX_PER_MM
-    pen = _usual(width[long_enough], length[long_enough]) if long_enough.any() else _PEN_PX
+    usual = _usual(width[long_enough], length[long_enough]) if long_enough.any() else _PEN_PX
+    pen = usual if pen_px is None else pen_px
     single = np.where(width <= _BUNDLE * pen, width, pen)
     # Border pixels are ink: the band's edge lies half a pixel further out.
     shift = (single - 1.0) / 2.0
-    return Seeds(edges + (inward * shift[:, None])[:, None, :], single, border, pen, mask, soft)
+    return _Runs(edges + (inward * shift[:, None])[:, None, :], single, border, pen)
+
+
+def dark_mask(soft: GreyImage, mask: GreyImage) -> GreyImage:
+    """What is nearly as dark as the darkest strokes of the sheet, as 1."""
+    inked = soft[mask > 0]
+    level = _DARK * float(np.quantile(inked[::7], _DARK_QUANTILE)) if len(inked) else 255.0
+    return np.asarray((soft >= level).astype(np.uint8))
 
 
 def ink_mask(soft: GreyImage) -> GreyImage:
