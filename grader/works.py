@@ -45,7 +45,7 @@ def works_of(  # noqa: PLR0913, PLR0917 - all that was found in a folder
     if roster is not None:
         for row in roster.rows:
             found[row.student_id, row.position] = _Gathered(row)
-    for owned in ownership.owned:
+    for owned in (*ownership.owned, *_blank_only(ownership, roster)):
         found.setdefault((owned.student_id, owned.position), _Gathered()).owned.append(owned)
     strangers = []
     for entered in measured:

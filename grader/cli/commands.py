@@ -63,6 +63,23 @@ def grade(
 
 
 @app.command()
+def check(
+    assignment: AssignmentArgument,
+    measured: Annotated[Path, typer.Option("--measured", help="Measurement file, CSV or JSON.")],
+    n: NumberOption = None,
+    position: PositionOption = None,
+    lang: LanguageOption = "en",
+    level: Annotated[
+        str, typer.Option("--level", help="symbol (right or off), hint (in which way), full (numbers).")
+    ] = "hint",
+) -> None:
+    """Check measured values: right, or off and in which way, without giving the answer away."""
+    from grader.cli.checking import check_measured
+
+    raise typer.Exit(1 if check_measured(assignment, n, position, measured, lang, level) else 0)
+
+
+@app.command()
 def demo(
     out: Annotated[Path, typer.Option("--out", help="The folder for the results.")] = Path("planmark-demo"),
     jobs: JobsOption = None,
@@ -155,3 +172,14 @@ def export(
         position=position, combine=combine, maximum=maximum, rescale=rescale, lang=lang,
     )  # fmt: skip
     raise typer.Exit(1 if open_ends else 0)
+
+
+@app.command()
+def bench(
+    quick: Annotated[bool, typer.Option("--quick", help="A few sheets only.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
+) -> None:
+    """Run time against error, on generated sheets with known truth."""
+    from grader.cli.benchmark import show_benchmark
+
+    show_benchmark(quick=quick, as_json=as_json)

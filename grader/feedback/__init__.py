@@ -1,6 +1,6 @@
 """What students and instructors read: sentences, a page per submission, an index of the class."""
 
 from grader.feedback.pages import write_feedback, write_index
-from grader.feedback.sentences import Level, criterion_feedback, mistake_feedback
+from grader.feedback.sentences import Level, criterion_feedback, mistake_feedback, reason_sentence
 
-__all__ = ["Level", "criterion_feedback", "mistake_feedback", "write_feedback", "write_index"]
+__all__ = ["Level", "criterion_feedback", "mistake_feedback", "reason_sentence", "write_feedback", "write_index"]

@@ -1,0 +1,85 @@
+"""``planmark check``: a student's own values held against the exact ones."""
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from grader.cli.grading import check_language, checked_rubric
+from grader.feedback import reason_sentence
+from grader.i18n import Tongue, tongue
+from grader.judging import Submission, task_of
+from grader.measurements import Measurements, names_of, read_measurements
+from grader.outcomes import Quantity
+from grader.selfcheck import LEVELS, Checked, Level, is_all_right, self_check
+from reference.assignment import Assignment, Variant, load_assignment
+from reference.errors import CallError
+
+MARKS = {"right": ("✓", "green"), "off": ("✗", "red"), "open": ("?", "magenta")}
+
+
+def check_measured(name: str, n: int | None, position: int | None, file: Path, lang: str, level: str) -> bool:
+    """Tell right and off for every value of a measurement file; whether anything is off."""
+    check_language(lang)
+    wanted = next((known for known in LEVELS if known == level), None)
+    if wanted is None:
+        raise CallError("unknown_level", f"--level {level}: known are {', '.join(LEVELS)}")
+    assignment = load_assignment(name)
+    rubric = checked_rubric(assignment)
+    words = tongue(lang)
+    console = Console()
+    all_right = True
+    for entered in read_measurements(file, names_of(assignment)):
+        variant = _variant(assignment, entered, n, position)
+        _tell_head(console, entered, variant)
+        submission = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
+        checked = self_check(task_of(assignment, rubric, variant), submission, wanted)
+        _tell(console, checked, wanted, words, assignment)
+        all_right = all_right and is_all_right(checked) and bool(checked) and not entered.problems
+    return not all_right
+
+
+def _variant(assignment: Assignment, entered: Measurements, n: int | None, position: int | None) -> Variant:
+    """The variant of the call or the file; raises CallError where they contradict each other."""
+    chosen = []
+    for what, called, filed in (("n", n, entered.n), ("position", position, entered.position)):
+        if called is not None and filed is not None and called != filed:
+            raise CallError(
+                f"{what}_disagrees",
+                f"--{what} {called}, but {entered.source} says {what} {filed}: which is right?",
+            )
+        chosen.append(filed if called is None else called)
+    return assignment.variant(*chosen)
+
+
+def _tell_head(console: Console, entered: Measurements, variant: Variant) -> None:
+    who = f"{entered.student_id}, " if entered.student_id else ""
+    console.print(f"{who}{variant}", style="bold", highlight=False, markup=False)
+    for problem in (*entered.problems, *entered.reading.problems):
+        console.print(f"  {problem.message}", style="yellow", highlight=False, markup=False)
+
+
+def _tell(
+    console: Console, checked: tuple[Checked, ...], level: Level, words: Tongue, assignment: Assignment
+) -> None:
+    if not checked:
+        console.print("  nothing that this assignment asks for was measured", style="yellow")
+        return
+    table = Table(box=None, show_header=False)
+    names = assignment.file.names
+    for one in checked:
+        mark, style = MARKS[one.result]
+        # What is right needs one reason: the others say what would be off, had it not been accepted.
+        shown = one.reasons[:1] if one.result == "right" else one.reasons
+        sentence = " ".join(reason_sentence(reason, words, level, names) for reason in shown)
+        numbers = ""
+        if level == "full" and one.measured and one.expected:
+            numbers = f"{_number(one.measured)} / {_number(one.expected)}"
+        table.add_row(f"[{style}]{mark}[/{style}]", names.get(one.name, one.name), numbers, sentence)
+    console.print(table, highlight=False)
+
+
+def _number(quantity: Quantity) -> str:
+    if quantity.length_mm is not None:
+        return f"{quantity.length_mm:.2f} mm"
+    return "-" if quantity.value is None else f"{quantity.value:.4g} {quantity.unit or ''}"
