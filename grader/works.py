@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from grader.documents import UnmatchedDocument
 from grader.measurements import Measurements
-from grader.ownership import Owned, Ownership
+from grader.ownership import How, Owned, Ownership, student_of_name
 from grader.pipeline import Place, Work
 from grader.records import Problem
-from grader.roster import Roster, RosterRow
+from grader.roster import STUDENT_ID, Roster, RosterRow
 from reference.assignment import Assignment, Variant
 from reference.errors import CallError
 
@@ -56,6 +56,21 @@ def works_of(  # noqa: PLR0913, PLR0917 - all that was found in a folder
             found.setdefault(key, _Gathered()).measured.append(entered)
     works = [_work(assignment, key, one, paths, lang) for key, one in found.items()]
     return works, strangers
+
+
+def _blank_only(ownership: Ownership, roster: Roster | None) -> list[Owned]:
+    """Blank pages whose file's name tells a student who has no other page: to be told, not passed over."""
+    having = {owned.student_id for owned in ownership.owned}
+    found: dict[str, Owned] = {}
+    for source in ownership.blank:
+        stem = PurePath(source.file).stem
+        improvised = [stem] if STUDENT_ID.fullmatch(stem) else []
+        student = student_of_name(source.file, improvised if roster is None else roster.student_ids)
+        if student is not None and student not in having:
+            rows = () if roster is None else roster.rows_of(student)
+            position = rows[0].position if len(rows) == 1 else None
+            found.setdefault(source.file, Owned(source, student, None, position, (How.NAME,)))
+    return list(found.values())
 
 
 def _owner(entered: Measurements, found: Mapping[Key, _Gathered], roster: Roster | None) -> Key | None:
