@@ -26,7 +26,7 @@ from grader.reading_document import reading_document
 from grader.records import Ink, Page, Problem, Reading, Sheet
 from grader.rubric import RubricFile
 from grader.scene import Picture
-from grader.sheet import rectify
+from grader.sheet import rectify, straighten
 from reference.assignment import Assignment, Scales, Variant
 from reference.construction import Vector
 from reference.errors import InputFileError, MechanismError
@@ -130,6 +130,8 @@ def see(place: Place) -> Seen:
         return Seen(place, page, problems=(problem,), timing_ms=timing)
     with _timed(timing, "sheet"):
         sheet = rectify(page)
+        if isinstance(sheet, Sheet):
+            page, sheet = straighten(page, sheet)
     if not isinstance(sheet, Sheet):
         problem = Problem("sheet_refused", f"{place.name}: page {place.page}: {sheet.reason}", place.name)
         return Seen(place, page, problems=(problem,), timing_ms=timing)

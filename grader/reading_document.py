@@ -49,7 +49,7 @@ def _sheet(sheet: Sheet) -> SheetDocument:
         px_per_mm=sheet.px_per_mm,
         rotation_deg=sheet.rotation_deg,
         residual_mm=sheet.residual_mm,
-        mm_to_px=sheet.mm_to_px.tolist(),
+        mm_to_px=(sheet.mm_to_px if sheet.lens is None else sheet.lens.stored).tolist(),
     )
 
 

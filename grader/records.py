@@ -64,6 +64,25 @@ class Identity:
 
 
 @dataclass(frozen=True, slots=True)
+class Lens:
+    """How a camera's lens bent the picture, see `grader.sheet.lens`.
+
+    Attributes
+    ----------
+    bend : first radial term
+    stored : (3, 3) sheet mm to stored pixels, the homography that fits best in spite of the bend
+    straight : (3, 3) sheet mm to pixels of the straightened picture
+    residual_mm, scale_se : as in `Sheet`, of the straightened picture
+    """
+
+    bend: float
+    stored: FloatArray
+    straight: FloatArray
+    residual_mm: float
+    scale_se: float
+
+
+@dataclass(frozen=True, slots=True)
 class Sheet:
     """A page in millimetres.
 
@@ -81,6 +100,8 @@ class Sheet:
     zones : the printed sheet's zones by name, empty for a plain sheet
     identity : from the QR code, or None
     problems : evidence that disagrees or is missing
+    lens : where the camera's bend was found; `mm_to_px` holds for the stored picture until
+        `grader.sheet.straighten`, then for the straightened one
     """
 
     mm_to_px: FloatArray
@@ -94,6 +115,7 @@ class Sheet:
     zones: Mapping[str, Box] = field(default_factory=dict)
     identity: Identity | None = None
     problems: tuple[Problem, ...] = ()
+    lens: Lens | None = None
 
 
 @dataclass(frozen=True, slots=True)

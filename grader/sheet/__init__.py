@@ -6,17 +6,14 @@ is missing is told as `Problem`, and what cannot be settled is refused with the 
 """
 
 from grader.records import Page, Sheet, Unread
+from grader.sheet import markers
+from grader.sheet.lens import straighten
 from grader.sheet.plain import register_plain
 
-try:
-    from grader.sheet import markers
-except ImportError:  # pragma: no cover
-    markers = None  # type: ignore[assignment]
-
-__all__ = ["rectify"]
+__all__ = ["rectify", "straighten"]
 
 
 def rectify(page: Page) -> Sheet | Unread:
     """The page's map from millimetres to pixels, or, false in a condition, why there is none."""
-    sheet = None if markers is None else markers.register(page)
+    sheet = markers.register(page)
     return register_plain(page) if sheet is None else sheet

@@ -6,6 +6,7 @@ torn off or drawn over is not missed; foreign markers fit no template and regist
 """
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -23,8 +24,9 @@ from grader.layout import (
     template_of,
 )
 from grader.pixels import BoolArray, shrink
-from grader.records import FloatArray, GreyImage, Page, Problem, Sheet
+from grader.records import FloatArray, GreyImage, Lens, Page, Problem, Sheet
 from grader.sheet.identity import identify
+from grader.sheet.lens import find_bend
 from grader.sheet.marker_edges import refine
 from grader.sheet.projection import Projection, fit_projection
 
@@ -34,15 +36,19 @@ _CLOSER_PX = 3200
 """Second look, for photos in which the sheet is a small part."""
 _LEAST_MARKERS = 2
 _LEAST_APART_MM = 100.0
-_OFF_MM = 1.5
-"""A marker farther off than this from where the others put it is a foreign one."""
+_OFF_MM = 3.0
+"""A marker farther off than this from where the others put it is a foreign one; no lens bends as much."""
 _LEAST_PX_PER_MM = 2.0
-_MAX_RMS_MM = 0.8
+_MAX_RMS_MM = 1.5
+"""A wide lens bends the sheet as much; what no lens explains is in `scale_se`."""
 _MAX_SE_MM = 0.6
 _MAX_UNEVEN = 2.5
 """Largest over smallest scale on the sheet; a photo any more slanted cannot be measured."""
 _PRINTER_SCALE_SE = 0.001
 """Of printers and paper; the calibration page measures it."""
+_USUAL_LENGTH_MM = 60.0
+_FLAT_MM = 0.12
+"""Misfit from which paper that is not flat is told; printers and flatbeds stay under 0.1."""
 _MM_PER_INCH = 25.4
 _SCALE_TOLD = 0.004
 _SCALE_PLAUSIBLE = 0.1
@@ -115,7 +121,16 @@ def _detector() -> cv2.aruco.ArucoDetector:
     return cv2.aruco.ArucoDetector(aruco.dictionary(), settings)
 
 
-def _agreed(seen: _Seen) -> Projection | None:
+@dataclass(frozen=True, slots=True)
+class _Agreed:
+    """The map on which markers agree, and the markers that do."""
+
+    fit: Projection
+    mm: FloatArray
+    px: FloatArray
+
+
+def _agreed(seen: _Seen) -> _Agreed | None:
     """The map on which the markers agree, leaving out at most those far off; None if there is none."""
     keep = np.ones(len(seen.mm), dtype=bool)
     while True:
@@ -125,7 +140,7 @@ def _agreed(seen: _Seen) -> Projection | None:
             return None
         fit = fit_projection(seen.mm[keep], seen.px[keep])
         if fit.misfit_mm.max() <= _OFF_MM:
-            return fit if _plausible(fit) else None
+            return _Agreed(fit, seen.mm[keep], seen.px[keep]) if _plausible(fit) else None
         if len(set(seen.marker[keep])) <= _LEAST_MARKERS + 1:
             return None
         keep &= seen.marker != _odd_one(seen, keep)
@@ -169,18 +184,14 @@ def _apply(matrix: FloatArray, points: FloatArray) -> FloatArray:
     return np.asarray(mapped[:, :2] / mapped[:, 2:])
 
 
-def _sheet(page: Page, template: Template, fit: Projection) -> Sheet:
+def _sheet(page: Page, template: Template, agreed: _Agreed) -> Sheet:
+    fit = agreed.fit
     middle = np.array(PAGE_MM) / 2.0
     ends = _apply(fit.mm_to_px, middle + np.array([(-50.0, 0.0), (50.0, 0.0)]))
     right = ends[1] - ends[0]
     px_per_mm = float(np.sqrt(np.mean(np.abs(_local_scales(fit.mm_to_px)) ** 2)))
-    stretch = fit.se_mm(_GRID_MM).max() / (DRAWING_MM[2] / 2.0)
-    scale_se, problems = _against_resolution(page, px_per_mm)
-    if template is CALIBRATION:
-        problems = (
-            *problems,
-            Problem("calibration_page", "this is the calibration page, not a drawing", page.source),
-        )
+    printed_se, problems = _against_resolution(page, px_per_mm)
+    lens = _lens(page, agreed, printed_se)
     return Sheet(
         mm_to_px=fit.mm_to_px,
         page_mm=PAGE_MM,
@@ -189,12 +200,35 @@ def _sheet(page: Page, template: Template, fit: Projection) -> Sheet:
         # Seen with y down, the sheet's x axis points at this angle; turning back by it is counter-clockwise.
         rotation_deg=float(np.degrees(np.arctan2(right[1], right[0]))) % 360.0 % 360.0,
         residual_mm=fit.rms_mm,
-        scale_se=float(np.hypot(scale_se, stretch)),
+        scale_se=_scale_se(fit, printed_se),
         drawable_mm=DRAWING_MM,
         zones=dict(template.zones),
         identity=identify(page, fit.mm_to_px),
-        problems=problems,
+        problems=(*problems, *_told(page, template, fit if lens is None else None)),
+        lens=lens,
     )
+
+
+def _lens(page: Page, agreed: _Agreed, printed_se: float) -> Lens | None:
+    shape = page.grey.shape[0], page.grey.shape[1]
+    bend, fit = find_bend(agreed.mm, agreed.px, agreed.fit, shape)
+    if not bend:
+        return None
+    return Lens(bend, agreed.fit.mm_to_px, fit.mm_to_px, fit.rms_mm, _scale_se(fit, printed_se))
+
+
+def _scale_se(fit: Projection, printed_se: float) -> float:
+    """Relative error of lengths: print, map, and what the map leaves unexplained between the markers."""
+    stretch = fit.se_mm(_GRID_MM).max() / (DRAWING_MM[2] / 2.0)
+    return float(np.linalg.norm([printed_se, stretch, fit.rms_mm / _USUAL_LENGTH_MM]))
+
+
+def _told(page: Page, template: Template, plain: Projection | None) -> Iterator[Problem]:
+    if template is CALIBRATION:
+        yield Problem("calibration_page", "this is the calibration page, not a drawing", page.source)
+    if plain is not None and plain.rms_mm > _FLAT_MM:
+        off = f"the printed markers are up to {plain.misfit_mm.max():.1f} mm off one plane"
+        yield Problem("sheet_not_flat", f"{off}: the sheet was not flat", page.source)
 
 
 def _against_resolution(page: Page, px_per_mm: float) -> tuple[float, tuple[Problem, ...]]:

@@ -13,6 +13,7 @@ from grader.intake import pages_of
 from grader.layout import MARKER_CORNERS, TEMPLATES
 from grader.records import Identity, Page
 from grader.roster import RosterRow
+from grader.sheet.lens import straighten
 from grader.sheet.markers import register
 from reference.assignment import load_assignment
 
@@ -198,3 +199,56 @@ def test_pictures_of_other_things_register_nothing():
     ):
         for page in pages_of(REAL / name):
             assert register(page) is None
+
+
+def bent(grey, bend):
+    """The picture as a lens with a bend stores it, and where it puts points (n, 2)."""
+    high, wide = grey.shape
+    centre, radius = np.array([(wide - 1) / 2, (high - 1) / 2]), np.hypot(wide / 2, high / 2)
+
+    def put(points):
+        off = (points - centre) / radius
+        return centre + (points - centre) * (1 + bend * (off**2).sum(axis=-1, keepdims=True))
+
+    stored = np.stack(np.meshgrid(np.arange(wide), np.arange(high)), axis=-1).astype(np.float64)
+    source = stored.copy()
+    for _ in range(10):
+        source += stored - put(source)
+    x, y = np.moveaxis(source, -1, 0).astype(np.float32)
+    return cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderValue=255), put
+
+
+@pytest.mark.parametrize("bend", [-0.013, 0.02])
+def test_a_lens_that_bends_is_found_and_the_page_straightened(bend):
+    grey, truth = printed(150)
+    photo, put = bent(grey, bend)
+    page = Page("s.jpg", 1, scanned(photo))
+    sheet = register(page)
+    straight_page, straight_sheet = straighten(page, sheet)
+    assert sheet.lens.bend == pytest.approx(bend, abs=0.001)
+    assert off_mm(straight_sheet, truth) < HARD_MM
+    # The picture itself is straight too: its markers are found where the straight map says.
+    again = register(straight_page)
+    assert again.lens is None
+    assert off_mm(again, truth) < HARD_MM
+    # The map of the stored picture is off by the bend, and says that lengths are less sure.
+    stored_off = apply(np.linalg.inv(sheet.mm_to_px), put(apply(truth, GRID_MM))) - GRID_MM
+    assert sheet.scale_se > 2 * straight_sheet.scale_se
+    assert np.hypot(*stored_off.T).max() > 0.2
+
+
+def test_a_page_without_bend_is_left_as_it_is():
+    page = Page("s.jpg", 1, printed(150)[0])
+    sheet = register(page)
+    assert sheet.lens is None
+    assert straighten(page, sheet) == (page, sheet)
+
+
+def test_paper_that_was_not_flat_is_told():
+    grey, _ = printed(150)
+    high, wide = grey.shape
+    x, y = np.meshgrid(np.arange(wide, dtype=np.float32), np.arange(high, dtype=np.float32))
+    curled = cv2.remap(grey, x + 5 * np.sin(x / wide * np.pi) ** 2, y, cv2.INTER_LINEAR, borderValue=255)
+    sheet = register(Page("s.jpg", 1, curled))
+    assert [problem.code for problem in sheet.problems] == ["sheet_not_flat"]
+    assert sheet.scale_se > 0.002
