@@ -36,7 +36,9 @@ def page_of(path: Path | str, number: int) -> Page:
     file = Path(path)
     page = next(_DOORS[kind_of(file)].pages(file, number), None)
     if page is None:
-        raise InputFileError("page_missing", f"{file.name}: there is no page {number}; it has {count_pages(file)}")
+        raise InputFileError(
+            "page_missing", f"{file.name}: there is no page {number}; it has {count_pages(file)}"
+        )
     return page
 
 

@@ -56,7 +56,9 @@ def kind_of(path: Path) -> str:
             head = file.read(_PDF_HEADER_WITHIN)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise InputFileError("file_missing", f"{path.name}: cannot be opened ({reason}); check the path") from error
+        raise InputFileError(
+            "file_missing", f"{path.name}: cannot be opened ({reason}); check the path"
+        ) from error
     if not head:
         raise InputFileError("file_empty", f"{path.name}: the file is empty (0 bytes); hand it in again")
     for magic, kind in _MAGIC.items():

@@ -74,7 +74,9 @@ def _quadrilaterals(lines: list[LongLine], shape: tuple[int, int]) -> list[tuple
     high, wide = shape
     pairs = []
     for across, own, other in ((False, wide, high), (True, high, wide)):
-        long_enough = [line for line in lines if line.across == across and line.length > _LEAST_LENGTH * other]
+        long_enough = [
+            line for line in lines if line.across == across and line.length > _LEAST_LENGTH * other
+        ]
         chosen = []
         for a, b in combinations(long_enough[:_LINES_EACH_WAY], 2):
             at = other / 2.0

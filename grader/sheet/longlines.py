@@ -158,7 +158,9 @@ def _paired(chains: dict[int, list[tuple[FloatArray, float]]], *, across: bool) 
         if partner is None:
             lines.append(_line(ends, seen, across, STEP, -1))
     lines += [
-        _line(ends, seen, across, STEP, 1) for index, (ends, seen) in enumerate(chains[1]) if index not in used
+        _line(ends, seen, across, STEP, 1)
+        for index, (ends, seen) in enumerate(chains[1])
+        if index not in used
     ]
     return lines
 

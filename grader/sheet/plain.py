@@ -62,7 +62,9 @@ def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
             f"{n / d * _MM_PER_INCH:.0f}" for n, d in zip(page.grey.shape[::-1], page.dpi, strict=True)
         )
         problems.append(
-            Problem("resolution_wrong", f"by its stated resolution the page is {size} mm, not A3", page.source)
+            Problem(
+                "resolution_wrong", f"by its stated resolution the page is {size} mm, not A3", page.source
+            )
         )
     for usual in _USUAL_DPI:
         if _is_a3(page, (usual, usual)):
@@ -80,12 +82,18 @@ def _is_a3(page: Page, dpi: tuple[float, float]) -> bool:
 
 
 def _from_lines(
-    page: Page, best: Hypothesis, lines: list[LongLine], dpi: tuple[float, float] | None, problems: list[Problem]
+    page: Page,
+    best: Hypothesis,
+    lines: list[LongLine],
+    dpi: tuple[float, float] | None,
+    problems: list[Problem],
 ) -> Sheet | Unread:
     fit, frame = _settled(best, dpi), best.frame
     block_mm = title_block_mm(fit.mm_to_px, lines)
     if block_mm == 0.0:
-        problems.append(Problem("upright_unsure", "no title block shows which way up the sheet is", page.source))
+        problems.append(
+            Problem("upright_unsure", "no title block shows which way up the sheet is", page.source)
+        )
     if frame is None and block_mm == 0.0 and dpi is None:
         return Unread("sheet", "neither a drawing frame nor a title block shows that this is an A3 drawing")
     if fit.freedom > 0 and fit.chi2 / fit.freedom > _BAD_FIT:
@@ -94,7 +102,9 @@ def _from_lines(
     scale_se = fit.scale_se
     if frame is None and dpi is None:
         scale_se = float(np.hypot(scale_se, _ASSUMED_PAPER_SE))
-        problems.append(Problem("paper_assumed", "only the paper's edges give the scale; taken for A3", page.source))
+        problems.append(
+            Problem("paper_assumed", "only the paper's edges give the scale; taken for A3", page.source)
+        )
     return _sheet(fit, frame, scale_se, problems)
 
 
@@ -103,7 +113,9 @@ def _settled(best: Hypothesis, dpi: tuple[float, float] | None) -> Fit:
     sides = list(best.sides)
     fit = fit_sides(best.mm_to_px, sides, dpi, perspective=best.perspective)
     keep = [side for side, off in zip(sides, fit.side_mm, strict=True) if abs(off) < _FAR_OFF_MM]
-    return fit if len(keep) == len(sides) else fit_sides(fit.mm_to_px, keep, dpi, perspective=best.perspective)
+    return (
+        fit if len(keep) == len(sides) else fit_sides(fit.mm_to_px, keep, dpi, perspective=best.perspective)
+    )
 
 
 def _from_resolution(
@@ -124,13 +136,19 @@ def _from_resolution(
     assert best is not None
     block, matrix = best
     if block == 0.0 and not resolution.stated:
-        return Unread("sheet", "no drawing frame, no title block and no stated resolution: not known to be A3")
+        return Unread(
+            "sheet", "no drawing frame, no title block and no stated resolution: not known to be A3"
+        )
     if block == 0.0:
-        problems.append(Problem("upright_unsure", "no title block shows which way up the sheet is", page.source))
+        problems.append(
+            Problem("upright_unsure", "no title block shows which way up the sheet is", page.source)
+        )
     if not resolution.stated:
         message = f"no stated resolution: {resolution.dpi[0]:.0f} dpi assumed, by which the page is A3"
         problems.append(Problem("resolution_assumed", message, page.source))
-    problems.append(Problem("frame_missing", "no drawing frame: the place on the sheet is rough", page.source))
+    problems.append(
+        Problem("frame_missing", "no drawing frame: the place on the sheet is rough", page.source)
+    )
     scale_se = 0.0015 if resolution.stated else _WINDOW_SE
     fit = Fit(matrix, 0.0, 0, 0.0, scale_se, np.zeros(0))
     return _sheet(fit, None, scale_se, problems)
