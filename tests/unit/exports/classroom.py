@@ -1,0 +1,57 @@
+"""Results of a small class."""
+
+from grader.documents import (
+    CriterionDocument,
+    MistakeDocument,
+    ProblemDocument,
+    QuantityDocument,
+    ReportDocument,
+    ResultsDocument,
+    ToleranceDocument,
+)
+
+
+def criterion(name, verdict, points, feedback=""):
+    return CriterionDocument(
+        id=name, title=f"Vector {name}", vector=name, points=points, max_points=5.0, verdict=verdict,
+        measured=QuantityDocument(length_mm=47.25, direction_deg=12.5),
+        expected=QuantityDocument(length_mm=46.4, direction_deg=12.0, value=1.67, unit="m/s"),
+        tolerance=ToleranceDocument(length_mm=1.0, direction_deg=1.5), confidence=0.99, feedback=feedback,
+    )  # fmt: skip
+
+
+def report(student_id, score=None, *, status="graded", position=None, n=None, **more):
+    fields = {
+        "student_id": student_id,
+        "assignment": "pump",
+        "variant": {} if n is None else {"n": n},
+        "position": position,
+        "status": status,
+        "score": score,
+        "score_range": None if score is None else (score, score),
+        "max_score": 10.0,
+    }
+    return ReportDocument(**{**fields, **more})
+
+
+def results(*reports):
+    return ResultsDocument(assignment="pump", reports=list(reports))
+
+
+def a_class():
+    return results(
+        report(
+            "s01", 7.5, n=1,
+            criteria=[criterion("v_A", "full", 5.0, "Right."), criterion("v_B", "partial", 2.5, "It is too long.")],
+            mistakes=[MistakeDocument(code="sense_reversed", at="v_B", explains=["v_B"], confidence=0.9)],
+        ),
+        report(
+            "s02", None, n=2, status="needs_review", score_range=(5.0, 10.0),
+            criteria=[criterion("v_A", "full", 5.0), criterion("v_B", "review", None, "A person will look.")],
+        ),
+        report("s03", None, n=3, status="missing", score_range=None),
+        report(
+            "s04", None, n=4, status="unreadable", score_range=None,
+            problems=[ProblemDocument(code="pdf_encrypted", message="password", file="=s04.pdf")],
+        ),
+    )  # fmt: skip
