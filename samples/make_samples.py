@@ -42,6 +42,10 @@ PHOTO = replace(QUIET, device="phone", mode="colour", dpi=170.0, dpi_tag=72.0, t
                 shading=0.15, shadow=0.15, bed=(128, 96, 66), skew_deg=1.0)
 WRITTEN_ONLY = replace(QUIET, dpi=20.0, dpi_tag=20.0)
 """For students who hand in numbers: the drawing stays at home."""
+ROMANIAN = PageStyle(letter_mm=4.2)
+PRINTED_FRAME = PageStyle(letter_mm=4.2, frame_by="print")
+RUSSIAN = PageStyle(letter_mm=4.2, language="ru", frame="gost")
+RUSSIAN_FORM = PageStyle(letter_mm=4.2, language="ru", frame="gost", frame_by="print", title_block="form")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +66,15 @@ class Pupil:
 
 
 def told(
-    pen: str, student: Student | None = None, scan: Scan = QUIET, *, careful: bool = True, **page: Any
+    pen: str,
+    student: Student | None = None,
+    scan: Scan = QUIET,
+    page: PageStyle = ROMANIAN,
+    *,
+    careful: bool = True,
 ) -> Settings:
     """A student's settings in one line."""
-    style = PageStyle(**{"language": "ro", "letter_mm": 4.2, **page})
-    return Settings(CAREFUL if careful else TYPICAL, student or Student(), PENS[pen], style, scan)
+    return Settings(CAREFUL if careful else TYPICAL, student or Student(), PENS[pen], page, scan)
 
 
 SCANS, PDF, SHEET = frozenset({"scans"}), frozenset({"class pdf"}), frozenset({"answer sheet"})
@@ -76,7 +84,7 @@ TWO = Student(sheets=2)
 PUMP = [
     Pupil(1, 7, told("fine pencil", TWO, replace(QUIET, dpi=200.0, dpi_tag=200.0)), 11, SCANS | CSV),
     Pupil(2, 12, told("soft pencil", Student(sheets=2, mistakes=("normal_reversed",)), careful=False), 12),
-    Pupil(3, 3, told("ink", Student(sheets=2, ka_ratio=1.25), COPY, frame_by="print"), 13),
+    Pupil(3, 3, told("ink", Student(sheets=2, ka_ratio=1.25), COPY, PRINTED_FRAME), 13),
     Pupil(4, 18, told("fine pencil"), 14, PDF),
     Pupil(5, 24, told("soft pencil", Student(sheets=2, mistakes=("wrong_link",))), 15, PDF),
     Pupil(6, 9, told("fine pencil", TWO), 16, SHEET),
@@ -86,13 +94,13 @@ PUMP = [
     Pupil(10, 30, told("fine pencil"), 20, NOTHING),
 ]
 PRESS = [
-    Pupil(1, 1, told("fine pencil", TWO, language="ru", frame="gost"), 31, SCANS | CSV),
+    Pupil(1, 1, told("fine pencil", TWO, QUIET, RUSSIAN), 31, SCANS | CSV),
     Pupil(2, 2, told("ink", TWO, replace(COPY, container="png", dpi=200.0, dpi_tag=200.0),
-                     language="ru", frame="gost", frame_by="print", title_block="form"), 32),
+                     RUSSIAN_FORM), 32),
     Pupil(3, 3, told("soft pencil", Student(sheets=2, mistakes=("wrong_link",)),
-                     replace(QUIET, quarter_turns=2), language="ru"), 33),
-    Pupil(4, 5, told("fine pencil", TWO, WRITTEN_ONLY, language="ru"), 34, CSV),
-    Pupil(5, 0, told("fine pencil", TWO, WRITTEN_ONLY, language="ru"), 35, CSV),
+                     replace(QUIET, quarter_turns=2), RUSSIAN), 33),
+    Pupil(4, 5, told("fine pencil", TWO, WRITTEN_ONLY, RUSSIAN), 34, CSV),
+    Pupil(5, 0, told("fine pencil", TWO, WRITTEN_ONLY, RUSSIAN), 35, CSV),
 ]
 
 
@@ -136,7 +144,9 @@ def sheets_of(assignment: Assignment, pupil: Pupil) -> list[SimulatedSheet]:
         row = RosterRow(pupil.student_id, f"Student {pupil.number}", variant.n, variant.position)
         document = make_sheets(assignment, [row], "ro")
         printed = printed_sheets(document.pdf, document.layout)
-    return simulate(assignment, variant, pupil.seed, pupil.settings, student_id=pupil.student_id, printed=printed)
+    return simulate(
+        assignment, variant, pupil.seed, pupil.settings, student_id=pupil.student_id, printed=printed
+    )
 
 
 def save(sheets: list[SimulatedSheet], pupil: Pupil, folder: Path) -> None:
@@ -168,7 +178,7 @@ def scales_of(sheets: list[SimulatedSheet]) -> dict[str, str]:
 
 
 def variant_columns(sheets: list[SimulatedSheet]) -> dict[str, Any]:
-    """n and position, blank where the assignment has none."""
+    """N and position, blank where the assignment has none."""
     truth = sheets[0].truth
     return {key: "" if truth[key] is None else truth[key] for key in ("n", "position")}
 
@@ -194,7 +204,9 @@ def write_csv(path: Path, lines: list[dict[str, Any]], delimiter: str) -> None:
         writer.writerow(columns)
         for line in lines:
             cells = [str(line.get(name, "")) for name in columns]
-            writer.writerow([c.replace(".", ",") if delimiter == ";" and c[:1].isdigit() else c for c in cells])
+            if delimiter == ";":
+                cells = [cell.replace(".", ",") if cell[:1].isdigit() else cell for cell in cells]
+            writer.writerow(cells)
 
 
 def write_json(path: Path, line: dict[str, Any]) -> None:

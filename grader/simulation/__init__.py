@@ -5,6 +5,7 @@ truth; ``any_settings(seed)`` draws a student of a mixed class by lot. The same 
 drawing whatever the scanner: hand, page, pen and scanner have random streams of their own.
 """
 
+from grader.simulation.desk import PrintedSheet
 from grader.simulation.settings import (
     CAREFUL,
     CLEAN_SCAN,
@@ -19,8 +20,8 @@ from grader.simulation.settings import (
     Student,
     any_settings,
 )
-from grader.simulation.student import PrintedSheet, SimulatedSheet, measured_by, simulate
 from grader.simulation.storing import blank_back, encoded, write_pdf, write_truth
+from grader.simulation.student import SimulatedSheet, measured_by, simulate
 
 __all__ = [
     "CAREFUL",

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from grader.simulation import symbols
-from grader.simulation.hand import ACCELERATION, MECHANISM, VELOCITY, DrawnFigure, Nodes, Task
+from grader.simulation.hand import MECHANISM, DrawnFigure, Nodes, Task
 from grader.simulation.settings import Student
 from grader.simulation.sketch import DASHES, Sketch
 from grader.simulation.strokes import arc
@@ -53,7 +53,8 @@ def draw_mechanism(sketch: Sketch, task: Task, nodes: Nodes, student: Student) -
     for group in task.mechanism.groups:
         if isinstance(group, Plate) and group.line_ratio is None and sketch.style.plate_hatched:
             p, q = group.base
-            symbols.inside_hatching(sketch, (nodes[p], nodes[q], nodes[group.node]), sketch.rng.uniform(2.5, 5))
+            corners = (nodes[p], nodes[q], nodes[group.node])
+            symbols.inside_hatching(sketch, corners, sketch.rng.uniform(2.5, 5.0))
         if isinstance(group, Slider):
             angle = float(np.mean(group.guide_rad))
             symbols.slider(sketch, nodes[group.node], turn * complex(np.exp(1j * angle)))
@@ -64,7 +65,7 @@ def draw_mechanism(sketch: Sketch, task: Task, nodes: Nodes, student: Student) -
             symbols.circle(sketch, nodes[joint], symbols.JOINT_RADIUS_MM, sketch.pen("line"))
     _crank_extras(sketch, task, nodes)
     if student.vectors_on_mechanism:
-        _vectors_at_pin(sketch, task, nodes, turn)
+        _vectors_at_pin(sketch, task, nodes)
     if student.altitude:
         _altitude(sketch, task, nodes)
     for joint in task.mechanism.joints:
@@ -108,9 +109,8 @@ def _crank_extras(sketch: Sketch, task: Task, nodes: Nodes) -> None:
     symbols.turning_arrow(sketch, pivot, start, min(radius * 0.5, sketch.rng.uniform(7, 12)), sense)
 
 
-def _vectors_at_pin(sketch: Sketch, task: Task, nodes: Nodes, turn: complex) -> None:
+def _vectors_at_pin(sketch: Sketch, task: Task, nodes: Nodes) -> None:
     """v_A and a_A drawn at the crank's pin as well."""
-    del turn
     known, crank = task.wrong.parameters, task.mechanism.crank
     arm = nodes[crank.pin] - nodes[crank.pivot]
     along = arm / abs(arm)
@@ -122,7 +122,8 @@ def _vectors_at_pin(sketch: Sketch, task: Task, nodes: Nodes, turn: complex) -> 
             sketch.line(sketch.pen("line", plan=True), p, q)
             symbols.arrowhead(sketch, sketch.pen("line", plan=True), p, q, sketch.style.arrow_mm)
             sketch.lines[MECHANISM, name] = (p, q)
-            sketch.letter(q, _vector_text(sketch, name), 0.85 * sketch.page.letter_mm, names=name, distance_mm=1.5)
+            height = 0.85 * sketch.page.letter_mm
+            sketch.letter(q, _vector_text(sketch, name), height, names=name, distance_mm=1.5)
 
 
 def _altitude(sketch: Sketch, task: Task, nodes: Nodes) -> None:
@@ -223,7 +224,8 @@ def _unnamed_sides(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> Non
     for step in task.wrong.construction.figures[figure]:
         if isinstance(step, Similar | Divide):
             for end in step.base:
-                if frozenset((end, step.node)) not in drawn and abs(nodes[end] - nodes[step.node]) > TOO_SHORT_MM:
+                length = abs(nodes[end] - nodes[step.node])
+                if frozenset((end, step.node)) not in drawn and length > TOO_SHORT_MM:
                     p, q = sketch.redrawn(nodes[end], nodes[step.node])
                     sketch.line(sketch.pen("line", plan=True), p, q)
                     sketch.lines[figure, f"side {end} {step.node}"] = (p, q)
@@ -235,7 +237,8 @@ def _letters(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
         letter = task.letter_of(node)
         if node.startswith("n_"):
             if sketch.chance(sketch.page.end_labels):
-                sketch.letter(at, f"n_{{{letter[2:]}}}", 0.7 * sketch.page.letter_mm, names=node, distance_mm=0.8)
+                text, height = f"n_{{{letter[2:]}}}", 0.7 * sketch.page.letter_mm
+                sketch.letter(at, text, height, names=node, distance_mm=0.8)
             continue
         if circles:
             symbols.circle(sketch, at, sketch.rng.uniform(0.7, 1.1), sketch.pen("thin"))
@@ -251,8 +254,8 @@ def pole_text(task: Task, figure: str) -> str:
 
 def _vector_text(sketch: Sketch, name: str) -> str:
     kind, about, *part = name.split("_")
-    del sketch
-    return f"{kind}_{{{about}}}" + (f"^{part[0]}" if part else "")
+    bar = "\u0304" if sketch.page.bar_over_vectors else ""
+    return f"{kind}{bar}_{{{about}}}" + (f"^{part[0]}" if part else "")
 
 
 def extent(nodes: Mapping[str, complex]) -> tuple[complex, complex]:
@@ -261,4 +264,3 @@ def extent(nodes: Mapping[str, complex]) -> tuple[complex, complex]:
     return (complex(points.real.min(), points.imag.min()), complex(points.real.max(), points.imag.max()))
 
 
-FIGURES = (MECHANISM, VELOCITY, ACCELERATION)

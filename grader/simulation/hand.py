@@ -170,11 +170,12 @@ def choose_mistake(
 
 
 def drawable(drawing: Drawing, right: Drawing) -> bool:
-    """Whether a drawing can be drawn at all: every node exists, plans at most three times too large."""
+    """Whether a drawing can be drawn at all: every node exists, none far off the paper."""
     nodes = evaluate(drawing.construction, drawing.parameters)
     proper = evaluate(right.construction, right.parameters)
     size = max(abs(complex(node)) for node in proper.values())
-    return all(np.isfinite(node) and abs(complex(node)) < 1.6 * size + 40.0 for node in nodes.values())
+    limit = max(1.6 * size + 40.0, 220.0)
+    return all(np.isfinite(node) and abs(complex(node)) < limit for node in nodes.values())
 
 
 def _other_variant(assignment: Assignment, variant: Variant, rng: Rng) -> Mistake:

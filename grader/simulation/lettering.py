@@ -11,6 +11,8 @@ import numpy as np
 from grader.simulation.glyphs import GLYPHS, TWINS
 from grader.simulation.strokes import ComplexArray, Pen, Rng, Stroke, inked, smooth
 
+BAR = "\u0304"
+"""A bar over the letter before it, as over a vector's name."""
 _SMALL = 0.66
 _DROP, _RISE = -0.32, 0.52
 _SPACE = 0.42
@@ -95,22 +97,24 @@ def _letters(text: str) -> Iterator[_Letter]:
 def _strokes_of(sign: str, forms: dict[str, int]) -> list[tuple[bool, ComplexArray]]:
     ways = GLYPHS.get(sign) or GLYPHS.get(TWINS.get(sign, "?")) or GLYPHS["?"]
     form = ways[forms.get(sign, 0) % len(ways)]
-    strokes = []
+    strokes: list[tuple[bool, ComplexArray]] = []
     for text in form.split("|"):
         pairs = [pair.split(",") for pair in text.lstrip("~").split()]
-        strokes.append((text.startswith("~"), np.array([float(x) + 1j * float(y) for x, y in pairs]) / 100))
+        corners = np.array([complex(float(x), float(y)) for x, y in pairs], dtype=np.complex128) / 100.0
+        strokes.append((text.startswith("~"), np.asarray(corners, dtype=np.complex128)))
     return strokes
 
 
-def write(rng: Rng, pen: Pen, text: str, height_mm: float, style: Handwriting, angle_rad: float = 0.0) -> Written:
+def write(rng: Rng, pen: Pen, text: str, height_mm: float, style: Handwriting) -> Written:
     """A text whose base line starts at 0."""
     forms = dict(style.forms)
     at, strokes = 0.0, []
-    turn = np.exp(1j * angle_rad)
     for letter in _letters(text):
         if letter.sign == " ":
             at += _SPACE * letter.size
             continue
+        if letter.sign == BAR:
+            at -= 0.55 * style.aspect + style.gap
         size = letter.size * (1.0 + style.unevenness * rng.standard_normal())
         lift = letter.lift + 0.4 * style.unevenness * rng.standard_normal()
         right = at
@@ -121,7 +125,7 @@ def write(rng: Rng, pen: Pen, text: str, height_mm: float, style: Handwriting, a
             points = smooth(shape, 4) if curved else shape
             x = at + points.real * size * style.aspect
             y = points.imag * size + lift
-            place = (x + style.slant * y + 1j * y) * height_mm * turn
+            place = (x + style.slant * y + 1j * y) * height_mm
             strokes.append(inked(rng, pen, np.asarray(place)))
             right = max(right, float(x.max()))
         at = right + style.gap * letter.size

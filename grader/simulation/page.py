@@ -100,7 +100,7 @@ def _cells(sketch: Sketch, cells: list[str], box: Box) -> None:
             sketch.line(pen, complex(left, y), complex(left, y - h))
         fitting = min(height, (right - left - 4.0) / max(1, len(cell)) / 0.62)
         base = complex(left + 2.0, y - 0.5 * h - 0.4 * fitting)
-        sketch.text(base, cell, fitting, printed=False)
+        sketch.text(base, cell, fitting)
 
 
 # Layout -------------------------------------------------------------------------------------------
@@ -170,8 +170,9 @@ def place_in_zones(
     return origins
 
 
-def write_caption(sketch: Sketch, task: Task, figure: str, nodes: Mapping[str, complex],
-                  written: dict[str, str]) -> None:
+def write_caption(
+    sketch: Sketch, task: Task, figure: str, nodes: Mapping[str, complex], written: dict[str, str]
+) -> None:
     """The figure's caption above it (or below), with its scale where the student writes it there."""
     low, high = extent(nodes)
     lines = wording.caption(figure, task, sketch.page, sketch.rng, written)
@@ -186,12 +187,24 @@ def write_caption(sketch: Sketch, task: Task, figure: str, nodes: Mapping[str, c
 def write_block(sketch: Sketch, lines: list[str], room: Box, taken: list[Box]) -> None:
     """Working written where there is room for it, or not at all."""
     height = 0.8 * sketch.page.letter_mm
-    w, h = max(len(line) for line in lines) * 0.5 * height, len(lines) * 1.9 * height
+    size = max(len(line) for line in lines) * 0.5 * height, len(lines) * 1.9 * height
+    place = free_place(size, room, taken, sketch.rng)
+    if place is None:
+        return
+    taken.append((*place, *size))
+    for index, line in enumerate(lines):
+        sketch.text(complex(place[0], -place[1] - (index + 1) * 1.9 * height), line, height)
+
+
+def free_place(
+    size: tuple[float, float], room: Box, taken: list[Box], rng: Rng
+) -> tuple[float, float] | None:
+    """The top left corner of a free box of this size, None where none was found."""
+    if size[0] > room[2] or size[1] > room[3]:
+        return None
     for _ in range(60):
-        x = room[0] + sketch.rng.uniform(0, max(1.0, room[2] - w))
-        y = room[1] + sketch.rng.uniform(0, max(1.0, room[3] - h))
-        if x + w < room[0] + room[2] and not any(overlap((x, y, w, h), box) for box in taken):
-            for index, line in enumerate(lines):
-                sketch.text(complex(x, -y - (index + 1) * 1.9 * height), line, height)
-            taken.append((x, y, w, h))
-            return
+        x = room[0] + rng.uniform(0.0, room[2] - size[0])
+        y = room[1] + rng.uniform(0.0, room[3] - size[1])
+        if not any(overlap((x, y, *size), box) for box in taken):
+            return x, y
+    return None

@@ -4,8 +4,8 @@ import numpy as np
 import pypdfium2
 
 from grader.layout import Layout
+from grader.simulation.desk import PrintedSheet
 from grader.simulation.scanner import Background
-from grader.simulation.student import PrintedSheet
 
 _DPI = 300.0
 
@@ -16,7 +16,7 @@ def printed_sheets(pdf: bytes, layout: Layout, first_page: int = 0) -> dict[str,
     Arguments: `first_page` is the student's first page in the document, from 0.
     """
     document = pypdfium2.PdfDocument(pdf)
-    sheets = {}
+    sheets: dict[str, PrintedSheet] = {}
     for index, page in enumerate(layout.pages):
         bitmap = document[first_page + index].render(scale=_DPI / 72.0, grayscale=True)
         grey = np.array(bitmap.to_numpy(), dtype=np.uint8).reshape(bitmap.height, -1)[:, : bitmap.width]

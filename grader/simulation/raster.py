@@ -67,7 +67,8 @@ def _local_scale(points: ComplexArray, mapping: Mapping) -> FloatArray:
     """Pixels per millimetre at each point (geometric mean of the two axes)."""
     xy = np.column_stack([points.real, -points.imag])
     here = mapping(xy)
-    along_x, along_y = mapping(xy + [1.0, 0.0]) - here, mapping(xy + [0.0, 1.0]) - here
+    along_x = mapping(xy + np.array([1.0, 0.0])) - here
+    along_y = mapping(xy + np.array([0.0, 1.0])) - here
     area = along_x[:, 0] * along_y[:, 1] - along_x[:, 1] * along_y[:, 0]
     return np.asarray(np.sqrt(np.abs(area)))
 

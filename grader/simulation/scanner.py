@@ -33,15 +33,22 @@ class Background:
     px_per_mm: float
 
 
-def digitise(
-    strokes: Sequence[Stroke], pens: PenStyle, scan: Scan, view: View, rng: Rng, background: Background | None
-) -> NDArray[np.uint8]:
+@dataclass(frozen=True, slots=True)
+class DrawnPaper:
+    """What lies on the glass: strokes, the pens that made them, and what was printed before."""
+
+    strokes: Sequence[Stroke]
+    pens: PenStyle
+    background: Background | None = None
+
+
+def digitise(paper: DrawnPaper, scan: Scan, view: View, rng: Rng) -> NDArray[np.uint8]:
     """The stored image: (h, w) grey, (h, w, 3) RGB, or for one bit (h, w) of 0 and 255."""
-    light = _light(scan, view, rng, pens.smudges)
+    light = _light(scan, view, rng, paper.pens.smudges)
     mask = _paper_mask(view, scan)
-    inks = _inks(strokes, pens, view, rng)
-    printed = None if background is None else _printed(background, view)
-    ghost = _show_through(strokes, view, scan)
+    inks = _inks(paper.strokes, paper.pens, view, rng)
+    printed = None if paper.background is None else _printed(paper.background, view)
+    ghost = _show_through(paper.strokes, view, scan)
     specks = _dust(scan, view.size, rng)
     channels = range(3) if scan.mode == "colour" else (None,)
     planes = []
@@ -94,7 +101,7 @@ def _grain(cover: Float32Array, amount: float, px_per_mm: float, rng: Rng) -> No
     side = 512
     tile = rng.standard_normal((side, side)).astype(np.float32)
     sigma = max(0.4, 0.06 * px_per_mm)
-    tile = cv2.GaussianBlur(tile, (0, 0), sigma)
+    tile = np.asarray(cv2.GaussianBlur(tile, (0, 0), sigma), dtype=np.float32)
     tile *= np.float32(amount) / tile.std()
     where = np.flatnonzero(cover)
     rows, columns = np.divmod(where, cover.shape[1])
@@ -137,7 +144,10 @@ def _show_through(strokes: Sequence[Stroke], view: View, scan: Scan) -> Float32A
     """Another drawing on the back, faint, mirrored and blurred."""
     if scan.show_through <= 0.0:
         return None
-    back = [Stroke(414.0 - np.conj(s.points), s.width, s.dark, s.layer) for s in strokes[::2]]
+    back = [
+        Stroke(np.asarray(414.0 - np.conj(s.points), dtype=np.complex128), s.width, s.dark, s.layer)
+        for s in strokes[::2]
+    ]
     small = (view.size[0] // 3, view.size[1] // 3)
     cover = render(back, lambda xy: (view.to_px(xy) + 0.5) / 3.0 - 0.5, small)
     blurred = cv2.GaussianBlur(cover, (0, 0), max(0.6, 0.12 * view.px_per_mm))
@@ -151,9 +161,9 @@ def _show_through(strokes: Sequence[Stroke], view: View, scan: Scan) -> Float32A
 def _outline(view: View) -> FloatArray:
     """The paper's outline in pixels, fine enough for a bent edge."""
     x0, y0, x1, y1 = view.paper_mm
-    corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
+    corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
     share = np.linspace(0.0, 1.0, 24, endpoint=False)[:, None]
-    edges = [p + (q - p) * share for p, q in zip(corners[:-1], corners[1:], strict=True)]
+    edges = [p + (q - p) * share for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
     return view.to_px(np.concatenate(edges))
 
 
@@ -180,7 +190,8 @@ def _light(scan: Scan, view: View, rng: Rng, smudges: int) -> Float32Array:
     y, x = np.mgrid[0:height, 0:width].astype(np.float32)
     u, v = x / width - 0.5, y / height - 0.5
     tilt = rng.normal(0.0, 0.5, 5) * scan.shading
-    light = 1.0 + tilt[0] * u + tilt[1] * v - abs(tilt[2]) * (u * u + v * v) * 2 + tilt[3] * np.sin(3 * u + 6 * tilt[4])
+    light = 1.0 + tilt[0] * u + tilt[1] * v - abs(tilt[2]) * (u * u + v * v) * 2
+    light += tilt[3] * np.sin(3 * u + 6 * tilt[4])
     if scan.shadow > 0:
         light *= _hand_shadow(u, v, scan.shadow, rng)
     xy_mm = view.to_mm(np.column_stack([x.ravel(), y.ravel()]).astype(float) * _COARSE).astype(np.float32)
@@ -230,7 +241,7 @@ def _sensed(plane: Float32Array, scan: Scan, rng: Rng, specks: Sequence[_Speck])
     for speck in specks:
         fixed = np.round(speck.points * 16).astype(np.int32)
         if len(fixed) > 1:
-            cv2.polylines(plane, [fixed], False, speck.value, 1, cv2.LINE_AA, 4)
+            cv2.polylines(plane, [fixed], isClosed=False, color=speck.value, lineType=cv2.LINE_AA, shift=4)
         else:
             x, y = (int(v) for v in fixed[0])
             cv2.circle(plane, (x, y), round(speck.radius_px * 16), speck.value, -1, cv2.LINE_AA, 4)

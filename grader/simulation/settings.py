@@ -170,7 +170,8 @@ CLEAN_SCAN = Scan(skew_deg=0.0, shift_mm=0.0, stretch=0.0, noise=0.0, shading=0.
 MISTAKES_OFTEN_MADE = (
     "parallel_for_perpendicular", "wrong_link", "sense_reversed", "rpm_not_converted", "scale_wrong",
     "normal_reversed", "normal_missing", "normal_from_absolute", "other_variant", "other_assembly",
-    "image_mirrored", "wrong_intersection", "vector_missing", "labels_swapped", "figure_rotated", "arithmetic",
+    "image_mirrored", "wrong_intersection", "vector_missing", "labels_swapped", "figure_rotated",
+    "arithmetic",
 )
 
 
@@ -279,7 +280,8 @@ def any_scan(
     common = Scan(
         device=device, dpi=resolution, quarter_turns=int(rng.choice(4, p=[0.7, 0.08, 0.12, 0.1])),
         skew_deg=float(rng.choice([0.2, 0.6, 1.8])), shift_mm=float(rng.choice([0.8, 2.5])),
-        stretch=float(rng.choice([0.0003, 0.001])), dpi_tag=tag, paper=(int(tint[0]), int(tint[1]), int(tint[2])),
+        stretch=float(rng.choice([0.0003, 0.001])), dpi_tag=tag,
+        paper=(int(tint[0]), int(tint[1]), int(tint[2])),
         bed=bed, jpeg_quality=int(rng.choice([55, 75, 85, 92])), blur_px=float(rng.uniform(0.4, 0.9)),
         noise=float(rng.uniform(1.0, 4.0)), shading=float(rng.choice([0.0, 0.04, 0.1])),
         dust=int(rng.integers(0, 40)), fold=bool(rng.random() < 0.12),

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from grader.simulation.lettering import PRINTED, Handwriting, Written, write
+from grader.simulation.lettering import Handwriting, Written, write
 from grader.simulation.settings import Hand, PageStyle, PenStyle
 from grader.simulation.strokes import ComplexArray, Dash, Pen, Rng, Stroke, dashed, inked, straight
 
@@ -85,16 +85,9 @@ class Sketch:
 
     # Writing ----------------------------------------------------------------------------------
 
-    def text(
-        self, at: complex, text: str, height_mm: float, *, names: str = "", printed: bool = False,
-        angle_rad: float = 0.0
-    ) -> Written:
+    def text(self, at: complex, text: str, height_mm: float, *, names: str = "") -> Written:
         """Write a text with its base line's start at a point."""
-        style = PRINTED if printed else self.writing
-        pen = self.pen("print" if printed else "text")
-        if printed:
-            pen = Pen(pen.layer, 0.09 * height_mm, pen.dark, 0.0, 0.0)
-        written = write(self.rng, pen, text, height_mm, style, angle_rad).moved(at)
+        written = write(self.rng, self.pen("text"), text, height_mm, self.writing).moved(at)
         self.strokes.extend(written.strokes)
         self.labels.append(Label(text, names, written.low, written.high))
         return written

@@ -59,7 +59,7 @@ class Dash:
 
 def wave(rng: Rng, along_mm: FloatArray, wavelengths_mm: tuple[float, float] = _WAVE_MM) -> FloatArray:
     """Smooth noise of unit variance along a stroke: four waves of random length and phase."""
-    lengths = np.exp(rng.uniform(*np.log(wavelengths_mm), 4))
+    lengths = np.exp(rng.uniform(np.log(wavelengths_mm[0]), np.log(wavelengths_mm[1]), 4))
     phases = rng.uniform(0.0, 2.0 * np.pi, 4)
     waves = np.cos(2.0 * np.pi * along_mm[:, None] / lengths + phases)
     return np.asarray(waves.sum(axis=1) / np.sqrt(2.0))
@@ -70,11 +70,11 @@ def straight(rng: Rng, pen: Pen, p: complex, q: complex) -> Stroke:
     length = abs(q - p)
     count = max(2, int(np.ceil(length / _STEP_MM)) + 1)
     share = np.linspace(0.0, 1.0, count)
-    points = p + (q - p) * share
+    points: ComplexArray = np.asarray(p + (q - p) * share, dtype=np.complex128)
     if count > 4 and pen.wobble_mm > 0:
         offset = wave(rng, share * length) * pen.wobble_mm * min(1.0, length / 30.0)
         offset -= np.polyval(np.polyfit(share, offset, 1), share)
-        points = points + 1j * (q - p) / length * offset
+        points += 1j * (q - p) / length * offset
     return inked(rng, pen, points)
 
 

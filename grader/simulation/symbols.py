@@ -99,7 +99,8 @@ def turning_arrow(sketch: Sketch, centre: complex, start_rad: float, radius_mm: 
     sketch.curve(pen, points)
     tip, before = complex(points[-1]), complex(points[-3])
     arrowhead(sketch, pen, tip + 4.0 * (before - tip) / abs(before - tip), tip, 2.2)
-    sketch.letter(complex(points[len(points) // 2]), "ω_1", 0.8 * sketch.page.letter_mm, names="", distance_mm=1.0)
+    middle = complex(points[len(points) // 2])
+    sketch.letter(middle, "ω_1", 0.8 * sketch.page.letter_mm, names="", distance_mm=1.0)
 
 
 def cross_out(sketch: Sketch, low: complex, high: complex) -> None:
@@ -128,5 +129,6 @@ def _crossings(points: np.ndarray, height: np.ndarray, at: float) -> list[comple
     found = []
     for i, j in ((0, 1), (1, 2), (2, 0)):
         if (height[i] - at) * (height[j] - at) < 0:
-            found.append(complex(points[i] + (points[j] - points[i]) * (at - height[i]) / (height[j] - height[i])))
+            share = (at - height[i]) / (height[j] - height[i])
+            found.append(complex(points[i] + (points[j] - points[i]) * share))
     return found

@@ -15,7 +15,7 @@ from grader.simulation.figures import at_origin, pole_text
 from grader.simulation.hand import MECHANISM, DrawnFigure, DrawnSheet, Task
 from grader.simulation.page import Frame
 from grader.simulation.settings import Settings
-from grader.simulation.sketch import Segment, Sketch
+from grader.simulation.sketch import Label, Sketch
 from grader.simulation.view import View
 from reference.mistakes import Mistake
 
@@ -53,12 +53,13 @@ def drawing_truth(
         "poles": {name: pole_text(task, name) for name in figures if name != MECHANISM},
         "scales": {"declared": _rounded(task.declared), "used": _rounded(task.used)},
         "mistakes": [_mistake(mistake) for mistake in task.mistakes],
-        "labels": [
-            {"text": label.text, "names": label.names,
-             "box_mm": [*xy(complex(label.low.real, label.high.imag)), *xy(complex(label.high.real, label.low.imag))]}
-            for label in sketch.labels
-        ],
+        "labels": [_label(label) for label in sketch.labels],
     }
+
+
+def _label(label: Label) -> dict[str, Any]:
+    top_left, low_right = complex(label.low.real, label.high.imag), complex(label.high.real, label.low.imag)
+    return {"text": label.text, "names": label.names, "box_mm": [*xy(top_left), *xy(low_right)]}
 
 
 def _rounded(scales: Mapping[str, float]) -> dict[str, float]:
@@ -66,10 +67,11 @@ def _rounded(scales: Mapping[str, float]) -> dict[str, float]:
 
 
 def _mistake(mistake: Mistake) -> dict[str, Any]:
-    told = {"code": mistake.code, "at": mistake.at, "slot": mistake.slot, "other": list(mistake.other),
-            "factor": mistake.factor, "quarters": mistake.quarters, "n": mistake.n, "position": mistake.position}
-    usual: dict[str, Any] = {"slot": 0, "other": [], "factor": 1.0, "quarters": 0, "n": None, "position": None}
-    return {key: value for key, value in told.items() if key not in usual or value != usual[key]}
+    usual = Mistake(mistake.code, mistake.at)
+    details = ("slot", "other", "factor", "quarters", "n", "position")
+    told = {name: getattr(mistake, name) for name in details}
+    unusual = {name: value for name, value in told.items() if value != getattr(usual, name)}
+    return {"code": mistake.code, "at": mistake.at, **unusual}
 
 
 def _figure(
@@ -107,7 +109,7 @@ def scan_truth(view: View, frame: Frame | None, settings: Settings) -> dict[str,
     return {
         "homography": [[float(cell) for cell in row] for row in view.homography],
         "lens": lens,
-        "grid_mm_px": [[mm.tolist(), [round(float(v), 4) for v in px]] for mm, px in zip(grid, pixels, strict=True)],
+        "grid_mm_px": [[a.tolist(), np.round(b, 4).tolist()] for a, b in zip(grid, pixels, strict=True)],
         "image_size": [view.size[1], view.size[0]],
         "px_per_mm": round(view.px_per_mm, 5),
         "rotation_deg": (-90 * view.turns) % 360,

@@ -65,7 +65,8 @@ class View:
         arm = px - self.centre
         if self.k1 != 0.0:
             arm = arm * (1.0 + self.k1 * (arm**2).sum(axis=1, keepdims=True) / self.radius**2)
-        return projected(np.linalg.inv(self.homography), arm + self.centre)
+        back = np.asarray(np.linalg.inv(self.homography), dtype=np.float64)
+        return projected(back, np.asarray(arm + self.centre))
 
     @property
     def px_per_mm(self) -> float:
@@ -93,7 +94,8 @@ def view_of(scan: Scan, rng: Rng) -> View:
     w, h = PAPER_MM
     grow = (1.0 / scan.copy_scale - 1.0) / 2.0
     paper = (-grow * w, -grow * h, (1 + grow) * w, (1 + grow) * h)
-    return View(homography, size, scan.lens_k1 if scan.device == "phone" else 0.0, scan.quarter_turns % 4, paper)
+    k1 = scan.lens_k1 if scan.device == "phone" else 0.0
+    return View(homography, size, k1, scan.quarter_turns % 4, paper)
 
 
 def _glass(scan: Scan, rng: Rng) -> tuple[FloatArray, tuple[int, int]]:
@@ -120,7 +122,8 @@ def _phone(scan: Scan, rng: Rng) -> tuple[FloatArray, tuple[int, int]]:
     ux, uy = np.cos(axis), np.sin(axis)
     cross = np.array([[0, 0, uy], [0, 0, -ux], [-uy, ux, 0]])
     rotation = np.eye(3) + np.sin(tilt) * cross + (1 - np.cos(tilt)) * cross @ cross
-    rotation = rotation @ np.array([[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
+    c, s = np.cos(roll), np.sin(roll)
+    rotation = rotation @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     focal, distance = _FOCAL * width, _FOCAL * PAPER_MM[0] / 0.92
     to_middle = np.array([[1, 0, -PAPER_MM[0] / 2], [0, 1, -PAPER_MM[1] / 2], [0, 0, 1.0]])
     pose = np.column_stack([rotation[:, 0], rotation[:, 1], [0, 0, distance]])

@@ -69,23 +69,20 @@ def caption(figure: str, task: Task, page: PageStyle, rng: Rng, written: dict[st
     return lines
 
 
-def title_rows(
-    task: Task, page: PageStyle, rng: Rng, sheet: tuple[int, int], student: str, written: dict[str, str]
-) -> list[list[str]]:
-    """The cells of the title block, row by row."""
+def title_rows(task: Task, page: PageStyle, rng: Rng, written: dict[str, str]) -> list[list[str]]:
+    """The cells of the title block, row by row; scales written go into `written`."""
     words = WORDS[page.language]
     who = task.variant.n if task.variant.n is not None else task.variant.position
     title = task.assignment.file.title
     name = title.in_language(page.language)
-    rows = [[name], [f"{words['name']}: {student}", f"{words['number']} {who}"]]
+    rows = [[name], [f"{words['number']} {who}"]]
     if page.scales_written in {"title", "both"}:
         scales = {n: scale_text(n, task.declared[n], task, page, rng) for n in ("kL", "kv", "ka")}
         written.update({n: plain(text) for n, text in scales.items()})
         rows.append(list(scales.values())[:2])
-        rows.append([scales["ka"], f"{words['sheet']} {sheet[0]}/{sheet[1]}"])
+        rows.append([scales["ka"]])
     else:
-        rows.append([f"{words['group']} {rng.choice(['ME-213', 'TM-31', 'M2-04', '402'])}",
-                     f"{words['sheet']} {sheet[0]}/{sheet[1]}"])
+        rows.append([f"{words['group']} {rng.choice(['ME-213', 'TM-31', 'M2-04', '402'])}"])
     if rng.random() < 0.5:
         rows.append([f"{words['date']} {rng.integers(1, 29)}.{rng.integers(1, 13):02d}.2025"])
     return rows
@@ -104,7 +101,7 @@ def calculations(task: Task, page: PageStyle, nodes: Mapping[str, complex]) -> l
     pull = abs(float(known[f"a_{crank.pin}_n"]))
     lines = [
         f"ω_1 = π n/30 = {number(speed / arm, page)} s^{{-1}}",
-        f"v_{crank.pin} = ω_1·{crank.pivot[0]}_{crank.pivot[1:] or ' '}{crank.pin} = {number(speed, page)} m/s",
+        f"v_{crank.pin} = ω_1·l = {number(speed, page)} m/s",
         f"a_{crank.pin} = ω_1^2·l = {number(pull, page)} m/s^2",
     ]
     for vector in task.wrong.construction.vectors_of(VELOCITY):
@@ -112,6 +109,6 @@ def calculations(task: Task, page: PageStyle, nodes: Mapping[str, complex]) -> l
             length = abs(nodes[vector.head] - nodes[vector.tail])
             value = length * task.used["kv"]
             about = vector.name.split("_", 1)[1]
-            drawn = number(round(length * 2) / 2, page)
-            lines.append(f"v_{{{about}}} = {drawn}·{number(task.used['kv'], page, 3)} = {number(value, page, 3)} m/s")
+            drawn, scale = number(round(length * 2) / 2, page), number(task.used["kv"], page, 3)
+            lines.append(f"v_{{{about}}} = {drawn}·{scale} = {number(value, page, 3)} m/s")
     return lines
