@@ -47,7 +47,7 @@ JPEG_QUALITY = 78
 PNG_COMPRESSION = 4
 
 
-def overlay(
+def overlay(  # noqa: PLR0913 - a page and all that is known of it
     page: Page,
     sheet: Sheet | None,
     reading: Reading | None,

@@ -65,7 +65,7 @@ def read_results(out_dir: Path) -> ResultsDocument:
         ) from error
 
 
-def export(
+def export(  # noqa: PLR0913 - an option each of the command
     results: ResultsDocument,
     to: str,
     path: Path,
@@ -119,7 +119,7 @@ def export(
     return Delivery(path, written, _withheld(grades))
 
 
-def _worksheet(
+def _worksheet(  # noqa: PLR0913 - all that the file holds
     grades: list[Grade],
     people: Mapping[str, Person],
     comments: Mapping[str, str],
@@ -135,7 +135,7 @@ def _worksheet(
     filled = fill(data, worksheet.name, grades, people, comments, rescale=rescale)
     write_whole(path, filled.data)
     missing = dict(filled.not_found)
-    missing.update({student: "Moodle says that this grade cannot be changed" for student in filled.locked})
+    missing.update(dict.fromkeys(filled.locked, "Moodle says that this grade cannot be changed"))
     return Delivery(path, filled.written, _withheld(grades), missing, filled.notes)
 
 

@@ -47,7 +47,8 @@ def grades_of(
     Raises CallError where the choice is missing or not one.
     """
     if combine is not None and combine not in COMBINE:
-        raise CallError("combine", f"'{combine}' is no way to combine positions: choose {' or '.join(COMBINE)}")
+        known = " or ".join(COMBINE)
+        raise CallError("combine", f"'{combine}' is no way to combine positions: choose {known}")
     if position is not None and combine is not None:
         raise CallError("combine", "either one position or a way to combine them, not both")
     found = []

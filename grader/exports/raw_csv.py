@@ -61,7 +61,8 @@ def parse(data: bytes, file: str, delimiter: str = ",") -> RawTable:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputFileError(
-            "not_utf8", f"{file}: is not UTF-8 text (byte {error.start}); download it again and do not resave it"
+            "not_utf8",
+            f"{file}: is not UTF-8 text (byte {error.start}); download it again and do not resave it",
         ) from error
     mark = "\ufeff" if text.startswith("\ufeff") else ""
     table = RawTable(mark, delimiter)

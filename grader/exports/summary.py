@@ -66,8 +66,10 @@ def _criterion_row(report: ReportDocument, criterion: CriterionDocument) -> list
     measured, expected, tolerance = criterion.measured, criterion.expected, criterion.tolerance
     return [
         report.student_id, report.variant.get("n"), report.position, report.status,
-        criterion.id, criterion.title, criterion.vector, criterion.verdict, criterion.points, criterion.max_points,
+        criterion.id, criterion.title, criterion.vector, criterion.verdict,
+        criterion.points, criterion.max_points,
         measured.length_mm, measured.direction_deg, measured.value,
         expected.length_mm, expected.direction_deg, expected.value, expected.unit or measured.unit,
-        tolerance.length_mm, tolerance.direction_deg, criterion.confidence, criterion.mistake, criterion.feedback,
+        tolerance.length_mm, tolerance.direction_deg,
+        criterion.confidence, criterion.mistake, criterion.feedback,
     ]  # fmt: skip

@@ -3,4 +3,11 @@
 from grader.feedback.pages import write_feedback, write_index
 from grader.feedback.sentences import Level, criterion_feedback, mistake_feedback, reason_sentence
 
-__all__ = ["Level", "criterion_feedback", "mistake_feedback", "reason_sentence", "write_feedback", "write_index"]
+__all__ = [
+    "Level",
+    "criterion_feedback",
+    "mistake_feedback",
+    "reason_sentence",
+    "write_feedback",
+    "write_index",
+]

@@ -16,8 +16,8 @@ from grader.documents import (
     ToleranceDocument,
 )
 from grader.feedback import statistics, words
-from grader.feedback.overlay import View, views
 from grader.feedback.mistakes import MISTAKES
+from grader.feedback.overlay import View, views
 from grader.feedback.problems import problem_sentence, unmatched_sentence
 from grader.feedback.sentences import PLACES, Level, mistake_sentences, place
 from grader.files import write_whole
@@ -29,7 +29,7 @@ SHEET = N_("the sheet")
 _NO_NAMES: Mapping[str, str] = {}
 
 
-def write_feedback(
+def write_feedback(  # noqa: PLR0913 - all that the file holds
     report: ReportDocument,
     pictures: Sequence[Picture],
     out_dir: Path,
@@ -60,7 +60,7 @@ def write_feedback(
     write_whole(out_dir / "feedback.html", page)
 
 
-def feedback_page(
+def feedback_page(  # noqa: PLR0913 - all that the file holds
     report: ReportDocument,
     pictures: Sequence[Picture],
     lang: str,

@@ -34,7 +34,9 @@ HINTS: dict[str, str] = {
     "doubtful": N_("It was read with too little certainty."),
     "near_limit": N_("It lies so near the limit of the tolerance that the scan cannot decide."),
     "readings_disagree": N_("The drawing and the entered measurement differ."),
-    "follows": N_("It follows rightly from your own earlier work; the earlier mistake is charged once, there."),
+    "follows": N_(
+        "It follows rightly from your own earlier work; the earlier mistake is charged once, there."
+    ),
     "scale_refused": N_("The declared scale could not be understood."),
     "scale_off": N_("The declared scale does not fit the drawing and the data."),
     "scale_assumed": N_("The scale was not declared; the assignment's own rule was assumed."),
@@ -53,7 +55,9 @@ FULL: dict[str, str] = {
     ),
     "value_too_large": N_("The value is too large: %(measured)s instead of %(expected)s."),
     "value_too_small": N_("The value is too small: %(measured)s instead of %(expected)s."),
-    "value_reversed": N_("The sign is wrong: %(measured)s instead of %(expected)s; counter-clockwise is positive."),
+    "value_reversed": N_(
+        "The sign is wrong: %(measured)s instead of %(expected)s; counter-clockwise is positive."
+    ),
     "unread": N_("It could not be read on the sheet (%(reason)s)."),
     "doubtful": N_("It was read with too little certainty (%(confidence)s)."),
     "near_limit": N_(
@@ -67,7 +71,9 @@ FULL: dict[str, str] = {
 """What is said at level `full` where that differs."""
 
 FOLLOWS: dict[str, str] = {
-    "nodes": N_("It follows rightly from your own earlier points; the earlier mistake is charged once, there."),
+    "nodes": N_(
+        "It follows rightly from your own earlier points; the earlier mistake is charged once, there."
+    ),
     "scale": N_("It is right at the scale that you used; the scale is charged once, there."),
     "vector": N_("It follows rightly from your own %(of)s; that mistake is charged once, there."),
     "value": N_("It follows rightly from your own %(of)s; that mistake is charged once, there."),

@@ -42,7 +42,10 @@ def a_class():
     return results(
         report(
             "s01", 7.5, n=1,
-            criteria=[criterion("v_A", "full", 5.0, "Right."), criterion("v_B", "partial", 2.5, "It is too long.")],
+            criteria=[
+                criterion("v_A", "full", 5.0, "Right."),
+                criterion("v_B", "partial", 2.5, "It is too long."),
+            ],
             mistakes=[MistakeDocument(code="sense_reversed", at="v_B", explains=["v_B"], confidence=0.9)],
         ),
         report(

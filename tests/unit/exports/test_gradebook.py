@@ -4,12 +4,12 @@ import csv
 import io
 
 import pytest
-from tests.unit.exports.classroom import report, results
 
 from grader.exports import Person, export, read_results
 from grader.exports.grades import grades_of
 from grader.exports.moodle_gradebook import gradebook_text
 from reference.errors import CallError, InputFileError
+from tests.unit.exports.classroom import report, results
 
 
 def rows(text):
