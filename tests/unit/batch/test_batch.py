@@ -1,0 +1,108 @@
+import json
+
+import pytest
+
+from grader.batch import Batch, folders_of, grade, needs_person
+from grader.pipeline import Work
+from grader.plan_document import plan_document
+from grader.rubric import load_rubric
+from reference.assignment import Variant, load_assignment
+from reference.errors import AuthoredFileError, CallError
+from reference.plan import exact_plan
+
+PUMP = load_assignment("pump")
+RUBRIC = load_rubric("pump-velocity")
+
+
+def perfect(n):
+    plan = plan_document(PUMP, exact_plan(PUMP, [Variant(n=n)]))
+    return {
+        "n": n,
+        "scales": {"kL": "1:5", "kv": "kv = omega kL"},
+        "segments_mm": {name: one.drawn_mm for name, one in plan.vectors.items() if name.startswith("v")},
+    }
+
+
+@pytest.fixture
+def class_folder(tmp_path):
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for student, n in (("s1", 4), ("s2", 9)):
+        (folder / f"{student}.json").write_text(json.dumps({"student_id": student, **perfect(n)}))
+    (folder / "roster.csv").write_text("student_id,name,n\ns1,Ana,4\ns2,Ion,9\ns3,Ilie,5\n")
+    return folder
+
+
+def run(folder, out, **changes):
+    told = []
+    batch = Batch(PUMP, RUBRIC, folder, out, **changes)
+    return grade(batch, lambda *progress: told.append(progress)), told
+
+
+def test_perfect_measurements_have_full_marks_and_nothing_handed_in_is_missing(class_folder, tmp_path):
+    results, _ = run(class_folder, tmp_path / "out")
+    states = {report.student_id: (report.status, report.score) for report in results.reports}
+    assert states == {"s1": ("graded", 20.0), "s2": ("graded", 20.0), "s3": ("missing", None)}
+    assert needs_person(results)
+    for name in ("results.json", "summary.csv", "index.html", "s1/report.json", "s1/feedback.html"):
+        assert (tmp_path / "out" / name).is_file()
+
+
+def test_a_second_run_marks_only_what_changed(class_folder, tmp_path):
+    out = tmp_path / "out"
+    first, _ = run(class_folder, out)
+    before = {name: (out / name / "report.json").stat().st_mtime_ns for name in ("s1", "s2")}
+    (class_folder / "s2.json").write_text(json.dumps({"student_id": "s2", **perfect(9), "segments_mm": {"v_A": 1}}))
+    second, _ = run(class_folder, out)
+    after = {name: (out / name / "report.json").stat().st_mtime_ns for name in ("s1", "s2")}
+    assert after["s1"] == before["s1"]
+    assert after["s2"] > before["s2"]
+    assert second.reports[0] == first.reports[0]
+    assert second.reports[1] != first.reports[1]
+
+
+def test_a_broken_file_stops_nobody_else(class_folder, tmp_path):
+    (class_folder / "s3.jpg").write_bytes(b"")
+    (class_folder / "s9.json").write_text("{")
+    results, _ = run(class_folder, tmp_path / "out")
+    assert [report.status for report in results.reports] == ["graded", "graded", "unreadable"]
+    assert "0 bytes" in results.reports[2].problems[0].message
+    assert [one.file for one in results.unmatched] == ["s9.json"]
+
+
+def test_progress_is_told_to_the_end(class_folder, tmp_path):
+    _, told = run(class_folder, tmp_path / "out")
+    assert told[-1] == ("marking", 3, 3)
+    assert ("looking", 2, 2) in told
+
+
+def test_several_processes_give_the_same_results(class_folder, tmp_path):
+    alone, _ = run(class_folder, tmp_path / "one")
+    together, _ = run(class_folder, tmp_path / "two", jobs=2)
+    assert together == alone
+
+
+def test_results_inside_the_folder_are_no_submissions(class_folder):
+    out = class_folder / "results"
+    first, _ = run(class_folder, out)
+    second, _ = run(class_folder, out)
+    assert second == first
+
+
+def test_a_folder_that_is_not_there_or_empty_is_told(tmp_path):
+    with pytest.raises(CallError, match="no such folder"):
+        run(tmp_path / "nowhere", tmp_path / "out")
+    with pytest.raises(CallError, match="nothing to grade"):
+        run(tmp_path, tmp_path / "out")
+
+
+def test_a_roster_with_faults_stops_before_anything_is_written(class_folder, tmp_path):
+    (class_folder / "roster.csv").write_text("student_id,name,n\ns 1,Ana,4\n")
+    with pytest.raises(AuthoredFileError, match="line 2"):
+        run(class_folder, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_several_positions_have_a_folder_each():
+    works = [Work("a", Variant(position=1)), Work("a", Variant(position=2)), Work("b", Variant(position=1))]
+    assert folders_of(works) == ["a/1", "a/2", "b"]
