@@ -1,0 +1,238 @@
+"""Grading folders as an instructor does, and checking values as a student does."""
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import cv2
+import jsonschema
+import numpy as np
+import pikepdf
+import pytest
+
+from grader.documents import schema
+from reference.assignment import load_assignment
+from reference.plan import exact_plan
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+SAMPLES = ROOT / "samples"
+
+
+def perfect_rows(name: str) -> list[dict[str, str]]:
+    """Every variant of an assignment as a perfect hand would measure it, to six decimals."""
+    assignment = load_assignment(name)
+    variants = assignment.variants()
+    plan = exact_plan(assignment, variants)
+    rows = []
+    for index, variant in enumerate(variants):
+        row = {"student_id": f"s{index + 1:02d}", "n": variant.n, "position": variant.position}
+        for scale, unit in (("kL", "m/mm"), ("kv", "(m/s)/mm"), ("ka", "(m/s^2)/mm")):
+            row[scale] = f"{getattr(plan.scales, scale)[index]:.12g} {unit}"
+        for vector in plan.vectors_si:
+            row[vector] = f"{abs(plan.drawn_mm(vector)[index]):.6f}"
+            angle = plan.direction_deg(vector)[index]
+            row[f"{vector}_deg"] = "" if np.isnan(angle) else f"{angle:.6f}"
+        for rate, values in plan.rates.items():
+            row[f"{rate}_value"] = f"{values[index]:.9g}"
+        rows.append({key: "" if value is None else str(value) for key, value in row.items()})
+    return rows
+
+
+def write_table(path: Path, rows: list[dict[str, str]]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def write_roster(path: Path, rows: list[dict[str, str]]) -> None:
+    write_table(
+        path,
+        [
+            {
+                "student_id": row["student_id"],
+                "name": row["student_id"].upper(),
+                "n": row["n"],
+                "position": row["position"],
+            }
+            for row in rows
+        ],
+    )
+
+
+def results_of(folder: Path) -> dict:
+    results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    jsonschema.validate(results, schema("results"))
+    return results
+
+
+@pytest.mark.parametrize("name", ["pump", "pump-230", "pump-collinear", "press", "engine"])
+def test_a_perfect_hand_scores_full_marks_in_every_variant(planmark, tmp_path, name):
+    rows = perfect_rows(name)
+    write_table(tmp_path / "in" / "measured.csv", rows)
+    write_roster(tmp_path / "roster.csv", rows)
+    ran = planmark("grade", "in", "--assignment", name, "--roster", "roster.csv", "--out", "out", "--jobs", 1)
+    reports = results_of(tmp_path / "out")["reports"]
+    assert len(reports) == len(rows)
+    lost = {
+        (report["student_id"], one["id"]): one["verdict"]
+        for report in reports
+        for one in report["criteria"]
+        if one["verdict"] not in {"full", "not_judged"}
+    }
+    assert not lost
+    assert all(report["score"] == pytest.approx(report["max_score"]) for report in reports)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+
+
+def broken_files(folder: Path) -> list[str]:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "x1.jpg").write_bytes((SAMPLES / "pump" / "s01_1.jpg").read_bytes()[:20_000])
+    (folder / "x2.png").write_text("I am no picture", encoding="utf-8")
+    (folder / "x3.tif").write_bytes(b"")
+    with pikepdf.new() as document:
+        document.add_blank_page(page_size=(1191, 842))
+        document.save(folder / "x4.pdf", encryption=pikepdf.Encryption(owner="o", user="u"))
+    (folder / "x5.json").write_text("{", encoding="utf-8")
+    return ["x1.jpg", "x2.png", "x3.tif", "x4.pdf", "x5.json"]
+
+
+def test_broken_files_are_each_told_and_the_others_graded(planmark, tmp_path):
+    rows = perfect_rows("pump")[:2]
+    write_table(tmp_path / "in" / "measured.csv", rows)
+    write_roster(tmp_path / "roster.csv", rows)
+    broken = broken_files(tmp_path / "in")
+    ran = planmark(
+        "grade", "in", "--assignment", "pump", "--roster", "roster.csv", "--out", "out", "--jobs", 1
+    )
+    assert ran.returncode == 1
+    assert "Traceback" not in ran.stderr
+    results = results_of(tmp_path / "out")
+    told = {one["file"]: one["message"] for one in results["unmatched"]}
+    assert set(told) == set(broken)
+    assert all(len(message) > 10 for message in told.values())
+    assert [report["status"] for report in results["reports"]] == ["graded", "graded"]
+    for name in broken:
+        assert name in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_broken_file_of_a_known_student_is_that_students_problem(planmark, tmp_path):
+    rows = perfect_rows("pump")[:1]
+    write_roster(tmp_path / "roster.csv", rows)
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "s01.png").write_text("I am no picture", encoding="utf-8")
+    ran = planmark(
+        "grade", "in", "--assignment", "pump", "--roster", "roster.csv", "--out", "out", "--jobs", 1
+    )
+    assert ran.returncode == 1
+    (report,) = results_of(tmp_path / "out")["reports"]
+    assert report["status"] == "unreadable"
+    assert report["problems"][0]["file"] == "s01.png"
+    assert report["score"] is None
+
+
+def test_a_sample_sheet_is_graded_with_report_feedback_and_picture(planmark, tmp_path):
+    (tmp_path / "in").mkdir()
+    for page in ("s01_1.jpg", "s01_2.jpg"):
+        shutil.copy(SAMPLES / "pump" / page, tmp_path / "in" / page)
+    roster = (SAMPLES / "pump" / "roster.csv").read_text(encoding="utf-8").splitlines()[:2]
+    (tmp_path / "in" / "roster.csv").write_text("\n".join(roster) + "\n", encoding="utf-8")
+    ran = planmark("grade", "in", "--assignment", "pump", "--out", "out", "--jobs", 1, "--lang", "ro")
+    assert ran.returncode in {0, 1}, ran.stderr
+    folder = tmp_path / "out" / "s01"
+    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    jsonschema.validate(report, schema("report"))
+    assert len(report["reading"]["sheets"]) == 2
+    assert report["status"] in {"graded", "needs_review"}
+    assert (folder / "overlay.png").is_file()
+    assert (folder / "overlay_2.png").is_file()
+    page = (folder / "feedback.html").read_text(encoding="utf-8")
+    assert 'lang="ro"' in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    text = (tmp_path / "out" / "summary.csv").read_text(encoding="utf-8-sig")
+    summary = list(csv.DictReader(text.splitlines()))
+    assert summary[0]["student_id"] == "s01"
+    for target in ("csv", "moodle"):
+        sent = planmark("export", "out", "--to", target, "--file", f"{target}.csv")
+        assert sent.returncode in {0, 1}, sent.stderr
+        assert (tmp_path / f"{target}.csv").is_file()
+
+
+def test_what_is_read_is_printed_as_its_schema_says(planmark):
+    scan = SAMPLES / "press" / "s01_1.jpg"
+    ran = planmark("read", scan, "--assignment", "press", "--position", 1, "--json")
+    assert ran.returncode in {0, 1}, ran.stderr
+    sheets = json.loads(ran.stdout)
+    assert len(sheets) == 1
+    jsonschema.validate(sheets[0], schema("reading"))
+    assert sheets[0]["source"] == "s01_1.jpg"
+    assert sheets[0]["sheet"]["px_per_mm"] == pytest.approx(150 / 25.4, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["empty.png", "photo.jpg"])
+def test_a_page_that_is_no_drawing_is_read_as_nothing(planmark, tmp_path, name):
+    rng = np.random.default_rng(3)
+    blank = np.full((1240, 1754), 250, np.uint8)
+    noise = cv2.GaussianBlur(rng.integers(0, 255, (900, 1200, 3), np.uint8), (0, 0), 9)
+    cv2.imwrite(str(tmp_path / name), blank if name == "empty.png" else noise)
+    ran = planmark("read", name, "--assignment", "pump", "--n", 3, "--json")
+    assert ran.returncode == 1
+    (sheet,) = json.loads(ran.stdout)
+    assert sheet["figures"] == {}
+    assert sheet["unread"] or sheet["problems"]
+
+
+def one_student(tmp_path: Path, **changes: float) -> Path:
+    row = perfect_rows("pump")[6]
+    plan = {key: float(row[key]) for key in row if key.startswith(("v_", "a_")) and "_deg" not in key}
+    document = {"student_id": "s07", "n": 7, "scales": {k: row[k] for k in ("kL", "kv", "ka")}}
+    document["segments_mm"] = plan | changes
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
+
+
+def test_a_students_right_values_are_told_right(planmark, tmp_path):
+    ran = planmark("check", "pump", "--measured", one_student(tmp_path))
+    assert ran.returncode == 0, ran.stdout
+    assert "✗" not in ran.stdout
+
+
+def test_a_students_wrong_value_is_told_without_giving_the_answer_away(planmark, tmp_path):
+    right_mm = float(perfect_rows("pump")[6]["v_D"])
+    ran = planmark("check", "pump", "--n", 7, "--measured", one_student(tmp_path, v_D=right_mm + 9.0))
+    assert ran.returncode == 1
+    assert "✗" in ran.stdout
+    assert f"{right_mm:.1f}" not in ran.stdout
+    assert f"{right_mm:.0f} mm" not in ran.stdout
+
+
+def test_a_roster_that_is_wrong_stops_before_anything_is_written(planmark, tmp_path):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "roster.csv").write_text("student_id,name\nno/slash,A\ns01,B\ns01,C\n", encoding="utf-8")
+    ran = planmark("grade", "in", "--assignment", "pump", "--roster", "roster.csv", "--out", "out")
+    assert ran.returncode == 2
+    assert "no/slash" in ran.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "grade nowhere --assignment pump --out out",
+        "grade . --assignment pmup --out out",
+        "grade . --assignment pump --roster nowhere.csv --out out",
+        "grade . --assignment pump --out out --lang xx",
+        "check pump --n 7 --measured nowhere.json",
+        "read nowhere.jpg --assignment pump",
+        "export nowhere --to csv",
+    ],
+)
+def test_a_call_that_names_what_there_is_not_is_refused(planmark, tmp_path, call):
+    ran = planmark(*call.split())
+    assert ran.returncode == 2, ran.stdout + ran.stderr
+    assert ran.stderr.strip()
+    assert "Traceback" not in ran.stderr
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,125 @@
+"""``planmark plan`` and what every command has in common."""
+
+import json
+import xml.etree.ElementTree as ET
+
+import jsonschema
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from grader.cli.app import app
+from grader.documents import schema, schema_names
+from reference.assignment import library
+
+
+def test_the_table_of_the_press_shows_the_five_printed_segments(planmark):
+    ran = planmark("plan", "press", "--position", 1)
+    assert ran.returncode == 0
+    assert ran.stderr == ""
+    for vector, segment in (
+        ("v_B", "46.40"),
+        ("v_BA", "47.17"),
+        ("v_C", "92.80"),
+        ("v_D", "89.36"),
+        ("v_DC", "21.61"),
+    ):
+        line = next(line for line in ran.stdout.splitlines() if line.split()[:1] == [vector])
+        assert line.split()[1] == segment
+
+
+@pytest.mark.parametrize(
+    "call", ["pump --n 1", "press --position 0", "engine --n 24", "pump-collinear --n 30"]
+)
+def test_the_plan_as_json_is_what_its_schema_says(planmark, call):
+    ran = planmark("plan", *call.split(), "--json")
+    assert ran.returncode == 0
+    document = json.loads(ran.stdout)
+    jsonschema.validate(document, schema("plan"))
+    assert document["schema_version"] == 1
+    assert document["assignment"] == call.split()[0]
+
+
+def test_a_zero_vector_has_no_direction(planmark):
+    document = json.loads(planmark("plan", "press", "--position", 0, "--json").stdout)
+    assert document["vectors"]["v_B"]["direction_deg"] is None
+    assert document["vectors"]["v_BA"]["drawn_mm"] == pytest.approx(50.0)
+
+
+def test_the_scales_follow_from_the_crank_as_drawn(planmark):
+    document = json.loads(planmark("plan", "pump", "--n", 7, "--crank-mm", 50, "--json").stdout)
+    assert document["scales"]["kL"] == pytest.approx(0.30 / 50)
+    assert document["vectors"]["v_A"]["drawn_mm"] == pytest.approx(50.0)
+
+
+def test_the_plan_is_drawn_into_a_file(planmark, tmp_path):
+    ran = planmark("plan", "pump", "--n", 7, "--svg", "new/plan.svg")
+    assert ran.returncode == 0
+    assert ET.parse(tmp_path / "new" / "plan.svg").getroot().tag.endswith("svg")
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["plan.svg"]
+
+
+@pytest.mark.parametrize(
+    ("call", "status", "words"),
+    [
+        ("plan pmup", 2, "built in are engine, press"),
+        ("plan pump", 2, "needs --n (n from 1 to 30)"),
+        ("plan pump --n 31", 2, "has n from 1 to 30"),
+        ("plan press --position 8", 2, "has position from 0 to 7"),
+        ("plan nowhere.toml --n 1", 2, "no such file"),
+        ("plan pump --n 1 --crank-mm 0", 2, "above 0"),
+        ("plan pump --n 1 --crank-mm nan", 2, "above 0"),
+        ("plan pump --n one", 2, "is not a valid"),
+        ("plan pump --m 1", 2, "No such option"),
+        ("schema rapport", 2, "known are"),
+        ("plan pump --n 1 --svg /proc/plan.svg", 5, "cannot be written"),
+    ],
+)
+def test_a_wrong_call_ends_with_its_status_and_one_message(planmark, tmp_path, call, status, words):
+    ran = planmark(*call.split())
+    assert ran.returncode == status
+    assert words in " ".join(ran.stderr.replace("│", " ").split())
+    assert "Traceback" not in ran.stderr
+    assert ran.stdout == ""
+    assert not list(tmp_path.iterdir())
+
+
+def test_all_faults_of_an_authored_file_are_told_at_once(planmark, tmp_path):
+    (tmp_path / "my.assignment.toml").write_text('schema_version = 2\nid = "my"\ncolour = "red"\n')
+    ran = planmark("plan", "my.assignment.toml")
+    assert ran.returncode == 2
+    for path in ("$.schema_version", "$.colour", "$.title.en"[:7], "$.mechanism", "$.scales", "$.page"):
+        assert path in ran.stderr
+
+
+def test_a_mechanism_that_does_not_assemble_has_its_own_status(planmark, tmp_path):
+    own = planmark("plan", "pump", "--n", 1, cwd=tmp_path)
+    assert own.returncode == 0
+    for kind in ("assignment", "mechanism"):
+        text = (library() / f"pump.{kind}.toml").read_text(encoding="utf-8")
+        text = text.replace("lengths = [40, 30]", "lengths = [4, 3]")
+        (tmp_path / f"pump.{kind}.toml").write_text(text, encoding="utf-8")
+    ran = planmark("plan", "./pump.assignment.toml", "--n", 1)
+    assert ran.returncode == 3
+    assert "group of B does not assemble" in ran.stderr
+
+
+@pytest.mark.parametrize("name", schema_names())
+def test_every_schema_is_a_schema(planmark, name):
+    ran = planmark("schema", name)
+    assert ran.returncode == 0
+    jsonschema.Draft202012Validator.check_schema(json.loads(ran.stdout))
+
+
+@pytest.mark.parametrize("command", sorted(typer.main.get_command(app).commands))
+def test_every_command_explains_itself(command):
+    told = CliRunner().invoke(app, [command, "--help"])
+    assert told.exit_code == 0
+    assert len(told.output) > 200
+
+
+def test_the_program_tells_its_version_and_its_commands(planmark):
+    assert planmark("--version").stdout.startswith("planmark 0.")
+    assert planmark("--help").returncode == 0
+    assert planmark().returncode == 2
+    assert planmark("frobnicate").returncode == 2
