@@ -18,6 +18,7 @@ TEMPERATURE = 3.0
 """Scores are this much too sure of themselves: strokes of one hand err alike."""
 HIGHEST = 0.995
 SHARED_STROKE = 0.8
+SHARED_CLOSELY = 0.93
 
 
 @dataclass(frozen=True, slots=True)

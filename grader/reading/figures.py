@@ -8,6 +8,8 @@ from grader.reading.plans import Plan
 from grader.reading.sketch import Sketch
 from grader.records import Figure, FloatArray, ReadNode, ReadVector, Unread
 
+CLOSE_MM = 0.35
+"""Two vectors on one stroke, both within this of it, could not be drawn any other way."""
 LEAST_VECTOR_MM = 2.0
 """A shorter vector is known by its nodes, whether or not it has a stroke."""
 
@@ -73,7 +75,8 @@ def _vectors(plan: Plan, fit: Fit, sure: FloatArray) -> tuple[dict[str, ReadVect
             continue
         sureness = float(min(sure[edge.tail], sure[edge.head]))
         if plan.found.shared[index]:
-            sureness = min(sureness, confidence.SHARED_STROKE)
+            off = float(np.abs(fit.residual_mm[index]).max())
+            sureness = min(sureness, confidence.SHARED_CLOSELY if off < CLOSE_MM else confidence.SHARED_STROKE)
         vectors[edge.name] = _vector(fit, edge.tail, edge.head, span, sureness)
     return vectors, unread
 

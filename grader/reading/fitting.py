@@ -10,17 +10,46 @@ from grader.reading.matching import Explanation
 from grader.records import FloatArray
 from reference.geometry import ComplexArray
 
-ROUNDS = 5
+ROUNDS = 6
 LEAST_REDRAW_MM = 0.12
 MOST_REDRAW_MM = 0.6
-END_MM = 0.25
-END_REACH_MM = 4.0
+AT_MM = 0.2
+"""How far a stroke that ends at its node ends from it."""
+END_REACH_MM = 5.0
 CENTRE_MM = 0.2
 """How far a circle drawn around a node is off it."""
-RUN_ON = 0.25
-"""Density of ends run on past their node, relative to that of ends at it."""
 LOOSE_MM = 6.0
 """Standard error of the belief that keeps unseen nodes from running away: it decides nothing else."""
+
+
+@dataclass(frozen=True, slots=True)
+class EndModel:
+    """Where strokes end about their nodes: at it, run on a little or far, or short of it.
+
+    Shares of `at`, `little`, `far`, `short` and the mean lengths (mm) of the last three.
+    """
+
+    at_mm: float = AT_MM
+    shares: tuple[float, float, float, float] = (0.45, 0.28, 0.2, 0.07)
+    reach_mm: tuple[float, float, float] = (0.7, 5.0, 1.2)
+
+    def density(self, gap: FloatArray, se_end: FloatArray) -> FloatArray:
+        """Per mm, of ends `gap` mm beyond their nodes; `se_end` is the end's own standard error."""
+        sigma = np.sqrt(self.at_mm**2 + se_end**2)
+        at = np.exp(-0.5 * (gap / sigma) ** 2) / (sigma * np.sqrt(2.0 * np.pi))
+        beyond = 1.0 / (1.0 + np.exp(-np.clip(1.7 * gap / sigma, -60.0, 60.0)))
+        little, far, short = self.reach_mm
+        over = np.maximum(gap, 0.0)
+        return np.asarray(
+            self.shares[0] * at
+            + self.shares[1] * beyond * np.exp(-over / (little + sigma)) / (little + sigma)
+            + self.shares[2] * beyond * np.exp(-over / far) / far
+            + self.shares[3] * (1.0 - beyond) * np.exp(np.minimum(gap, 0.0) / short) / short
+        )
+
+
+PLAN_ENDS = EndModel()
+LINK_ENDS = EndModel(at_mm=1.5, shares=(0.7, 0.1, 0.1, 0.1), reach_mm=(2.0, 6.0, 3.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,78 +69,90 @@ class Fit:
     residual_mm: FloatArray
 
 
+@dataclass(frozen=True, slots=True)
+class _Lines:
+    """Rows: a node lies on a stroke's line. `design` @ nodes should equal `goal`, to `sigma` mm."""
+
+    design: FloatArray
+    goal: FloatArray
+    sigma: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class _Ends:
+    """Rows: a stroke ends about a node. Along the stroke's outward `design` direction, the end is at `end`."""
+
+    design: FloatArray
+    end: FloatArray
+    se: FloatArray
+
+
 def fit_nodes(
     found: Explanation,
     lines: Lines,
-    end_mm: float = END_MM,
+    ends: EndModel = PLAN_ENDS,
     centres: Mapping[int, complex] | None = None,
 ) -> Fit:
-    """Weighted least squares over all strokes taken, repeated with large misfits held back.
+    """Weighted least squares over all strokes taken, with large misfits held back.
 
-    A stroke's end that lies near its node may be the node or a line run on past it: it counts by the
-    probability of the former, given where the node now is.
+    A stroke's end near its node may be the node or a line run on past it. Each end's own density is
+    replaced by a Gaussian with the moments that it has in the light of everything else (expectation
+    propagation; Minka 2001), so that the covariance owns up to what ends cannot tell.
 
     Arguments: `centres` of circles drawn around nodes, by node.
     """
-    expected = found.expected
+    at = found.expected.at.copy()
+    count = 2 * len(at)
     redraw = 0.3
-    at = expected.at.copy()
-    cov = np.eye(2 * len(at)) * LOOSE_MM**2
+    about = _end_rows(found, lines, at)
+    precision, pull = np.zeros(len(about.end)), np.zeros(len(about.end))
+    cov = np.eye(count) * LOOSE_MM**2
     for _ in range(ROUNDS):
-        design, values, sigma, is_end = _observations(found, lines, at, redraw, end_mm)
-        design, values, sigma, is_end = _with_centres(design, values, sigma, is_end, at, centres or {})
-        scaled = np.abs(values / sigma)
-        weights = np.where(is_end, _end_weight(scaled), np.minimum(1.0, 2.0 / np.maximum(scaled, 1e-9)))
-        rows = design * (np.sqrt(weights) / sigma)[:, None]
-        normal = rows.T @ rows + np.eye(2 * len(at)) / LOOSE_MM**2
+        rows = _line_rows(found, lines, at, redraw, centres or {})
+        state = _pairs(at)
+        misfit = np.abs(rows.goal - rows.design @ state) / rows.sigma
+        weight = np.minimum(1.0, 2.0 / np.maximum(misfit, 1e-9)) / rows.sigma**2
+        normal = rows.design.T @ (rows.design * weight[:, None]) + np.eye(count) / LOOSE_MM**2
+        right = rows.design.T @ (rows.goal * weight) + _pairs(found.expected.at) / LOOSE_MM**2
+        normal = normal + about.design.T @ (about.design * precision[:, None])
+        right = right + about.design.T @ pull
         cov = np.asarray(np.linalg.inv(normal), dtype=np.float64)
-        prior = _pairs(expected.at - at) / LOOSE_MM**2
-        step = cov @ (rows.T @ (values * np.sqrt(weights) / sigma) + prior)
-        at = at + step[0::2] + 1j * step[1::2]
-        redraw = _redraw(found, lines, at, design.shape)
+        state = cov @ right
+        at = state[0::2] + 1j * state[1::2]
+        redraw = _redraw(found, lines, at, count)
+        precision, pull = _sites(about, state, cov, precision, pull, ends)
     return Fit(at, cov, redraw, _residuals(found, lines, at))
 
 
-def _with_centres(  # noqa: PLR0913
-    design: FloatArray,
-    values: FloatArray,
-    sigma: FloatArray,
-    is_end: np.ndarray,
-    at: ComplexArray,
-    centres: Mapping[int, complex],
-) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray]:
-    rows, missing = [], []
-    for node, centre in centres.items():
-        for axis, value in enumerate(((centre - at[node]).real, (centre - at[node]).imag)):
-            row = np.zeros(2 * len(at))
-            row[2 * node + axis] = 1.0
-            rows.append(row)
-            missing.append(value)
-    if not rows:
-        return design, values, sigma, is_end
-    return (
-        np.vstack([design, rows]),
-        np.append(values, missing),
-        np.append(sigma, np.full(len(rows), CENTRE_MM)),
-        np.append(is_end, np.zeros(len(rows), dtype=bool)),
-    )
-
-
-def _end_weight(scaled: FloatArray) -> FloatArray:
-    """Probability that an end this many standard errors off its node is meant to be at it."""
-    at_node = np.exp(-0.5 * scaled**2)
-    return np.asarray(at_node / (at_node + RUN_ON))
+def _sites(  # noqa: PLR0913
+    about: _Ends, state: FloatArray, cov: FloatArray, precision: FloatArray, pull: FloatArray, ends: EndModel
+) -> tuple[FloatArray, FloatArray]:
+    """The Gaussian that stands for each end: its precision, and precision times place."""
+    if not len(about.end):
+        return precision, pull
+    mean = about.design @ state
+    variance = np.maximum(np.einsum("ij,jk,ik->i", about.design, cov, about.design), 1e-6)
+    rest = np.maximum(1.0 / variance - precision, 1.0 / LOOSE_MM**2)
+    rest_mean = (mean / variance - pull) / rest
+    grid = np.linspace(-4.0, 4.0, 81)
+    place = rest_mean[:, None] + grid / np.sqrt(rest)[:, None]
+    weight = np.exp(-0.5 * grid**2) * ends.density(about.end[:, None] - place, about.se[:, None])
+    weight /= weight.sum(axis=1, keepdims=True)
+    new_mean = (weight * place).sum(axis=1)
+    new_variance = np.maximum((weight * (place - new_mean[:, None]) ** 2).sum(axis=1), 1e-4)
+    fresh = np.maximum(1.0 / new_variance - rest, 0.0)
+    fresh_pull = np.where(fresh > 0.0, new_mean / new_variance - rest_mean * rest, 0.0)
+    return 0.5 * (precision + fresh), 0.5 * (pull + fresh_pull)
 
 
 def _pairs(values: ComplexArray) -> FloatArray:
     return np.column_stack([values.real, values.imag]).ravel()
 
 
-def _observations(
-    found: Explanation, lines: Lines, at: ComplexArray, redraw: float, end_mm: float
-) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray]:
-    """Rows of the design, what is missing in each (mm), standard errors, whether it is of an end."""
-    rows, values, sigmas, of_end = [], [], [], []
+def _line_rows(
+    found: Explanation, lines: Lines, at: ComplexArray, redraw: float, centres: Mapping[int, complex]
+) -> _Lines:
+    design, goal, sigma = [], [], []
     middles = lines.middle
     for index, edge in enumerate(found.expected.edges):
         row = int(found.stroke[index])
@@ -119,25 +160,46 @@ def _observations(
             continue
         along, middle = complex(lines.along[row]), complex(middles[row])
         loose = 0.5 if found.shared[index] else redraw
-        for slot, node in enumerate((edge.tail, edge.head)):
-            off = (at[node] - middle) * np.conj(along)
-            h = np.zeros(2 * len(at))
-            h[2 * node : 2 * node + 2] = (-along.imag, along.real)
-            rows.append(h)
-            values.append(-off.imag)
-            sigmas.append(np.sqrt(loose**2 + lines.se_offset[row] ** 2 + (lines.se_angle[row] * off.real) ** 2))
-            of_end.append(False)
+        for node in (edge.tail, edge.head):
+            arm = float(((at[node] - middle) * np.conj(along)).real)
+            design.append(_row(len(at), node, 1j * along))
+            goal.append(float((middle * np.conj(1j * along)).real))
+            sigma.append(float(np.sqrt(loose**2 + lines.se_offset[row] ** 2 + (lines.se_angle[row] * arm) ** 2)))
+    for node, centre in centres.items():
+        for axis, value in ((1.0 + 0j, centre.real), (1j, centre.imag)):
+            design.append(_row(len(at), node, axis))
+            goal.append(value)
+            sigma.append(CENTRE_MM)
+    if not design:
+        return _Lines(np.zeros((0, 2 * len(at))), np.zeros(0), np.zeros(0))
+    return _Lines(np.array(design), np.array(goal), np.array(sigma))
+
+
+def _end_rows(found: Explanation, lines: Lines, at: ComplexArray) -> _Ends:
+    """The ends of strokes of their own that lie within reach of a node, each outward."""
+    design, goal, errors = [], [], []
+    for index, edge in enumerate(found.expected.edges):
+        row = int(found.stroke[index])
+        if row < 0 or found.shared[index]:
+            continue
+        for node, other in ((edge.tail, edge.head), (edge.head, edge.tail)):
+            along = complex(lines.along[row])
+            if ((at[node] - at[other]) * np.conj(along)).real < 0:
+                along = -along
             end, error = lines.nearer_end(row, complex(at[node]))
-            if not found.shared[index] and abs(end - at[node]) < END_REACH_MM:
-                h = np.zeros(2 * len(at))
-                h[2 * node : 2 * node + 2] = (along.real, along.imag)
-                rows.append(h)
-                values.append(((end - at[node]) * np.conj(along)).real)
-                sigmas.append(np.sqrt(end_mm**2 + error**2))
-                of_end.append(True)
-    if not rows:
-        rows, values, sigmas, of_end = [np.zeros(2 * len(at))], [0.0], [1.0], [False]
-    return np.array(rows), np.array(values), np.array(sigmas), np.array(of_end)
+            if abs(((end - at[node]) * np.conj(along)).real) < END_REACH_MM:
+                design.append(_row(len(at), node, along))
+                goal.append(float((end * np.conj(along)).real))
+                errors.append(error)
+    if not design:
+        return _Ends(np.zeros((0, 2 * len(at))), np.zeros(0), np.zeros(0))
+    return _Ends(np.array(design), np.array(goal), np.array(errors))
+
+
+def _row(count: int, node: int, along: complex) -> FloatArray:
+    row = np.zeros(2 * count)
+    row[2 * node : 2 * node + 2] = (along.real, along.imag)
+    return row
 
 
 def _residuals(found: Explanation, lines: Lines, at: ComplexArray) -> FloatArray:
@@ -151,11 +213,11 @@ def _residuals(found: Explanation, lines: Lines, at: ComplexArray) -> FloatArray
     return off
 
 
-def _redraw(found: Explanation, lines: Lines, at: ComplexArray, shape: tuple[int, ...]) -> float:
+def _redraw(found: Explanation, lines: Lines, at: ComplexArray, unknowns: int) -> float:
     """How far strokes miss nodes here, from what is left over beyond the unknowns."""
     off = _residuals(found, lines, at)
     seen = off[np.isfinite(off)]
-    spare = len(seen) - shape[1]
+    spare = len(seen) - unknowns
     if spare <= 0:
         return 0.3
     usual = np.sqrt(np.sum(np.minimum(seen**2, 1.0)) + 4 * 0.2**2) / np.sqrt(spare + 4)

@@ -17,6 +17,9 @@ LEAST_MM = 1.2
 SE_OFFSET_MM = 0.04
 """No line of ink is known better: paper and pen are not ideal."""
 SE_END_MM = 0.2
+LONG_MM = 12.0
+ENOUGH = 6
+THIN = 0.62
 JOIN_OFF_MM = 0.45
 JOIN_GAP_MM = 14.0
 JOIN_TURN_RAD = 0.03
@@ -37,6 +40,7 @@ class Lines:
     se_offset, se_angle : standard errors across (mm) and of direction (rad)
     se_end : (n, 2) standard errors along, of start and end (mm)
     darkness, width : means over the stroke
+    thin : much thinner or fainter than the long strokes of its sheet
     members : (n, 2) the strokes it is made of, by their number; the same twice for a single one
     """
 
@@ -49,6 +53,7 @@ class Lines:
     se_end: FloatArray
     darkness: FloatArray
     width: FloatArray
+    thin: BoolArray
     members: IntArray
 
     def __len__(self) -> int:
@@ -88,9 +93,18 @@ def lines_of(ink: Ink) -> Lines:
         se_end=np.maximum(strokes.se_end[kept], SE_END_MM),
         darkness=strokes.darkness[kept],
         width=strokes.width[kept],
+        thin=_thin(strokes.width[kept] * strokes.darkness[kept], length),
         members=np.column_stack([number, number]),
     )
     return _with_joined(single)
+
+
+def _thin(ink: FloatArray, length: FloatArray) -> BoolArray:
+    """Strokes with much less ink per length than the heavier long ones have."""
+    long = length > LONG_MM
+    if np.count_nonzero(long) < ENOUGH:
+        return np.zeros(len(ink), dtype=bool)
+    return np.asarray(ink < THIN * np.quantile(ink[long], 0.7))
 
 
 def _without_caps(ends: ComplexArray, width: FloatArray) -> ComplexArray:
@@ -124,6 +138,7 @@ def _with_joined(single: Lines) -> Lines:
         se_end=np.column_stack([errors[lowest, pick], errors[highest, pick]]),
         darkness=np.minimum(single.darkness[first], single.darkness[second]),
         width=np.minimum(single.width[first], single.width[second]),
+        thin=single.thin[first] | single.thin[second],
         members=np.column_stack([single.members[first, 0], single.members[second, 0]]),
     )
     return Lines(*(np.concatenate([getattr(single, name), getattr(joined, name)]) for name in Lines.__slots__))

@@ -20,11 +20,14 @@ REDRAW_MM = 0.3
 """How far a stroke misses the nodes that it joins, one standard error."""
 GATE = 18.0
 """Squared Mahalanobis distance (two degrees of freedom) beyond which a stroke is not the edge."""
-FIELD_MM = 150.0
-"""Side of the field in which other strokes lie by chance."""
+PENALTY_OF_THIN = 2.0
+"""Nats against a line drawn thinner than vectors are: it is likelier one that they were constructed by."""
 INVISIBLE_MM = 0.8
 RUN_ON_FAR = 4e-4
 """Density per mm of ends anywhere: the stroke goes on as another edge, or as a line drawn through."""
+RUN_ON_EXPLAINED = 3.0
+"""Nats given back when a second edge explains why a stroke runs on past the first."""
+LITTLE_COMMON = 0.4
 SHARED_RADIUS2_MM2 = 1.0
 """Two edges share one stroke where their lines lie within about half a millimetre of each other."""
 
@@ -70,12 +73,18 @@ class _Choice:
     ended: tuple[bool, bool]
 
 
-def explain(
-    expected: Expected, lines: Lines, ends: Ends, beam: int = BEAM, kept: Mapping[int, int] | None = None
+def explain(  # noqa: PLR0913
+    expected: Expected,
+    lines: Lines,
+    ends: Ends,
+    beam: int = BEAM,
+    kept: Mapping[int, int] | None = None,
+    barred: tuple[int, int] | None = None,
 ) -> list[Explanation]:
     """The best explanations of a placed figure, best first.
 
-    Arguments: `kept` are edges whose strokes are settled already (rows of `lines`, -1 for none).
+    Arguments: `kept` are edges whose strokes are settled already (rows of `lines`, -1 for none);
+    `barred` is an edge and a row that it must not take.
     """
     edges = expected.edges
     start = Explanation(
@@ -92,6 +101,8 @@ def explain(
         choices = [
             choice for index, state in enumerate(states) for choice in _choices(state, index, edge, lines, ends)
         ]
+        if barred is not None and edge == barred[0]:
+            choices = [one for one in choices if one.row != barred[1]]
         if edge in settled:
             choices = [one for one in choices if one.row == settled[edge]] or choices
         choices.sort(key=lambda choice: -choice.score)
@@ -131,16 +142,55 @@ def _choices(state: Explanation, index: int, edge: int, lines: Lines, ends: Ends
         return found
     taken = state.stroke[state.stroke >= 0]
     shared = np.isin(lines.members[near], lines.members[taken]).any(axis=1)
-    chance = (np.count_nonzero(lines.length > 0.5 * size) + 1.0) / FIELD_MM**2
-    own = -0.5 * distance[near] - 0.5 * log_det[near] - np.log(2 * np.pi) - np.log(chance) + gains
+    chance = _log_chance(state.expected.at[tail] + span / 2.0, size, lines)
+    own = -0.5 * distance[near] - 0.5 * log_det[near] - np.log(2 * np.pi) + np.log(size) + gains - chance
+    own -= PENALTY_OF_THIN * lines.thin[near]
     wide_distance, wide_log_det = _mahalanobis(off, spread + 0.3**2 * np.eye(2))
     density = np.exp(-0.5 * (wide_distance + wide_log_det)) / (2 * np.pi)
     both = np.log(np.minimum(1.0, density * SHARED_RADIUS2_MM2) + 1e-12) - 1.0
+    both += RUN_ON_EXPLAINED * _explains_run_on(state, lines, near, tail, head) * shared
     gains = state.score + np.where(shared, both, own)
     for place, row in enumerate(near):
         at_ends = (False, False) if shared[place] else (bool(ended[place, 0]), bool(ended[place, 1]))
         found.append(_Choice(index, float(gains[place]), int(row), bool(shared[place]), at_ends))
     return found
+
+
+def _explains_run_on(state: Explanation, lines: Lines, near: IntArray, tail: int, head: int) -> FloatArray:
+    """Whether the edge lies where a stroke runs on past the edge that it was taken for."""
+    told = np.zeros(len(near))
+    for place, row in enumerate(near):
+        owners = [
+            edge
+            for edge, taken in enumerate(state.stroke)
+            if taken >= 0 and np.isin(lines.members[taken], lines.members[row]).any()
+        ]
+        if not owners:
+            continue
+        along = lines.along[row]
+
+        def span(first: int, second: int, along: complex = along) -> tuple[float, float]:
+            ends = sorted(float((state.expected.at[node] * np.conj(along)).real) for node in (first, second))
+            return ends[0], ends[1]
+
+        low, high = span(tail, head)
+        covered = [span(state.expected.edges[one].tail, state.expected.edges[one].head) for one in owners]
+        common = max(min(high, other[1]) - max(low, other[0]) for other in covered)
+        told[place] = float(common < LITTLE_COMMON * (high - low))
+    return told
+
+
+def _log_chance(middle: complex, size: float, lines: Lines) -> float:
+    """Log density of strokes of about this length that lie here for other reasons.
+
+    Per mm across, per mm along, per radian and per mm of length: letters and arrowheads crowd about
+    nodes, so that a short stroke in the right place tells little.
+    """
+    radius = max(8.0, 1.5 * size)
+    shortest, longest = 0.4 * size, 2.5 * size + 4.0
+    alike = (lines.length > shortest) & (lines.length < longest) & (np.abs(lines.middle - middle) < radius)
+    count = float(np.count_nonzero(alike)) + 1.0
+    return float(np.log(count / (np.pi * radius**2 * np.pi * (longest - shortest))))
 
 
 def _missed(size_mm: float) -> float:
@@ -178,7 +228,7 @@ def _mahalanobis(off: FloatArray, spread: FloatArray) -> tuple[FloatArray, Float
 def _ends(
     expected: Expected, tail: int, head: int, lines: Lines, ends: Ends
 ) -> tuple[FloatArray, BoolArray, IntArray]:
-    """Log ratio for where strokes end, (n, 2) whether they end at the nodes, and which (n of s) cover the edge."""
+    """Log density of where strokes end, (n, 2) whether they end at the nodes, and which (n of s) cover the edge."""
     span = expected.at[head] - expected.at[tail]
     along = np.where((lines.along * np.conj(span)).real > 0, lines.along, -lines.along)
     place = np.column_stack([
@@ -204,14 +254,14 @@ def _ends(
 
 
 def _end_score(gap: FloatArray, variance: FloatArray, ends: Ends) -> tuple[FloatArray, BoolArray]:
-    """Log density of an end `gap` mm beyond its node, against anywhere in 100 mm."""
+    """Log density per mm of an end `gap` mm beyond its node."""
     sigma = np.sqrt(variance)
     at = ends.at_share * np.exp(-0.5 * gap**2 / variance) / (sigma * np.sqrt(2 * np.pi))
     # Beyond and short, smeared by what is not known of the node.
     reach = np.where(gap > 0, ends.beyond_mm, ends.short_mm)
     share = np.where(gap > 0, ends.beyond_share, ends.short_share)
     off = share * np.exp(-np.maximum(np.abs(gap) - sigma, 0.0) / reach) / (reach + sigma)
-    return np.asarray(np.log(100.0 * (at + off + RUN_ON_FAR))), np.asarray(at > 2.0 * off)
+    return np.asarray(np.log(at + off + RUN_ON_FAR)), np.asarray(at > 2.0 * off)
 
 
 def _taken(state: Explanation, edge: int, choice: _Choice, lines: Lines, ends: Ends) -> Explanation:

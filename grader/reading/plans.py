@@ -30,6 +30,10 @@ LEAST_LAID_MM = 4.0
 LEFT_OUT = "not drawn: normal component left out"
 LEAST_SEEN_MM = 2.5
 RIVALS = 25
+BEAM_OF_DOUBTS = 3
+LEAST_DOUBT = 15.0
+SURE_MM = 30.0
+"""Longer vectors are not taken for others when a neighbour's stroke is doubted."""
 ALTERNATIVES = 4
 NEARLY = 8.0
 """Nats: explanations of one place that are worse by more are no rivals."""
@@ -62,6 +66,7 @@ class Plan:
     Attributes
     ----------
     hypothesis, place : how it was drawn and where
+    placed : what was expected there before strokes were looked at
     found, fit : strokes by vector, and nodes
     score : log likelihood ratio less costs
     rivals : other explanations, best first
@@ -70,6 +75,7 @@ class Plan:
 
     hypothesis: Hypothesis
     place: Place
+    placed: Expected
     found: Explanation
     score: float
     lines: Lines
@@ -160,7 +166,31 @@ def best_plan(
         return None
     everything = [*plans, *_with_mistakes(plans, drawing, figure, lines, given)]
     everything.sort(key=lambda plan: -plan.score)
-    return replace(everything[0], rivals=tuple(everything[1:RIVALS]))
+    best = everything[0]
+    doubts = _without_each_stroke(best)
+    return replace(best, rivals=(*everything[1:RIVALS], *doubts))
+
+
+def _without_each_stroke(plan: Plan) -> list[Plan]:
+    """For every edge the best explanation in which its stroke is not its stroke: what if it is not?"""
+    edges = plan.found.expected.edges
+    size = [abs(plan.found.expected.at[edge.head] - plan.found.expected.at[edge.tail]) for edge in edges]
+    cost = plan.found.score - plan.score
+    doubts = []
+    for index, edge in enumerate(edges):
+        row = int(plan.found.stroke[index])
+        if row < 0:
+            continue
+        ends = {edge.tail, edge.head}
+        kept = {
+            other: int(plan.found.stroke[other])
+            for other, one in enumerate(edges)
+            if other != index and (size[other] > SURE_MM or not {one.tail, one.head} & ends)
+        }
+        found = explain(plan.placed, plan.lines, PLAN_ENDS, BEAM_OF_DOUBTS, kept, (index, row))[0]
+        if found.score > plan.found.score - LEAST_DOUBT:
+            doubts.append(replace(plan, found=found, score=found.score - cost))
+    return doubts
 
 
 def _with_mistakes(
@@ -249,7 +279,7 @@ def _read(
     cost = hypothesis.cost + (0.0 if known else COST_OF_SIZE)
     cost += 0.0 if abs(place.turn_rad) < np.pi / 4 else COST_OF_TURN
     return [
-        Plan(hypothesis, place, found, found.score - cost, around)
+        Plan(hypothesis, place, placed, found, found.score - cost, around)
         for found in explained[:ALTERNATIVES]
         if found.score > explained[0].score - NEARLY
     ]

@@ -27,6 +27,8 @@ LEAST_SKETCH = 15.0
 LEAST_PLAN = 12.0
 """Nats: what less is explained by may be chance."""
 
+CLEAR = 0.85
+
 Given = dict[str, ComplexArray]
 
 
@@ -108,20 +110,24 @@ def _turned(page: _Page, pages: Sequence[_Page], drawing: Drawing) -> Drawing:
 
 def _find(pages: Sequence[_Page], drawing: Drawing, figure: str, known: Mapping[str, ComplexArray]) -> Plan | None:
     """The plan on the sheet that explains it best, kept there."""
-    best: tuple[_Page, Given, list[Plan]] | None = None
+    laid = []
     for page in pages:
         given = {**_given(page, pages), **known}
         plans = regular_plans(page.lines, _turned(page, pages, drawing), figure, given)
-        if plans and (best is None or plans[0].score > best[2][0].score):
-            best = page, given, plans
-    if best is None:
+        if plans:
+            laid.append((page, given, plans))
+    laid.sort(key=lambda one: -one[2][0].score)
+    # Where no sheet shows the plan as it should be, a mistaken one may be on either.
+    clear = bool(laid) and laid[0][2][0].place.score > CLEAR
+    best: tuple[_Page, Plan] | None = None
+    for page, given, plans in laid[:1] if clear else laid:
+        plan = best_plan(plans, page.lines, _turned(page, pages, drawing), figure, given)
+        if plan is not None and (best is None or plan.score > best[1].score):
+            best = page, plan
+    if best is None or best[1].score < LEAST_PLAN:
         return None
-    page, given, plans = best
-    plan = best_plan(plans, page.lines, _turned(page, pages, drawing), figure, given)
-    if plan is None or plan.score < LEAST_PLAN:
-        return None
-    page.plans[figure] = plan
-    return plan
+    best[0].plans[figure] = best[1]
+    return best[1]
 
 
 def _nodes(plan: Plan) -> Given:

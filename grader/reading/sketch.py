@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grader.reading.expected import Expected, Hand, Slack, expect, links_of
+from grader.reading.fitting import LINK_ENDS as LINKS_END
 from grader.reading.fitting import Fit, fit_nodes
 from grader.reading.lines import Lines
 from grader.reading.matching import Ends, Explanation, explain
@@ -119,9 +120,9 @@ def _read(drawing: Drawing, place: Place, lines: Lines, circles: FloatArray) -> 
     near = (np.abs(lines.middle - expected.at.mean()) < np.ptp(expected.at.real) + np.ptp(expected.at.imag) + reach)
     around = lines.take(near & (lines.length > 4.0))  # noqa: PLR2004 - mm
     found = explain(expected, around, LINK_ENDS)[0]
-    fit = fit_nodes(found, around, end_mm=1.5)
+    fit = fit_nodes(found, around, LINKS_END)
     centres = _centres(fit, circles)
-    fit = fit_nodes(found, around, end_mm=1.5, centres=centres)
+    fit = fit_nodes(found, around, LINKS_END, centres)
     exact = _expected(drawing).at
     turn = float(np.angle(np.sum((fit.at - fit.at.mean()) * np.conj(exact - exact.mean()))))
     score = found.score + WORTH_OF_CIRCLE * len(centres)
