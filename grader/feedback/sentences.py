@@ -178,15 +178,15 @@ def _speak(params: Mapping[str, Param], speaker: Tongue, names: Mapping[str, str
 
 def _unit_of_limit(params: Mapping[str, Param]) -> str:
     """`near_limit` says what it speaks of instead of a unit."""
-    return {"length": "mm", "direction": "°"}.get(str(params.get("what", "")), "")
+    return {"length": "mm", "scale": "mm", "direction": "°"}.get(str(params.get("what", "")), "")
 
 
 def _real(speaker: Tongue, value: float, unit: str) -> str:
     if unit == "mm":
         return speaker.quantity(value, 2, unit)
-    text = speaker.significant(value, 4)
     if unit == "°":
-        return f"{text}°"
+        return f"{speaker.number(value, 2)}°"
+    text = speaker.significant(value, 4)
     return f"{text}\N{NO-BREAK SPACE}{speaker.unit(unit)}" if unit else text
 
 

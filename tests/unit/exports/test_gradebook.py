@@ -49,9 +49,7 @@ def test_a_row_that_would_abort_moodles_import_is_refused(people, identity, told
 def test_two_students_with_one_address_are_refused_together_with_all_other_faults():
     people = {"s01": Person(email="a@x.ro"), "s02": Person(email="A@x.ro")}
     with pytest.raises(CallError, match=r"(?s)s02: has the same email.*s03: the roster gives no"):
-        gradebook(
-            report("s01", 1.0), report("s02", 2.0), report("s03", 3.0), people=people, identity="email"
-        )
+        gradebook(report("s01", 1.0), report("s02", 2.0), report("s03", 3.0), people=people, identity="email")
 
 
 @pytest.mark.parametrize("item", ["", "  ", "=1"])

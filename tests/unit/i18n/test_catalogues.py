@@ -69,13 +69,13 @@ def test_translations_keep_the_placeholders(lang):
 @pytest.mark.parametrize("lang", TRANSLATED)
 def test_the_compiled_catalogue_is_that_of_the_source(lang):
     with (LOCALE / lang / "LC_MESSAGES" / "planmark.mo").open("rb") as file:
-        compiled = {key(message): message.string for message in read_mo(file) if message.id}
-    source = {key(message): message.string for message in catalogue(lang) if message.id}
+        compiled = {as_key(message.id): as_key(message.string) for message in read_mo(file) if message.id}
+    source = {as_key(message.id): as_key(message.string) for message in catalogue(lang) if message.id}
     assert compiled == source
 
 
-def key(message):
-    return message.id if isinstance(message.id, str) else tuple(message.id)
+def as_key(text):
+    return text if isinstance(text, str) else tuple(text)
 
 
 @pytest.mark.parametrize("lang", TRANSLATED)

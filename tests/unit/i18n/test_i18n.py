@@ -55,9 +55,7 @@ def test_every_unit_is_cyrillic_in_russian():
 def test_plurals_have_the_forms_of_the_language(lang, forms):
     speaker = tongue(lang)
     counts = [1, 2, 20] if lang == "ro" else [1, 2, 5]
-    found = [
-        speaker.ngettext("%(num)d submission", "%(num)d submissions", n) % {"num": n} for n in counts
-    ]
+    found = [speaker.ngettext("%(num)d submission", "%(num)d submissions", n) % {"num": n} for n in counts]
     assert [text.split()[-1] for text in found] == [text.split()[-1] for text in forms]
 
 

@@ -1,0 +1,131 @@
+"""Reasons and mistakes as sentences."""
+
+import re
+from typing import get_args
+
+import pytest
+
+from grader import outcomes
+from grader.documents import MistakeCode
+from grader.feedback.mistakes import MISTAKES
+from grader.feedback.sentences import FULL, HINTS, criterion_feedback, mistake_feedback, reason_sentence
+from grader.i18n import LANGUAGES, tongue
+from grader.outcomes import Mistake, Outcome, Quantity, Reason, Tolerance
+
+TOO_LONG = Reason("too_long", {"measured_mm": 49.5, "expected_mm": 47.2, "off_mm": 2.3, "tolerance_mm": 1.0})
+VALUE = Reason(
+    "value_too_large", {"measured": 1.91, "expected": 1.67, "off": 0.24, "tolerance": 0.03, "unit": "m/s"}
+)
+
+
+def outcome(verdict, *reasons, mistake=None):
+    return Outcome(
+        "v_B", "v_B", verdict, Quantity(), Quantity(), Tolerance(), 0.99, reasons, (verdict, verdict), mistake
+    )
+
+
+def documented_codes():
+    text = outcomes.__doc__.split("said when")[1].rsplit("=====", 1)[0]
+    codes = set()
+    for row in text.splitlines():
+        codes |= set(re.findall(r"[a-z_]+", row[:22]))
+    return {code for code in codes if code}
+
+
+def test_every_reason_that_judging_may_give_has_a_sentence():
+    assert documented_codes() >= {"right", "too_long", "turned_right", "follows", "scale_assumed"}
+    assert documented_codes() - set(HINTS) == set()
+    assert set(FULL) <= set(HINTS)
+
+
+def test_every_mistake_of_the_contract_has_words():
+    assert set(MISTAKES) == set(get_args(MistakeCode))
+
+
+@pytest.mark.parametrize(
+    ("lang", "text"),
+    [
+        ("en", "It is too long by 2.3\u00a0mm (tolerance ±1.0\u00a0mm)."),
+        ("ro", "Este prea lung cu 2,3\u00a0mm (toleranță ±1,0\u00a0mm)."),
+        ("ru", "Длиннее, чем нужно, на 2,3\u00a0мм (допуск ±1,0\u00a0мм)."),
+    ],
+)
+def test_a_length_off_is_told_in_the_language_with_its_decimal_mark(lang, text):
+    assert criterion_feedback(outcome("none", TOO_LONG), lang) == text
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+@pytest.mark.parametrize("code", sorted(HINTS))
+def test_hints_say_no_number(lang, code):
+    params = {
+        "measured_mm": 49.5, "expected_mm": 47.2, "off_mm": 2.3, "tolerance_mm": 1.0, "off_deg": 3.3,
+        "measured": 1.91, "expected": 1.67, "off": 0.24, "tolerance": 0.03, "unit": "m/s", "se": 0.4,
+        "confidence": 0.62, "first": 47.0, "second": 49.0, "used": 0.2, "declared": 0.3, "what": "nodes",
+        "length_mm": 2.0, "least_mm": 3.0, "text": "1:5?", "why": "9", "reason": "8", "of": "v_A",
+    }  # fmt: skip
+    assert not re.search(r"\d", reason_sentence(Reason(code, params), tongue(lang), "hint"))
+
+
+def test_the_symbol_level_says_nothing():
+    assert criterion_feedback(outcome("none", TOO_LONG), "en", "symbol") == ""
+    assert mistake_feedback(Mistake("arithmetic", "v_B", (), 0.9), "en", "symbol") == ""
+
+
+def test_a_wrong_value_is_told_with_what_is_right_only_in_full():
+    assert "1.670\u00a0m/s" in criterion_feedback(outcome("none", VALUE), "en")
+    assert criterion_feedback(outcome("none", VALUE), "en", "hint") == "The value is too large."
+
+
+def test_a_partial_verdict_says_so_and_what_is_off_but_not_that_it_is_right():
+    text = criterion_feedback(outcome("partial", Reason("right"), TOO_LONG), "en")
+    assert text.startswith("Nearly right. It is too long by")
+    assert "Right." not in text.replace("Nearly right.", "")
+
+
+def test_what_waits_for_a_person_says_why():
+    told = criterion_feedback(outcome("review", Reason("doubtful", {"confidence": 0.62})), "en")
+    assert told == "A person will look at this. It was read with too little certainty (62\u00a0%)."
+
+
+def test_the_likely_cause_is_named_where_points_are_lost():
+    told = criterion_feedback(outcome("none", TOO_LONG, mistake="normal_reversed"), "en")
+    assert told.endswith("Likely cause: normal component reversed.")
+
+
+@pytest.mark.parametrize("what", ["nodes", "scale", "vector", "value", "something new"])
+def test_following_from_an_earlier_value_says_that_it_is_charged_once(what):
+    told = criterion_feedback(outcome("follow_through", Reason("follows", {"what": what, "of": "v_A"})), "en")
+    assert "charged once" in told
+
+
+def test_a_reason_without_a_sentence_is_told_by_its_code():
+    assert reason_sentence(Reason("brand_new"), tongue("ro"), "full") == "brand_new"
+
+
+def test_a_reason_without_its_numbers_falls_back_to_the_hint():
+    assert reason_sentence(Reason("too_long"), tongue("en"), "full") == "It is too long."
+
+
+def test_a_limit_of_direction_is_told_in_degrees():
+    near = Reason("near_limit", {"what": "direction", "off": 1.4, "tolerance": 1.5, "se": 0.25})
+    assert "0.25°" in reason_sentence(near, tongue("en"), "full")
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+@pytest.mark.parametrize("code", sorted(MISTAKES))
+def test_every_mistake_says_what_was_done_and_what_to_redo(lang, code):
+    told = mistake_feedback(Mistake(code, "velocity_plan", (), 0.9), lang)
+    assert len(told) > 40
+    assert "%(" not in told
+    assert "velocity_plan" not in told
+
+
+def test_names_are_those_that_the_students_know():
+    told = mistake_feedback(Mistake("scale_wrong", "kv", (), 0.9), "ru", names={"kv": "μv"})
+    assert "μv" in told
+    assert "kv" not in told
+
+
+def test_a_students_text_with_a_per_cent_sign_does_no_harm():
+    refused = Reason("scale_refused", {"text": "50%(x)s", "why": "no unit"})
+    assert "50%(x)s" in reason_sentence(refused, tongue("en"), "full")
