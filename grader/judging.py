@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from grader.comparison import Comparison, Submission, Task, compare, task_of
-from grader.diagnosis import Case, Observed, diagnose, wrong_scale
+from grader.diagnosis import Case, Observed, diagnose
 from grader.documents import (
     CriterionDocument,
     MistakeDocument,
@@ -33,56 +33,54 @@ __all__ = ["Submission", "Task", "judge", "report_of", "task_of", "unjudged_repo
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission)
-    mistakes = (*_wrong_scales(comparison), *diagnose(_case(task, comparison)))
+    mistakes = diagnose(_case(task, comparison))
     outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
 
 
 def _case(task: Task, comparison: Comparison) -> Case:
-    """The drawing to explain, at the scales that it follows."""
-    scales = {name: np.asarray(scale) for name, scale in comparison.followed.items()}
-    drawing = Drawing(task.construction, {**task.parameters, **scales})
-    vectors = {one.id: one.vector for one in task.rubric.criterion}
-    observed = []
-    for outcome in comparison.outcomes:
-        name = vectors[outcome.criterion]
-        drawn = comparison.evidence.vector(name) if name else None
-        if name is None or drawn is None or outcome.tolerance.length_mm is None:
-            continue
-        turn = outcome.tolerance.direction_deg
-        observed.append(
-            Observed(
-                criterion=outcome.criterion,
-                vector=name,
-                length_mm=drawn.length_mm,
-                direction_rad=drawn.direction_rad,
-                allowed_mm=outcome.tolerance.length_mm,
-                allowed_rad=None if turn is None else math.radians(turn),
-                is_lost=outcome.verdict in {"none", "partial", "follow_through"},
-            )
-        )
-    return Case(drawing, observed, task.assignment, task.variant)
-
-
-def _wrong_scales(comparison: Comparison) -> tuple[Mistake, ...]:
-    """Declared scales that the drawing contradicts, and the criteria that they explain."""
-    found = []
-    for name, scale in comparison.scales.items():
-        followed = comparison.followed[name]
-        if scale.declared is None or followed == scale.used:
-            continue
-        explains = [one.criterion for one in comparison.outcomes if _hangs_on_scale(one, name)]
-        found.append(wrong_scale(name, scale.declared, followed, explains))
-    return tuple(found)
-
-
-def _hangs_on_scale(outcome: Outcome, scale: str) -> bool:
-    """Whether a criterion lost by a scale, or is right only by the scale that the drawing follows."""
-    by_scale = any(
-        one.code == "follows" and one.params.get("what") == "scale" and one.params.get("of") == scale
-        for one in outcome.reasons
+    """The drawing to explain, at the scales used, with what contradicts them."""
+    used = {name: np.asarray(scale.used) for name, scale in comparison.scales.items()}
+    names = {one.id: one.name for one in task.rubric.criterion}
+    observed = [
+        found
+        for outcome in comparison.outcomes
+        if (found := _observed(outcome, names[outcome.criterion], comparison)) is not None
+    ]
+    return Case(
+        drawing=Drawing(task.construction, {**task.parameters, **used}),
+        observed=observed,
+        assignment=task.assignment,
+        variant=task.variant,
+        followed={
+            name: followed
+            for name, followed in comparison.followed.items()
+            if followed != comparison.scales[name].used and not comparison.scales[name].assumed
+        },
+        scale_criteria={
+            one.name: one.criterion
+            for one in comparison.outcomes
+            if one.name in comparison.scales and one.verdict in {"none", "partial"}
+        },
+        own=comparison.evidence.nodes,
     )
-    return by_scale or (outcome.name == scale and outcome.verdict in {"none", "partial"})
+
+
+def _observed(outcome: Outcome, name: str, comparison: Comparison) -> Observed | None:
+    """What diagnosis sees of a vector; None for what was not drawn."""
+    drawn = comparison.evidence.vector(name)
+    if drawn is None or outcome.tolerance.length_mm is None:
+        return None
+    turn = outcome.tolerance.direction_deg
+    return Observed(
+        criterion=outcome.criterion,
+        vector=name,
+        length_mm=drawn.length_mm,
+        direction_rad=drawn.direction_rad,
+        allowed_mm=outcome.tolerance.length_mm,
+        allowed_rad=None if turn is None else math.radians(turn),
+        is_lost=outcome.verdict in {"none", "partial", "follow_through"},
+    )
 
 
 def _with_mistake(outcome: Outcome, mistakes: Sequence[Mistake]) -> Outcome:

@@ -13,6 +13,9 @@ from grader.comparison.task import Task, unit_of
 from grader.outcomes import Outcome, Quantity, Reason, Tolerance, UsedScale
 from grader.rubric import CriterionTable
 
+DEVIATING_SHARE = 0.25
+"""Of the length tolerance: a node nearer to its right place than this is right."""
+
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
@@ -29,7 +32,9 @@ def compare(task: Task, submission: Submission) -> Comparison:
     """Mark every criterion of the task's rubric."""
     evidence = gather(task, submission)
     settled = settle(task, evidence, submission.declared)
-    session = _Session(task, evidence, settled, used_scales(settled), followed_scales(settled))
+    used = used_scales(settled)
+    deviating = _deviating(task, evidence, used)
+    session = _Session(task, evidence, settled, used, followed_scales(settled), deviating)
     # What was drawn contradicts a scale that nobody declared, or that nobody understood.
     session.doubtful.update(name for name, scale in settled.items() if scale.other and scale.used.assumed)
     order = [*settled, *task.construction.vectors, *task.construction.rates]
@@ -38,6 +43,15 @@ def compare(task: Task, submission: Submission) -> Comparison:
     outcomes = tuple(found[criterion.id] for criterion in task.rubric.criterion)
     scales = {name: scale.used for name, scale in settled.items()}
     return Comparison(outcomes, scales, session.followed, evidence)
+
+
+def _deviating(task: Task, evidence: Evidence, used: Mapping[str, float]) -> frozenset[str]:
+    """The student's own nodes that are not where they should be: what can be followed through from."""
+    crank = evidence.crank_mm
+    scales = dict(used) if crank is None else {**used, "kL": task.crank_m / crank[0]}
+    exact = task.nodes(scales)
+    least = DEVIATING_SHARE * task.rubric.tolerance.length_mm
+    return frozenset(name for name, own in evidence.nodes.items() if abs(own - exact[name]) > least)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +67,7 @@ class _Session:
     settled: Mapping[str, Scale]
     used: Mapping[str, float]
     followed: Mapping[str, float]
+    deviating: frozenset[str]
     charged: set[str] = field(default_factory=set)
     doubtful: set[str] = field(default_factory=set)
 
@@ -215,12 +230,14 @@ class _Session:
 
     def allowed(self, relies_on: frozenset[str], mark: Mark) -> Mark:
         """Credit for following only where the earlier mistake has been charged; else it is charged here."""
-        if relies_on & self.charged:
+        wrong = relies_on & self.deviating | relies_on - self.evidence.nodes.keys()
+        is_doubtful = bool(wrong & self.doubtful & self.settled.keys())
+        if wrong & self.charged and not is_doubtful:
             return mark
-        if relies_on & self.doubtful:
+        if wrong & self.doubtful:
             return Mark("none", "none", mark.best, mark.reasons)
         if mark.worst == "full":
-            self.charged.update(relies_on)
+            self.charged.update(wrong)
         return Mark("none", "none", "none", mark.reasons)
 
     def remember(self, name: str, mark: Mark) -> None:
@@ -250,6 +267,11 @@ class _Session:
         reason = Reason("not_measured") if unread is None else Reason("unread", {"reason": unread})
         if criterion.optional:
             return verdicts.unjudged(criterion, "not_judged", (Reason("optional"), reason), expected=expected)
+        least, length = self.task.tolerance(criterion).least_mm, expected.length_mm
+        if length is not None and length < least:
+            told = {"length_mm": length, "least_mm": least}
+            short = Reason("too_short_to_judge", told)
+            return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
         if criterion.vector is not None:
             # Later criteria may hang on what nobody has seen.
             self.doubtful.add(self.task.construction.vectors[criterion.vector].head)
