@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from grader.records import FloatArray
-from grader.sheet.longlines import LongLine
-from grader.sheet.models import PAGE_MM, Model
+from grader.sheet.longlines import RIDGE, LongLine
+from grader.sheet.models import PAGE_MM, PAPER, Model
 
 _POINTS = 5
+_FIRST, _LAST = 0.05, 0.95
 _STEPS = 12
 _CENTRE_MM = np.array([PAGE_MM[0] / 2.0, PAGE_MM[1] / 2.0])
 DPI_SE = 0.002
@@ -107,7 +108,7 @@ def fit_sides(
             parts.append((p[:2] - stated) / DPI_SE)
         return np.concatenate(parts) if parts else np.zeros(0)
 
-    params, jacobian = _gauss_newton(residuals, params)
+    params, jacobian = gauss_newton(residuals, params)
     matrix = to_matrix(params)
     final = residuals(params)
     freedom = 2 * len(sides) + (2 if stated is not None else 0) - len(params)
@@ -116,20 +117,31 @@ def fit_sides(
     off = np.array([_off(inverse, side) for side in sides]).reshape(-1, _POINTS)
     inflate = max(1.0, chi2 / max(freedom, 1))
     covariance = np.linalg.pinv(jacobian.T @ jacobian) * inflate
-    gradient = _derivative(lambda p: np.array([_log_scale(to_matrix(p))]), params)[0]
+    gradient = _derivative(lambda p: np.array([log_scale(to_matrix(p))]), params)[0]
     scale_se = float(np.sqrt(max(gradient @ covariance @ gradient, 0.0)))
     rms = float(np.sqrt(np.mean(off**2))) if len(sides) else 0.0
     return Fit(matrix / matrix[2, 2], chi2, freedom, rms, scale_se, off.mean(axis=1))
 
 
 def _off(inverse: FloatArray, side: Side) -> FloatArray:
-    share = np.linspace(0.05, 0.95, _POINTS)[:, None]
+    """(points,) mm by which a side's points miss it."""
+    share = np.linspace(_FIRST, _LAST, _POINTS)[:, None]
     ends = side.line.ends
-    points = ends[0] + share * (ends[1] - ends[0])
-    return apply(inverse, points)[:, side.axis] - side.value
+    mm = apply(inverse, ends[0] + share * (ends[1] - ends[0]))
+    return mm[:, side.axis] - side.value + _shadow_mm(side, mm)
 
 
-def _log_scale(matrix: FloatArray) -> float:
+def _shadow_mm(side: Side, mm: FloatArray) -> float:
+    """A paper edge seen as a dark line is its shadow: the sheet ends at the shadow's inner border."""
+    if side.model is not PAPER or side.line.kind != RIDGE:
+        return 0.0
+    px_per_mm = side.line.length * (_LAST - _FIRST) / float(np.hypot(*(mm[-1] - mm[0])))
+    inward = 1.0 if side.value < 1.0 else -1.0
+    return inward * 0.5 * side.line.width / px_per_mm
+
+
+def log_scale(matrix: FloatArray) -> float:
+    """Logarithm of the mean pixels per millimetre around the sheet's middle."""
     corners = _CENTRE_MM + 60.0 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     mapped = apply(matrix, corners)
     x, y = mapped[:, 0], mapped[:, 1]
@@ -137,13 +149,13 @@ def _log_scale(matrix: FloatArray) -> float:
     return 0.5 * float(np.log(max(abs(area), 1e-12)))
 
 
-def _gauss_newton(
+def gauss_newton(
     residuals: Callable[[FloatArray], FloatArray], params: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
+    """Least squares from a good first guess: (parameters, Jacobian there)."""
     jacobian = _derivative(residuals, params)
     for _ in range(_STEPS):
-        value = residuals(params)
-        step = np.linalg.lstsq(jacobian, -value, rcond=None)[0]
+        step = np.linalg.lstsq(jacobian, -residuals(params), rcond=None)[0]
         params = params + step
         jacobian = _derivative(residuals, params)
         if np.abs(jacobian @ step).max(initial=0.0) < 1e-6:

@@ -10,7 +10,7 @@ from grader.records import FloatArray
 from grader.sheet.fitting import Side, affine_of, affine_params, apply
 from grader.sheet.longlines import RIDGE, STEP, LongLine
 from grader.sheet.models import FRAMES, PAGE_MM, PAPER, Model
-from grader.sheet.upright import title_block_mm
+from grader.sheet.upright import drawn_ends, title_block_mm
 
 _LINES_EACH_WAY = 12
 _APART = 0.4
@@ -19,6 +19,7 @@ _LEAST_LENGTH = 0.4
 _SCAN_BEND_MM = 1.2
 """A quadrilateral whose corners lie nearer than this to a scanner's map is a scan."""
 _MATCH_MM = 2.0
+_TILT_MM = 2.0
 _UNEQUAL_SE = 0.004
 _DPI_SE = 0.005
 _CAMERA_SE = 0.015
@@ -60,11 +61,12 @@ def hypotheses(
                 hypothesis = _judged(quad, model, lines, shape, dpi, trust, turns)
                 if hypothesis is not None:
                     found.append(hypothesis)
+    drawn = drawn_ends(lines)
     best = sorted(found, key=lambda hypothesis: -hypothesis.score)[:_LOOKED_AT]
     judged = [
         replace(hypothesis, block_mm=block, score=hypothesis.score + min(block / _BLOCK_MM, _BLOCK_WORTH))
         for hypothesis in best
-        for block in [title_block_mm(hypothesis.mm_to_px, lines)]
+        for block in [title_block_mm(hypothesis.mm_to_px, drawn)]
     ]
     return sorted(judged, key=lambda hypothesis: -hypothesis.score)
 
@@ -177,7 +179,7 @@ def _worth(side: Side) -> float:
 def match_sides(mm_to_px: FloatArray, lines: list[LongLine]) -> tuple[tuple[Side, ...], Model | None]:
     """Long lines that lie on a side of the paper or of one frame, and which frame that is."""
     inverse = np.linalg.inv(mm_to_px)
-    by_model = {model.name: _on_sides(inverse, model, lines) for model in (PAPER, *FRAMES)}
+    by_model = {model.name: on_sides(inverse, model, lines) for model in (PAPER, *FRAMES)}
     frame = max(FRAMES, key=lambda model: len(by_model[model.name]))
     frame_sides = by_model[frame.name]
     if len(frame_sides) < 2:
@@ -185,7 +187,10 @@ def match_sides(mm_to_px: FloatArray, lines: list[LongLine]) -> tuple[tuple[Side
     return tuple(by_model[PAPER.name] + frame_sides), frame
 
 
-def _on_sides(inverse: FloatArray, model: Model, lines: list[LongLine]) -> list[Side]:
+def on_sides(
+    inverse: FloatArray, model: Model, lines: list[LongLine], within_mm: float = _MATCH_MM
+) -> list[Side]:
+    """For each side of a model the long line that lies on it best, where one does."""
     x0, y0, x1, y1 = model.box
     found: list[Side] = []
     for axis, value, outer in ((0, x0, -1), (1, y0, -1), (0, x1, 1), (1, y1, 1)):
@@ -194,8 +199,10 @@ def _on_sides(inverse: FloatArray, model: Model, lines: list[LongLine]) -> list[
         for line in lines:
             ends = apply(inverse, line.ends)
             along = abs(ends[1, 1 - axis] - ends[0, 1 - axis])
+            if abs(ends[1, axis] - ends[0, axis]) > _TILT_MM:
+                continue
             off = float(np.abs(ends[:, axis] - value).max())
-            if off > _MATCH_MM or along < 0.5 * length or along > 1.1 * length:
+            if off > within_mm or along < 0.5 * length or along > 1.1 * length:
                 continue
             if model is not PAPER and line.kind != RIDGE:
                 continue

@@ -37,6 +37,7 @@ class LongLine:
     bright : for a step the side that is bright: +1 below or right of it, -1 above or left
     ends : (2, 2) left and right, or upper and lower, end
     inked : share of the length that was seen
+    width : of a drawn line's ink, px; 0 for a step
     """
 
     across: bool
@@ -44,13 +45,15 @@ class LongLine:
     bright: int
     ends: FloatArray
     inked: float
+    width: float = 0.0
 
     @property
     def length(self) -> float:
+        """Distance of the ends, px."""
         return float(np.hypot(*(self.ends[1] - self.ends[0])))
 
     def at(self, position: float) -> float:
-        """y at x = position for a horizontal line, x at y = position for a vertical one."""
+        """The y at x = position of a horizontal line, the x at y = position of a vertical one."""
         i = 0 if self.across else 1
         (p0, q0), (p1, q1) = self.ends[:, [i, 1 - i]]
         return float(q0 + (position - p0) * (q1 - q0) / (p1 - p0))
@@ -165,7 +168,7 @@ def _paired(chains: dict[int, list[tuple[FloatArray, float]]], *, across: bool) 
     return lines
 
 
-def _line(ends: FloatArray, seen: float, across: bool, kind: str, bright: int) -> LongLine:  # noqa: FBT001
+def _line(ends: FloatArray, seen: float, across: bool, kind: str, bright: int) -> LongLine:
     return LongLine(across, kind, bright, ends if across else ends[:, ::-1].copy(), seen)
 
 
@@ -197,5 +200,8 @@ def _refined(flat: Flat, lines: list[LongLine], full_per_small: float) -> list[L
         u = (line.ends[1] - line.ends[0]) / line.length
         shift = fit.a[index] + fit.b[index] * np.array([0.0, line.length])
         moved = line.ends + shift[:, None] * np.array([-u[1], u[0]])
-        refined.append(LongLine(line.across, line.kind, line.bright, moved, float(good[index].mean())))
+        width = float(usual[index])
+        refined.append(
+            LongLine(line.across, line.kind, line.bright, moved, float(good[index].mean()), width)
+        )
     return refined

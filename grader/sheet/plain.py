@@ -1,16 +1,17 @@
 """Registration of a plain sheet by frame, paper and stated resolution, weighed together."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.pixels import flatten
+from grader.pixels import Flat, flatten
 from grader.records import FloatArray, Page, Problem, Sheet, Unread
+from grader.sheet.bend import find_lens
 from grader.sheet.fitting import Fit, affine_of, apply, fit_sides
-from grader.sheet.hypotheses import Hypothesis, hypotheses
+from grader.sheet.hypotheses import Hypothesis, hypotheses, on_sides
 from grader.sheet.longlines import LongLine, long_lines
-from grader.sheet.models import PAGE_MM, Model, drawable
-from grader.sheet.upright import title_block_mm
+from grader.sheet.models import PAGE_MM, PAPER, Model, drawable
+from grader.sheet.upright import drawn_ends, title_block_mm
 
 _MM_PER_INCH = 25.4
 _LEAST_PX_PER_MM = 3.0
@@ -23,7 +24,12 @@ _A3_SHORT_MM = 5.0
 _WINDOW_SE = 0.004
 _DPI_OFF = 0.02
 _BAD_FIT = 4.0
+_NO_FIT_MM = 1.5
+_VAGUE_SE = 0.02
+_MOST_SIDES = 3
+_SOME_SIDES = 2
 _FAR_OFF_MM = 1.5
+_EDGE_WITHIN_MM = 6.0
 _ASSUMED_PAPER_SE = 0.004
 
 
@@ -40,14 +46,16 @@ def register_plain(page: Page) -> Sheet | Unread:
     long_px = max(page.grey.shape)
     if long_px < _LEAST_PX_PER_MM * PAGE_MM[0]:
         return Unread("sheet", f"{long_px} pixels along the long side are too few for an A3 drawing")
-    lines = long_lines(flatten(page.grey))
+    flat = flatten(page.grey)
+    lines = long_lines(flat)
     problems: list[Problem] = []
     resolution = _resolution(page, problems)
     dpi = resolution.dpi if resolution is not None and resolution.stated else None
     shape = (page.grey.shape[0], page.grey.shape[1])
     ranked = hypotheses(lines, shape, dpi)
     if ranked:
-        return _from_lines(page, ranked[0], lines, dpi, problems)
+        sheet = _from_lines(page, ranked[0], lines, dpi, problems)
+        return _with_lens(flat, sheet, ranked[0]) if sheet and ranked[0].perspective else sheet
     if resolution is None:
         return Unread("sheet", "no drawing frame, no paper edges and no resolution that fits A3 were found")
     return _from_resolution(page, resolution, lines, problems)
@@ -88,24 +96,59 @@ def _from_lines(
     dpi: tuple[float, float] | None,
     problems: list[Problem],
 ) -> Sheet | Unread:
-    fit, frame = _settled(best, dpi), best.frame
-    block_mm = title_block_mm(fit.mm_to_px, lines)
+    try:
+        fit, frame = _settled(best, dpi), best.frame
+    except np.linalg.LinAlgError:
+        return Unread("sheet", "the long lines found do not make one sheet")
+    block_mm = title_block_mm(fit.mm_to_px, drawn_ends(lines))
+    doubt = _doubt(best, fit, block_mm, _Stated(dpi is not None, bool(problems)))
+    if doubt is not None:
+        return Unread("sheet", doubt)
     if block_mm == 0.0:
-        problems.append(
-            Problem("upright_unsure", "no title block shows which way up the sheet is", page.source)
-        )
-    if frame is None and block_mm == 0.0 and dpi is None:
-        return Unread("sheet", "neither a drawing frame nor a title block shows that this is an A3 drawing")
+        problems.append(_unsure_upright(page))
     if fit.freedom > 0 and fit.chi2 / fit.freedom > _BAD_FIT:
         message = f"frame, paper and resolution disagree by {fit.rms_mm:.1f} mm"
         problems.append(Problem("registration_disagrees", message, page.source))
     scale_se = fit.scale_se
     if frame is None and dpi is None:
         scale_se = float(np.hypot(scale_se, _ASSUMED_PAPER_SE))
-        problems.append(
-            Problem("paper_assumed", "only the paper's edges give the scale; taken for A3", page.source)
-        )
+        message = "only the paper's edges give the scale; taken for A3"
+        problems.append(Problem("paper_assumed", message, page.source))
     return _sheet(fit, frame, scale_se, problems)
+
+
+@dataclass(frozen=True, slots=True)
+class _Stated:
+    """What the file says of its resolution: that the page is A3, or that it is something else."""
+
+    a3: bool
+    other: bool
+
+
+def _doubt(best: Hypothesis, fit: Fit, block_mm: float, stated: _Stated) -> str | None:
+    """Why the lines found are not enough to know the sheet, or None."""
+    of_frame = sum(side.model is not PAPER for side in best.sides)
+    of_paper = len(best.sides) - of_frame
+    both = of_frame >= _MOST_SIDES and of_paper >= _SOME_SIDES
+    if not np.isfinite(fit.scale_se) or fit.scale_se > _VAGUE_SE:
+        return "the long lines found do not settle the scale"
+    if fit.freedom > 0 and fit.rms_mm > _NO_FIT_MM:
+        return f"what could be frame and paper's edges disagree by {fit.rms_mm:.1f} mm: not an A3 drawing"
+    if block_mm == 0.0 and not stated.a3 and not both:
+        return "neither a title block nor frame and paper together show that this is an A3 drawing"
+    if stated.other and not (of_frame >= _MOST_SIDES and block_mm > 0.0):
+        return "by its resolution the page is not A3, and no frame with a title block says otherwise"
+    return None
+
+
+def _unsure_upright(page: Page) -> Problem:
+    return Problem("upright_unsure", "no title block shows which way up the sheet is", page.source)
+
+
+def _with_lens(flat: Flat, sheet: Sheet, best: Hypothesis) -> Sheet:
+    """A photo's sheet with the lens's bend, where one shows."""
+    lens = find_lens(flat, sheet.mm_to_px, list(best.sides))
+    return sheet if lens is None else replace(sheet, lens=lens)
 
 
 def _settled(best: Hypothesis, dpi: tuple[float, float] | None) -> Fit:
@@ -125,24 +168,20 @@ def _from_resolution(
     high, wide = page.grey.shape
     tilt = _tilt(lines)
     quarter = 0.0 if wide >= high else np.pi / 2.0
-    best: tuple[float, FloatArray] | None = None
+    drawn = drawn_ends(lines)
+    tried: list[tuple[float, FloatArray]] = []
     for half in (0.0, np.pi):
         angle = tilt + quarter + half
         params = np.array([*np.log(np.array(resolution.dpi) / _MM_PER_INCH), angle, wide / 2.0, high / 2.0])
         matrix = affine_of(params)
-        block = title_block_mm(matrix, lines)
-        if best is None or block > best[0]:
-            best = (block, matrix)
-    assert best is not None
-    block, matrix = best
+        tried.append((title_block_mm(matrix, drawn), matrix))
+    block, matrix = max(tried, key=lambda one: one[0])
     if block == 0.0 and not resolution.stated:
         return Unread(
             "sheet", "no drawing frame, no title block and no stated resolution: not known to be A3"
         )
     if block == 0.0:
-        problems.append(
-            Problem("upright_unsure", "no title block shows which way up the sheet is", page.source)
-        )
+        problems.append(_unsure_upright(page))
     if not resolution.stated:
         message = f"no stated resolution: {resolution.dpi[0]:.0f} dpi assumed, by which the page is A3"
         problems.append(Problem("resolution_assumed", message, page.source))
@@ -150,8 +189,15 @@ def _from_resolution(
         Problem("frame_missing", "no drawing frame: the place on the sheet is rough", page.source)
     )
     scale_se = 0.0015 if resolution.stated else _WINDOW_SE
-    fit = Fit(matrix, 0.0, 0, 0.0, scale_se, np.zeros(0))
-    return _sheet(fit, None, scale_se, problems)
+    return _sheet(_placed(matrix, resolution, lines, scale_se), None, scale_se, problems)
+
+
+def _placed(matrix: FloatArray, resolution: Resolution, lines: list[LongLine], scale_se: float) -> Fit:
+    """The map moved to the paper's edges, where one to three of them are seen."""
+    edges = on_sides(np.linalg.inv(matrix), PAPER, lines, _EDGE_WITHIN_MM)
+    if not edges:
+        return Fit(matrix, 0.0, 0, 0.0, scale_se, np.zeros(0))
+    return fit_sides(matrix, edges, resolution.dpi, perspective=False)
 
 
 def _tilt(lines: list[LongLine]) -> float:

@@ -1,4 +1,4 @@
-"""Which way up: the title block is at the bottom right, the binding margin on the left."""
+"""Which way up: the title block is at the bottom right of an upright sheet."""
 
 import numpy as np
 
@@ -7,23 +7,48 @@ from grader.sheet.fitting import apply
 from grader.sheet.longlines import RIDGE, LongLine
 from grader.sheet.models import PAGE_MM
 
-_BLOCK_MM = (200.0, 75.0)
-_SQUARE_MM = 1.5
+_CORNER_MM = (215.0, 80.0)
+_INSET_MM = 7.0
+"""The frame's own bottom line, and the paper's edge, are no part of the block."""
+_SQUARE_MM = 2.5
 _LEAST_MM = 12.0
+_LEAST_LEVEL = 2
+_OTHERS = 0.8
 
 
-def title_block_mm(mm_to_px: FloatArray, lines: list[LongLine]) -> float:
-    """Length of ruled lines, mm, in the corner where an upright sheet has its title block."""
-    inverse = np.linalg.inv(mm_to_px)
-    total = 0.0
-    for line in lines:
-        if line.kind != RIDGE:
-            continue
-        ends = apply(inverse, line.ends)
-        span = np.abs(ends[1] - ends[0])
-        low, high = ends.min(axis=0), ends.max(axis=0)
-        inside = low[0] > PAGE_MM[0] - 10.0 - _BLOCK_MM[0] and low[1] > PAGE_MM[1] - 5.0 - _BLOCK_MM[1]
-        inner = high[0] < PAGE_MM[0] and high[1] < PAGE_MM[1] - 7.0 or span[1] > span[0]
-        if inside and inner and span.min() < _SQUARE_MM and span.max() > _LEAST_MM:
-            total += float(span.max())
-    return total
+def drawn_ends(lines: list[LongLine]) -> FloatArray:
+    """(n, 2, 2) ends in pixels of the drawn lines among long lines."""
+    return np.array([line.ends for line in lines if line.kind == RIDGE]).reshape(-1, 2, 2)
+
+
+def title_block_mm(mm_to_px: FloatArray, drawn: FloatArray) -> float:
+    """Length of ruled lines, mm, in the corner where an upright sheet has its title block.
+
+    What the other corners have too (squared paper has it everywhere) does not count.
+    """
+    mm = apply(np.linalg.inv(mm_to_px), drawn.reshape(-1, 2)).reshape(-1, 2, 2)
+    page = np.array(PAGE_MM)
+    own = _ruled_mm(mm)
+    turned = (
+        page - mm,
+        np.stack([page[0] - mm[..., 0], mm[..., 1]], -1),
+        np.stack([mm[..., 0], page[1] - mm[..., 1]], -1),
+    )
+    return max(0.0, own - _OTHERS * max(_ruled_mm(other) for other in turned))
+
+
+def _ruled_mm(ends: FloatArray) -> float:
+    """Length of level and upright lines in the bottom right corner, 0 for fewer than two level ones."""
+    if len(ends) == 0:
+        return 0.0
+    span = np.abs(ends[:, 1] - ends[:, 0])
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    level = span[:, 0] > span[:, 1]
+    near = (low[:, 0] > PAGE_MM[0] - _CORNER_MM[0]) & (low[:, 1] > PAGE_MM[1] - _CORNER_MM[1])
+    inner = (high[:, 0] < PAGE_MM[0]) & np.where(
+        level, high[:, 1] < PAGE_MM[1] - _INSET_MM, high[:, 1] < PAGE_MM[1]
+    )
+    ruled = near & inner & (span.min(axis=1) < _SQUARE_MM) & (span.max(axis=1) > _LEAST_MM)
+    if np.count_nonzero(ruled & level) < _LEAST_LEVEL:
+        return 0.0
+    return float(span[ruled].max(axis=1).sum())
