@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from grader.pixels import Flat, cut_across, robust_lines, shrink
 from grader.records import FloatArray, GreyImage
@@ -13,6 +14,7 @@ _LONG_SIDE_PX = 1400
 _AXIS_DEG = 16.0
 """Skew, roll and the convergence of a photo together stay under this."""
 _COLLINEAR_PX = 1.8
+_GAP_PX = 80.0
 _LEAST_PX = 12.0
 _LEAST_SHARE = 0.12
 """Of the image's width or height; the title block's lines are kept too."""
@@ -112,7 +114,7 @@ def _chains(edges: FloatArray, shape: tuple[int, ...], *, across: bool) -> list[
     order = np.argsort(-length)
     free = np.ones(len(edges), dtype=bool)
     chains: list[tuple[FloatArray, float]] = []
-    for first in order:
+    for first in map(int, order):
         if not free[first]:
             continue
         members = np.array([first])
@@ -122,7 +124,7 @@ def _chains(edges: FloatArray, shape: tuple[int, ...], *, across: bool) -> list[
                 np.abs(edges[:, 1] - np.polyval(line, edges[:, 0])),
                 np.abs(edges[:, 3] - np.polyval(line, edges[:, 2])),
             )
-            grown = np.flatnonzero(free & (near <= _COLLINEAR_PX))
+            grown = _reached(edges, np.flatnonzero(free & (near <= _COLLINEAR_PX)), first)
             if len(grown) == 0 or np.array_equal(grown, members):
                 break
             members = grown
@@ -133,6 +135,18 @@ def _chains(edges: FloatArray, shape: tuple[int, ...], *, across: bool) -> list[
             ends = np.array([[low, np.polyval(line, low)], [high, np.polyval(line, high)]])
             chains.append((ends, min(1.0, float(length[members].sum() / (high - low)))))
     return chains
+
+
+def _reached(edges: FloatArray, near: NDArray[np.intp], first: int) -> NDArray[np.intp]:
+    """Those of the collinear edges that are reached from the first one without a large gap."""
+    low, high = float(edges[first, 0]), float(edges[first, 2])
+    taken = np.zeros(len(near), dtype=bool)
+    while True:
+        more = ~taken & (edges[near, 0] <= high + _GAP_PX) & (edges[near, 2] >= low - _GAP_PX)
+        if not more.any():
+            return near[taken]
+        taken |= more
+        low, high = min(low, float(edges[near[more], 0].min())), max(high, float(edges[near[more], 2].max()))
 
 
 def _weighted_line(edges: FloatArray, length: FloatArray) -> FloatArray:
