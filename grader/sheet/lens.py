@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from grader.records import FloatArray, GreyImage, Page, Sheet
-from grader.sheet.projection import Projection, fit_projection
+from grader.sheet.projection import Marked, Projection, fit_projection
 
 MAX_BEND = 0.06
 """Phones bend by 0.02 at most, wide-angle lenses more."""
@@ -47,24 +47,22 @@ def straightened(grey: GreyImage, bend: float) -> GreyImage:
     )
 
 
-def find_bend(
-    points_mm: FloatArray, points_px: FloatArray, plain: Projection, shape: tuple[int, int]
-) -> tuple[float, Projection]:
+def find_bend(marked: Marked, plain: Projection, shape: tuple[int, int]) -> tuple[float, Projection]:
     """The bend that best explains marked points, and the map of the straightened picture.
 
     Arguments: `plain` is the map without a bend, given back with 0 where a bend explains little.
     """
-    if plain.rms_mm < _WORTH_MM or len(points_mm) < _LEAST_POINTS:
+    if plain.rms_mm < _WORTH_MM or len(marked) < _LEAST_POINTS:
         return 0.0, plain
 
     def misfit(bend: float) -> float:
-        return fit_projection(points_mm, straight(points_px, bend, shape)).rms_mm
+        return fit_projection(replace(marked, px=straight(marked.px, bend, shape))).rms_mm
 
     found = minimize_scalar(misfit, bounds=(-MAX_BEND, MAX_BEND), method="bounded", options={"xatol": 1e-5})
     if found.fun > _WORTH_SHARE * plain.rms_mm:
         return 0.0, plain
     bend = float(found.x)
-    return bend, fit_projection(points_mm, straight(points_px, bend, shape))
+    return bend, fit_projection(replace(marked, px=straight(marked.px, bend, shape)))
 
 
 def straighten(page: Page, sheet: Sheet) -> tuple[Page, Sheet]:

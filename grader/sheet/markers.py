@@ -18,6 +18,7 @@ from grader.layout import (
     CALIBRATION,
     DRAWING_MM,
     MARKER_CORNERS,
+    MARKER_MM,
     MARKERS_PER_TEMPLATE,
     PAGE_MM,
     Template,
@@ -28,7 +29,7 @@ from grader.records import FloatArray, GreyImage, Lens, Page, Problem, Sheet
 from grader.sheet.identity import identify
 from grader.sheet.lens import find_bend
 from grader.sheet.marker_edges import refine
-from grader.sheet.projection import Projection, fit_projection
+from grader.sheet.projection import Marked, Projection, fit_projection
 
 _DETECTION_PX = 1600
 """Long side of the picture on which markers are looked for: on A3 a marker's cell has 7 pixels."""
@@ -56,12 +57,15 @@ _SCALE_PLAUSIBLE = 0.1
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """Refined corners of one template's markers, (n, 2) each, and whose they are (n,)."""
+    """Refined corners of one template's markers, and whose they are (n,)."""
 
     template: Template
-    mm: FloatArray
-    px: FloatArray
+    marked: Marked
     marker: NDArray[np.intp]
+
+    def kept(self, keep: BoolArray) -> Marked:
+        """Some of the corners."""
+        return Marked(self.marked.mm[keep], self.marked.px[keep], self.marked.outward[keep])
 
 
 def register(page: Page) -> Sheet | None:
@@ -104,9 +108,10 @@ def _seen(grey: GreyImage, quads: dict[int, FloatArray]) -> _Seen | None:
     corners = refine(grey, np.stack([quads[number] for number in ours]))
     places = np.array(ours) - template.marker_ids.start
     owner = np.broadcast_to(places[:, None], corners.seen.shape)
-    return _Seen(
-        template, MARKER_CORNERS[places][corners.seen], corners.px[corners.seen], owner[corners.seen]
-    )
+    at = MARKER_CORNERS[places]
+    outward = (at - at.mean(axis=1, keepdims=True)) / (MARKER_MM / 2.0)
+    marked = Marked(at[corners.seen], corners.px[corners.seen], outward[corners.seen])
+    return _Seen(template, marked, owner[corners.seen])
 
 
 def _detector() -> cv2.aruco.ArucoDetector:
@@ -126,21 +131,21 @@ class _Agreed:
     """The map on which markers agree, and the markers that do."""
 
     fit: Projection
-    mm: FloatArray
-    px: FloatArray
+    marked: Marked
 
 
 def _agreed(seen: _Seen) -> _Agreed | None:
     """The map on which the markers agree, leaving out at most those far off; None if there is none."""
-    keep = np.ones(len(seen.mm), dtype=bool)
+    keep = np.ones(len(seen.marked), dtype=bool)
     while True:
         if len(set(seen.marker[keep])) < _LEAST_MARKERS:
             return None
-        if np.ptp(seen.mm[keep], axis=0).max() < _LEAST_APART_MM:
+        kept = seen.kept(keep)
+        if np.ptp(kept.mm, axis=0).max() < _LEAST_APART_MM:
             return None
-        fit = fit_projection(seen.mm[keep], seen.px[keep])
+        fit = fit_projection(kept)
         if fit.misfit_mm.max() <= _OFF_MM:
-            return _Agreed(fit, seen.mm[keep], seen.px[keep]) if _plausible(fit) else None
+            return _Agreed(fit, kept) if _plausible(fit) else None
         if len(set(seen.marker[keep])) <= _LEAST_MARKERS + 1:
             return None
         keep &= seen.marker != _odd_one(seen, keep)
@@ -150,7 +155,7 @@ def _odd_one(seen: _Seen, keep: BoolArray) -> int:
     """The marker without which the others agree best."""
     numbers = sorted(set(seen.marker[keep]))
     rests = [keep & (seen.marker != number) for number in numbers]
-    rms = [fit_projection(seen.mm[rest], seen.px[rest]).rms_mm for rest in rests]
+    rms = [fit_projection(seen.kept(rest)).rms_mm for rest in rests]
     return int(numbers[int(np.argmin(rms))])
 
 
@@ -211,7 +216,7 @@ def _sheet(page: Page, template: Template, agreed: _Agreed) -> Sheet:
 
 def _lens(page: Page, agreed: _Agreed, printed_se: float) -> Lens | None:
     shape = page.grey.shape[0], page.grey.shape[1]
-    bend, fit = find_bend(agreed.mm, agreed.px, agreed.fit, shape)
+    bend, fit = find_bend(agreed.marked, agreed.fit, shape)
     if not bend:
         return None
     return Lens(bend, agreed.fit.mm_to_px, fit.mm_to_px, fit.rms_mm, _scale_se(fit, printed_se))

@@ -1,23 +1,47 @@
-"""The map from sheet millimetres to pixels that fits marked points, no freer than they demand.
+"""The map from sheet millimetres to pixels that fits printed markers, no freer than they demand.
 
 A flatbed's map is a similarity, a scanner with unequal axes or a skewed feed makes it affine, a
 phone's photo is a perspective. Few points cannot tell a perspective apart from noise and would
 extrapolate it wildly, so the freest map is taken only where it explains the points better by far.
+
+Ink that spreads, or a copier's threshold, moves all sides of a marker outward alike. This gain is
+fitted too: taken for scale it would bend a map that rests on two markers side by side.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from grader.records import FloatArray
 
 _POINT_SE_MM = 0.02
 """Of a corner found at 150 dpi or better; printers and paper do no better."""
+_GAIN_SE_MM = 0.15
+"""How far ink spreads on usual printers and copiers."""
 _WORTH = 12.0
 """Fall of chi squared for each of two further parameters that makes them worth having."""
 _FREEDOMS = (4, 6, 8)
 _LEAST_POINTS = 4
+_ROUNDS = 12
+_SETTLED = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Marked:
+    """Corners of markers, on the sheet and as seen.
+
+    Attributes
+    ----------
+    mm, px : (n, 2)
+    outward : (n, 2) where the corner moves when its marker's sides move outward by one millimetre
+    """
+
+    mm: FloatArray
+    px: FloatArray
+    outward: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.mm)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,65 +51,77 @@ class Projection:
     Attributes
     ----------
     mm_to_px : (3, 3), last element 1
-    rms_mm : root mean square misfit of the points
+    rms_mm : root mean square misfit of the points, the gain taken off
     misfit_mm : (n,) misfit of each point
-    cov : covariance of the parameters, see `_matrix`
-    params : the parameters fitted, 4, 6 or 8
+    gain_mm : how far the markers' sides stand outward of where they should
+    params, cov : parameters of `_matrix` (4, 6 or 8), and their covariance
     centre, size : of the points, mm, by which parameters are made alike
     """
 
     mm_to_px: FloatArray
     rms_mm: float
     misfit_mm: FloatArray
-    cov: FloatArray
+    gain_mm: float
     params: FloatArray
+    cov: FloatArray
     centre: FloatArray
     size: float
 
     def se_mm(self, points_mm: FloatArray) -> FloatArray:
         """(n,) standard error of the place of points (n, 2)."""
-        jacobian = _jacobian(self.params, (points_mm - self.centre) / self.size)
-        scale = float(np.sqrt(abs(np.linalg.det(_matrix(self.params)[:2, :2])))) / self.size
+        unit = (points_mm - self.centre) / self.size
+        jacobian = _jacobian(np.array([0.0, *self.params]), unit, np.zeros_like(unit))[:, :, 1:]
         spread = np.einsum("nij,jk,nik->n", jacobian, self.cov, jacobian)
-        return np.asarray(np.sqrt(spread / 2.0) / scale)
+        return np.asarray(np.sqrt(spread / 2.0) / _px_per_mm(self.params, self.size))
 
 
-def fit_projection(points_mm: FloatArray, points_px: FloatArray) -> Projection:
-    """The plainest map that explains the points (n, 2), n >= 4."""
-    if len(points_mm) < _LEAST_POINTS:
-        raise ValueError(f"at least {_LEAST_POINTS} points are expected, not {len(points_mm)}")
-    centre, size = points_mm.mean(axis=0), float(np.ptp(points_mm, axis=0).max()) / 2.0
-    unit = (points_mm - centre) / size
-    params = _similarity(unit, points_px)
-    params, cov, chi2 = _fit(params[: _FREEDOMS[0]], _FREEDOMS[0], unit, points_px, size)
-    best = params, cov, chi2
-    for freedom in _FREEDOMS[1:]:
-        params, cov, chi2 = _fit(params[:freedom], freedom, unit, points_px, size)
-        # The misfit that is left says how good the corners are where they are worse than usual.
-        noise = max(1.0, chi2 / max(2 * len(unit) - freedom, 1))
-        if best[2] - chi2 > 2 * _WORTH * noise:
-            best = params, cov, chi2
-    params, cov, _ = best
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """Gain and parameters of `_matrix` in one array, their covariance, chi squared."""
+
+    found: FloatArray
+    cov: FloatArray
+    chi2: float
+
+
+def fit_projection(marked: Marked) -> Projection:
+    """The plainest map that explains at least four marked corners; ValueError for fewer."""
+    if len(marked) < _LEAST_POINTS:
+        raise ValueError(f"at least {_LEAST_POINTS} points are expected, not {len(marked)}")
+    centre, size = marked.mm.mean(axis=0), float(np.ptp(marked.mm, axis=0).max()) / 2.0
+    unit = Marked((marked.mm - centre) / size, marked.px, marked.outward / size)
+    best = _plainest(unit, size)
+    gain, params = float(best.found[0]), best.found[1:]
     matrix = _matrix(params)
-    scale_px = float(np.sqrt(abs(np.linalg.det(matrix[:2, :2])))) / size
-    misfit = np.hypot(*(_apply(matrix, unit) - points_px).T) / scale_px
-    to_unit = np.array(
-        [[1.0 / size, 0.0, -centre[0] / size], [0.0, 1.0 / size, -centre[1] / size], [0.0, 0.0, 1.0]]
-    )
+    misfit = np.hypot(*(_placed(best.found, unit.mm, unit.outward) - unit.px).T) / _px_per_mm(params, size)
+    to_unit = np.array([[1.0, 0.0, -centre[0]], [0.0, 1.0, -centre[1]], [0.0, 0.0, size]]) / size
     whole = matrix @ to_unit
     rms = float(np.sqrt(np.mean(misfit**2)))
     # A misfit beyond the corners' own error (bent paper, a lens) makes the map less sure by as much.
-    inflated = cov * max(1.0, (rms / (_POINT_SE_MM * np.sqrt(2.0))) ** 2)
-    return Projection(whole / whole[2, 2], rms, misfit, inflated, params, centre, size)
+    noise = max(1.0, (rms / (_POINT_SE_MM * np.sqrt(2.0))) ** 2)
+    cov = best.cov[1:, 1:] * noise
+    return Projection(whole / whole[2, 2], rms, misfit, gain, params, cov, centre, size)
 
 
-def _similarity(unit: FloatArray, px: FloatArray) -> FloatArray:
-    """Closed form of the best x' = s x + t on complex numbers, as the full eight parameters."""
-    z, w = unit[:, 0] + 1j * unit[:, 1], px[:, 0] + 1j * px[:, 1]
+def _plainest(unit: Marked, size: float) -> _Fit:
+    """The fit with the fewest parameters that a freer one does not beat by far."""
+    best = last = _fit(np.array([0.0, *_similarity(unit)]), unit, size)
+    for freedom in _FREEDOMS[1:]:
+        last = _fit(np.concatenate([last.found, [0.0, 0.0]]), unit, size)
+        # The misfit that is left says how good the corners are where they are worse than usual.
+        noise = max(1.0, last.chi2 / max(2 * len(unit) - freedom, 1))
+        if best.chi2 - last.chi2 > 2 * _WORTH * noise:
+            best = last
+    return best
+
+
+def _similarity(unit: Marked) -> FloatArray:
+    """Closed form of the best w = s z + t on complex numbers: real and imaginary parts of s and t."""
+    z, w = unit.mm[:, 0] + 1j * unit.mm[:, 1], unit.px[:, 0] + 1j * unit.px[:, 1]
     zc, wc = z - z.mean(), w - w.mean()
     s = np.vdot(zc, wc) / np.vdot(zc, zc)
     t = w.mean() - s * z.mean()
-    return np.array([s.real, s.imag, t.real, t.imag, 0.0, 0.0, 0.0, 0.0])
+    return np.array([s.real, s.imag, t.real, t.imag])
 
 
 def _matrix(params: FloatArray) -> FloatArray:
@@ -98,42 +134,49 @@ def _matrix(params: FloatArray) -> FloatArray:
     return np.array([[linear[0, 0], linear[0, 1], x], [linear[1, 0], linear[1, 1], y], [g, h, 1.0]])
 
 
-def _apply(matrix: FloatArray, points: FloatArray) -> FloatArray:
-    mapped = points @ matrix[:, :2].T + matrix[:, 2]
+def _px_per_mm(params: FloatArray, size: float) -> float:
+    return float(np.sqrt(abs(np.linalg.det(_matrix(params)[:2, :2])))) / size
+
+
+def _placed(found: FloatArray, unit: FloatArray, outward: FloatArray) -> FloatArray:
+    """(n, 2) pixels of points, moved outward by the gain."""
+    matrix = _matrix(found[1:])
+    mapped = (unit + found[0] * outward) @ matrix[:, :2].T + matrix[:, 2]
     return np.asarray(mapped[:, :2] / mapped[:, 2:])
 
 
-def _jacobian(params: FloatArray, unit: FloatArray) -> FloatArray:
-    """(n, 2, p) by central differences; the map is smooth and eight evaluations are cheap."""
-    steps = 1e-6 * np.where(np.arange(len(params)) < 4, max(float(np.abs(params[:2]).max()), 1.0), 1.0)
-    columns = []
-    for index, step in enumerate(steps):
-        nudge = np.zeros(len(params))
-        nudge[index] = step
-        columns.append(
-            (_apply(_matrix(params + nudge), unit) - _apply(_matrix(params - nudge), unit)) / (2 * step)
-        )
-    return np.stack(columns, axis=2)
+def _steps(found: FloatArray) -> FloatArray:
+    """What is a usual size of each parameter: gain, scale and place in pixels, shape."""
+    place = max(float(np.abs(found[1:3]).max()), 1.0)
+    return np.array([_GAIN_SE_MM, *[place] * 4, *[1.0] * (len(found) - 5)])
 
 
-def _fit(
-    start: FloatArray, freedom: int, unit: FloatArray, px: FloatArray, size: float
-) -> tuple[FloatArray, FloatArray, float]:
-    """Least squares; parameters, their covariance, chi squared."""
-    full = np.zeros(freedom)
-    full[: len(start)] = start
-    se_px = _POINT_SE_MM * float(np.hypot(*start[:2])) / size
-
-    def misfit(params: FloatArray) -> FloatArray:
-        return np.asarray((_apply(_matrix(params), unit) - px).ravel() / se_px)
-
-    typical = np.where(np.arange(freedom) < 4, float(np.abs(full[:2]).max()), 1.0)
-    found = least_squares(
-        misfit,
-        full,
-        jac=lambda p: _jacobian(p, unit).reshape(-1, freedom) / se_px,
-        x_scale=typical,
-        max_nfev=30,
+def _jacobian(found: FloatArray, unit: FloatArray, outward: FloatArray) -> FloatArray:
+    """(n, 2, p) by central differences; the map is smooth and its evaluation cheap."""
+    nudges = np.diag(1e-6 * _steps(found))
+    ends = [(_placed(found + by, unit, outward), _placed(found - by, unit, outward)) for by in nudges]
+    return np.stack(
+        [(high - low) / (2.0 * by.max()) for by, (high, low) in zip(nudges, ends, strict=True)], axis=2
     )
-    cov = np.linalg.pinv(found.jac.T @ found.jac)
-    return np.asarray(found.x), np.asarray(cov), float(2.0 * found.cost)
+
+
+def _fit(start: FloatArray, unit: Marked, size: float) -> _Fit:
+    """Least squares by Gauss and Newton, with what is known of the gain beforehand as one more datum."""
+    se_px = _POINT_SE_MM * float(np.hypot(*start[1:3])) / size
+    prior = np.zeros(len(start))
+    prior[0] = 1.0 / _GAIN_SE_MM
+
+    found = start
+    for _ in range(_ROUNDS):
+        off = np.append((_placed(found, unit.mm, unit.outward) - unit.px).ravel() / se_px, prior @ found)
+        slope = _jacobian(found, unit.mm, unit.outward).reshape(-1, len(found)) / se_px
+        # Columns of a usual size each keep the normal equations well conditioned.
+        usual = _steps(found)
+        weighted = np.vstack([slope, prior]) * usual
+        step = np.linalg.lstsq(weighted, -off, rcond=None)[0]
+        found = found + step * usual
+        if np.abs(step).max() < _SETTLED:
+            break
+    off = np.append((_placed(found, unit.mm, unit.outward) - unit.px).ravel() / se_px, prior @ found)
+    cov = np.linalg.pinv(weighted.T @ weighted) * np.outer(usual, usual)
+    return _Fit(found, np.asarray(cov), float(off @ off))
