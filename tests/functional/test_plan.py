@@ -69,7 +69,7 @@ def test_the_plan_is_drawn_into_a_file(planmark, tmp_path):
         ("plan nowhere.toml --n 1", 2, "no such file"),
         ("plan pump --n 1 --crank-mm 0", 2, "above 0"),
         ("plan pump --n 1 --crank-mm nan", 2, "above 0"),
-        ("plan pump --n one", 2, "is not a valid"),
+        ("plan pump --n one", 2, "'--n'"),
         ("plan pump --m 1", 2, "No such option"),
         ("schema rapport", 2, "known are"),
         ("plan pump --n 1 --svg /proc/plan.svg", 5, "cannot be written"),
