@@ -19,6 +19,7 @@ from grader.answer_sheet import make_sheets
 from grader.roster import RosterRow
 from grader.simulation import (
     CAREFUL,
+    PENS,
     TYPICAL,
     PageStyle,
     Scan,
@@ -32,7 +33,6 @@ from grader.simulation import (
     write_truth,
 )
 from grader.simulation.printing import printed_sheets
-from grader.simulation.settings import PENS
 from reference.assignment import Assignment, load_assignment
 
 QUIET = Scan(dpi=150.0, dpi_tag=150.0, noise=1.0, tint_grain=0.5, jpeg_quality=62, dust=8)

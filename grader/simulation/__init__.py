@@ -6,6 +6,7 @@ drawing whatever the scanner: hand, page, pen and scanner have random streams of
 """
 
 from grader.simulation.desk import PrintedSheet
+from grader.simulation.mixture import PENS, any_settings
 from grader.simulation.settings import (
     CAREFUL,
     CLEAN_SCAN,
@@ -18,7 +19,6 @@ from grader.simulation.settings import (
     Scan,
     Settings,
     Student,
-    any_settings,
 )
 from grader.simulation.storing import blank_back, encoded, write_pdf, write_truth
 from grader.simulation.student import SimulatedSheet, measured_by, simulate
@@ -26,6 +26,7 @@ from grader.simulation.student import SimulatedSheet, measured_by, simulate
 __all__ = [
     "CAREFUL",
     "CLEAN_SCAN",
+    "PENS",
     "PERFECT",
     "SLOPPY",
     "TYPICAL",

@@ -9,7 +9,7 @@ from grader.simulation.hand import MECHANISM, DrawnFigure, Nodes, Task
 from grader.simulation.settings import Student
 from grader.simulation.sketch import DASHES, Sketch
 from grader.simulation.strokes import arc
-from reference.construction import Divide, Similar, TwoArcs, TwoLines, Vector, evaluate
+from reference.construction import Divide, Given, Similar, TwoArcs, TwoLines, Vector, evaluate
 from reference.mechanism import Dyad, Plate, PointOnLine, Slider
 
 TOO_SHORT_MM = 0.8
@@ -166,7 +166,7 @@ def draw_plan(sketch: Sketch, task: Task, figure: str, nodes: Nodes, student: St
         if reason:
             missing[vector.name] = reason
         else:
-            _vector(sketch, figure, vector, nodes)
+            _vector(sketch, task, figure, vector, nodes)
     _letters(sketch, task, figure, nodes)
     return missing
 
@@ -178,19 +178,28 @@ def _names(task: Task, figure: str) -> set[str]:
 def _left_out(sketch: Sketch, task: Task, vector: Vector, nodes: Nodes, student: Student) -> str | None:
     if abs(nodes[vector.head] - nodes[vector.tail]) < TOO_SHORT_MM:
         return "too short to draw"
-    crank = task.mechanism.crank.pin
-    is_result = vector.link is None and vector.name.split("_", 1)[1] != crank
-    if is_result and sketch.chance(student.omitted):
+    if _is_result(task, vector) and sketch.chance(student.omitted):
         return "not drawn out"
     return None
 
 
-def _vector(sketch: Sketch, figure: str, vector: Vector, nodes: Nodes) -> None:
+def _is_result(task: Task, vector: Vector) -> bool:
+    """Whether a vector only joins two nodes that are there without it (pole and c, pole and b')."""
+    step = task.wrong.construction.step(vector.head)
+    if isinstance(step, TwoLines):
+        return vector.tail not in {step.first.through, step.second.through}
+    return vector.link is None and not isinstance(step, Given)
+
+
+def _vector(sketch: Sketch, task: Task, figure: str, vector: Vector, nodes: Nodes) -> None:
     p, q = sketch.redrawn(nodes[vector.tail], nodes[vector.head])
     pen = sketch.pen("line", plan=True)
-    is_result = vector.link is None
-    dash = DASHES if is_result and sketch.style.dashed_absolutes and abs(q - p) > 12 else None
+    dash = None
+    if sketch.style.dashed_absolutes and abs(q - p) > 12 and _is_result(task, vector):
+        dash = DASHES
     sketch.line(pen, p, q, dash)
+    if dash is None and sketch.chance(sketch.style.doubled):
+        sketch.line(pen, *sketch.redrawn(p, q))
     symbols.arrowhead(sketch, pen, p, q, sketch.style.arrow_mm)
     sketch.lines[figure, vector.name] = (p, q)
     if sketch.chance(0.4 * sketch.style.erased):

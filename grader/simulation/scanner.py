@@ -192,6 +192,7 @@ def _light(scan: Scan, view: View, rng: Rng, smudges: int) -> Float32Array:
     tilt = rng.normal(0.0, 0.5, 5) * scan.shading
     light = 1.0 + tilt[0] * u + tilt[1] * v - abs(tilt[2]) * (u * u + v * v) * 2
     light += tilt[3] * np.sin(3 * u + 6 * tilt[4])
+    light *= min(1.0, 1.02 / float(light.max()))  # a camera exposes for the brightest part
     if scan.shadow > 0:
         light *= _hand_shadow(u, v, scan.shadow, rng)
     xy_mm = view.to_mm(np.column_stack([x.ravel(), y.ravel()]).astype(float) * _COARSE).astype(np.float32)

@@ -1,11 +1,7 @@
-"""What can be set about a simulated student, pen and scanner, and how a mixed class is drawn by lot."""
+"""What can be set about a simulated student, pen and scanner."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
-
-import numpy as np
-
-from grader.simulation.strokes import Rng
 
 Colour = tuple[int, int, int]
 
@@ -67,7 +63,18 @@ class Student:
 
 @dataclass(frozen=True, slots=True)
 class PenStyle:
-    """Pens: widths in millimetres, darkness 0..1, colours, how the drawing is finished."""
+    """Pens and how the drawing is finished.
+
+    Attributes
+    ----------
+    line_mm, thin_mm : mean width of finished and of construction lines
+    dark, thin_dark : share of light that they take
+    pressure, wobble_mm, grain : unevenness along a stroke, across it, and of its surface
+    plan_colour : another colour for vectors, None for the same pen
+    overrun_mm : mean length by which construction lines run past the points they gave
+    construction_lines, node_circles, erased, doubled, arcs : shares of the chances to draw such a thing
+    dashed_absolutes : vectors that only join two known points are dashed
+    """
 
     line_mm: float = 0.5
     thin_mm: float = 0.25
@@ -90,6 +97,7 @@ class PenStyle:
     crank_circle: bool = False
     erased: float = 0.1
     smudges: int = 1
+    doubled: float = 0.0
     arcs: float = 0.4
 
 
@@ -166,150 +174,3 @@ class Settings:
 CLEAN_SCAN = Scan(skew_deg=0.0, shift_mm=0.0, stretch=0.0, noise=0.0, shading=0.0, tint_grain=0.0, dust=0,
                   blur_px=0.0, jpeg_quality=98)
 """A scanner without faults."""
-
-MISTAKES_OFTEN_MADE = (
-    "parallel_for_perpendicular", "wrong_link", "sense_reversed", "rpm_not_converted", "scale_wrong",
-    "normal_reversed", "normal_missing", "normal_from_absolute", "other_variant", "other_assembly",
-    "image_mirrored", "wrong_intersection", "vector_missing", "labels_swapped", "figure_rotated",
-    "arithmetic",
-)
-
-
-def any_settings(
-    seed: int,
-    *,
-    device: Literal["flatbed", "copier", "phone"] | None = None,
-    dpi: float | None = None,
-    mistakes: float = 0.5,
-) -> Settings:
-    """Somebody of a mixed class: hand, habits, pen, page and scanner drawn by lot from the seed.
-
-    Arguments: `device` and `dpi` may be fixed; `mistakes` is the mean number of mistakes.
-    """
-    rng = np.random.default_rng([seed, 7])
-    hand = (CAREFUL, TYPICAL, SLOPPY)[rng.choice(3, p=[0.35, 0.45, 0.2])]
-    page = any_page(rng)
-    return Settings(hand, any_student(rng, mistakes), any_pen(rng, hand), page, any_scan(rng, device, dpi))
-
-
-def any_student(rng: Rng, mistakes: float) -> Student:
-    """Somebody's choices."""
-    count = min(2, int(rng.poisson(mistakes)))
-    codes = rng.choice(MISTAKES_OFTEN_MADE, size=count, replace=False)
-    return Student(
-        crank_mm=None if rng.random() < 0.5 else float(rng.choice([50.0, 55.0, 60.0])),
-        ka_ratio=float(rng.choice([1.0, 1.25, 0.8], p=[0.7, 0.15, 0.15])),
-        kv_ratio=float(rng.choice([1.0, 1.25, 0.8], p=[0.84, 0.08, 0.08])),
-        similarity=bool(rng.random() < 0.3),
-        turn_deg=float(rng.choice([0.0, rng.normal(0, 0.4), rng.normal(0, 3.0)], p=[0.5, 0.4, 0.1])),
-        mistakes=tuple(str(code) for code in codes),
-        sheets=2 if rng.random() < 0.35 else 1,
-        vectors_on_mechanism=bool(rng.random() < 0.35),
-        altitude=bool(rng.random() < 0.15),
-        omitted=float(rng.choice([0.0, 0.25], p=[0.7, 0.3])),
-        abandoned=bool(rng.random() < 0.06),
-    )
-
-
-PENS: dict[str, PenStyle] = {
-    "soft pencil": PenStyle(0.55, 0.3, 0.72, 0.38, 0.16, 0.05, 0.5, (62, 62, 66)),
-    "hard pencil": PenStyle(0.32, 0.2, 0.5, 0.24, 0.1, 0.035, 0.4, (84, 84, 88)),
-    "fine pencil": PenStyle(0.4, 0.25, 0.62, 0.34, 0.08, 0.03, 0.3, (70, 70, 72)),
-    "ink": PenStyle(0.5, 0.25, 0.96, 0.9, 0.04, 0.03, 0.03, (24, 24, 28)),
-    "ballpoint": PenStyle(0.42, 0.3, 0.85, 0.7, 0.12, 0.06, 0.12, (34, 44, 120)),
-    "coloured": PenStyle(0.45, 0.25, 0.74, 0.4, 0.12, 0.05, 0.3, (66, 66, 70), (150, 36, 40)),
-    "felt": PenStyle(0.7, 0.35, 0.95, 0.85, 0.06, 0.05, 0.02, (30, 30, 34)),
-}
-
-
-def any_pen(rng: Rng, hand: Hand) -> PenStyle:
-    """Somebody's pens and way of finishing a drawing."""
-    kind = rng.choice(list(PENS), p=[0.24, 0.2, 0.22, 0.1, 0.1, 0.09, 0.05])
-    style = PENS[str(kind)]
-    free = rng.random() < 0.15
-    return replace(
-        style,
-        line_mm=style.line_mm * float(rng.uniform(0.85, 1.2)),
-        wobble_mm=style.wobble_mm * (3.0 if free and hand is SLOPPY else float(rng.uniform(0.7, 1.5))),
-        arrow=rng.choice(["open", "filled", "half", "none"], p=[0.4, 0.33, 0.12, 0.15]),
-        arrow_mm=float(rng.uniform(2.4, 5.0)),
-        overrun_mm=float(rng.choice([0.0, 4.0, 10.0, 20.0])),
-        construction_lines=float(rng.choice([0.0, 0.5, 1.0], p=[0.2, 0.4, 0.4])),
-        dashed_absolutes=bool(rng.random() < 0.25),
-        node_circles=float(rng.choice([0.0, 0.4, 1.0], p=[0.5, 0.3, 0.2])),
-        support=rng.choice(["triangle", "arch", "fork"], p=[0.6, 0.25, 0.15]),
-        links_stop_short=bool(rng.random() < 0.75),
-        plate_hatched=bool(rng.random() < 0.3),
-        crank_circle=bool(rng.random() < 0.3),
-        erased=float(rng.choice([0.0, 0.15, 0.4])),
-        smudges=int(rng.integers(0, 4)),
-        arcs=float(rng.choice([0.0, 0.5, 1.0])),
-    )
-
-
-def any_page(rng: Rng) -> PageStyle:
-    """Somebody's page."""
-    language = rng.choice(["ro", "ru", "en"], p=[0.5, 0.3, 0.2])
-    return PageStyle(
-        frame=rng.choice(["iso", "gost", "none"], p=[0.5, 0.35, 0.15]),
-        frame_by=rng.choice(["hand", "print"], p=[0.7, 0.3]),
-        title_block=rng.choice(["rows", "form", "none"], p=[0.55, 0.3, 0.15]),
-        language=language,
-        decimal_comma=bool(language != "en" and rng.random() < 0.8),
-        captions=bool(rng.random() < 0.75),
-        calculations=bool(rng.random() < 0.6),
-        scales_written=rng.choice(["title", "captions", "both", "none"], p=[0.4, 0.25, 0.15, 0.2]),
-        letter_mm=float(rng.uniform(3.0, 5.5)),
-        vector_labels=float(rng.choice([0.0, 0.5, 1.0])),
-        end_labels=float(rng.choice([0.0, 0.5, 1.0])),
-        bar_over_vectors=bool(rng.random() < 0.2),
-    )
-
-
-def any_scan(
-    rng: Rng, device: Literal["flatbed", "copier", "phone"] | None = None, dpi: float | None = None
-) -> Scan:
-    """Some scanner, copier or phone with its faults."""
-    device = device or rng.choice(["flatbed", "copier", "phone"], p=[0.65, 0.15, 0.2])
-    resolution = dpi or float(rng.choice([150.0, 200.0, 300.0, 400.0], p=[0.2, 0.25, 0.45, 0.1]))
-    tag = {0: None, 1: 72.0, 2: resolution * 0.5}.get(int(rng.integers(0, 14)), resolution)
-    bed: Colour = ((236, 238, 240), (250, 250, 250), (24, 24, 26), (180, 182, 186))[
-        rng.choice(4, p=[0.5, 0.25, 0.15, 0.1])
-    ]
-    tint = rng.uniform(-8, 2, 3) + np.array([244.0, 243.0, 238.0]) - rng.choice([0.0, 14.0], p=[0.8, 0.2])
-    common = Scan(
-        device=device, dpi=resolution, quarter_turns=int(rng.choice(4, p=[0.7, 0.08, 0.12, 0.1])),
-        skew_deg=float(rng.choice([0.2, 0.6, 1.8])), shift_mm=float(rng.choice([0.8, 2.5])),
-        stretch=float(rng.choice([0.0003, 0.001])), dpi_tag=tag,
-        paper=(int(tint[0]), int(tint[1]), int(tint[2])),
-        bed=bed, jpeg_quality=int(rng.choice([55, 75, 85, 92])), blur_px=float(rng.uniform(0.4, 0.9)),
-        noise=float(rng.uniform(1.0, 4.0)), shading=float(rng.choice([0.0, 0.04, 0.1])),
-        dust=int(rng.integers(0, 40)), fold=bool(rng.random() < 0.12),
-        show_through=float(rng.choice([0.0, 0.06], p=[0.85, 0.15])), punched=bool(rng.random() < 0.15),
-        mode=rng.choice(["grey", "colour"], p=[0.6, 0.4]),
-        container=rng.choice(["jpg", "png", "tif"], p=[0.8, 0.1, 0.1]),
-    )
-    return {"flatbed": _flatbed, "copier": _copier, "phone": _phone}[device](rng, common)
-
-
-def _flatbed(_rng: Rng, scan: Scan) -> Scan:
-    return scan
-
-
-def _copier(rng: Rng, scan: Scan) -> Scan:
-    return replace(
-        scan, mode="bilevel", container=rng.choice(["tif", "png"]), dpi=max(scan.dpi, 200.0),
-        copy_scale=float(rng.choice([1.0, 0.98, 0.995, 1.01])), dust=scan.dust * 3,
-        dpi_tag=max(scan.dpi, 200.0) if scan.dpi_tag == scan.dpi else scan.dpi_tag,
-    )
-
-
-def _phone(rng: Rng, scan: Scan) -> Scan:
-    desk: Colour = ((128, 96, 66), (60, 58, 56), (206, 200, 190), (92, 104, 112))[rng.integers(4)]
-    return replace(
-        scan, mode="colour", container="jpg", dpi=float(rng.uniform(190.0, 235.0)), dpi_tag=72.0, bed=desk,
-        tilt_deg=float(rng.uniform(1.0, 11.0)), lens_k1=float(rng.normal(0.0, 0.02)),
-        shading=float(rng.uniform(0.1, 0.3)), shadow=float(rng.uniform(0.0, 0.35)),
-        blur_px=float(rng.uniform(0.6, 1.2)), jpeg_quality=int(rng.integers(75, 94)),
-        noise=float(rng.uniform(2.0, 5.0)), skew_deg=2.0,
-    )
