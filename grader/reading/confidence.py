@@ -13,9 +13,11 @@ from reference.geometry import ComplexArray
 
 NEAR_MM = 0.5
 """A node is right within this of what was drawn."""
-ELSEWHERE_MM = 0.8
+ELSEWHERE_MM = 0.5
 TEMPERATURE = 3.0
 """Scores are this much too sure of themselves: strokes of one hand err alike."""
+FARTHEST = 12.0
+"""Nats: rivals worse by more weigh nothing."""
 HIGHEST = 0.995
 SHARED_STROKE = 0.8
 SHARED_CLOSELY = 0.93

@@ -55,10 +55,11 @@ def _node(fit: Fit, index: int, sure: float) -> ReadNode:
 def _node_confidence(plan: Plan, fit: Fit) -> FloatArray:
     names = plan.found.expected.names
     rivals = [
-        confidence.Rival(dict(zip(other.found.expected.names, other.found.expected.at, strict=True)), other.score)
+        confidence.Rival(dict(zip(other.found.expected.names, other.fit.at, strict=True)), other.score)
         for other in plan.rivals
+        if other.score > plan.score - confidence.FARTHEST
     ]
-    named = confidence.of_names(names, plan.found.expected.at, plan.score, rivals)
+    named = confidence.of_names(names, fit.at, plan.score, rivals)
     placed = confidence.of_places(fit)
     support = min(1.0, max(0.0, (plan.place.score - 0.3) / 0.4))
     return np.asarray(np.minimum(named * placed * support, confidence.HIGHEST))

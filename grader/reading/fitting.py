@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grader.reading.lines import Lines
+from grader.reading.lines import BoolArray, Lines
 from grader.reading.matching import Explanation
 from grader.records import FloatArray
 from reference.geometry import ComplexArray
@@ -13,6 +13,10 @@ from reference.geometry import ComplexArray
 ROUNDS = 6
 LEAST_REDRAW_MM = 0.12
 MOST_REDRAW_MM = 0.6
+USUAL_REDRAW_MM = 0.25
+DOUBT = 4.0
+"""The usual redraw error counts as much as this many spare observations."""
+SHARED_MM = 0.5
 AT_MM = 0.2
 """How far a stroke that ends at its node ends from it."""
 END_REACH_MM = 5.0
@@ -71,11 +75,15 @@ class Fit:
 
 @dataclass(frozen=True, slots=True)
 class _Lines:
-    """Rows: a node lies on a stroke's line. `design` @ nodes should equal `goal`, to `sigma` mm."""
+    """Rows: a node lies on a stroke's line: `design` @ nodes should equal `goal`, to `sigma` mm.
+
+    `own` where the stroke is this edge's alone: then it also misses its nodes by the redraw error.
+    """
 
     design: FloatArray
     goal: FloatArray
     sigma: FloatArray
+    own: BoolArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,15 +111,15 @@ def fit_nodes(
     """
     at = found.expected.at.copy()
     count = 2 * len(at)
-    redraw = 0.3
+    redraw = USUAL_REDRAW_MM
     about = _end_rows(found, lines, at)
     precision, pull = np.zeros(len(about.end)), np.zeros(len(about.end))
     cov = np.eye(count) * LOOSE_MM**2
+    rows = _line_rows(found, lines, at, centres or {})
     for _ in range(ROUNDS):
-        rows = _line_rows(found, lines, at, redraw, centres or {})
-        state = _pairs(at)
-        misfit = np.abs(rows.goal - rows.design @ state) / rows.sigma
-        weight = np.minimum(1.0, 2.0 / np.maximum(misfit, 1e-9)) / rows.sigma**2
+        sigma = np.sqrt(rows.sigma**2 + np.where(rows.own, redraw**2, 0.0))
+        misfit = np.abs(rows.goal - rows.design @ _pairs(at)) / sigma
+        weight = np.minimum(1.0, 2.0 / np.maximum(misfit, 1e-9)) / sigma**2
         normal = rows.design.T @ (rows.design * weight[:, None]) + np.eye(count) / LOOSE_MM**2
         right = rows.design.T @ (rows.goal * weight) + _pairs(found.expected.at) / LOOSE_MM**2
         normal = normal + about.design.T @ (about.design * precision[:, None])
@@ -119,7 +127,7 @@ def fit_nodes(
         cov = np.asarray(np.linalg.inv(normal), dtype=np.float64)
         state = cov @ right
         at = state[0::2] + 1j * state[1::2]
-        redraw = _redraw(found, lines, at, count)
+        redraw = _redraw((rows.goal - rows.design @ state)[rows.own], count)
         precision, pull = _sites(about, state, cov, precision, pull, ends)
     return Fit(at, cov, redraw, _residuals(found, lines, at))
 
@@ -150,29 +158,31 @@ def _pairs(values: ComplexArray) -> FloatArray:
 
 
 def _line_rows(
-    found: Explanation, lines: Lines, at: ComplexArray, redraw: float, centres: Mapping[int, complex]
+    found: Explanation, lines: Lines, at: ComplexArray, centres: Mapping[int, complex]
 ) -> _Lines:
-    design, goal, sigma = [], [], []
+    design, goal, sigma, own = [], [], [], []
     middles = lines.middle
     for index, edge in enumerate(found.expected.edges):
         row = int(found.stroke[index])
         if row < 0:
             continue
         along, middle = complex(lines.along[row]), complex(middles[row])
-        loose = 0.5 if found.shared[index] else redraw
+        loose = SHARED_MM if found.shared[index] else 0.0
         for node in (edge.tail, edge.head):
             arm = float(((at[node] - middle) * np.conj(along)).real)
             design.append(_row(len(at), node, 1j * along))
             goal.append(float((middle * np.conj(1j * along)).real))
             sigma.append(float(np.sqrt(loose**2 + lines.se_offset[row] ** 2 + (lines.se_angle[row] * arm) ** 2)))
+            own.append(not found.shared[index])
     for node, centre in centres.items():
         for axis, value in ((1.0 + 0j, centre.real), (1j, centre.imag)):
             design.append(_row(len(at), node, axis))
             goal.append(value)
             sigma.append(CENTRE_MM)
+            own.append(False)
     if not design:
-        return _Lines(np.zeros((0, 2 * len(at))), np.zeros(0), np.zeros(0))
-    return _Lines(np.array(design), np.array(goal), np.array(sigma))
+        return _Lines(np.zeros((0, 2 * len(at))), np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool))
+    return _Lines(np.array(design), np.array(goal), np.array(sigma), np.array(own))
 
 
 def _end_rows(found: Explanation, lines: Lines, at: ComplexArray) -> _Ends:
@@ -213,12 +223,10 @@ def _residuals(found: Explanation, lines: Lines, at: ComplexArray) -> FloatArray
     return off
 
 
-def _redraw(found: Explanation, lines: Lines, at: ComplexArray, unknowns: int) -> float:
+def _redraw(off: FloatArray, unknowns: int) -> float:
     """How far strokes miss nodes here, from what is left over beyond the unknowns."""
-    off = _residuals(found, lines, at)
-    seen = off[np.isfinite(off)]
-    spare = len(seen) - unknowns
+    spare = len(off) - unknowns
     if spare <= 0:
-        return 0.3
-    usual = np.sqrt(np.sum(np.minimum(seen**2, 1.0)) + 4 * 0.2**2) / np.sqrt(spare + 4)
-    return float(np.clip(usual, LEAST_REDRAW_MM, MOST_REDRAW_MM))
+        return USUAL_REDRAW_MM
+    squares = np.sum(np.minimum(off**2, 1.0)) + DOUBT * USUAL_REDRAW_MM**2
+    return float(np.clip(np.sqrt(squares / (spare + DOUBT)), LEAST_REDRAW_MM, MOST_REDRAW_MM))

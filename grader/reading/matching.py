@@ -140,15 +140,15 @@ def _choices(state: Explanation, index: int, edge: int, lines: Lines, ends: Ends
     near, off, spread = near[kept], off[near[kept]], spread[near[kept]]
     if not len(near):
         return found
-    taken = state.stroke[state.stroke >= 0]
-    shared = np.isin(lines.members[near], lines.members[taken]).any(axis=1)
+    shared = _in_use(state, lines)[lines.members[near]].any(axis=1)
     chance = _log_chance(state.expected.at[tail] + span / 2.0, size, lines)
     own = -0.5 * distance[near] - 0.5 * log_det[near] - np.log(2 * np.pi) + np.log(size) + gains - chance
     own -= PENALTY_OF_THIN * lines.thin[near]
     wide_distance, wide_log_det = _mahalanobis(off, spread + 0.3**2 * np.eye(2))
     density = np.exp(-0.5 * (wide_distance + wide_log_det)) / (2 * np.pi)
     both = np.log(np.minimum(1.0, density * SHARED_RADIUS2_MM2) + 1e-12) - 1.0
-    both += RUN_ON_EXPLAINED * _explains_run_on(state, lines, near, tail, head) * shared
+    for place in np.flatnonzero(shared):
+        both[place] += RUN_ON_EXPLAINED * _explains_run_on(state, lines, int(near[place]), tail, head)
     gains = state.score + np.where(shared, both, own)
     for place, row in enumerate(near):
         at_ends = (False, False) if shared[place] else (bool(ended[place, 0]), bool(ended[place, 1]))
@@ -156,28 +156,28 @@ def _choices(state: Explanation, index: int, edge: int, lines: Lines, ends: Ends
     return found
 
 
-def _explains_run_on(state: Explanation, lines: Lines, near: IntArray, tail: int, head: int) -> FloatArray:
-    """Whether the edge lies where a stroke runs on past the edge that it was taken for."""
-    told = np.zeros(len(near))
-    for place, row in enumerate(near):
-        owners = [
-            edge
-            for edge, taken in enumerate(state.stroke)
-            if taken >= 0 and np.isin(lines.members[taken], lines.members[row]).any()
-        ]
-        if not owners:
-            continue
-        along = lines.along[row]
+def _in_use(state: Explanation, lines: Lines) -> BoolArray:
+    """Which strokes, by their number, serve an edge already."""
+    used = np.zeros(int(lines.members.max()) + 1, dtype=bool)
+    used[lines.members[state.stroke[state.stroke >= 0]].ravel()] = True
+    return used
 
-        def span(first: int, second: int, along: complex = along) -> tuple[float, float]:
-            ends = sorted(float((state.expected.at[node] * np.conj(along)).real) for node in (first, second))
-            return ends[0], ends[1]
 
-        low, high = span(tail, head)
-        covered = [span(state.expected.edges[one].tail, state.expected.edges[one].head) for one in owners]
-        common = max(min(high, other[1]) - max(low, other[0]) for other in covered)
-        told[place] = float(common < LITTLE_COMMON * (high - low))
-    return told
+def _explains_run_on(state: Explanation, lines: Lines, row: int, tail: int, head: int) -> bool:
+    """Whether the edge lies where a stroke runs on past the edges that it was taken for."""
+    along, own = lines.along[row], set(lines.members[row].tolist())
+
+    def span(first: int, second: int) -> tuple[float, float]:
+        ends = sorted(float((state.expected.at[node] * np.conj(along)).real) for node in (first, second))
+        return ends[0], ends[1]
+
+    low, high = span(tail, head)
+    for edge, taken in zip(state.expected.edges, state.stroke.tolist(), strict=True):
+        if taken >= 0 and own & set(lines.members[taken].tolist()):
+            other = span(edge.tail, edge.head)
+            if min(high, other[1]) - max(low, other[0]) > LITTLE_COMMON * (high - low):
+                return False
+    return True
 
 
 def _log_chance(middle: complex, size: float, lines: Lines) -> float:
