@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grader.answer_sheet.fit import best_template
 from grader.rubric import RubricFile, check_rubric
 from reference.assignment import Assignment, Variant
 from reference.derivation import construction_of
 from reference.errors import Finding, MechanismError
-from reference.geometry import FloatArray
 from reference.plan import Plan, conditioning, exact_plan
 
 LEAST_TRANSMISSION = 0.25
@@ -17,6 +17,8 @@ LEAST_TRANSMISSION = 0.25
 LEAST_CROSSING_DEG = 20.0
 """Construction lines that meet at less are hard to intersect by hand."""
 NAMED = 5
+
+BoolArray = NDArray[np.bool_]
 
 
 def lint(assignment: Assignment, rubric: RubricFile) -> list[Finding]:
@@ -81,12 +83,13 @@ def _short_vectors(plan: Plan, rubric: RubricFile) -> Iterator[Finding]:
 def _too_large(assignment: Assignment) -> Iterator[Finding]:
     for index, page in enumerate(assignment.file.page):
         fit = best_template(assignment, page.figures)
-        for figure, scale in fit.shrinks.items():
-            told = f"the {figure.replace('_', ' ')} does not fit its zone on A3 at the proposed scales"
-            yield Finding(f"$.page[{index}]", f"{told}: it must be drawn at {scale:.2f} of that size")
+        for figure, room in fit.room.items():
+            if room < 1.0:
+                told = f"the {figure.replace('_', ' ')} does not fit its zone on A3 at the proposed scales"
+                yield Finding(f"$.page[{index}]", f"{told}: it fits at {room:.2f} of that size")
 
 
-def _named(plan: Plan, which: FloatArray) -> str:
+def _named(plan: Plan, which: BoolArray) -> str:
     """The variants meant, the first of many by name."""
     chosen: Sequence[Variant] = [one for one, is_so in zip(plan.variants, which, strict=True) if is_so]
     told = "; ".join(str(variant) for variant in chosen[:NAMED])
