@@ -36,8 +36,10 @@ ColourImage = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
 WIDTH_PX = 2000
-INK_STRENGTH = 0.72
-"""The scan's ink is shown lighter than it is, so that the overlay stands out."""
+INK_STRENGTH = 1.25
+"""Pencil is shown darker than it is, so that it can be followed under the overlay,"""
+DARKEST = 0.8
+"""and ink lighter, so that the overlay stands out."""
 PAPER_FROM = 0.90
 """Share of the local paper's brightness from which everything is shown white."""
 OPACITY = 0.82
@@ -124,13 +126,13 @@ def _upright(grey: GreyImage, sheet: Sheet, width_px: int) -> GreyImage:
 
 
 def _clean(grey: GreyImage) -> GreyImage:
-    """Shadows evened out, paper white, ink somewhat lighter."""
+    """Shadows evened out, paper white, strokes of one strength."""
     height, width = grey.shape
     small = cv2.resize(grey, (max(1, width // 8), max(1, height // 8)), interpolation=cv2.INTER_AREA)
     paper = cv2.GaussianBlur(cv2.dilate(small, np.ones((7, 7), np.uint8)), (0, 0), 5)
     level = cv2.resize(paper, (width, height), interpolation=cv2.INTER_LINEAR).astype(np.float32)
     share = np.minimum(grey / np.maximum(level, 1.0) / PAPER_FROM, 1.0)
-    return _grey(255.0 - 255.0 * INK_STRENGTH * (1.0 - share))
+    return _grey(255.0 - 255.0 * np.minimum(INK_STRENGTH * (1.0 - share), DARKEST))
 
 
 def _grey(image: NDArray[np.generic]) -> GreyImage:
@@ -228,9 +230,7 @@ class _Brush:
     ) -> None:
         thick = max(1, round(width_mm * self.px_per_mm))
         for a, b in _dashes(start, end, dash):
-            cv2.line(
-                self.image, self._fixed(a), self._fixed(b), colour, thick, cv2.LINE_AA, FRACTION_BITS
-            )
+            cv2.line(self.image, self._fixed(a), self._fixed(b), colour, thick, cv2.LINE_AA, FRACTION_BITS)
 
     def fill(self, points: tuple[XY, ...], colour: Colour) -> None:
         corners = np.array([self._fixed(point) for point in points], dtype=np.int32)
@@ -280,7 +280,5 @@ def _dashes(start: XY, end: XY, dash: tuple[float, float] | None) -> list[tuple[
     pieces = []
     for index in range(count):
         first, last = index * pitch, index * pitch + pitch - off
-        pieces.append(
-            tuple((start[0] + at * along[0], start[1] + at * along[1]) for at in (first, last))
-        )
+        pieces.append(tuple((start[0] + at * along[0], start[1] + at * along[1]) for at in (first, last)))
     return [(a, b) for a, b in pieces]

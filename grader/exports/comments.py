@@ -5,9 +5,15 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from grader.documents import ReportDocument
-from grader.i18n import Tongue, tongue
+from grader.i18n import N_, Tongue, tongue
 
-_SAID = {"partial", "none", "review", "follow_through"}
+VERDICTS = {
+    "partial": N_("nearly right"),
+    "none": N_("wrong"),
+    "review": N_("waits for a person"),
+    "follow_through": N_("follows rightly"),
+}
+"""The verdicts that are worth a comment."""
 
 
 def comment(reports: Sequence[ReportDocument], lang: str) -> str:
@@ -20,11 +26,15 @@ def _of_report(report: ReportDocument, speaker: Tongue, *, many: bool) -> Markup
     head = Markup("")
     if many:
         head = Markup("<p><b>{} {}</b></p>").format(speaker.gettext("Position"), report.position)
-    said = [criterion for criterion in report.criteria if criterion.verdict in _SAID]
+    said = [criterion for criterion in report.criteria if criterion.verdict in VERDICTS]
     if not said:
         return head + Markup("<p>{}</p>").format(speaker.gettext("Everything is right."))
     items = Markup("").join(
-        Markup("<li><b>{}</b> {}</li>").format(criterion.title, " ".join(criterion.feedback.split()))
+        Markup("<li><b>{}</b> ({}) {}</li>").format(
+            criterion.title,
+            speaker.gettext(VERDICTS[criterion.verdict]),
+            " ".join(criterion.feedback.split()),
+        )
         for criterion in said
     )
     return head + Markup("<ul>{}</ul>").format(items)

@@ -56,9 +56,7 @@ _LONG = (
 
 def criteria_text(results: ResultsDocument) -> str:
     """A row per student, position and criterion, with all that was measured and expected."""
-    rows = (
-        _criterion_row(report, criterion) for report in results.reports for criterion in report.criteria
-    )
+    rows = (_criterion_row(report, criterion) for report in results.reports for criterion in report.criteria)
     return csv_text(_LONG, rows)
 
 

@@ -30,8 +30,9 @@ CLOSE_UP_BELOW = 0.55
 """A plan smaller than this share of the sheet is worth a close-up."""
 WIDE_TO_HIGH = (1.3, 1.9)
 """Aspects of close-ups that sit well on a page."""
-SIZE_PER_MM = {0: 0.0062, 1: 0.0075, 2: 0.0105}
-"""Size of marks and letters by the width shown, for the whole sheet and for one or two close-ups in a row."""
+WHOLE_SIZE_PER_MM = 0.0062
+CLOSE_UP_SIZE_PER_MM = 0.0105
+"""Size of marks and letters by the width shown: close-ups stand two in a row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +60,16 @@ def views(picture: Picture, number: int, captions: Mapping[str, str]) -> list[Vi
         if (box := _close_up([arrow for arrow in scene.arrows if arrow.figure == figure], scene)) is not None
     }
     whole = _svg(
-        (0.0, 0.0, width, height), image, scene, captions["sheet"], SIZE_PER_MM[0], without=set(close_ups)
+        (0.0, 0.0, width, height), image, scene, captions["sheet"], WHOLE_SIZE_PER_MM, without=set(close_ups)
     )
-    share = SIZE_PER_MM[len(close_ups)]
     return [
         View("sheet", captions["sheet"], whole),
         *(
-            View(figure, captions[figure], _svg(box, again, _part(scene, figure), captions[figure], share))
+            View(
+                figure,
+                captions[figure],
+                _svg(box, again, _part(scene, figure), captions[figure], CLOSE_UP_SIZE_PER_MM),
+            )
             for figure, box in close_ups.items()
         ),
     ]

@@ -54,9 +54,7 @@ def write_feedback(  # noqa: PLR0913 - all that the file holds
     """
     for index, picture in enumerate(pictures, start=1):
         write_whole(out_dir / ("overlay.png" if index == 1 else f"overlay_{index}.png"), picture.png)
-    page = feedback_page(
-        report, pictures, lang, level, title=title, student_name=student_name, names=names
-    )
+    page = feedback_page(report, pictures, lang, level, title=title, student_name=student_name, names=names)
     write_whole(out_dir / "feedback.html", page)
 
 
@@ -111,6 +109,7 @@ def index_page(
             "name": student_names.get(report.student_id, ""),
             "link": f"{quote(folder)}/feedback.html",
             "score": _score(report, speaker),
+            "waiting": sum(criterion.verdict == "review" for criterion in report.criteria),
             "problems": [problem_sentence(problem, speaker) for problem in report.problems],
             "best": report.score if report.score is not None else (report.score_range or (-1.0, -1.0))[0],
         }
@@ -264,9 +263,7 @@ def _scales(
 
 def _sheets(pictures: Sequence[Picture], speaker: Tongue) -> list[tuple[Picture, list[View]]]:
     captions = {kind: speaker.gettext(text) for kind, text in {**PLACES, "sheet": SHEET}.items()}
-    return [
-        (picture, views(picture, number, captions)) for number, picture in enumerate(pictures, start=1)
-    ]
+    return [(picture, views(picture, number, captions)) for number, picture in enumerate(pictures, start=1)]
 
 
 __all__ = ["feedback_page", "folders_of", "index_page", "write_feedback", "write_index"]

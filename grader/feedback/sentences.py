@@ -80,12 +80,8 @@ FOLLOWS: dict[str, str] = {
 }
 """Reason `follows`, by what it follows from."""
 
-LEADS: dict[str, str] = {
-    "partial": N_("Nearly right."),
-    "review": N_("A person will look at this."),
-    "not_judged": N_("Not judged."),
-}
-"""What a verdict says before its reasons."""
+MOST_REASONS = 3
+"""More would hide the important ones."""
 
 
 def criterion_feedback(
@@ -98,15 +94,29 @@ def criterion_feedback(
     if level == "symbol":
         return ""
     speaker = tongue(lang)
-    lead = LEADS.get(outcome.verdict)
-    parts = [speaker.gettext(lead)] if lead else []
-    # A partial verdict may carry "right" for what is right beside what is off: that says nothing.
-    shown = [reason for reason in outcome.reasons if reason.code != "right"] or list(outcome.reasons)
-    parts += [reason_sentence(reason, speaker, level, names) for reason in shown]
+    told = (reason_sentence(reason, speaker, level, names) for reason in _worth_telling(outcome))
+    parts = list(dict.fromkeys(told))[:MOST_REASONS]
     if outcome.mistake and outcome.verdict in {"none", "partial"} and outcome.mistake in MISTAKES:
         title = speaker.gettext(MISTAKES[outcome.mistake].title)
         parts.append(speaker.gettext("Likely cause: %(cause)s.") % {"cause": title})
     return " ".join(part for part in parts if part)
+
+
+def _worth_telling(outcome: Outcome) -> list[Reason]:
+    """The reasons without those that say nothing beside the others."""
+    codes = {reason.code for reason in outcome.reasons}
+    if outcome.verdict == "follow_through" and "follows" in codes:
+        return [reason for reason in outcome.reasons if reason.code == "follows"]
+    needless = {"right"} if codes - {"right"} else set()
+    if "optional" in codes:
+        needless |= {"not_measured", "unread"}
+    near = next((reason for reason in outcome.reasons if reason.code == "near_limit"), None)
+    return [
+        reason
+        for reason in outcome.reasons
+        # Of several limits that are near, the first one is enough.
+        if reason.code not in needless and (reason.code != "near_limit" or reason is near)
+    ]
 
 
 def mistake_feedback(

@@ -78,13 +78,32 @@ def test_a_wrong_value_is_told_with_what_is_right_only_in_full():
 
 def test_a_partial_verdict_says_so_and_what_is_off_but_not_that_it_is_right():
     text = criterion_feedback(outcome("partial", Reason("right"), TOO_LONG), "en")
-    assert text.startswith("Nearly right. It is too long by")
-    assert "Right." not in text.replace("Nearly right.", "")
+    assert text.startswith("It is too long by")
+    assert "Right." not in text
 
 
 def test_what_waits_for_a_person_says_why():
     told = criterion_feedback(outcome("review", Reason("doubtful", {"confidence": 0.62})), "en")
-    assert told == "A person will look at this. It was read with too little certainty (62\u00a0%)."
+    assert told == "It was read with too little certainty (62\u00a0%)."
+
+
+def test_of_several_limits_that_are_near_one_is_told():
+    near = [
+        Reason("near_limit", {"what": "length", "off": 1.0, "tolerance": 1.0, "se": se}) for se in (0.2, 0.3)
+    ]
+    told = criterion_feedback(outcome("review", *near), "en")
+    assert told.count("near the limit") == 1
+    assert "0.20" in told
+
+
+def test_what_is_not_required_is_not_called_missing_too():
+    told = criterion_feedback(outcome("not_judged", Reason("optional"), Reason("not_measured")), "en")
+    assert told == "It was not handed in, and is not required."
+
+
+def test_what_follows_rightly_is_not_called_off():
+    told = criterion_feedback(outcome("follow_through", TOO_LONG, Reason("follows", {"what": "nodes"})), "en")
+    assert "too long" not in told
 
 
 def test_the_likely_cause_is_named_where_points_are_lost():
