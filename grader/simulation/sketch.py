@@ -1,5 +1,6 @@
 """A sheet of paper while it is being drawn on: strokes, letters, and what a truth must remember."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -99,16 +100,19 @@ class Sketch:
         reach = distance_mm + abs(written.high - written.low) / 2.0
         angles = self.rng.uniform(0, 2 * np.pi) + np.arange(8) * (2 * np.pi / 8)
         tried = [near + reach * self.rng.uniform(0.75, 1.15) * complex(np.exp(1j * a)) for a in angles]
-        centre = max(tried, key=self._room)
+        centre = max(tried, key=self._room())
         placed = written.moved(centre - middle)
         self.strokes.extend(placed.strokes)
         self.labels.append(Label(text, names, placed.low, placed.high))
 
-    def _room(self, centre: complex) -> float:
+    def _room(self) -> Callable[[complex], float]:
         """How far the nearest ink is, with a person's carelessness; a letter's width is enough."""
-        near = [s.points for s in self.strokes[-400:]]
-        nearest = min((float(np.abs(points - centre).min()) for points in near), default=9.0)
-        return min(nearest, 3.5) + float(self.rng.normal(0.0, 0.5))
+        ink = np.concatenate([stroke.points for stroke in self.strokes[-400:]] or [np.array([1e6 + 0j])])
+
+        def room(centre: complex) -> float:
+            return min(float(np.abs(ink - centre).min()), 3.5) + float(self.rng.normal(0.0, 0.5))
+
+        return room
 
 
 def box_of(strokes: list[Stroke]) -> tuple[complex, complex]:

@@ -1,0 +1,158 @@
+"""The simulated student: errors propagate, mistakes are followed through, the truth says so."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grader.simulation import (
+    CLEAN_SCAN,
+    PERFECT,
+    SLOPPY,
+    PenStyle,
+    Scan,
+    Settings,
+    Student,
+    any_settings,
+    measured_by,
+    simulate,
+)
+from grader.simulation.hand import draw, task_of
+from reference.assignment import load_assignment
+from reference.mistakes import CODES
+from reference.plan import exact_plan
+
+ROUNDING_MM = 2e-4
+TINY = replace(CLEAN_SCAN, dpi=12.0)
+"""A scan of a few pixels, where only the truth matters."""
+
+
+def nodes_of(sheets, figure):
+    truth = next(sheet.truth for sheet in sheets if figure in sheet.truth["figures"])
+    return {name: complex(x, -y) for name, (x, y) in truth["figures"][figure]["nodes"].items()}
+
+
+def vectors_of(sheets):
+    figures = [figure for sheet in sheets for figure in sheet.truth["figures"].values()]
+    return {name: vector for figure in figures for name, vector in figure.get("vectors", {}).items()}
+
+
+@pytest.mark.parametrize("name", ["pump", "press", "engine", "pump-collinear"])
+def test_a_perfect_hand_draws_the_exact_plan(name):
+    assignment = load_assignment(name)
+    variant = assignment.variants()[2]
+    sheets = simulate(assignment, variant, 4, Settings(hand=PERFECT, scan=TINY))
+    plan = exact_plan(assignment, [variant])
+    shrunk = sheets[0].truth["scales"]["used"]
+    for figure in ("velocity_plan", "acceleration_plan"):
+        nodes = nodes_of(sheets, figure)
+        pole = nodes[plan.construction.poles[figure]]
+        scale = "kv" if figure == "velocity_plan" else "ka"
+        ratio = float(getattr(plan.scales, scale)[0]) / shrunk[scale]
+        for node, at in plan.nodes_mm[figure].items():
+            assert abs(nodes[node] - pole - ratio * complex(at[0])) < 10 * ROUNDING_MM
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_every_mistake_is_drawn_and_told(code):
+    assignment = load_assignment("pump")
+    settings = Settings(hand=PERFECT, student=Student(mistakes=(code,)), scan=TINY)
+    sheets = simulate(assignment, assignment.variant(9), 6, settings)
+    right = simulate(assignment, assignment.variant(9), 6, replace(settings, student=Student()))
+    assert [mistake["code"] for mistake in sheets[0].truth["mistakes"]] == [code]
+    assert told(sheets) != told(right)
+
+
+def told(sheets):
+    """What differs when a mistake is made: vectors, letters written, or scales."""
+    vectors = {n: (v["length_mm"], v["direction_deg"]) for n, v in vectors_of(sheets).items()}
+    letters = sorted(label["names"] + label["text"] for sheet in sheets for label in sheet.truth["labels"])
+    return vectors, letters, sheets[0].truth["scales"]["declared"]
+
+
+def test_a_mistake_is_followed_through():
+    assignment = load_assignment("pump")
+    student = Student(mistakes=("sense_reversed",))
+    settings = Settings(hand=PERFECT, student=student, scan=TINY)
+    sheets = simulate(assignment, assignment.variant(9), 1, settings)
+    right = simulate(assignment, assignment.variant(9), 1, replace(settings, student=Student()))
+    at = sheets[0].truth["mistakes"][0]["at"]
+    wrong, proper = vectors_of(sheets), vectors_of(right)
+    name = "a_A" if at.endswith("'") else "v_A"
+    kin = "a_D" if name == "a_A" else "v_D"
+    turned = (wrong[name]["direction_deg"] - proper[name]["direction_deg"]) % 360
+    assert turned == pytest.approx(180.0, abs=0.01)
+    if kin == "v_D":
+        turned = (wrong[kin]["direction_deg"] - proper[kin]["direction_deg"]) % 360
+        assert turned == pytest.approx(180.0, abs=0.01)
+    assert wrong[kin]["intended"]["length_mm"] == pytest.approx(wrong[kin]["length_mm"], abs=ROUNDING_MM)
+
+
+def test_errors_grow_along_the_construction():
+    assignment = load_assignment("pump")
+    spread = {"a'": [], "d'": []}
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        student = Student()
+        task = task_of(assignment, assignment.variant(9), student, rng)
+        plan = draw(task, SLOPPY, student, rng)[0].figures[2]
+        for node, misses in spread.items():
+            misses.append(abs(plan.nodes[node] - plan.intended[node]))
+    assert 0.3 < np.median(spread["a'"]) < 2.0
+    assert np.median(spread["d'"]) > 1.5 * np.median(spread["a'"])
+
+
+def test_two_sheets_carry_two_sketches_of_one_mechanism():
+    assignment = load_assignment("pump")
+    sheets = simulate(assignment, assignment.variant(4), 3, Settings(student=Student(sheets=2), scan=TINY))
+    assert [sheet.truth["kind"] for sheet in sheets] == ["velocity", "acceleration"]
+    first, second = (nodes_of([sheet], "mechanism") for sheet in sheets)
+    lengths = [abs(nodes["B"] - nodes["A"]) for nodes in (first, second)]
+    assert lengths[0] != lengths[1]
+    assert lengths[0] == pytest.approx(lengths[1], abs=3.0)
+
+
+def test_the_same_seed_draws_the_same_sheet_whatever_the_scanner():
+    assignment = load_assignment("pump")
+    settings = any_settings(5, device="flatbed")
+    coarse = replace(settings, scan=replace(settings.scan, dpi=20.0, mode="grey"))
+    fine = replace(settings, scan=replace(settings.scan, dpi=40.0, mode="colour", skew_deg=3.0))
+    one, same, other = (simulate(assignment, assignment.variant(8), 5, s) for s in (coarse, coarse, fine))
+    assert [sheet.truth for sheet in one] == [sheet.truth for sheet in same]
+    assert all(np.array_equal(a.image, b.image) for a, b in zip(one, same, strict=True))
+    assert [sheet.truth["figures"] for sheet in one] == [sheet.truth["figures"] for sheet in other]
+    different = simulate(assignment, assignment.variant(8), 6, coarse)
+    assert different[0].truth["figures"] != one[0].truth["figures"]
+
+
+@pytest.mark.parametrize("turns", [0, 1, 2, 3])
+def test_a_turned_scan_says_by_how_much(turns):
+    scan = Scan(dpi=20.0, quarter_turns=turns, skew_deg=0.0)
+    assignment = load_assignment("pump")
+    truth = simulate(assignment, assignment.variant(8), 5, Settings(scan=scan))[0].truth
+    homography = np.array(truth["homography"])
+    right = homography[:2, 0]
+    # Counter-clockwise on a screen is from +x towards -y.
+    stored = np.degrees(np.arctan2(-right[1], right[0])) % 360
+    assert (stored + truth["rotation_deg"]) % 360 == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_ruler_reads_the_drawing_to_its_own_error():
+    assignment = load_assignment("pump")
+    sheets = simulate(assignment, assignment.variant(8), 5, Settings(student=Student(sheets=2), scan=TINY))
+    measured = measured_by(sheets, np.random.default_rng(1), spread_mm=0.0, step_mm=0.1)
+    vectors = vectors_of(sheets)
+    assert set(vectors) <= set(measured)
+    for name, vector in vectors.items():
+        assert measured[name] == pytest.approx(vector["length_mm"], abs=0.051)
+
+
+def test_every_stroke_of_a_vector_joins_its_nodes():
+    assignment = load_assignment("press")
+    settings = Settings(student=Student(sheets=2), scan=TINY, pen=PenStyle(wobble_mm=0.0))
+    for sheet in simulate(assignment, assignment.variant(None, 2), 5, settings):
+        for figure in sheet.truth["figures"].values():
+            for vector in figure.get("vectors", {}).values():
+                for end, node in zip(vector["line_mm"], ("tail", "head"), strict=True):
+                    gap = np.subtract(end, figure["nodes"][vector[node]])
+                    assert np.hypot(*gap) < 6 * settings.hand.redraw_mm
