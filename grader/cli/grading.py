@@ -45,7 +45,7 @@ def grade_folder(
     batch = Batch(
         assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1, lang
     )
-    with _progress() as tell:
+    with progress() as tell:
         results = grade(batch, tell)
     _tell(results, out)
     return needs_person(results)
@@ -67,7 +67,8 @@ def check_language(lang: str) -> None:
 
 
 @contextmanager
-def _progress() -> Iterator[Tell]:
+def progress() -> Iterator[Tell]:
+    """A progress bar on the terminal; what it gives tells it how far each kind of work is."""
     columns = (TextColumn("{task.description:>8}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         tasks: dict[str, TaskID] = {}

@@ -1,20 +1,27 @@
 """``planmark sheet`` and ``planmark match``."""
 
+import cmath
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import typer
 
 from grader.answer_sheet import make_calibration, make_sheets
-from grader.cli.grading import check_language
+from grader.batch import Progress
+from grader.cli.grading import check_language, progress
 from grader.contact_sheet import contact_sheet, thumbnail
 from grader.files import write_whole
 from grader.folder import submissions
 from grader.intake import page_of
 from grader.matching import SURE, draft_csv, suggest
 from grader.measurements import names_of
+from grader.ownership import PageSource
+from grader.pipeline import Place, read, see
+from grader.records import MECHANISM
 from grader.roster import read_roster
 from grader.survey import survey
-from reference.assignment import load_assignment
+from reference.assignment import Assignment, load_assignment
 from reference.errors import CallError, InputFileError
 
 
@@ -51,6 +58,10 @@ def draft_matches(
     files = {path.relative_to(folder).as_posix(): path for path in submissions(folder, roster_file, (out,))}
     sources = [source for file, path in files.items() for source in survey(path, file, names).pages]
     draft = suggest(sources, roster, assignment, pages_per_student=pages_per_student)
+    loose = [one.source for one in draft.suggestions if not one.sure]
+    with progress() as tell:
+        angles = dict(_crank_angles(loose, files, assignment, tell))
+    draft = suggest(sources, roster, assignment, crank_deg=angles, pages_per_student=pages_per_student)
     entries = []
     for suggestion in draft.suggestions:
         source = suggestion.source
@@ -69,3 +80,18 @@ def draft_matches(
     )
     typer.echo(f"Look at {sheet}, correct the column `scans`, then grade with --roster {out}")
     return open_ends > 0
+
+
+def _crank_angles(
+    sources: Sequence[PageSource], files: Mapping[str, Path], assignment: Assignment, tell: Progress
+) -> Iterator[tuple[PageSource, float]]:
+    """The crank's direction as drawn on each page, degrees counter-clockwise, where it can be read."""
+    crank = assignment.mechanism(assignment.variants()[:1]).crank
+    for done, source in enumerate(sources, start=1):
+        seen = see(Place(files[source.file], source.page, source.file))
+        (reading,) = read([seen], assignment, None, {}, ())
+        sketch = reading.figures.get(MECHANISM)
+        nodes = {} if sketch is None else sketch.nodes
+        if crank.pivot in nodes and crank.pin in nodes:
+            yield source, math.degrees(cmath.phase(nodes[crank.pin].at - nodes[crank.pivot].at)) % 360.0
+        tell("reading", done, len(sources))
