@@ -1,0 +1,50 @@
+"""Make the pictures of the documentation: `python docs/make_pictures.py`, from the project's folder."""
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import cv2
+
+from grader.batch import Batch, grade
+from grader.rubric import load_rubric
+from reference.assignment import load_assignment
+from reference.canvas import svg
+from reference.draw import reference_drawing
+from reference.plan import exact_plan
+
+HERE = Path(__file__).resolve().parent
+WIDTH_PX = 1100
+STUDENT = "s01"
+
+
+def reference_picture() -> None:
+    """The reference drawing of one variant."""
+    pump = load_assignment("pump")
+    plan = exact_plan(pump, [pump.variant(7)])
+    sheets = reference_drawing(pump, plan)
+    (HERE / "pump-7.svg").write_text(svg([sheet.shapes for sheet in sheets]), encoding="utf-8")
+
+
+def overlay_picture() -> None:
+    """A sample scan as graded: what was read and marked, drawn over it."""
+    samples = HERE.parent / "samples" / "pump"
+    pump = load_assignment("pump")
+    with tempfile.TemporaryDirectory() as work:
+        folder, out = Path(work) / "in", Path(work) / "out"
+        folder.mkdir()
+        for path in samples.glob(f"{STUDENT}_*"):
+            shutil.copy(path, folder)
+        header, *rows = (samples / "roster.csv").read_text(encoding="utf-8").splitlines()
+        own = [row for row in rows if row.startswith(f"{STUDENT},")]
+        (folder / "roster.csv").write_text("\n".join([header, *own]) + "\n", encoding="utf-8")
+        grade(Batch(pump, load_rubric(pump.file.rubric), folder, out, None, None, 1, "en"), lambda *_: None)
+        image = cv2.imread(str(out / STUDENT / "overlay.png"))
+    height = round(image.shape[0] * WIDTH_PX / image.shape[1])
+    small = cv2.resize(image, (WIDTH_PX, height), interpolation=cv2.INTER_AREA)
+    cv2.imwrite(str(HERE / "overlay.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, 80])
+
+
+if __name__ == "__main__":
+    reference_picture()
+    overlay_picture()
