@@ -8,12 +8,15 @@ import simplejpeg
 from PIL import Image
 
 from grader.intake.grey import from_pillow
-from grader.intake.limits import Door, check_size, damaged, truncated
-from grader.intake.tags import of_image
+from grader.intake.limits import Door, damaged, truncated
+from grader.intake.tags import of_image, opened
 from grader.records import GreyImage, Page
 
 _HARMLESS = ("extraneous bytes", "Invalid SOS parameters", "unknown Adobe color transform")
 """Warnings of libjpeg that leave the picture whole."""
+_END = b"\xff\xd9"
+_LEAST_BYTES = 600
+"""A header with its tables is longer than this."""
 _CUT_OFF = ("remature end", "exhausted", "mpty input")
 
 
@@ -21,13 +24,11 @@ def _pages(path: Path, first: int) -> Iterator[Page]:
     if first > 1:
         return
     data = path.read_bytes()
-    try:
-        with Image.open(io.BytesIO(data)) as image:
-            check_size(path, 1, *image.size)
-            dpi, turn_deg = of_image(image)
-            four_inks = image.mode == "CMYK"
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise _unreadable(path, data) from error
+    if not data.rstrip(b"\0").endswith(_END) and len(data) < _LEAST_BYTES:
+        raise truncated(path, 1)
+    with opened(path, data) as image:
+        dpi, turn_deg = of_image(image)
+        four_inks = image.mode == "CMYK"
     grey = _four_inks(path, data) if four_inks else decode(path, 1, data)
     yield Page(path.name, 1, grey, dpi, turn_deg)
 
@@ -38,7 +39,7 @@ def decode(path: Path, page: int, data: bytes) -> GreyImage:
     libjpeg fills what is missing with grey and only warns: the warning is an error here.
     """
     try:
-        return np_plane(simplejpeg.decode_jpeg(data, colorspace="GRAY", strict=True))
+        return _plane(simplejpeg.decode_jpeg(data, colorspace="GRAY", strict=True))
     except ValueError as error:
         message = str(error)
     if any(sign in message for sign in _CUT_OFF):
@@ -46,12 +47,12 @@ def decode(path: Path, page: int, data: bytes) -> GreyImage:
     if not any(harmless in message for harmless in _HARMLESS):
         raise damaged(path, page, message)
     try:
-        return np_plane(simplejpeg.decode_jpeg(data, colorspace="GRAY", strict=False))
+        return _plane(simplejpeg.decode_jpeg(data, colorspace="GRAY", strict=False))
     except ValueError as error:
         raise damaged(path, page, str(error)) from error
 
 
-def np_plane(image: GreyImage) -> GreyImage:
+def _plane(image: GreyImage) -> GreyImage:
     """The only channel of a (h, w, 1) image."""
     return image[..., 0]
 
@@ -62,11 +63,6 @@ def _four_inks(path: Path, data: bytes) -> GreyImage:
             return from_pillow(image)
     except (OSError, ValueError, SyntaxError) as error:
         raise damaged(path, 1, str(error)) from error
-
-
-def _unreadable(path: Path, data: bytes) -> Exception:
-    ends_early = not data.rstrip(b"\0").endswith(b"\xff\xd9")
-    return truncated(path, 1) if ends_early else damaged(path, 1, "its header cannot be read")
 
 
 def _count(path: Path) -> int:

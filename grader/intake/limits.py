@@ -79,11 +79,16 @@ def check_size(path: Path, page: int, width: int, height: int) -> None:
     if width <= 0 or height <= 0:
         raise damaged(path, page, "it has no pixels")
     if width * height > MAX_PIXELS:
-        raise InputFileError(
-            "image_too_large",
-            f"{path.name}, page {page}: {width} x {height} pixels, more than {MAX_PIXELS // 1_000_000} million; "
-            "scan A3 at 600 dpi or less",
-        )
+        raise too_large(path, page)
+
+
+def too_large(path: Path, page: int) -> InputFileError:
+    """The error for an image of more pixels than a sheet can need."""
+    return InputFileError(
+        "image_too_large",
+        f"{path.name}, page {page}: more than {MAX_PIXELS // 1_000_000} million pixels; "
+        "scan A3 at 600 dpi or less",
+    )
 
 
 def check_pages(path: Path, pages: int) -> None:

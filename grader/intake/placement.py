@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import cast
 
 import pikepdf
 
@@ -28,11 +29,11 @@ class Placement:
 
 def only_image(page: pikepdf.Page) -> Placement | None:
     """The image that is the whole page, or None where the page shows more, less or a mirrored one."""
-    found: list[tuple[pikepdf.Object, Matrix]] = []
+    found: list[tuple[pikepdf.Stream, Matrix]] = []
     matrix, stack, text_mode = _UNIT, [], 0
     try:
-        for operands, operator in pikepdf.parse_content_stream(page):
-            name = str(operator)
+        for instruction in pikepdf.parse_content_stream(page):
+            operands, name = instruction.operands, str(instruction.operator)
             if name == "q":
                 stack.append(matrix)
             elif name == "Q" and stack:
@@ -42,7 +43,7 @@ def only_image(page: pikepdf.Page) -> Placement | None:
             elif name == "Tr":
                 text_mode = int(operands[0])
             elif name == "Do":
-                found.append((page.resources.XObject[str(operands[0])], matrix))
+                found.append((cast("pikepdf.Stream", page.resources.XObject[str(operands[0])]), matrix))
             elif name in _PAINTS or (name in _SHOWS_TEXT and text_mode != _INVISIBLE_TEXT):
                 return None
     except (pikepdf.PdfError, AttributeError, KeyError, TypeError, ValueError):
@@ -52,7 +53,7 @@ def only_image(page: pikepdf.Page) -> Placement | None:
     return _placed(page, *found[0])
 
 
-def _placed(page: pikepdf.Page, image: pikepdf.Object, matrix: Matrix) -> Placement | None:
+def _placed(page: pikepdf.Page, image: pikepdf.Stream, matrix: Matrix) -> Placement | None:
     a, b, c, d, _, _ = matrix
     width, height = math.hypot(a, b), math.hypot(c, d)
     box = [float(value) for value in page.mediabox]

@@ -5,11 +5,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from PIL import Image
 
 from grader.intake.grey import to_grey
-from grader.intake.limits import Door, check_size, damaged, truncated
-from grader.intake.tags import of_image
+from grader.intake.limits import Door, damaged, truncated
+from grader.intake.tags import of_image, opened
 from grader.records import Page
 
 _END = b"IEND"
@@ -19,16 +18,12 @@ _END_WITHIN = 64
 def _pages(path: Path, first: int) -> Iterator[Page]:
     if first > 1:
         return
-    try:
-        with Image.open(path) as image:
-            check_size(path, 1, *image.size)
-            dpi, turn_deg = of_image(image)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise damaged(path, 1, "its header cannot be read") from error
     data = path.read_bytes()
     if _END not in data[-_END_WITHIN:]:
         # The decoder would fill the missing rows with black or nothing.
         raise truncated(path, 1)
+    with opened(path, data) as image:
+        dpi, turn_deg = of_image(image)
     pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None:
         raise damaged(path, 1, "it cannot be decoded")

@@ -1,6 +1,14 @@
 """Resolution and orientation as files state them."""
 
+import io
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
 from PIL import Image
+
+from grader.intake.limits import check_size, damaged, too_large
 
 _ORIENTATION_TAG = 274
 _INCH, _CENTIMETRE = 2, 3
@@ -35,6 +43,21 @@ def from_unit(x: float, y: float, unit: int) -> Dpi | None:
 def turn_of(orientation: int) -> int:
     """Counter-clockwise turn in degrees for an EXIF orientation."""
     return _TURN_CCW.get(orientation, 0)
+
+
+@contextmanager
+def opened(path: Path, data: bytes) -> Iterator[Image.Image]:
+    """An image's header, its size within bounds; InputFileError where it cannot be read."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(data)) as image:
+                check_size(path, 1, *image.size)
+                yield image
+    except Image.DecompressionBombError as error:
+        raise too_large(path, 1) from error
+    except (OSError, ValueError, SyntaxError) as error:
+        raise damaged(path, 1, "its header cannot be read") from error
 
 
 def of_image(image: Image.Image) -> tuple[Dpi | None, int]:

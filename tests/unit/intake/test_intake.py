@@ -1,0 +1,286 @@
+"""Files of every kind in, pages out; what cannot be used is said."""
+
+import io
+import struct
+import zlib
+
+import cv2
+import numpy as np
+import pikepdf
+import pypdfium2
+import pytest
+import tifffile
+from PIL import Image
+
+from grader.intake import count_pages, is_blank, pages_of
+from reference.errors import InputFileError
+
+SHAPE = (300, 420)
+JPEG_ERROR_LEVELS = 3
+MM_PER_INCH = 25.4
+
+
+def drawing(shape=SHAPE):
+    """White paper with dark lines, not symmetric in any way."""
+    grey = np.full(shape, 250, dtype=np.uint8)
+    cv2.line(grey, (20, 30), (shape[1] - 60, 90), 20, 3)
+    cv2.line(grey, (50, 40), (80, shape[0] - 20), 60, 3)
+    return grey
+
+
+def only_page(path):
+    (page,) = pages_of(path)
+    return page
+
+
+def jpeg_bytes(grey, **options):
+    buffer = io.BytesIO()
+    Image.fromarray(grey).save(buffer, "JPEG", quality=95, **options)
+    return buffer.getvalue()
+
+
+def pdf_of(path, *jpegs, matrix=(840, 0, 0, 600, 0, 0), box=(840, 600), rotate=0, extra=b""):
+    """A PDF with one JPEG a page, placed by `matrix` (points)."""
+    pdf = pikepdf.new()
+    for data in jpegs:
+        with Image.open(io.BytesIO(data)) as image:
+            wide, high = image.size
+            space = "/DeviceGray" if image.mode == "L" else "/DeviceRGB"
+        stream = pikepdf.Stream(
+            pdf,
+            data,
+            Type=pikepdf.Name.XObject,
+            Subtype=pikepdf.Name.Image,
+            Width=wide,
+            Height=high,
+            ColorSpace=pikepdf.Name(space),
+            BitsPerComponent=8,
+            Filter=pikepdf.Name.DCTDecode,
+        )
+        page = pdf.add_blank_page(page_size=box)
+        page.Resources = pikepdf.Dictionary(XObject=pikepdf.Dictionary(Scan=stream))
+        placed = " ".join(str(number) for number in matrix)
+        page.Contents = pdf.make_stream(f"q {placed} cm /Scan Do Q ".encode() + extra)
+        page.Rotate = rotate
+    pdf.save(path)
+
+
+@pytest.mark.parametrize("suffix", ["png", "tif", "jpg"])
+def test_grey_pixels_come_through_as_stored(tmp_path, suffix):
+    path = tmp_path / f"scan.{suffix}"
+    options = {"quality": 98} if suffix == "jpg" else {}
+    Image.fromarray(drawing()).save(path, dpi=(300, 300), **options)
+    page = only_page(path)
+    allowed = JPEG_ERROR_LEVELS * 3 if suffix == "jpg" else 0
+    assert np.abs(page.grey.astype(int) - drawing()).max() <= allowed
+    assert page.dpi == pytest.approx((300, 300), rel=1e-3)
+    assert (page.source, page.page, page.turn_deg) == (path.name, 1, 0)
+
+
+@pytest.mark.parametrize("compression", ["zlib", "lzw", "jpeg"])
+def test_pages_of_a_tiff_come_one_by_one(tmp_path, compression):
+    path = tmp_path / "class.tif"
+    with tifffile.TiffWriter(path) as writer:
+        for shade in (200, 100):
+            writer.write(
+                np.full(SHAPE, shade, np.uint8),
+                compression=compression,
+                resolution=(200 / 2.54, 200 / 2.54),
+                resolutionunit=3,
+            )
+    pages = list(pages_of(path))
+    assert [page.page for page in pages] == [1, 2]
+    assert [int(np.median(page.grey)) for page in pages] == [200, 100]
+    assert pages[0].dpi == pytest.approx((200, 200), rel=1e-3)
+    assert count_pages(path) == 2
+
+
+@pytest.mark.parametrize("fax", [True, False])
+def test_paper_of_a_one_bit_page_is_white(tmp_path, fax):
+    path = tmp_path / "copy.tif"
+    bits = drawing() >= 128
+    if fax:
+        Image.fromarray(bits).save(path, compression="group4")
+    else:
+        tifffile.imwrite(path, ~bits, photometric="miniswhite")
+    assert np.array_equal(only_page(path).grey, bits * np.uint8(255))
+
+
+@pytest.mark.parametrize("pen", [(30, 50, 160), (190, 30, 40), (90, 90, 95), (20, 120, 50)])
+def test_strokes_of_every_pen_stay_dark(tmp_path, pen):
+    picture = np.full((*SHAPE, 3), (250, 247, 240), dtype=np.uint8)
+    picture[100:104, 50:300] = pen
+    path = tmp_path / "colour.png"
+    Image.fromarray(picture).save(path)
+    grey = only_page(path).grey
+    assert grey[102, 200] < 0.55 * grey[20, 20]
+
+
+def test_transparent_paper_is_white(tmp_path):
+    picture = np.zeros((*SHAPE, 4), dtype=np.uint8)
+    picture[100:104, 50:300] = (0, 0, 0, 255)
+    path = tmp_path / "clear.png"
+    Image.fromarray(picture).save(path)
+    grey = only_page(path).grey
+    assert (grey[20, 20], grey[102, 200]) == (255, 0)
+
+
+@pytest.mark.parametrize(("orientation", "turn_deg"), [(1, 0), (3, 180), (6, 270), (8, 90)])
+def test_a_phones_orientation_is_told_and_its_pixels_left(tmp_path, orientation, turn_deg):
+    exif = Image.Exif()
+    exif[274] = orientation
+    path = tmp_path / "phone.jpg"
+    path.write_bytes(jpeg_bytes(drawing(), exif=exif))
+    page = only_page(path)
+    assert page.turn_deg == turn_deg
+    assert page.grey.shape == SHAPE
+
+
+def test_a_scan_in_a_pdf_is_taken_out_with_its_resolution(tmp_path):
+    path = tmp_path / "class.pdf"
+    data = jpeg_bytes(drawing())
+    pdf_of(path, data, data)
+    pages = list(pages_of(path))
+    direct = tmp_path / "direct.jpg"
+    direct.write_bytes(data)
+    assert count_pages(path) == len(pages) == 2
+    assert np.array_equal(pages[1].grey, only_page(direct).grey)
+    assert pages[1].dpi == pytest.approx((420 / 840 * 72, 300 / 600 * 72))
+    assert pages[1].paper_mm == pytest.approx((840 / 72 * MM_PER_INCH, 600 / 72 * MM_PER_INCH))
+
+
+@pytest.mark.parametrize("rotate", [0, 90, 180, 270])
+@pytest.mark.parametrize("turned_matrix", [False, True])
+def test_what_a_viewer_shows_of_a_pdf_is_what_the_turn_says(tmp_path, rotate, turned_matrix):
+    path = tmp_path / "turned.pdf"
+    matrix, box = (
+        ((0, 840, -600, 0, 600, 0), (600, 840)) if turned_matrix else ((840, 0, 0, 600, 0, 0), (840, 600))
+    )
+    pdf_of(path, jpeg_bytes(drawing()), matrix=matrix, box=box, rotate=rotate)
+    taken = only_page(path)
+    shown = pdf_rendered(path)
+    turned = np.rot90(taken.grey, taken.turn_deg // 90)
+    turned = cv2.resize(turned, shown.shape[::-1], interpolation=cv2.INTER_AREA)
+    assert np.abs(turned.astype(int) - shown).mean() < JPEG_ERROR_LEVELS
+
+
+def pdf_rendered(path):
+    with pypdfium2.PdfDocument(path) as document:
+        image = document[0].render(scale=0.5, grayscale=True).to_numpy()
+    return np.ascontiguousarray(image.reshape(image.shape[0], image.shape[1], -1)[..., 0])
+
+
+def test_a_page_with_more_than_its_scan_is_rendered(tmp_path):
+    path = tmp_path / "stamped.pdf"
+    pdf_of(path, jpeg_bytes(drawing()), extra=b"0 g 100 100 50 50 re f")
+    page = only_page(path)
+    assert page.dpi == pytest.approx((300, 300), rel=1e-3)
+    assert page.grey[-int(125 / 72 * 300), int(125 / 72 * 300)] < 10
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "code"),
+    [
+        ("empty.jpg", b"", "file_empty"),
+        ("text.png", b"not a picture at all", "file_type_unsupported"),
+        ("notes.docx", b"PK\x03\x04 and so on", "file_type_unsupported"),
+        ("broken.pdf", b"%PDF-1.7\nnothing more", "pdf_damaged"),
+        ("broken.tif", b"II*\x00\xff\xff\xff\x7f", "pages_none"),
+        ("broken.png", b"\x89PNG\r\n\x1a\n IEND", "image_damaged"),
+        ("broken.jpg", b"\xff\xd8\xff\xe0 nothing", "image_truncated"),
+    ],
+)
+def test_a_file_that_is_no_scan_is_refused_with_its_name_and_a_remedy(tmp_path, name, content, code):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputFileError) as caught:
+        list(pages_of(path))
+    assert caught.value.code == code
+    assert name in caught.value.message
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.97])
+@pytest.mark.parametrize("suffix", ["jpg", "png"])
+def test_a_picture_that_is_cut_off_is_never_half_a_picture(tmp_path, suffix, share):
+    noisy = np.random.default_rng(0).integers(0, 255, SHAPE, dtype=np.uint8)
+    whole = tmp_path / f"whole.{suffix}"
+    Image.fromarray(noisy).save(whole)
+    data = whole.read_bytes()
+    cut = tmp_path / f"cut.{suffix}"
+    cut.write_bytes(data[: int(share * len(data))])
+    with pytest.raises(InputFileError) as caught:
+        list(pages_of(cut))
+    assert caught.value.code == "image_truncated"
+
+
+def test_a_missing_file_is_told(tmp_path):
+    with pytest.raises(InputFileError) as caught:
+        list(pages_of(tmp_path / "nowhere.jpg"))
+    assert caught.value.code == "file_missing"
+
+
+def test_a_pdf_with_a_password_is_told(tmp_path):
+    path = tmp_path / "secret.pdf"
+    pdf = pikepdf.new()
+    pdf.add_blank_page()
+    pdf.save(path, encryption=pikepdf.Encryption(owner="owner", user="user"))
+    with pytest.raises(InputFileError) as caught:
+        count_pages(path)
+    assert caught.value.code == "pdf_encrypted"
+
+
+def test_a_pdf_without_pages_is_told(tmp_path):
+    path = tmp_path / "none.pdf"
+    pikepdf.new().save(path)
+    with pytest.raises(InputFileError) as caught:
+        count_pages(path)
+    assert caught.value.code == "pages_none"
+
+
+def test_a_decompression_bomb_is_not_decoded(tmp_path):
+    path = tmp_path / "bomb.png"
+    header = struct.pack(">IIBBBBB", 40_000, 40_000, 1, 0, 0, 0, 0)
+    chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(b"\0")), (b"IEND", b"")]
+    path.write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + b"".join(
+            struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+            for name, data in chunks
+        )
+    )
+    with pytest.raises(InputFileError) as caught:
+        list(pages_of(path))
+    assert caught.value.code == "image_too_large"
+
+
+A3_AT_100_DPI = (1169, 1654)
+
+
+def duplex_back(rng, show_through):
+    """The back of a drawing: grain, dust, a shadow at the rim, and the front shining through."""
+    front = np.full(A3_AT_100_DPI, 0.0, dtype=np.float32)
+    for _ in range(12):
+        ends = rng.integers(100, 1000, 4)
+        cv2.line(front, tuple(map(int, ends[:2])), tuple(map(int, ends[2:])), 1.0, 2)
+    back = 248.0 * (1.0 - show_through * cv2.GaussianBlur(front[:, ::-1], (0, 0), 2.0))
+    back += rng.normal(0, 2.0, back.shape)
+    for x, y in rng.integers(60, 1000, (40, 2)):
+        cv2.circle(back, (int(x), int(y)), 1, 60.0, -1)
+    back[:4] = 120.0
+    return np.clip(back, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("show_through", [0.0, 0.1, 0.2])
+def test_the_back_of_a_drawing_is_blank(tmp_path, show_through):
+    path = tmp_path / "back.png"
+    Image.fromarray(duplex_back(np.random.default_rng(3), show_through)).save(path)
+    assert is_blank(only_page(path))
+
+
+def test_a_faint_pencil_drawing_is_not_blank(tmp_path):
+    grey = duplex_back(np.random.default_rng(4), 0.0)
+    cv2.line(grey, (300, 300), (700, 500), 165, 2, cv2.LINE_AA)
+    cv2.line(grey, (300, 300), (600, 700), 165, 2, cv2.LINE_AA)
+    path = tmp_path / "faint.png"
+    Image.fromarray(grey).save(path)
+    assert not is_blank(only_page(path))
