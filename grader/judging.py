@@ -40,7 +40,10 @@ def judge(task: Task, submission: Submission) -> Judgement:
 
 def _case(task: Task, comparison: Comparison) -> Case:
     """The drawing to explain, at the scales used, with what contradicts them."""
-    used = {name: np.asarray(scale.used) for name, scale in comparison.scales.items()}
+    used = {
+        name: np.asarray(comparison.followed[name] if scale.assumed else scale.used)
+        for name, scale in comparison.scales.items()
+    }
     names = {one.id: one.name for one in task.rubric.criterion}
     observed = [
         found

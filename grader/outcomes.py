@@ -86,7 +86,7 @@ class Outcome:
     measured, expected, tolerance : the evidence; `expected` is against the original data, or
         against the student's own earlier values where the verdict is follow_through
     confidence : that the verdict is right
-    reasons : most important first; never empty
+    reasons : most important first; empty only for a declared scale that nothing can be held against
     mistake : code of the mistake that explains a loss, or None
     """
 

@@ -1,7 +1,7 @@
 """All criteria of a rubric, marked in the order of construction so that earlier mistakes are known."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from grader.comparison import verdicts
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
@@ -103,10 +103,9 @@ class _Session:
                 return self.absent(criterion, expected)
             return verdicts.unjudged(criterion, "not_judged", scale.reasons, expected=expected)
         self.remember(name, scale.mark)
-        mark = replace(scale.mark, reasons=(*scale.mark.reasons, *scale.reasons))
         measured = Quantity(value=scale.used.declared, unit=unit)
         allowed = Tolerance(value=self.task.tolerance(criterion).scale_relative * right)
-        return verdicts.outcome(criterion, mark, measured, expected, allowed)
+        return verdicts.outcome(criterion, scale.mark, measured, expected, allowed)
 
     # Vectors --------------------------------------------------------------------------------------
 

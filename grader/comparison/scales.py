@@ -110,11 +110,9 @@ def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> fl
     witness = _witness(task, evidence, name)
     if witness is None or name == "kL":
         return None
-    real, drawn_mm, _ = witness
-    other = real / drawn_mm
-    tolerance = task.rubric.tolerance
-    if abs(drawn_mm - real / used) <= length_tolerance(tolerance, real / used):
+    if _is_witnessed(task, witness, used):
         return None
+    other = witness[0] / witness[1]
     return other if _fitting(task, evidence, name, other) > _fitting(task, evidence, name, used) else None
 
 
@@ -138,32 +136,50 @@ def _fits(drawn: DrawnVector, expected_mm: float, tolerance: ToleranceTable) -> 
 
 
 def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, rule: float) -> Scale:
-    """A declared scale against what was drawn, or against the rule where nothing was."""
+    """A declared scale against what was drawn, or against the rule where nothing was.
+
+    Another scale than the rule's cannot be judged where nothing was drawn: it may be the own choice.
+    """
     tolerance = task.rubric.tolerance
     is_rule = abs(scale.used - rule) <= tolerance.scale_relative * rule
-    remarks = () if is_rule else (_off("scale_off", name, scale.used, rule),)
     witness = _witness(task, evidence, name)
     if witness is None:
-        return Scale(scale, None, mark([]) if is_rule else None, remarks)
-    real, drawn_mm, se_mm = witness
-    fits_drawn = abs(real / scale.used - drawn_mm) <= length_tolerance(tolerance, real / scale.used)
-    if fits_drawn:
-        return Scale(scale, None, mark([]), remarks)
-    other = _contradiction(task, evidence, name, scale.used)
-    if name == "kL":
-        other = real / drawn_mm
-    elif other is None and not is_rule:
-        # Nothing else tells: a drawing that follows the rule where the declaration does not.
-        follows_rule = abs(real / rule - drawn_mm) <= length_tolerance(tolerance, real / rule)
-        other = real / drawn_mm if follows_rule else None
+        return Scale(scale, None, mark([]) if is_rule else None)
+    other = _followed_instead(task, evidence, name, scale.used, None if is_rule else rule)
     if other is None:
-        return Scale(scale, None, mark([]), remarks)
-    allowed = length_tolerance(tolerance, drawn_mm)
-    off = abs(real / scale.used - drawn_mm)
-    reason = _off("scale_off", name, scale.used, other)
-    limit = Limit("scale", off, allowed, se_mm, tolerance.partial_factor, reason)
+        return Scale(scale, None, mark([]))
+    real, drawn_mm, se_mm = witness
+    told: dict[str, float | str] = {"declared": scale.used, "expected": other, "unit": unit_of(name)}
+    limit = Limit(
+        what="scale",
+        off=abs(real / scale.used - drawn_mm),
+        tolerance=length_tolerance(tolerance, drawn_mm),
+        se=se_mm,
+        factor=tolerance.partial_factor,
+        reason=Reason("scale_off", told),
+    )
     return Scale(scale, other, mark([limit]))
 
 
-def _off(code: str, name: str, declared: float, expected: float) -> Reason:
-    return Reason(code, {"declared": declared, "expected": expected, "unit": unit_of(name)})
+def _followed_instead(
+    task: Task, evidence: Evidence, name: str, declared: float, rule: float | None
+) -> float | None:
+    """The scale that the drawing follows where that is not the declared one.
+
+    Arguments: `rule` is the assignment's, None where the declared one is that.
+    """
+    witness = _witness(task, evidence, name)
+    if witness is None or _is_witnessed(task, witness, declared):
+        return None
+    other = witness[0] / witness[1]
+    if name == "kL":
+        return other
+    # Where nothing else tells, a drawing that follows the rule tells that the declaration does not.
+    follows_rule = rule is not None and _is_witnessed(task, witness, rule)
+    return other if follows_rule else _contradiction(task, evidence, name, declared)
+
+
+def _is_witnessed(task: Task, witness: tuple[float, float, float], scale: float) -> bool:
+    """Whether a scale makes the real value of what was drawn."""
+    expected_mm = witness[0] / scale
+    return abs(expected_mm - witness[1]) <= length_tolerance(task.rubric.tolerance, expected_mm)

@@ -46,7 +46,7 @@ BOUND = 16.0
 GROSS = 36.0
 """At three times the tolerance: what is off by less in every vector is a careless hand's."""
 CARELESS = 4.0
-"""What a careless hand, of twice the standard deviation, costs as an explanation."""
+"""What it costs to suppose a careless hand, of twice the standard deviation."""
 RARITY: Mapping[str, float] = {"other_variant": 8.0, "labels_swapped": 6.0, "figure_rotated": 5.0}
 USUAL_RARITY = 3.0
 RPM_WITHIN = 0.03
@@ -173,16 +173,18 @@ def _best(stage: _Stage, candidates: "_Candidates") -> tuple[operators.Mistake, 
     rivals = [
         other for other, rival, _ in tried[1:] if (rival.code, rival.at) != (operator.code, operator.at)
     ]
-    careless = _sum([was / 4.0 for was in before]) + CARELESS
-    weights = [math.exp((cost - other) / 2.0) for other in (*rivals, careless, _sum(before))]
+    weights = [math.exp((cost - other) / 2.0) for other in (*rivals, _sum(before))]
     confidence = 1.0 / (1.0 + sum(weights))
     if confidence < LEAST_CONFIDENCE:
         return None
     return operator, _told(stage.case, operator, [name for name, _ in explained], confidence)
 
 
-def _sum(costs: Iterable[float]) -> float:
-    return sum(min(cost, BOUND) for cost in costs)
+def _sum(costs: Sequence[float]) -> float:
+    """What an explanation costs by a careful hand, or by a careless one if that costs less."""
+    careful = sum(min(cost, BOUND) for cost in costs)
+    careless = sum(min(cost / 4.0, BOUND) for cost in costs) + CARELESS
+    return min(careful, careless)
 
 
 def _at_stake(stage: _Stage, operator: operators.Mistake, before: Sequence[float]) -> int:

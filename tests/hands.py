@@ -1,0 +1,122 @@
+"""Students of tests: what they measure or draw, exactly or with a known change."""
+
+import cmath
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from grader.comparison import Task, task_of
+from grader.records import Figure, Reading, ReadNode, ReadVector
+from grader.rubric import rubric_of
+from reference.assignment import load_assignment
+from reference.construction import evaluate
+from reference.mistakes import Drawing, Mistake, commit
+
+ZERO_MM = 1e-9
+
+
+@cache
+def task_for(name: str, n: int | None = None, position: int | None = None) -> Task:
+    """A built-in task."""
+    assignment = load_assignment(name)
+    return task_of(assignment, rubric_of(assignment), assignment.variant(n, position))
+
+
+def rule_scales(task: Task) -> dict[str, float]:
+    """The assignment's own scales."""
+    return {name: float(task.parameters[name]) for name in ("kL", "kv", "ka")}
+
+
+def measured(
+    task: Task,
+    scales: Mapping[str, float] | None = None,
+    *,
+    directions: bool = True,
+    mistakes: tuple[Mistake, ...] = (),
+) -> Reading:
+    """All vectors as a perfect hand measures them, at some scales, with some mistakes followed through."""
+    nodes = drawn_nodes(task, scales, mistakes)
+    figures = {}
+    for plan in task.construction.poles:
+        vectors = {}
+        for vector in task.construction.vectors_of(plan):
+            drawn = nodes[vector.head] - nodes[vector.tail]
+            known = directions and abs(drawn) > ZERO_MM
+            degrees = math.degrees(cmath.phase(drawn)) % 360.0 if known else None
+            vectors[vector.name] = ReadVector(abs(drawn), 0.0, degrees, 0.0 if known else None, 1.0)
+        figures[plan] = Figure({}, vectors)
+    return Reading(figures)
+
+
+def drawn_nodes(
+    task: Task, scales: Mapping[str, float] | None = None, mistakes: tuple[Mistake, ...] = ()
+) -> dict[str, complex]:
+    """All nodes as a perfect hand draws them."""
+    used = scales or rule_scales(task)
+    parameters = {**task.parameters, **{name: np.asarray(used[name]) for name in ("kL", "kv", "ka")}}
+    drawing = Drawing(task.construction, parameters)
+    for mistake in mistakes:
+        drawing = commit(mistake, drawing)
+    found = evaluate(drawing.construction, drawing.parameters)
+    return {name: complex(np.ravel(place)[0]) for name, place in found.items()}
+
+
+def changed(reading: Reading, name: str, **change: object) -> Reading:
+    """A reading with one vector changed."""
+    figures = {}
+    for plan, figure in reading.figures.items():
+        vectors = dict(figure.vectors)
+        if name in vectors:
+            vectors[name] = replace(vectors[name], **change)
+        figures[plan] = Figure(figure.nodes, vectors)
+    return replace(reading, figures=figures)
+
+
+def without(reading: Reading, *names: str) -> Reading:
+    """A reading without some vectors."""
+    figures = {
+        plan: Figure(figure.nodes, {name: one for name, one in figure.vectors.items() if name not in names})
+        for plan, figure in reading.figures.items()
+    }
+    return replace(reading, figures=figures)
+
+
+def sheet(
+    task: Task,
+    scales: Mapping[str, float] | None = None,
+    *,
+    mistakes: tuple[Mistake, ...] = (),
+    moved: Mapping[str, complex] | None = None,
+    turn_deg: float = 0.0,
+    se_mm: float = 0.02,
+    confidence: float = 0.99,
+    figures: tuple[str, ...] = ("mechanism", "velocity_plan", "acceleration_plan"),
+) -> Reading:
+    """A sheet as read: every node exactly where it was drawn, the whole turned on the paper.
+
+    Arguments: `moved` shifts single nodes, millimetres, after everything is drawn.
+    """
+    nodes = drawn_nodes(task, scales, mistakes)
+    shift = {name: nodes[name] + (moved or {}).get(name, 0j) for name in nodes}
+    turn = cmath.rect(1.0, math.radians(turn_deg))
+    places = {"mechanism": 100 - 90j, "velocity_plan": 300 - 90j, "acceleration_plan": 200 - 220j}
+    found = {}
+    for figure in figures:
+        names = [step.node for step in task.construction.figures[figure]]
+        read = {
+            name: ReadNode(places[figure] + shift[name] * turn, np.eye(2) * se_mm**2, confidence)
+            for name in names
+        }
+        vectors = {}
+        for vector in task.construction.vectors_of(figure):
+            drawn = (shift[vector.head] - shift[vector.tail]) * turn
+            length = abs(drawn)
+            known = length > ZERO_MM
+            degrees = math.degrees(cmath.phase(drawn)) % 360.0 if known else None
+            se_deg = min(math.degrees(1.4 * se_mm / length), 90.0) if known else None
+            vectors[vector.name] = ReadVector(length, 1.4 * se_mm, degrees, se_deg, confidence)
+        found[figure] = Figure(read, vectors)
+    return Reading(found)

@@ -1,0 +1,85 @@
+"""The perfect hand has full marks everywhere; 0.9 of a tolerance costs nothing, 1.1 that criterion alone."""
+
+import random
+
+import pytest
+
+from grader.comparison import Submission, task_of
+from grader.comparison.marking import direction_tolerance, length_tolerance
+from grader.judging import judge
+from grader.rubric import rubric_of
+from reference.assignment import built_in, load_assignment
+from tests.hands import changed, measured, task_for
+
+WITHIN, BEYOND = 0.9, 1.1
+"""Of a tolerance."""
+SAMPLE = 40
+"""Perturbations tried per assignment, drawn by lot from all variants and criteria."""
+
+
+def variants():
+    for name in built_in():
+        for variant in load_assignment(name).variants():
+            yield pytest.param(name, variant.n, variant.position, id=f"{name} {variant}")
+
+
+def lost(judgement):
+    return [one.criterion for one in judgement.outcomes if one.verdict not in {"full", "not_judged"}]
+
+
+@pytest.mark.parametrize(("name", "n", "position"), list(variants()))
+def test_a_perfect_hand_has_full_marks(name, n, position):
+    task = task_for(name, n, position)
+    values = {**{vector: abs(real) for vector, real in task.real.items()}, **task.rates}
+    for directions in (True, False):
+        reading = measured(task, directions=directions)
+        judgement = judge(task, Submission(measured=reading, values=values))
+        assert lost(judgement) == []
+        assert judgement.score.total == judgement.score.maximum
+        assert judgement.mistakes == ()
+
+
+def perturbations(task, share):
+    """Every vector made longer, shorter, turned left and right by a share of its tolerance."""
+    reading = measured(task)
+    for criterion in task.rubric.criterion:
+        if criterion.vector is None:
+            continue
+        tolerance = task.tolerance(criterion)
+        drawn = next(
+            f.vectors[criterion.vector] for f in reading.figures.values() if criterion.vector in f.vectors
+        )
+        step = share * length_tolerance(tolerance, drawn.length_mm)
+        turn = direction_tolerance(tolerance, drawn.length_mm)
+        for sign in (1.0, -1.0):
+            if drawn.length_mm + sign * step >= 0.0:
+                yield (
+                    criterion.id,
+                    changed(reading, criterion.vector, length_mm=drawn.length_mm + sign * step),
+                )
+            if turn is not None:
+                degrees = (drawn.direction_deg + sign * share * turn) % 360.0
+                yield criterion.id, changed(reading, criterion.vector, direction_deg=degrees)
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_a_tolerance_is_where_the_rubric_has_it(name):
+    assignment = load_assignment(name)
+    rubric = rubric_of(assignment)
+    lot = random.Random(name)  # noqa: S311 - a sample, no secret
+    variants = assignment.variants()
+    for _ in range(SAMPLE):
+        task = task_of(assignment, rubric, lot.choice(variants))
+        for share in (WITHIN, BEYOND):
+            criterion, reading = lot.choice(list(perturbations(task, share)))
+            judgement = judge(task, Submission(measured=reading))
+            assert lost(judgement) == ([] if share < 1.0 else [criterion]), (task.variant, criterion)
+
+
+@pytest.mark.parametrize(("name", "n", "position"), [("pump", 7, None), ("press", None, 3)])
+def test_every_criterion_has_its_tolerance_to_itself(name, n, position):
+    task = task_for(name, n, position)
+    for share in (WITHIN, BEYOND):
+        for criterion, reading in perturbations(task, share):
+            judgement = judge(task, Submission(measured=reading))
+            assert lost(judgement) == ([] if share < 1.0 else [criterion])
