@@ -42,11 +42,19 @@ DARKEST = 0.8
 """and ink lighter, so that the overlay stands out."""
 PAPER_FROM = 0.90
 """Share of the local paper's brightness from which everything is shown white."""
+_TONES = np.array(
+    [
+        255.0 - 255.0 * min(INK_STRENGTH * (1.0 - min(share / 255.0 / PAPER_FROM, 1.0)), DARKEST)
+        for share in range(256)
+    ],
+    dtype=np.uint8,
+)
+"""What is shown for each share of the paper's brightness, 0..255."""
 OPACITY = 0.82
 FRACTION_BITS = 4
 LEAST_ARROW_MM = 0.05
 JPEG_QUALITY = 78
-PNG_COMPRESSION = 4
+PNG_COMPRESSION = 1
 
 
 def overlay(  # noqa: PLR0913 - a page and all that is known of it
@@ -130,9 +138,8 @@ def _clean(grey: GreyImage) -> GreyImage:
     height, width = grey.shape
     small = cv2.resize(grey, (max(1, width // 8), max(1, height // 8)), interpolation=cv2.INTER_AREA)
     paper = cv2.GaussianBlur(cv2.dilate(small, np.ones((7, 7), np.uint8)), (0, 0), 5)
-    level = cv2.resize(paper, (width, height), interpolation=cv2.INTER_LINEAR).astype(np.float32)
-    share = np.minimum(grey / np.maximum(level, 1.0) / PAPER_FROM, 1.0)
-    return _grey(255.0 - 255.0 * np.minimum(INK_STRENGTH * (1.0 - share), DARKEST))
+    level = cv2.resize(paper, (width, height), interpolation=cv2.INTER_LINEAR)
+    return _grey(cv2.LUT(cv2.divide(grey, level, scale=255.0), _TONES))
 
 
 def _grey(image: NDArray[np.generic]) -> GreyImage:
