@@ -1,30 +1,32 @@
 """A draft of the roster's `scans` where nothing says whose page is whose, for a person to check.
 
 What is known for certain (QR code, the roster's own `scans`, file names) is taken over; the rest is
-suggested by the crank's angle as drawn and by the roster's order, and marked to be checked. Nothing
-is assigned here: the draft counts only once a person hands it in as the roster.
+suggested by what the drawing looks like (crank angle, directions of links and plans: the student's
+own variant) and by the roster's order, and marked to be checked. Nothing is assigned here: the draft
+counts only once a person hands it in as the roster.
 """
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-import numpy as np
-
+from grader.likeness import likeness
 from grader.ownership import How, Owned, PageSource, assign_pages
-from grader.records import Problem
+from grader.records import FloatArray, Problem
 from grader.roster import COLUMNS, DRAFT_COLUMNS, SCALES, Roster, RosterRow
-from reference.assignment import Assignment
+from reference.assignment import Assignment, Variant
 from reference.errors import CallError
 
 SURE, CHECK = "yes", "check"
-_CRANK_SE_DEG = 0.7
-"""Of a crank of 60 mm drawn by hand."""
-_CRANK_FAR = 3.0
-"""Standard errors beyond which an angle speaks against a row."""
-_CRANK_CLEAR = 2.0
-"""The next row must be this many standard errors farther off to be told apart."""
+_LIKE_MM = 150.0
+"""Length of lines matched, less half of those missed, from which a likeness is told."""
+_CLEAR = 0.75
+"""The next best variant must match this share of it, or less, to be told apart."""
+_NAMED = 6
+
+Look = Callable[[PageSource], FloatArray | None]
+"""The strokes (n, 2, 2) of a page in sheet millimetres, y down; None where there are none to be had."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,14 +59,14 @@ def suggest(
     roster: Roster,
     assignment: Assignment,
     *,
-    crank_deg: Mapping[PageSource, float] | None = None,
+    look: Look | None = None,
     pages_per_student: int | None = None,
 ) -> Draft:
     """Who each page may belong to.
 
     Arguments
     ---------
-    crank_deg : the crank's direction as drawn, counter-clockwise, where it could be read
+    look : gives the strokes of a page whose owner is not certain, to see whose variant they look like
     pages_per_student : how many pages each student has, if the file is in the roster's order
     """
     known = assign_pages(pages, roster, assignment.id, pages_per_student=pages_per_student)
@@ -72,16 +74,16 @@ def suggest(
     reasons = {loose.source: loose.problem for loose in known.unmatched}
     if pages_per_student is None:
         settled |= _by_likely_order(pages, roster, assignment, settled)
-    taken = {suggestion.row.line for suggestion in settled.values() if suggestion.row is not None}
-    angles = _crank_angles(roster, assignment)
+    variants = _variants(roster, assignment)
     found: list[Suggestion] = []
     for page in pages:
-        if page in settled:
-            found.append(settled[page])
-        elif page in reasons:
-            contested = reasons[page].code in {"owner_disagree", "owner_other_assignment"}
-            by_crank = None if contested else _by_crank(page, (crank_deg or {}).get(page), roster, angles)
-            found.append(by_crank or _open(page, roster, taken, reasons[page]))
+        first = settled.get(page)
+        if first is None and page not in reasons:
+            continue
+        contested = page in reasons and reasons[page].code in {"owner_disagree", "owner_other_assignment"}
+        if (first is None or not first.sure) and not contested and look is not None and variants:
+            first = _by_likeness(page, look(page), assignment, variants, first) or first
+        found.append(first or Suggestion(page, None, _reason(reasons[page], page), sure=False))
     return Draft(tuple(found), known.problems)
 
 
@@ -93,39 +95,43 @@ def _certain(owned: Owned, roster: Roster) -> Suggestion:
     return Suggestion(owned.source, row, ", ".join(how.value for how in owned.how), sure)
 
 
-def _crank_angles(roster: Roster, assignment: Assignment) -> dict[int, float]:
-    """The crank's exact angle in degrees, by the row's line; rows whose variant is unknown have none."""
-    found: dict[int, float] = {}
+def _variants(roster: Roster, assignment: Assignment) -> dict[Variant, list[RosterRow]]:
+    """The rows of each variant; rows whose variant is unknown have none."""
+    found: dict[Variant, list[RosterRow]] = {}
     for row in roster.rows:
         try:
-            variant = assignment.variant(row.n, row.position)
+            found.setdefault(assignment.variant(row.n, row.position), []).append(row)
         except CallError:
             continue
-        angle = np.degrees(assignment.mechanism([variant]).crank.angle_rad)
-        found[row.line] = float(np.ravel(angle)[0])
     return found
 
 
-def _by_crank(
-    page: PageSource, drawn_deg: float | None, roster: Roster, angles: Mapping[int, float]
+def _by_likeness(
+    page: PageSource,
+    strokes: FloatArray | None,
+    assignment: Assignment,
+    variants: Mapping[Variant, list[RosterRow]],
+    before: Suggestion | None,
 ) -> Suggestion | None:
-    """The row whose crank angle is drawn, where it stands out from all others."""
-    if drawn_deg is None or not angles:
+    """The row whose variant is drawn, where it stands out from those of all others."""
+    if strokes is None or len(variants) < 2:
         return None
-    off = {
-        line: abs((drawn_deg - angle + 180.0) % 360.0 - 180.0) / _CRANK_SE_DEG
-        for line, angle in angles.items()
-    }
-    ranked = sorted(off, key=lambda line: off[line])
-    if off[ranked[0]] > _CRANK_FAR:
+    matched = likeness(strokes, assignment, list(variants))
+    if matched.max() < _LIKE_MM:
         return None
-    near = [row for row in roster.rows if row.line in off and off[row.line] < off[ranked[0]] + _CRANK_CLEAR]
-    why = f"the crank is drawn at {drawn_deg:.1f} degrees"
-    if len(near) > 1:
-        names = ", ".join(_who(row) for row in near[:6]) + (", ..." if len(near) > 6 else "")
-        return Suggestion(page, None, f"{why}: {names} are all near", sure=False)
-    told = f"{why}; {_who(near[0])} has {angles[near[0].line]:.1f}"
-    return Suggestion(page, near[0], told, sure=False)
+    near = [
+        variant for variant, score in zip(variants, matched, strict=True) if score > _CLEAR * matched.max()
+    ]
+    rows = [row for variant in near for row in variants[variant]]
+    names = ", ".join(_who(row) for row in rows[:_NAMED]) + (", ..." if len(rows) > _NAMED else "")
+    why = f"the drawing looks like the variant of {names}"
+    if before is None or before.row is None:
+        return Suggestion(page, rows[0] if len(rows) == 1 else None, why, sure=False)
+    if before.row in rows:
+        return replace(before, why=f"{before.why}; {why}")
+    # What is drawn speaks louder than an order that one missing sheet shifts.
+    row = rows[0] if len(rows) == 1 else None
+    return Suggestion(page, row, f"{why}; by {before.why}: {_who(before.row)}", sure=False)
 
 
 def _by_likely_order(
@@ -145,11 +151,8 @@ def _by_likely_order(
     return {owned.source: _certain(owned, roster) for owned in dealt.owned if owned.source not in settled}
 
 
-def _open(page: PageSource, roster: Roster, taken: set[int], problem: Problem) -> Suggestion:
-    """Nobody is suggested: the reason, and who has no pages so far."""
-    free = [row for row in roster.rows if row.line not in taken]
-    hint = f"; without pages so far: {', '.join(_who(row) for row in free[:6])}" if free else ""
-    return Suggestion(page, None, problem.message.removeprefix(f"{page}: ") + hint, sure=False)
+def _reason(problem: Problem, page: PageSource) -> str:
+    return problem.message.removeprefix(f"{page}: ")
 
 
 def _who(row: RosterRow) -> str:

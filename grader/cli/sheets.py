@@ -1,7 +1,5 @@
 """``planmark sheet`` and ``planmark match``."""
 
-import cmath
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -17,11 +15,11 @@ from grader.intake import page_of
 from grader.matching import SURE, draft_csv, suggest
 from grader.measurements import names_of
 from grader.ownership import PageSource
-from grader.pipeline import Place, read, see
-from grader.records import MECHANISM
+from grader.pipeline import Place, see
+from grader.records import FloatArray
 from grader.roster import read_roster
 from grader.survey import survey
-from reference.assignment import Assignment, load_assignment
+from reference.assignment import load_assignment
 from reference.errors import CallError, InputFileError
 
 
@@ -60,8 +58,8 @@ def draft_matches(
     draft = suggest(sources, roster, assignment, pages_per_student=pages_per_student)
     loose = [one.source for one in draft.suggestions if not one.sure]
     with progress() as tell:
-        angles = dict(_crank_angles(loose, files, assignment, tell))
-    draft = suggest(sources, roster, assignment, crank_deg=angles, pages_per_student=pages_per_student)
+        strokes = dict(_strokes(loose, files, tell))
+    draft = suggest(sources, roster, assignment, look=strokes.get, pages_per_student=pages_per_student)
     entries = []
     for suggestion in draft.suggestions:
         source = suggestion.source
@@ -82,16 +80,12 @@ def draft_matches(
     return open_ends > 0
 
 
-def _crank_angles(
-    sources: Sequence[PageSource], files: Mapping[str, Path], assignment: Assignment, tell: Progress
-) -> Iterator[tuple[PageSource, float]]:
-    """The crank's direction as drawn on each page, degrees counter-clockwise, where it can be read."""
-    crank = assignment.mechanism(assignment.variants()[:1]).crank
+def _strokes(
+    sources: Sequence[PageSource], files: Mapping[str, Path], tell: Progress
+) -> Iterator[tuple[PageSource, FloatArray]]:
+    """The strokes drawn on each page, sheet millimetres, where there are any to be had."""
     for done, source in enumerate(sources, start=1):
-        seen = see(Place(files[source.file], source.page, source.file))
-        (reading,) = read([seen], assignment, None, {}, ())
-        sketch = reading.figures.get(MECHANISM)
-        nodes = {} if sketch is None else sketch.nodes
-        if crank.pivot in nodes and crank.pin in nodes:
-            yield source, math.degrees(cmath.phase(nodes[crank.pin].at - nodes[crank.pivot].at)) % 360.0
+        ink = see(Place(files[source.file], source.page, source.file)).ink
+        if ink is not None:
+            yield source, ink.strokes.ends
         tell("reading", done, len(sources))

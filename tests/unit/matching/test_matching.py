@@ -3,11 +3,14 @@ import pytest
 import simplejpeg
 
 from grader.contact_sheet import contact_sheet, thumbnail
+from grader.likeness import likeness
 from grader.matching import draft_csv, suggest
 from grader.ownership import PageSource
 from grader.records import Identity
 from grader.roster import parse_roster
 from reference.assignment import load_assignment
+from reference.construction import evaluate
+from reference.derivation import construction_of, parameters_of
 
 PUMP = load_assignment("pump")
 ROSTER = parse_roster("student_id,name,n,kv,scans\ns1,Ana,1,0.2 (m/s)/mm,\ns2,Ion,10,,\ns3,Eva,20,,\n")
@@ -42,30 +45,81 @@ def test_codes_and_names_are_sure_and_the_rest_is_to_be_checked():
     }
 
 
-def test_a_crank_drawn_at_one_students_angle_suggests_that_student():
-    # phi = 30 + 2n degrees: 32, 50 and 70.
-    drawn = page(1)
-    draft = suggest([drawn, page(2)], ROSTER, PUMP, crank_deg={drawn: 50.6})
-    (suggestion, other) = draft.suggestions
-    assert suggestion.row.student_id == "s2"
+def drawn(n, *, turn_deg=0.0, seed=0, hand_mm=0.2):
+    """A careful student's strokes of mechanism and velocity plan, among scribbles; (n, 2, 2) mm, y down."""
+    construction = construction_of(PUMP.mechanism([PUMP.variant(n)]), accelerations=False)
+    scales = PUMP.scales([PUMP.variant(n)], crank_mm=55.0)
+    nodes = evaluate(
+        construction, parameters_of(PUMP.mechanism([PUMP.variant(n)]), scales.kL, scales.kv, scales.ka)
+    )
+    rng = np.random.default_rng(seed)
+    at = {"mechanism": 150.0 - 150.0j, "velocity_plan": 300.0 - 120.0j}
+    pairs = [
+        ("mechanism", *pair)
+        for pair in ("O1 A", "A B", "O2 B", "A C", "B C", "C D")
+        for pair in [pair.split()]
+    ]
+    pairs += [
+        ("velocity_plan", vector.tail, vector.head) for vector in construction.vectors_of("velocity_plan")
+    ]
+    turn = np.exp(1j * np.radians(turn_deg))
+    ends = np.array(
+        [
+            [at[figure] + turn * complex(np.ravel(nodes[name])[0]) for name in names]
+            for figure, *names in pairs
+        ]
+    )
+    ends = np.concatenate([ends, rng.uniform(20, 400, (40, 2)) - 1j * rng.uniform(50, 260, (40, 2))])
+    ends = ends + rng.normal(0.0, hand_mm, ends.shape) + 1j * rng.normal(0.0, hand_mm, ends.shape)
+    return np.stack([ends.real, -ends.imag], axis=-1)
+
+
+@pytest.mark.parametrize("n", [1, 10, 20])
+def test_a_drawing_of_one_students_variant_suggests_that_student(n):
+    sheet = PageSource("x.jpg", 1, 1)
+    (suggestion,) = suggest([sheet], ROSTER, PUMP, look=lambda _: drawn(n)).suggestions
+    assert suggestion.row.n == n
     assert not suggestion.sure
-    assert "50.6" in suggestion.why
-    assert other.row is None
+    assert suggestion.row.student_id in suggestion.why
 
 
-@pytest.mark.parametrize("angle", [41.0, 200.0])
-def test_a_crank_at_nobodys_angle_suggests_nobody(angle):
-    drawn = page(1)
-    assert suggest([drawn, page(2)], ROSTER, PUMP, crank_deg={drawn: angle}).suggestions[0].row is None
+def test_likeness_tells_neighbours_apart_by_two_degrees():
+    variants = PUMP.variants()
+    for n in (2, 15, 29):
+        assert variants[int(np.argmax(likeness(drawn(n), PUMP, variants)))].n == n
 
 
-def test_neighbours_that_a_hand_cannot_tell_apart_are_all_named():
-    roster = parse_roster("student_id,name,n\ns1,A,5\ns2,B,6\ns3,C,5\n")
-    drawn = PageSource("x.jpg", 1, 1)
-    (suggestion,) = suggest([drawn], roster, PUMP, crank_deg={drawn: 40.2}).suggestions
+@pytest.mark.parametrize("strokes", [None, np.zeros((0, 2, 2)), drawn(15), drawn(10)[-40:]])
+def test_a_drawing_that_looks_like_nobodys_variant_suggests_nobody(strokes):
+    (suggestion,) = suggest([PageSource("x.jpg", 1, 1)], ROSTER, PUMP, look=lambda _: strokes).suggestions
     assert suggestion.row is None
-    assert "s1" in suggestion.why
-    assert "s3" in suggestion.why
+    assert "looks like" not in suggestion.why
+
+
+def test_students_of_one_variant_are_all_named_and_none_is_chosen():
+    roster = parse_roster("student_id,name,n\ns1,A,5\ns2,B,16\ns3,C,5\n")
+    (suggestion,) = suggest([PageSource("x.jpg", 1, 1)], roster, PUMP, look=lambda _: drawn(5)).suggestions
+    assert suggestion.row is None
+    assert suggestion.why.endswith("s1, s3")
+
+
+def test_only_pages_that_are_not_certain_are_looked_at():
+    looked = []
+    pages = [page(1, identity=code("s2", 10)), page(2), page(3, blank=True)]
+    suggest(pages, ROSTER, PUMP, look=looked.append)
+    assert looked == [pages[1]]
+
+
+def test_a_drawing_that_speaks_against_the_order_is_believed_and_both_are_told():
+    order = {1: 10, 2: 1, 3: 20}
+    draft = suggest([page(1), page(2), page(3)], ROSTER, PUMP, look=lambda source: drawn(order[source.page]))
+    assert by_page(draft) == {
+        "class.pdf#1": ("s2", False),
+        "class.pdf#2": ("s1", False),
+        "class.pdf#3": ("s3", False),
+    }
+    assert "by roster's order: s1" in draft.suggestions[0].why
+    assert "roster's order; the drawing looks like" in draft.suggestions[2].why
 
 
 def test_pages_that_come_out_even_are_suggested_in_order_to_be_checked():
@@ -80,9 +134,9 @@ def test_pages_that_come_out_even_are_suggested_in_order_to_be_checked():
     }
 
 
-def test_sources_that_disagree_are_left_to_the_person_whatever_the_crank_says():
+def test_sources_that_disagree_are_left_to_the_person_whatever_is_drawn():
     contested = PageSource("s1.jpg", 1, 1, identity=code("s2", 10))
-    (suggestion,) = suggest([contested], ROSTER, PUMP, crank_deg={contested: 32.0}).suggestions
+    (suggestion,) = suggest([contested], ROSTER, PUMP, look=lambda _: drawn(1)).suggestions
     assert suggestion.row is None
     assert "s1" in suggestion.why
     assert "s2" in suggestion.why
