@@ -27,6 +27,14 @@ def plan(
 
 
 @app.command()
+def lint(assignment: AssignmentArgument) -> None:
+    """Hold an assignment and its rubric against every variant: all findings at once."""
+    from grader.cli.linting import lint_assignment
+
+    raise typer.Exit(1 if lint_assignment(assignment) else 0)
+
+
+@app.command()
 def schema(name: Annotated[str, typer.Argument(help="report, results, reading, measurements, ...")]) -> None:
     """The JSON Schema of a document or authored file."""
     import json
