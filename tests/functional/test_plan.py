@@ -123,3 +123,12 @@ def test_the_program_tells_its_version_and_its_commands(planmark):
     assert planmark("--help").returncode == 0
     assert planmark().returncode == 2
     assert planmark("frobnicate").returncode == 2
+
+
+def test_lint_tells_all_that_is_unwise_in_an_assignment(planmark, tmp_path):
+    found = planmark("lint", "pump")
+    assert found.returncode == 1
+    assert "a_DC_n is shorter than" in found.stdout
+    assert found.stdout.splitlines()[-1].startswith("pump: 30 variants, ")
+    (tmp_path / "broken.assignment.toml").write_text("id = 1\n", encoding="utf-8")
+    assert planmark("lint", "broken.assignment.toml").returncode == 2
