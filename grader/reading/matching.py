@@ -25,6 +25,7 @@ PENALTY_OF_THIN = 2.0
 INVISIBLE_MM = 0.8
 RUN_ON_FAR = 4e-4
 """Density per mm of ends anywhere: the stroke goes on as another edge, or as a line drawn through."""
+COST_OF_SHARING = 0.3
 RUN_ON_EXPLAINED = 3.0
 """Nats given back when a second edge explains why a stroke runs on past the first."""
 LITTLE_COMMON = 0.4
@@ -146,7 +147,7 @@ def _choices(state: Explanation, index: int, edge: int, lines: Lines, ends: Ends
     own -= PENALTY_OF_THIN * lines.thin[near]
     wide_distance, wide_log_det = _mahalanobis(off, spread + 0.3**2 * np.eye(2))
     density = np.exp(-0.5 * (wide_distance + wide_log_det)) / (2 * np.pi)
-    both = np.log(np.minimum(1.0, density * SHARED_RADIUS2_MM2) + 1e-12) - 1.0
+    both = np.log(np.minimum(1.0, density * SHARED_RADIUS2_MM2) + 1e-12) - COST_OF_SHARING
     for place in np.flatnonzero(shared):
         both[place] += RUN_ON_EXPLAINED * _explains_run_on(state, lines, int(near[place]), tail, head)
     gains = state.score + np.where(shared, both, own)

@@ -16,7 +16,7 @@ from reference.mistakes import Drawing, Mistake, affected, commit, single_mistak
 
 HAND = Hand()
 PLAN_ENDS = Ends()
-QUARTERS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
+QUARTERS = (np.pi / 2, -np.pi / 2, np.pi)
 COST_OF_TURN = 6.0
 COST_OF_SIZE = 4.0
 COST_OF_MISTAKE = 8.0
@@ -27,6 +27,9 @@ BEAM_OF_MISTAKES = 4
 SMALLEST_MM, LARGEST_MM = 20.0, 280.0
 """Of a plan's longest vector: what fits on a sheet and can be measured."""
 LEAST_LAID_MM = 4.0
+SPECK_MM = 1e-6
+WORSE = 0.3
+"""Places supported by this much less of the plan's length are not looked at."""
 LEFT_OUT = "not drawn: normal component left out"
 LEAST_SEEN_MM = 2.5
 RIVALS = 25
@@ -208,7 +211,7 @@ def _with_mistakes(
         if expected is None:
             continue
         if poor:
-            for place in _laid(expected, lines, count=1):
+            for place in sorted(_laid(expected, lines, count=1), key=lambda place: -place.score)[:2]:
                 yield from _read(hypothesis, expected, place, lines, BEAM_OF_MISTAKES)
         else:
             moved = affected(mistake, hypothesis.drawing.construction)
@@ -251,14 +254,24 @@ def _tied(hypothesis: Hypothesis) -> Construction:
     return replace(construction, vectors=vectors)
 
 
-def _laid(expected: Expected, lines: Lines, count: int = 3) -> list[Place]:
+def _laid(expected: Expected, lines: Lines, count: int = 2) -> list[Place]:
+    """Where the plan may lie: upright at the size expected, upright at any size, turned by quarters.
+
+    Each way has places of its own: a plan of nearly parallel vectors fits a bundle at any size.
+    """
     largest = max(abs(expected.at[edge.head] - expected.at[edge.tail]) for edge in expected.edges)
-    if largest < 1e-6:  # noqa: PLR2004 - nothing to lay
+    if largest < SPECK_MM:
         return []
-    bounds = {"smallest": SMALLEST_MM / largest, "largest": LARGEST_MM / largest}
-    search = Search(turns_rad=QUARTERS, sizes=(1.0, 0.0), **bounds)
     long = lines.take(lines.length > LEAST_LAID_MM)
-    return places(expected, long, search, count=count)
+    bounds = {"smallest": SMALLEST_MM / largest, "largest": LARGEST_MM / largest}
+    ways = (
+        Search(sizes=(1.0,)),
+        Search(sizes=(0.0,), **bounds),
+        Search(turns_rad=QUARTERS, sizes=(1.0, 0.0), **bounds),
+    )
+    found = [place for way in ways for place in places(expected, long, way, count=count)]
+    best = max((place.score for place in found), default=0.0)
+    return [place for place in found if place.score > best - WORSE]
 
 
 def _read(
