@@ -38,12 +38,14 @@ class Suggestion:
     row : None where nothing suggests one
     why : the evidence, a sentence
     sure : a source that decides says so, not a likeness
+    among : rows between which a likeness leaves the choice
     """
 
     source: PageSource
     row: RosterRow | None
     why: str
     sure: bool
+    among: tuple[RosterRow, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +86,7 @@ def suggest(
         if (first is None or not first.sure) and not contested and look is not None and variants:
             first = _by_likeness(page, look(page), assignment, variants, first) or first
         found.append(first or Suggestion(page, None, _reason(reasons[page], page), sure=False))
-    return Draft(tuple(found), known.problems)
+    return Draft(tuple(_in_order(found, roster)), known.problems)
 
 
 def _certain(owned: Owned, roster: Roster) -> Suggestion:
@@ -126,7 +128,7 @@ def _by_likeness(
     names = ", ".join(_who(row) for row in rows[:_NAMED]) + (", ..." if len(rows) > _NAMED else "")
     why = f"the drawing looks like the variant of {names}"
     if before is None or before.row is None:
-        return Suggestion(page, rows[0] if len(rows) == 1 else None, why, sure=False)
+        return Suggestion(page, rows[0] if len(rows) == 1 else None, why, sure=False, among=tuple(rows))
     if before.row in rows:
         return replace(before, why=f"{before.why}; {why}")
     # What is drawn speaks louder than an order that one missing sheet shifts.
@@ -149,6 +151,26 @@ def _by_likely_order(
     if any(loose.problem.code in {"owner_disagree", "order_refused"} for loose in dealt.unmatched):
         return {}
     return {owned.source: _certain(owned, roster) for owned in dealt.owned if owned.source not in settled}
+
+
+def _in_order(found: list[Suggestion], roster: Roster) -> list[Suggestion]:
+    """Choices left open settled by the roster's order, where all pages that have a row follow it."""
+    place = {id(row): index for index, row in enumerate(roster.rows)}
+    reached = 0
+    settled: list[Suggestion] = []
+    for suggestion in found:
+        row = suggestion.row
+        if row is None and suggestion.among:
+            row = next((row for row in suggestion.among if place[id(row)] >= reached), None)
+            if row is not None:
+                why = f"{suggestion.why}; by the roster's order {_who(row)}"
+                suggestion = replace(suggestion, row=row, why=why)  # noqa: PLW2901
+        if row is not None:
+            if place[id(row)] < reached:
+                return found
+            reached = place[id(row)]
+        settled.append(suggestion)
+    return settled
 
 
 def _reason(problem: Problem, page: PageSource) -> str:

@@ -96,11 +96,28 @@ def test_a_drawing_that_looks_like_nobodys_variant_suggests_nobody(strokes):
     assert "looks like" not in suggestion.why
 
 
-def test_students_of_one_variant_are_all_named_and_none_is_chosen():
+def test_students_of_one_variant_are_all_named_and_only_an_order_chooses():
     roster = parse_roster("student_id,name,n\ns1,A,5\ns2,B,16\ns3,C,5\n")
-    (suggestion,) = suggest([PageSource("x.jpg", 1, 1)], roster, PUMP, look=lambda _: drawn(5)).suggestions
-    assert suggestion.row is None
-    assert suggestion.why.endswith("s1, s3")
+    pages = [page(1), page(2)]
+    draft = suggest(pages, roster, PUMP, look=lambda source: drawn((16, 5)[source.page - 1]))
+    other = suggest(pages[::-1], roster, PUMP, look=lambda source: drawn((16, 5)[source.page - 1]))
+    assert by_page(draft) == {"class.pdf#1": ("s2", False), "class.pdf#2": ("s3", False)}
+    assert by_page(other) == {"class.pdf#2": ("s1", False), "class.pdf#1": ("s2", False)}
+    backwards = suggest(
+        [page(1), page(2), page(3, 3)], roster, PUMP, look=lambda s: drawn((16, 5, 16)[s.page - 1])
+    )
+    assert backwards.suggestions[1].row is None
+    assert "s1, s3" in backwards.suggestions[1].why
+
+
+def test_a_choice_between_students_of_one_variant_follows_the_rosters_order_where_all_pages_do():
+    roster = parse_roster("student_id,name,n\ns1,A,5\ns2,B,16\ns3,C,5\ns4,D,25\n")
+    pages = [page(number, 5) for number in range(1, 6)]
+    in_order = suggest(pages, roster, PUMP, look=lambda source: drawn((5, 5, 16, 5, 25)[source.page - 1]))
+    assert [student for student, _ in by_page(in_order).values()] == ["s1", "s1", "s2", "s3", "s4"]
+    assert not any(suggestion.sure for suggestion in in_order.suggestions)
+    mixed = suggest(pages, roster, PUMP, look=lambda source: drawn((25, 5, 16, 5, 16)[source.page - 1]))
+    assert [student for student, _ in by_page(mixed).values()] == ["s4", None, "s2", None, "s2"]
 
 
 def test_only_pages_that_are_not_certain_are_looked_at():
