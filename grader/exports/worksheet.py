@@ -95,6 +95,7 @@ def fill(  # noqa: PLR0913 - all that the file holds
     maximum is not the rubric's and `rescale` is not asked for.
     """
     sheet = _open(data, file)
+    replaced = 0
     rows, not_found = _matched(sheet, grades, people)
     written, locked = [], []
     for grade in grades:
@@ -105,10 +106,17 @@ def fill(  # noqa: PLR0913 - all that the file holds
             locked.append(grade.student_id)
             continue
         score = rescaled(grade, _maximum(sheet, row, grade), rescale=rescale)
-        sheet.table.put(row, sheet.columns["grade"], number(score or 0.0))
+        text = number(score or 0.0)
+        replaced += sheet.value(row, "grade") not in {"", "-", text}
+        sheet.table.put(row, sheet.columns["grade"], text)
         if "feedback" in sheet.columns and grade.student_id in comments:
             sheet.table.put(row, sheet.columns["feedback"], comments[grade.student_id])
         written.append(grade.student_id)
+    if replaced:
+        sheet.notes.append(
+            f"{replaced} grade(s) that Moodle holds already are changed: it skips them unless the box for"
+            " updating records is ticked at the upload, or the worksheet was downloaded afresh"
+        )
     return Filled(
         sheet.table.text().encode("utf-8"), tuple(written), not_found, tuple(locked), tuple(sheet.notes)
     )

@@ -1,5 +1,6 @@
 """The pages: one per submission, one for the class. Self-contained, readable offline and on paper."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -52,8 +53,13 @@ def write_feedback(  # noqa: PLR0913 - all that the file holds
 
     Raises OutputError where a file cannot be written.
     """
-    for index, picture in enumerate(pictures, start=1):
-        write_whole(out_dir / ("overlay.png" if index == 1 else f"overlay_{index}.png"), picture.png)
+    files = ["overlay.png" if k == 1 else f"overlay_{k}.png" for k in range(1, len(pictures) + 1)]
+    for file, picture in zip(files, pictures, strict=True):
+        write_whole(out_dir / file, picture.png)
+    for old in out_dir.glob("overlay*.png"):
+        # Of an earlier run, when more pages were handed in.
+        if old.name not in files:
+            old.unlink(missing_ok=True)
     page = feedback_page(report, pictures, lang, level, title=title, student_name=student_name, names=names)
     write_whole(out_dir / "feedback.html", page)
 
@@ -110,7 +116,9 @@ def index_page(
             "link": f"{quote(folder)}/feedback.html",
             "score": _score(report, speaker),
             "waiting": sum(criterion.verdict == "review" for criterion in report.criteria),
-            "problems": [problem_sentence(problem, speaker) for problem in report.problems],
+            "problems": Counter(
+                problem_sentence(problem, speaker, brief=True) for problem in report.problems
+            ),
             "best": report.score if report.score is not None else (report.score_range or (-1.0, -1.0))[0],
         }
         for report, folder in zip(results.reports, folders, strict=True)

@@ -73,8 +73,10 @@ class Told:
     file: str
 
 
-def problem_sentence(problem: ProblemDocument, speaker: Tongue) -> Told:
-    """A problem of a submission."""
+def problem_sentence(problem: ProblemDocument, speaker: Tongue, *, brief: bool = False) -> Told:
+    """A problem of a submission; `brief` leaves the program's own words out where a sentence says it."""
+    if brief and problem.code in PROBLEMS:
+        return Told(speaker.gettext(PROBLEMS[problem.code]), "", problem.file or "")
     return _told(problem.code, problem.message, problem.file or "", speaker)
 
 

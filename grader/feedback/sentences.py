@@ -16,6 +16,9 @@ Level = Literal["symbol", "hint", "full"]
 
 _NO_NAMES: Mapping[str, str] = {}
 
+UNDECIDED = "scale_undecided"
+"""Said for `scale_assumed` and `follows` together, under review: neither alone says what is in doubt."""
+
 HINTS: dict[str, str] = {
     "right": N_("Right."),
     "too_long": N_("It is too long."),
@@ -40,6 +43,10 @@ HINTS: dict[str, str] = {
     "scale_refused": N_("The declared scale could not be understood."),
     "scale_off": N_("The declared scale does not fit the drawing and the data."),
     "scale_assumed": N_("The scale was not declared; the assignment's own rule was assumed."),
+    UNDECIDED: N_(
+        "No scale was declared: it is off at the assignment's own, and right at the one"
+        " that the drawing follows."
+    ),
 }
 """What is said at level `hint`, by code of the reason."""
 
@@ -105,6 +112,9 @@ def criterion_feedback(
 def _worth_telling(outcome: Outcome) -> list[Reason]:
     """The reasons without those that say nothing beside the others."""
     codes = {reason.code for reason in outcome.reasons}
+    by_scale = any(one.code == "follows" and one.params.get("what") == "scale" for one in outcome.reasons)
+    if outcome.verdict == "review" and "scale_assumed" in codes and by_scale:
+        return [Reason(UNDECIDED)]
     if outcome.verdict == "follow_through" and "follows" in codes:
         return [reason for reason in outcome.reasons if reason.code == "follows"]
     needless = {"right"} if codes - {"right"} else set()

@@ -63,6 +63,12 @@ def test_grades_have_decimal_dots():
     assert rows(filled_in(worksheet(line(101)), report("s01", 7.25)).data)[0]["Grade"] == "7.25"
 
 
+def test_grades_that_moodle_holds_already_are_changed_and_told():
+    found = filled_in(worksheet(line(101, grade="3.00")), report("s01", 5.0))
+    assert rows(found.data)[0]["Grade"] == "5"
+    assert found.notes[0].startswith("1 grade(s) that Moodle holds already")
+
+
 def test_what_waits_for_a_person_stays_blank():
     data = worksheet(line(101), line(102, "Ana Ionescu", "ana@x.ro"))
     found = filled_in(data, report("s01", 5.0), report("s02", None, status="needs_review"))

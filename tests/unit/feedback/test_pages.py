@@ -170,6 +170,12 @@ def test_pictures_and_page_are_written_side_by_side(tmp_path):
     assert (tmp_path / "s07" / "overlay.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_pictures_of_an_earlier_run_do_not_stay_behind(tmp_path):
+    write_feedback(report(), [picture(), picture("s07_2.jpg")], tmp_path, "en")
+    write_feedback(report(), [picture()], tmp_path, "en")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["feedback.html", "overlay.png"]
+
+
 # The class ----------------------------------------------------------------------------------------
 
 
@@ -201,6 +207,13 @@ def test_the_index_names_the_hardest_criteria_and_commonest_mistakes():
     assert "v D 0 %" in after
     assert "v A" not in after
     assert "Normal component reversed" in after
+
+
+def test_the_same_problem_many_times_is_told_once_with_its_number():
+    many = [ProblemDocument(code="measurement_fault", message=f"line {k}", file="m.csv") for k in range(9)]
+    text = Page(index_page(results(report(problems=many)), "en")).text
+    assert text.count("could not be used") == 1
+    assert "×9" in text
 
 
 def test_an_empty_class_has_a_page():

@@ -96,6 +96,17 @@ def test_of_several_limits_that_are_near_one_is_told():
     assert "0.20" in told
 
 
+def test_a_doubt_about_an_undeclared_scale_is_told_as_one():
+    reasons = (
+        Reason("scale_assumed", {"used": 0.036, "unit": "m/s"}),
+        Reason("follows", {"what": "scale"}),
+        TOO_LONG,
+    )
+    told = criterion_feedback(outcome("review", *reasons), "en")
+    assert told.startswith("No scale was declared")
+    assert "too long" not in told
+
+
 def test_what_is_not_required_is_not_called_missing_too():
     told = criterion_feedback(outcome("not_judged", Reason("optional"), Reason("not_measured")), "en")
     assert told == "It was not handed in, and is not required."
