@@ -1,0 +1,128 @@
+"""The bundled classes: complete, small, made by their script, and read to their floors.
+
+A floor is the number of vectors of 5 mm or more that must be read within 0.5 mm; the ceiling of
+vectors reported with confidence but wrong by more than 1 mm is separate, and zero.
+"""
+
+import importlib.util
+import json
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from grader.intake import is_blank, page_of
+from grader.measurements import names_of, read_measurements
+from grader.pipeline import Place, read, see
+from grader.roster import read_roster
+from grader.rubric import load_rubric
+from reference.assignment import load_assignment
+
+SAMPLES = Path(__file__).resolve().parents[2] / "samples"
+MOST_BYTES = 5_000_000
+RIGHT_MM, WRONG_MM, LEAST_MM, SURE = 0.5, 1.0, 5.0, 0.9
+
+
+def truths_of(name):
+    found = defaultdict(list)
+    for line in (SAMPLES / name / "truth.jsonl").read_text(encoding="utf-8").splitlines():
+        truth = json.loads(line)
+        found[truth["student_id"]].append(truth)
+    return found
+
+
+@pytest.fixture(scope="module")
+def script():
+    spec = importlib.util.spec_from_file_location("make_samples", SAMPLES / "make_samples.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_samples_are_small_enough_to_travel():
+    assert sum(path.stat().st_size for path in SAMPLES.rglob("*") if path.is_file()) < MOST_BYTES
+
+
+@pytest.mark.parametrize("name", ["pump", "press"])
+def test_the_readme_names_every_sample(name):
+    told = (SAMPLES / "README.md").read_text(encoding="utf-8")
+    for path in (SAMPLES / name).iterdir():
+        assert f"`{name}/{path.name}`" in told or f"`{path.name}`" in told, path.name
+
+
+@pytest.mark.parametrize("name", ["pump", "press"])
+def test_roster_truth_and_measurements_agree_on_who_is_who(name):
+    roster = read_roster(SAMPLES / name / "roster.csv")
+    known = {row.student_id for row in roster.rows}
+    assert set(truths_of(name)) <= known
+    assignment = load_assignment(name)
+    for entered in read_measurements(SAMPLES / name / "measurements.csv", names_of(assignment)):
+        assert entered.student_id in known
+        assert not entered.problems
+        assert len(entered.reading.figures) == 2
+
+
+@pytest.mark.parametrize(("name", "student"), [("pump", "s04"), ("press", "s01")])
+def test_the_script_makes_the_same_drawing_again(script, name, student):
+    pupil = next(p for p in {"pump": script.PUMP, "press": script.PRESS}[name] if p.student_id == student)
+    made = [sheet.truth for sheet in script.sheets_of(load_assignment(name), pupil)]
+    for again, bundled in zip(made, truths_of(name)[student], strict=True):
+        for figure, drawn in bundled["figures"].items():
+            for node, place in drawn["nodes"].items():
+                assert again["figures"][figure]["nodes"][node] == pytest.approx(place, abs=0.001)
+        assert np.allclose(again["homography"], bundled["homography"], atol=1e-6)
+
+
+def test_the_backs_in_the_class_pdf_are_blank_and_the_fronts_are_not():
+    blank = [is_blank(page_of(SAMPLES / "pump" / "class.pdf", number)) for number in range(1, 7)]
+    assert blank == [False, True, False, True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("name", "student", "floor"),
+    [("pump", "s01", 18), ("pump", "s03", 18), ("pump", "s06", 18), ("press", "s01", 14)],
+    ids=["flatbed at 200 dpi", "one-bit copy", "answer sheets", "press"],
+)
+def test_a_sample_is_read_to_its_floor_and_never_silently_wrong(name, student, floor):
+    right, misread = marks(name, student)
+    assert misread == []
+    assert right >= floor
+
+
+@pytest.mark.xfail(
+    strict=False, reason="a' and c' lie under letters and arrowheads; b' is taken 4 mm off, with confidence"
+)
+def test_a_hard_sample_is_never_silently_wrong():
+    assert marks("pump", "s02")[1] == []
+
+
+def marks(name, student):
+    """Vectors read right, and those reported with confidence but wrong."""
+    folder, assignment = SAMPLES / name, load_assignment(name)
+    row = read_roster(folder / "roster.csv").rows_of(student)[0]
+    truths = truths_of(name)[student]
+    seen = [see(Place(folder / truth["file"], truth["page"], truth["file"])) for truth in truths]
+    wanted = load_rubric(assignment.file.rubric).vectors
+    readings = read(seen, assignment, assignment.variant(row.n, row.position), row.scales, wanted)
+    right, misread = 0, []
+    for truth, reading in zip(truths, readings, strict=True):
+        for figure, drawn in truth["figures"].items():
+            found = reading.figures.get(figure)
+            for vector in drawn.get("vectors", {}) if found else ():
+                error, confidence = miss_mm(drawn, vector, found.vectors.get(vector))
+                right += error <= RIGHT_MM and drawn["vectors"][vector]["length_mm"] >= LEAST_MM
+                if error > WRONG_MM and confidence >= SURE:
+                    misread.append((vector, round(error, 2), round(confidence, 3)))
+    return right, misread
+
+
+def miss_mm(drawn, name, as_read):
+    """How far a vector as read is from the one drawn: node to node, or along its stroke."""
+    if as_read is None or as_read.length_mm is None:
+        return np.inf, 0.0
+    vector = drawn["vectors"][name]
+    ends = [drawn["nodes"][vector["tail"]], drawn["nodes"][vector["head"]]]
+    ways = [complex(q[0] - p[0], p[1] - q[1]) for p, q in (ends, vector["line_mm"] or ends)]
+    read_as = as_read.length_mm * np.exp(1j * np.radians(as_read.direction_deg or 0.0))
+    return min(abs(read_as - way) for way in ways), as_read.confidence
