@@ -5,14 +5,10 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from grader.documents import ReportDocument
-from grader.i18n import N_, Tongue, tongue
+from grader.i18n import Tongue, tongue
+from grader.scene import MARKS
 
-VERDICTS = {
-    "partial": N_("nearly right"),
-    "none": N_("wrong"),
-    "review": N_("waits for a person"),
-    "follow_through": N_("follows rightly"),
-}
+SAID = {"partial", "none", "review", "follow_through"}
 """The verdicts that are worth a comment."""
 
 
@@ -26,14 +22,12 @@ def _of_report(report: ReportDocument, speaker: Tongue, *, many: bool) -> Markup
     head = Markup("")
     if many:
         head = Markup("<p><b>{} {}</b></p>").format(speaker.gettext("Position"), report.position)
-    said = [criterion for criterion in report.criteria if criterion.verdict in VERDICTS]
+    said = [criterion for criterion in report.criteria if criterion.verdict in SAID]
     if not said:
         return head + Markup("<p>{}</p>").format(speaker.gettext("Everything is right."))
     items = Markup("").join(
-        Markup("<li><b>{}</b> ({}) {}</li>").format(
-            criterion.title,
-            speaker.gettext(VERDICTS[criterion.verdict]),
-            " ".join(criterion.feedback.split()),
+        Markup("<li>{} <b>{}</b>: {}</li>").format(
+            MARKS[criterion.verdict], criterion.title, " ".join(criterion.feedback.split())
         )
         for criterion in said
     )

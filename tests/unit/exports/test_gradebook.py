@@ -90,7 +90,7 @@ def test_export_writes_one_file_and_says_who_is_in_it(a_class, tmp_path):
     assert told.withheld == {"s02": "needs review", "s03": "nothing handed in", "s04": "unreadable"}
     header, first, *_ = rows((tmp_path / "moodle.csv").read_text(encoding="utf-8"))
     assert header == ["idnumber", "Pump", "Pump (feedback)"]
-    assert first[2] == "<ul><li><b>Vector v_B</b> (nearly right) It is too long.</li></ul>"
+    assert first[2] == "<ul><li>~ <b>Vector v_B</b>: It is too long.</li></ul>"
 
 
 def test_the_csv_target_is_the_table_of_criteria(a_class, tmp_path):
