@@ -54,14 +54,19 @@ def measured(
 def drawn_nodes(
     task: Task, scales: Mapping[str, float] | None = None, mistakes: tuple[Mistake, ...] = ()
 ) -> dict[str, complex]:
-    """All nodes as a perfect hand draws them."""
+    """All nodes as a perfect hand draws and names them."""
     used = scales or rule_scales(task)
     parameters = {**task.parameters, **{name: np.asarray(used[name]) for name in ("kL", "kv", "ka")}}
     drawing = Drawing(task.construction, parameters)
     for mistake in mistakes:
         drawing = commit(mistake, drawing)
     found = evaluate(drawing.construction, drawing.parameters)
-    return {name: complex(np.ravel(place)[0]) for name, place in found.items()}
+    nodes = {name: complex(np.ravel(place)[0]) for name, place in found.items()}
+    for mistake in mistakes:
+        if mistake.code == "labels_swapped":
+            first, second = mistake.other
+            nodes[first], nodes[second] = nodes[second], nodes[first]
+    return nodes
 
 
 def changed(reading: Reading, name: str, **change: object) -> Reading:

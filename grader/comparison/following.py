@@ -98,8 +98,8 @@ def _from_vector(
     match task.construction.step(vector.head):
         case Given(length=Normal(tail=tail, head=head, length=link)):
             source = _named(task, tail, head)
-            own = evidence.vector(source) if source else None
-            if own is None or source is None:
+            own = evidence.vector(source)
+            if own is None:
                 return None
             speed = own.length_mm * scales["kv"]
             length = speed**2 / (float(task.parameters[link]) * scales["ka"])
@@ -111,8 +111,8 @@ def _from_vector(
             share = float(task.parameters[ratio])
             share = share if pole == p else 1.0 - share
             source = _named(task, pole, other)
-            own = evidence.vector(source) if source else None
-            if own is None or source is None:
+            own = evidence.vector(source)
+            if own is None:
                 return None
             along = own.direction_rad
             phase = cmath.phase(task.real[source]) if along is None else along
@@ -121,10 +121,9 @@ def _from_vector(
     return None
 
 
-def _named(task: Task, tail: str, head: str) -> str | None:
-    """The vector from one node to another."""
-    vectors = task.construction.vectors.values()
-    return next((v.name for v in vectors if (v.tail, v.head) == (tail, head)), None)
+def _named(task: Task, tail: str, head: str) -> str:
+    """The vector from one node to another: what a step is made from always is one."""
+    return next(v.name for v in task.construction.vectors.values() if (v.tail, v.head) == (tail, head))
 
 
 def from_rate(task: Task, evidence: Evidence, rate: AngularRate, per_mm: float) -> float | None:

@@ -23,7 +23,7 @@ from grader.outcomes import Mistake
 from grader.records import VELOCITY_PLAN
 from reference import mistakes as operators
 from reference.assignment import Assignment, Variant
-from reference.construction import ancestors, evaluate
+from reference.construction import Nodes, ancestors, evaluate
 from reference.derivation import parameters_of
 from reference.errors import PlanmarkError
 from reference.geometry import FloatArray
@@ -113,7 +113,7 @@ class _Stage:
             for one, cost in zip(self.case.observed, before, strict=True)
         ]
 
-    def meant(self, drawing: Drawing, whole: Mapping[str, FloatArray], one: Observed) -> complex:
+    def meant(self, drawing: Drawing, whole: Nodes, one: Observed) -> complex:
         """A vector drawn from the student's own earlier nodes where they are known."""
         vector = drawing.construction.vectors[one.vector]
         upstream = ancestors(drawing.construction, [vector.head, vector.tail]) - {vector.head}
@@ -167,7 +167,9 @@ def _best(stage: _Stage, candidates: "_Candidates") -> tuple[operators.Mistake, 
         for one, was, now in zip(stage.case.observed, before, costs, strict=True)
         if was > OFF and now <= min(was / 2.0, EXPLAINED) and one.criterion in stage.lost
     ]
-    is_gross = any(was >= GROSS for _, was in explained)
+    # What this mistake leaves tells how careless the hand is; of the whole, only the better part of it.
+    hand = max(1.0, sorted(costs)[len(costs) // (2 if stage.own else 4)])
+    is_gross = any(was >= GROSS * hand for _, was in explained)
     if not is_gross or len(explained) < LEAST_SHARE * _at_stake(stage, operator, before):
         return None
     rivals = [

@@ -1,0 +1,505 @@
+"""Verdicts: tolerance, sense, zero vectors, doubt, what is missing, follow-through."""
+
+import cmath
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grader.comparison import Submission, compare, task_of
+from grader.records import Figure, Reading, ReadNode, ReadVector, Unread
+from grader.rubric import CriterionTable, load_rubric
+from reference.assignment import load_assignment
+from reference.mistakes import Mistake
+from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
+
+PUMP = task_for("pump", 7)
+PRESS = task_for("press", position=1)
+DEAD = task_for("press", position=0)
+ROUNDING = 1e-9
+
+
+def verdicts(comparison):
+    return {one.criterion: one.verdict for one in comparison.outcomes}
+
+
+def outcome_of(comparison, criterion):
+    return next(one for one in comparison.outcomes if one.criterion == criterion)
+
+
+def codes(outcome):
+    return [reason.code for reason in outcome.reasons]
+
+
+def lost(comparison):
+    return [one.criterion for one in comparison.outcomes if one.verdict not in {"full", "not_judged"}]
+
+
+def with_rubric(task, **change):
+    return replace(task, rubric=task.rubric.model_copy(update=change))
+
+
+def with_criterion(task, name, **change):
+    criteria = [one.model_copy(update=change) if one.id == name else one for one in task.rubric.criterion]
+    return with_rubric(task, criterion=criteria)
+
+
+# The original data --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("off_mm", "verdict", "code"),
+    [
+        (0.9, "full", "right"),
+        (1.5, "partial", "too_long"),
+        (-1.5, "partial", "too_short"),
+        (3.0, "none", "too_long"),
+    ],
+)
+def test_a_length_off_costs_half_and_then_all(off_mm, verdict, code):
+    reading = measured(PUMP)
+    length = reading.figures["acceleration_plan"].vectors["a_BA_t"].length_mm
+    comparison = compare(PUMP, Submission(measured=changed(reading, "a_BA_t", length_mm=length + off_mm)))
+    outcome = outcome_of(comparison, "a_BA_t")
+    assert outcome.verdict == verdict
+    assert codes(outcome)[0] == code
+
+
+@pytest.mark.parametrize(
+    ("turn_deg", "verdict", "code"),
+    [
+        (1.4, "full", "right"),
+        (2.0, "partial", "turned_left"),
+        (-2.0, "partial", "turned_right"),
+        (90.0, "none", "turned_left"),
+        (179.0, "none", "reversed"),
+    ],
+)
+def test_a_direction_off_is_told_with_its_side(turn_deg, verdict, code):
+    reading = measured(PUMP)
+    degrees = reading.figures["velocity_plan"].vectors["v_D"].direction_deg
+    turned = changed(reading, "v_D", direction_deg=(degrees + turn_deg) % 360.0)
+    outcome = outcome_of(compare(PUMP, Submission(measured=turned)), "v_D")
+    assert outcome.verdict == verdict
+    assert codes(outcome)[0] == code
+
+
+def test_the_record_holds_what_was_measured_expected_and_allowed():
+    outcome = outcome_of(compare(PUMP, Submission(measured=measured(PUMP))), "v_A")
+    assert outcome.expected.length_mm == pytest.approx(60.0, rel=ROUNDING)
+    assert outcome.expected.direction_deg == pytest.approx(44.0 + 90.0, rel=ROUNDING)
+    assert outcome.expected.value == pytest.approx(PUMP.omega * 0.3, rel=ROUNDING)
+    assert outcome.measured.length_mm == pytest.approx(60.0, rel=ROUNDING)
+    assert outcome.measured.direction_deg == pytest.approx(134.0, rel=ROUNDING)
+    assert outcome.expected.unit == "m/s"
+    assert outcome.tolerance.length_mm == pytest.approx(1.2, rel=ROUNDING)
+    assert outcome.tolerance.direction_deg == pytest.approx(1.5, rel=ROUNDING)
+
+
+def test_lengths_alone_are_judged_on_their_length_alone():
+    comparison = compare(PUMP, Submission(measured=measured(PUMP, directions=False)))
+    assert lost(comparison) == []
+    assert outcome_of(comparison, "v_D").tolerance.direction_deg is None
+
+
+def test_a_rubric_may_leave_a_direction_out():
+    task = with_criterion(PUMP, "v_D", direction=False)
+    turned = changed(measured(task), "v_D", direction_deg=77.0)
+    assert outcome_of(compare(task, Submission(measured=turned)), "v_D").verdict == "full"
+
+
+def test_a_short_vector_has_no_direction_that_could_be_wrong():
+    lengths = {n: abs(task_for("pump", n).real["v_DC"]) for n in range(1, 31)}
+    task = task_for("pump", min(lengths, key=lengths.__getitem__))
+    reading = changed(measured(task), "v_DC", direction_deg=123.0)
+    drawn = reading.figures["velocity_plan"].vectors["v_DC"].length_mm
+    assert drawn < task.rubric.tolerance.least_mm
+    outcome = outcome_of(compare(task, Submission(measured=reading)), "v_DC")
+    assert outcome.verdict == "full"
+    assert "too_short_to_judge" in codes(outcome)
+
+
+def test_at_a_dead_point_nothing_drawn_is_right_and_something_drawn_is_not():
+    reading = measured(DEAD)
+    assert lost(compare(DEAD, Submission(measured=reading))) == []
+    outcome = outcome_of(compare(DEAD, Submission(measured=changed(reading, "v_B", length_mm=5.0))), "v_B")
+    assert outcome.verdict == "none"
+    assert codes(outcome)[0] == "should_be_zero"
+    assert outcome.expected.direction_deg is None
+
+
+def test_the_printed_table_of_the_press_is_right():
+    segments = {"v_A": 50.0, "v_B": 46.4, "v_BA": 47.17, "v_C": 92.8, "v_D": 89.36, "v_DC": 21.61,
+                "a_BA_n": 22.2, "a_B_n": 32.4, "a_DC_n": 15.7}  # fmt: skip
+    values = {"v_B": 1.67, "v_BA": 1.7, "v_C": 3.34, "v_D": 3.22, "v_DC": 0.78}
+    vectors = {name: ReadVector(length, 0.0, None, None, 1.0) for name, length in segments.items()}
+    declared = {"kL": "0.00667 m/mm", "kv": "0.036 (m/s)/mm", "ka": "0.108 (m/s2)/mm"}
+    submission = Submission(measured=Reading({"all": Figure({}, vectors)}), values=values, declared=declared)
+    comparison = compare(with_rubric(PRESS, missing="not_judged"), submission)
+    assert lost(comparison) == []
+    assert {one.criterion for one in comparison.outcomes if one.verdict == "full"} == {
+        "kL", "kv", "ka", *segments}  # fmt: skip
+
+
+# What standard errors leave open ------------------------------------------------------------------
+
+
+def test_an_error_that_straddles_the_limit_goes_to_a_person():
+    reading = measured(PUMP)
+    longer = changed(reading, "v_A", length_mm=61.1, se_mm=0.1)
+    outcome = outcome_of(compare(PUMP, Submission(measured=longer)), "v_A")
+    assert outcome.verdict == "review"
+    assert outcome.possible == ("partial", "full")
+    assert "near_limit" in codes(outcome)
+
+
+def test_an_error_that_cannot_change_the_verdict_does_not():
+    longer = changed(measured(PUMP), "v_A", length_mm=61.1, se_mm=0.04)
+    assert outcome_of(compare(PUMP, Submission(measured=longer)), "v_A").verdict == "full"
+
+
+def test_a_reading_without_confidence_goes_to_a_person():
+    doubtful = changed(measured(PUMP), "v_A", confidence=0.8)
+    outcome = outcome_of(compare(PUMP, Submission(measured=doubtful)), "v_A")
+    assert outcome.verdict == "review"
+    assert outcome.possible == ("none", "full")
+    assert codes(outcome)[0] == "doubtful"
+
+
+# What is not there --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("missing", ["review", "none", "not_judged"])
+def test_what_was_not_handed_in_is_as_the_rubric_says(missing):
+    task = with_rubric(PUMP, missing=missing)
+    outcome = outcome_of(compare(task, Submission(measured=without(measured(task), "v_D"))), "v_D")
+    assert outcome.verdict == missing
+    assert codes(outcome) == ["not_measured"]
+
+
+def test_what_is_optional_is_not_judged_where_it_is_not_there():
+    comparison = compare(PUMP, Submission(measured=without(measured(PUMP), "v_CA")))
+    assert outcome_of(comparison, "v_CA").verdict == "not_judged"
+    assert outcome_of(comparison, "omega_3").verdict == "not_judged"
+
+
+def test_a_scale_that_is_asked_for_and_not_declared_is_missing():
+    task = with_criterion(PUMP, "kv", optional=False)
+    assert outcome_of(compare(task, Submission(measured=measured(task))), "kv").verdict == "review"
+
+
+def test_a_vector_too_short_to_draw_is_not_asked_for():
+    outcome = outcome_of(compare(DEAD, Submission(measured=without(measured(DEAD), "v_D"))), "v_D")
+    assert outcome.verdict == "not_judged"
+
+
+@pytest.mark.parametrize("named", ["v_D", "d"])
+def test_what_was_not_read_goes_to_a_person_with_the_reason(named):
+    reading = replace(without(sheet(PUMP), "v_D"), unread=(Unread(named, "torn off"),))
+    outcome = outcome_of(compare(PUMP, Submission(readings=(reading,))), "v_D")
+    assert outcome.verdict == "review"
+    assert outcome.reasons[0].params["reason"] == "torn off"
+
+
+def test_a_plan_that_is_on_no_sheet_goes_to_a_person():
+    reading = sheet(PUMP, figures=("mechanism", "velocity_plan"))
+    outcome = outcome_of(compare(PUMP, Submission(readings=(reading,))), "a_D")
+    assert outcome.verdict == "review"
+    assert codes(outcome) == ["unread"]
+
+
+# Values -------------------------------------------------------------------------------------------
+
+
+def test_a_wrong_value_beside_a_right_drawing_is_arithmetic():
+    value = abs(PUMP.real["v_D"])
+    comparison = compare(PUMP, Submission(measured=measured(PUMP), values={"v_D": 1.3 * value}))
+    outcome = outcome_of(comparison, "v_D")
+    assert outcome.verdict == "none"
+    assert outcome.mistake == "arithmetic"
+    assert codes(outcome)[0] == "value_too_large"
+    assert outcome.measured.value == pytest.approx(1.3 * value)
+
+
+def test_a_value_right_by_the_own_wrong_drawing_costs_nothing_more():
+    longer = changed(measured(PUMP), "v_D", length_mm=70.0)
+    value = 70.0 * rule_scales(PUMP)["kv"]
+    comparison = compare(PUMP, Submission(measured=longer, values={"v_D": value}))
+    outcome = outcome_of(comparison, "v_D")
+    assert codes(outcome)[0] in {"too_long", "too_short"}
+    assert not [code for code in codes(outcome) if code.startswith("value")]
+    assert outcome.mistake is None
+
+
+@pytest.mark.parametrize(
+    ("factor", "verdict", "code"),
+    [
+        (1.0, "full", "right"),
+        (-1.0, "full", "right"),
+        (1.03, "partial", "value_too_large"),
+        (0.5, "none", "value_too_small"),
+    ],
+)
+def test_a_value_alone_is_judged(factor, verdict, code):
+    task = with_rubric(PUMP, missing="not_judged")
+    value = factor * abs(PUMP.real["v_A"])
+    outcome = outcome_of(compare(task, Submission(values={"v_A": value})), "v_A")
+    assert outcome.verdict == verdict
+    assert codes(outcome)[0] == code
+
+
+@pytest.mark.parametrize(
+    ("factor", "verdict", "code"),
+    [(1.0, "full", "right"), (-1.0, "none", "value_reversed"), (1.3, "none", "value_too_large")],
+)
+def test_an_angular_velocity_has_its_sign(factor, verdict, code):
+    values = {"omega_3": factor * PUMP.rates["omega_3"]}
+    outcome = outcome_of(compare(PUMP, Submission(measured=measured(PUMP), values=values)), "omega_3")
+    assert outcome.verdict == verdict
+    assert codes(outcome)[0] == code
+    assert outcome.expected.unit == "rad/s"
+
+
+# Following through --------------------------------------------------------------------------------
+
+
+WRONG_B = Mistake("wrong_link", "b", 1, other=("C", "D"))
+
+
+def test_what_follows_rightly_from_a_wrong_node_has_full_marks():
+    reading = measured(PUMP, mistakes=(WRONG_B,))
+    comparison = compare(PUMP, Submission(measured=reading))
+    found = verdicts(comparison)
+    assert {name for name, verdict in found.items() if verdict == "none"} == {"v_B", "v_BA"}
+    assert found["v_C"] == found["v_D"] == found["a_BA_n"] == "follow_through"
+    assert outcome_of(comparison, "v_C").reasons[0].code == "follows"
+
+
+def test_a_rubric_may_leave_following_through_out():
+    task = with_rubric(PUMP, follow_through=False)
+    comparison = compare(task, Submission(measured=measured(task, mistakes=(WRONG_B,))))
+    assert "follow_through" not in verdicts(comparison).values()
+
+
+def test_a_reversed_velocity_costs_once():
+    reading = measured(PUMP, mistakes=(Mistake("sense_reversed", "a"),))
+    assert [n for n, v in verdicts(compare(PUMP, Submission(measured=reading))).items() if v == "none"] == [
+        "v_A"
+    ]
+
+
+def test_another_assembly_costs_once_although_no_criterion_is_the_mechanism():
+    reading = sheet(PUMP, mistakes=(Mistake("other_assembly", "D"),))
+    comparison = compare(PUMP, Submission(readings=(reading,)))
+    none = [name for name, verdict in verdicts(comparison).items() if verdict == "none"]
+    assert none == ["v_D"]
+    assert outcome_of(comparison, "v_DC").verdict == "follow_through"
+    assert outcome_of(comparison, "v_DC").reasons[0].params["of"] in {"mechanism", "v_D"}
+
+
+def test_a_normal_component_follows_from_the_own_velocity_by_its_length_alone():
+    reading = measured(PUMP, directions=False, mistakes=(Mistake("wrong_link", "d", 0, other=("A", "B")),))
+    comparison = compare(PUMP, Submission(measured=reading))
+    assert outcome_of(comparison, "v_DC").verdict == "none"
+    outcome = outcome_of(comparison, "a_DC_n")
+    assert outcome.verdict == "follow_through"
+    assert outcome.reasons[0].params == {"what": "vector", "of": "v_DC"}
+
+
+@pytest.mark.parametrize("directions", [True, False])
+def test_an_image_on_a_line_follows_from_its_base(directions):
+    reading = changed(measured(PRESS, directions=directions), "v_B", length_mm=40.0)
+    reading = changed(reading, "v_C", length_mm=80.0)
+    outcome = outcome_of(compare(PRESS, Submission(measured=reading)), "v_C")
+    assert outcome.verdict == "follow_through"
+
+
+@pytest.mark.parametrize(("task", "source", "name"), [(PUMP, "v_DC", "a_DC_n"), (PRESS, "v_B", "v_C")])
+def test_nothing_follows_from_what_is_not_there(task, source, name):
+    reading = changed(without(measured(task, directions=False), source), name, length_mm=99.0)
+    assert outcome_of(compare(task, Submission(measured=reading)), name).verdict == "none"
+
+
+def test_nothing_follows_from_own_nodes_that_determine_nothing():
+    nodes = drawn_nodes(PUMP)
+    folded = sheet(PUMP, moved={"D": nodes["C"] - nodes["D"], "d": 20j})
+    assert outcome_of(compare(PUMP, Submission(readings=(folded,))), "v_D").verdict == "none"
+
+
+def test_a_trivial_earlier_answer_gives_no_credit():
+    reading = measured(PUMP, directions=False)
+    reading = changed(reading, "v_BA", length_mm=2.0)
+    reading = changed(reading, "a_BA_n", length_mm=0.1)
+    comparison = compare(PUMP, Submission(measured=reading))
+    assert outcome_of(comparison, "a_BA_n").verdict == "none"
+
+
+def test_what_hangs_on_a_doubtful_node_is_doubtful_too():
+    reading = measured(PUMP, mistakes=(WRONG_B,))
+    reading = changed(changed(reading, "v_B", confidence=0.5), "v_BA", confidence=0.5)
+    outcome = outcome_of(compare(PUMP, Submission(measured=reading)), "v_C")
+    assert outcome.verdict == "review"
+    assert outcome.possible[0] == "none"
+
+
+def test_an_angular_velocity_follows_from_the_own_vector():
+    reading = measured(PUMP, mistakes=(WRONG_B,))
+    own = reading.figures["velocity_plan"].vectors["v_BA"].length_mm
+    per_mm = rule_scales(PUMP)["kv"] / 0.4
+    for sign, verdict in ((1.0, "follow_through"), (-1.0, "none")):
+        # The wrong line reverses v_BA here or not: its own sense counts.
+        right = PUMP.rates["omega_3"]
+        values = {"omega_3": sign * own * per_mm * own_sense(reading) * (1 if right > 0 else -1)}
+        outcome = outcome_of(compare(PUMP, Submission(measured=reading, values=values)), "omega_3")
+        assert outcome.verdict == verdict
+
+
+def own_sense(reading):
+    drawn = math.radians(reading.figures["velocity_plan"].vectors["v_BA"].direction_deg)
+    return math.copysign(1.0, math.cos(drawn - cmath.phase(PUMP.real["v_BA"])))
+
+
+@pytest.mark.parametrize("length", [None, 1.0])
+def test_an_angular_velocity_follows_from_no_vector_and_from_none_that_is_trivial(length):
+    reading = (
+        without(measured(PUMP), "v_BA") if length is None else changed(measured(PUMP), "v_BA", length_mm=1.0)
+    )
+    values = {"omega_3": 0.5 * PUMP.rates["omega_3"]}
+    comparison = compare(PUMP, Submission(measured=reading, values=values))
+    assert outcome_of(comparison, "omega_3").verdict == "none"
+
+
+def test_an_angular_velocity_follows_from_a_length_alone():
+    reading = measured(PUMP, directions=False, mistakes=(WRONG_B,))
+    own = reading.figures["velocity_plan"].vectors["v_BA"].length_mm
+    value = own * rule_scales(PUMP)["kv"] / 0.4 * (1 if PUMP.rates["omega_3"] > 0 else -1)
+    comparison = compare(PUMP, Submission(measured=reading, values={"omega_3": value}))
+    assert outcome_of(comparison, "omega_3").verdict == "follow_through"
+
+
+# Sheets -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 12.0, 90.0, -35.0])
+def test_a_sketch_turned_on_its_sheet_is_legitimate(turn_deg):
+    comparison = compare(PUMP, Submission(readings=(sheet(PUMP, turn_deg=turn_deg),)))
+    assert lost(comparison) == []
+    outcome = outcome_of(comparison, "v_A")
+    assert outcome.expected.direction_deg == pytest.approx((134.0 + turn_deg) % 360.0)
+    assert outcome.measured.direction_deg == pytest.approx((134.0 + turn_deg) % 360.0)
+
+
+def test_a_plan_turned_against_its_mechanism_is_not():
+    upright, turned = sheet(PUMP), sheet(PUMP, turn_deg=10.0)
+    reading = Reading({**turned.figures, "mechanism": upright.figures["mechanism"]})
+    assert outcome_of(compare(PUMP, Submission(readings=(reading,))), "v_A").verdict == "none"
+
+
+def test_without_a_mechanism_the_sheets_own_axis_counts():
+    reading = sheet(PUMP, turn_deg=10.0, figures=("velocity_plan", "acceleration_plan"))
+    assert outcome_of(compare(PUMP, Submission(readings=(reading,))), "v_A").verdict == "none"
+
+
+def test_two_sheets_each_have_their_own_turn():
+    first = sheet(PUMP, turn_deg=5.0, figures=("mechanism", "velocity_plan"))
+    second = sheet(PUMP, turn_deg=-8.0, figures=("mechanism", "acceleration_plan"))
+    assert lost(compare(PUMP, Submission(readings=(first, second)))) == []
+
+
+def test_of_a_plan_on_two_sheets_the_surer_reading_counts():
+    wrong = changed(sheet(PUMP, confidence=0.95), "v_D", length_mm=99.0)
+    for order in ((wrong, sheet(PUMP)), (sheet(PUMP), wrong)):
+        assert outcome_of(compare(PUMP, Submission(readings=order)), "v_D").verdict == "full"
+
+
+def test_scan_and_measurement_that_agree_are_one():
+    comparison = compare(PUMP, Submission(readings=(sheet(PUMP),), measured=measured(PUMP)))
+    assert lost(comparison) == []
+    assert codes(outcome_of(comparison, "v_D")) == ["right"]
+
+
+def test_scan_and_measurement_that_differ_within_a_verdict_are_told():
+    entered = changed(
+        measured(PUMP),
+        "a_DC_n",
+        length_mm=measured(PUMP).figures["acceleration_plan"].vectors["a_DC_n"].length_mm - 0.9,
+    )
+    drawn = sheet(PUMP, se_mm=0.001)
+    drawn = changed(
+        drawn, "a_DC_n", length_mm=drawn.figures["acceleration_plan"].vectors["a_DC_n"].length_mm + 0.9
+    )
+    outcome = outcome_of(compare(PUMP, Submission(readings=(drawn,), measured=entered)), "a_DC_n")
+    assert outcome.verdict == "full"
+    assert "readings_disagree" in codes(outcome)
+
+
+def test_scan_and_measurement_of_different_verdicts_go_to_a_person():
+    entered = changed(measured(PUMP), "v_D", length_mm=99.0)
+    outcome = outcome_of(compare(PUMP, Submission(readings=(sheet(PUMP),), measured=entered)), "v_D")
+    assert outcome.verdict == "review"
+    assert outcome.possible == ("none", "full")
+    assert codes(outcome)[0] == "readings_disagree"
+
+
+# Rubrics ------------------------------------------------------------------------------------------
+
+
+def test_a_velocity_only_rubric_solves_no_accelerations():
+    assignment = load_assignment("pump")
+    task = task_of(assignment, load_rubric("pump-velocity"), assignment.variant(7))
+    assert "acceleration_plan" not in task.construction.figures
+    reading = measured(task)
+    assert lost(compare(task, Submission(measured=reading))) == []
+
+
+def test_a_criterion_may_have_its_own_tolerance():
+    wide = PUMP.rubric.tolerance.model_copy(update={"length_mm": 5.0})
+    task = with_criterion(PUMP, "a_BA_t", tolerance=wide)
+    reading = measured(task)
+    length = reading.figures["acceleration_plan"].vectors["a_BA_t"].length_mm
+    comparison = compare(task, Submission(measured=changed(reading, "a_BA_t", length_mm=length + 4.0)))
+    assert outcome_of(comparison, "a_BA_t").verdict == "full"
+    assert isinstance(task.rubric.criterion[0], CriterionTable)
+
+
+# Readings that lack something ---------------------------------------------------------------------
+
+
+def test_a_direction_without_a_length_is_no_measurement():
+    reading = changed(measured(PUMP), "v_D", length_mm=None)
+    assert outcome_of(compare(PUMP, Submission(measured=reading)), "v_D").verdict == "review"
+    drawn = changed(sheet(PUMP), "v_D", length_mm=None)
+    assert outcome_of(compare(PUMP, Submission(readings=(drawn,))), "v_D").verdict == "review"
+
+
+def test_vectors_without_nodes_or_a_pole_are_judged_all_the_same():
+    reading = sheet(PUMP)
+    bare = Reading({plan: Figure({}, figure.vectors) for plan, figure in reading.figures.items()})
+    assert lost(compare(PUMP, Submission(readings=(bare,)))) == []
+
+
+def sketch_of(**nodes):
+    return Figure({name: ReadNode(at, np.eye(2) * 1e-4, 0.99) for name, at in nodes.items()}, {})
+
+
+@pytest.mark.parametrize(
+    "sketch",
+    [
+        sketch_of(O1=100 - 90j),
+        sketch_of(O1=100 - 90j, A=100 - 90j),
+        sketch_of(O1=100 - 90j, B=103 - 90j),
+        sketch_of(B=100 - 90j, C=150 - 90j),
+    ],
+)
+def test_a_mechanism_read_in_part_tells_no_turn_and_breaks_nothing(sketch):
+    plans = sheet(PUMP, figures=("velocity_plan", "acceleration_plan"))
+    reading = Reading({**plans.figures, "mechanism": sketch})
+    comparison = compare(PUMP, Submission(readings=(reading,)))
+    assert comparison.scales["kL"].used == pytest.approx(0.005)
+
+
+def test_pivots_alone_tell_the_turn_where_the_mechanism_is_a_wrong_one():
+    reading = sheet(PUMP, turn_deg=20.0, mistakes=(Mistake("other_assembly", "B"),))
+    comparison = compare(PUMP, Submission(readings=(reading,)))
+    assert outcome_of(comparison, "v_A").verdict == "full"

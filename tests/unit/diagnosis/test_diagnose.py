@@ -1,0 +1,128 @@
+"""The mistake that explains what is off, and none for a hand that is only careless."""
+
+import random
+
+import pytest
+
+from grader.comparison import Submission, task_of
+from grader.judging import judge
+from grader.rubric import rubric_of
+from reference.assignment import library, load_assignment
+from reference.mistakes import Mistake
+from tests.hands import changed, measured, rule_scales, sheet, task_for
+
+PUMP = task_for("pump", 7)
+PRESS = task_for("press", position=1)
+
+
+def codes(judgement):
+    return [one.code for one in judgement.mistakes]
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [
+        Mistake("parallel_for_perpendicular", "b", 0),
+        Mistake("wrong_link", "b", 1, other=("C", "D")),
+        Mistake("sense_reversed", "a"),
+        Mistake("normal_reversed", "n_B"),
+        Mistake("normal_missing", "n_DC"),
+        Mistake("normal_from_absolute", "n_BA"),
+        Mistake("wrong_intersection", "b'", 1, other=("o'",)),
+        Mistake("image_mirrored", "c'"),
+        Mistake("labels_swapped", "b", other=("b", "d")),
+        Mistake("figure_rotated", "velocity_plan", quarters=1),
+        Mistake("other_assembly", "B"),
+    ],
+    ids=lambda mistake: f"{mistake.code} at {mistake.at}",
+)
+@pytest.mark.parametrize("seen", ["sheet", "measured"])
+def test_a_single_mistake_is_found_where_it_was_made(mistake, seen):
+    if seen == "sheet":
+        submission = Submission(readings=(sheet(PUMP, mistakes=(mistake,)),))
+    else:
+        submission = Submission(measured=measured(PUMP, mistakes=(mistake,)))
+    judgement = judge(PUMP, submission)
+    assert [(one.code, one.at) for one in judgement.mistakes] == [(mistake.code, mistake.at)]
+    found = judgement.mistakes[0]
+    lost = {one.criterion for one in judgement.outcomes if one.verdict in {"none", "partial"}}
+    assert set(found.explains) & lost
+    assert found.confidence > 0.6
+    blamed = {one.criterion: one.mistake for one in judgement.outcomes}
+    assert {blamed[name] for name in set(found.explains) & lost} == {mistake.code}
+
+
+def test_two_mistakes_are_told_apart_from_the_own_nodes():
+    made = (Mistake("normal_missing", "n_DC"), Mistake("parallel_for_perpendicular", "b", 0))
+    judgement = judge(PUMP, Submission(readings=(sheet(PUMP, mistakes=made),)))
+    assert set(codes(judgement)) == {"normal_missing", "parallel_for_perpendicular"}
+
+
+@pytest.mark.parametrize(
+    ("powers", "code"),
+    [((1, 2), "rpm_not_converted"), ((0, 1), "scale_wrong"), ((1, 0), "rpm_not_converted")],
+)
+def test_a_wrong_declared_scale_is_told_as_what_it_is(powers, code):
+    scales = rule_scales(PUMP)
+    factor = 9.5493 if code == "rpm_not_converted" else 0.1
+    declared = {
+        "kv": f"{scales['kv'] * factor ** powers[0]!r} (m/s)/mm",
+        "ka": f"{scales['ka'] * factor ** powers[1]!r} (m/s2)/mm",
+    }
+    judgement = judge(PUMP, Submission(measured=measured(PUMP), declared=declared))
+    assert set(codes(judgement)) == {code}
+    wrong = {name for name, power in zip(("kv", "ka"), powers, strict=True) if power}
+    assert {one.at for one in judgement.mistakes} == wrong
+    assert all(one.at in one.explains for one in judgement.mistakes)
+
+
+def test_another_students_data_are_recognised():
+    other = task_for("pump", 20)
+    reading = measured(other)
+    declared = {name: f"{scale!r} {unit}" for (name, scale), unit in zip(
+        rule_scales(other).items(), ("m/mm", "(m/s)/mm", "(m/s2)/mm"), strict=True)}  # fmt: skip
+    judgement = judge(PUMP, Submission(measured=reading, declared=declared))
+    assert codes(judgement)[0] == "other_variant"
+    assert judgement.mistakes[0].detail["n"] == 20
+
+
+def test_a_right_drawing_is_accused_of_nothing():
+    for task in (PUMP, PRESS):
+        assert judge(task, Submission(measured=measured(task))).mistakes == ()
+
+
+@pytest.mark.parametrize("name", ["pump", "press"])
+def test_a_careless_hand_is_accused_of_nothing(name):
+    assignment = load_assignment(name)
+    rubric = rubric_of(assignment)
+    lot = random.Random(name)  # noqa: S311 - a sample, no secret
+    for _ in range(6):
+        task = task_of(assignment, rubric, lot.choice(assignment.variants()))
+        moved = {step.node: complex(lot.gauss(0, 0.7), lot.gauss(0, 0.7)) for step in task.construction.steps}
+        reading = sheet(task, moved=moved)
+        assert judge(task, Submission(readings=(reading,))).mistakes == ()
+
+
+def test_what_no_mistake_explains_is_left_unexplained():
+    reading = changed(measured(PUMP, directions=False), "v_D", length_mm=75.0)
+    judgement = judge(PUMP, Submission(measured=reading))
+    assert "v_D" not in {name for one in judgement.mistakes for name in one.explains}
+
+
+def test_a_drawing_at_a_scale_that_nobody_declared_is_not_called_a_mistake():
+    other = {**rule_scales(PUMP), "kv": 2.0 * rule_scales(PUMP)["kv"]}
+    assert judge(PUMP, Submission(measured=measured(PUMP, other))).mistakes == ()
+
+
+def test_variants_that_do_not_assemble_are_passed_over(tmp_path):
+    text = (library() / "press.assignment.toml").read_text(encoding="utf-8")
+    mechanism = (library() / "press.mechanism.toml").read_text(encoding="utf-8")
+    # At position 7 no rod is long enough.
+    mechanism = mechanism.replace("length = 0.35", 'length = "0.35 - 0.34*floor(position/7)"')
+    (tmp_path / "press.mechanism.toml").write_text(mechanism, encoding="utf-8")
+    path = tmp_path / "short.assignment.toml"
+    path.write_text(text, encoding="utf-8")
+    assignment = load_assignment(str(path))
+    task = task_of(assignment, rubric_of(assignment), assignment.variant(None, 1))
+    reading = measured(task, mistakes=(Mistake("normal_reversed", "n_B"),))
+    assert codes(judge(task, Submission(measured=reading))) == ["normal_reversed"]
