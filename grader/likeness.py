@@ -12,8 +12,9 @@ import numpy as np
 
 from grader.records import FloatArray
 from reference.assignment import Assignment, Variant
-from reference.construction import ArcAndLine, Construction, Divide, Given, Scaled, TwoArcs, evaluate
+from reference.construction import Construction, evaluate
 from reference.derivation import construction_of, parameters_of
+from reference.steps import ArcAndLine, Divide, Given, Scaled, TwoArcs
 
 _ANCHOR_OFF_RAD = np.radians(2.5)
 _SCALES = (0.4, 1.6)

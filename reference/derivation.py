@@ -9,11 +9,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from reference.construction import (
+from reference.construction import AngularRate, Construction, Vector
+from reference.geometry import FloatArray
+from reference.mechanism import Crank, Dyad, Group, Mechanism, Plate, PointOnLine, Slider
+from reference.steps import (
     Along,
-    AngularRate,
     ArcAndLine,
-    Construction,
     Divide,
     Fixed,
     Given,
@@ -26,10 +27,7 @@ from reference.construction import (
     Step,
     TwoArcs,
     TwoLines,
-    Vector,
 )
-from reference.geometry import FloatArray
-from reference.mechanism import Crank, Dyad, Group, Mechanism, Plate, PointOnLine, Slider
 
 VELOCITY_POLE, ACCELERATION_POLE = "o", "o'"
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from reference.assignment import Assignment
 from reference.canvas import CONSTRUCTION, INK, Area, Label, Point, Ring, Shape, Stroke
-from reference.construction import TwoLines, View
 from reference.geometry import direction
 from reference.mechanism import Crank, Dyad, Plate, PointOnLine, Slider
 from reference.plan import ZERO_SHARE, Plan
+from reference.steps import TwoLines, View
 
 FRAME = (20.0, 10.0, 410.0, 287.0)
 GAP_MM = 16.0

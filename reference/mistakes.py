@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from reference.construction import (
+from reference.construction import Construction, Vector, ancestors
+from reference.steps import (
     Along,
     ArcAndLine,
-    Construction,
     Direction,
     Fixed,
     Given,
@@ -24,8 +24,6 @@ from reference.construction import (
     Step,
     TwoArcs,
     TwoLines,
-    Vector,
-    ancestors,
 )
 
 CODES = (

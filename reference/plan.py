@@ -10,12 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from reference.assignment import Assignment, Scales, Variant
-from reference.construction import Construction, TwoLines, View, evaluate
+from reference.construction import Construction, evaluate
 from reference.derivation import construction_of, image_name, parameters_of
 from reference.geometry import ComplexArray, FloatArray, cross, dot
 from reference.mechanism import Mechanism
 from reference.mistakes import Drawing
 from reference.motion import Motion, move
+from reference.steps import TwoLines, View
 
 ZERO_SHARE = 1e-9
 """A vector shorter than this share of its plan's size is a zero vector and has no direction."""

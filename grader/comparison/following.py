@@ -14,7 +14,8 @@ import numpy as np
 
 from grader.comparison.evidence import Evidence
 from grader.comparison.task import SCALE_NAMES, Task
-from reference.construction import AngularRate, Divide, Given, Normal, Vector, ancestors, evaluate
+from reference.construction import AngularRate, Vector, ancestors, evaluate
+from reference.steps import Divide, Given, Normal
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,9 @@ import numpy as np
 
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference.assignment import Assignment, Variant
-from reference.construction import Construction, Nodes, Parameters, evaluate
+from reference.construction import Construction, evaluate
 from reference.plan import exact_plan
+from reference.steps import Nodes, Parameters
 
 SCALE_NAMES = ("kL", "kv", "ka")
 UNITS: Mapping[str, str] = {

@@ -23,11 +23,12 @@ from grader.outcomes import Mistake
 from grader.records import VELOCITY_PLAN
 from reference import mistakes as operators
 from reference.assignment import Assignment, Variant
-from reference.construction import Nodes, ancestors, evaluate
+from reference.construction import ancestors, evaluate
 from reference.derivation import parameters_of
 from reference.errors import PlanmarkError
 from reference.geometry import FloatArray
 from reference.mistakes import Drawing
+from reference.steps import Nodes
 
 LEAST_CONFIDENCE = 0.6
 """An explanation less certain than this is not told."""

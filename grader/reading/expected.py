@@ -11,20 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from grader.records import FloatArray
-from reference.construction import (
-    ArcAndLine,
-    Construction,
-    Divide,
-    Given,
-    Normal,
-    Similar,
-    Step,
-    TwoArcs,
-    TwoLines,
-    evaluate,
-)
+from reference.construction import Construction, evaluate
 from reference.geometry import ComplexArray
 from reference.mistakes import Drawing
+from reference.steps import ArcAndLine, Divide, Given, Normal, Similar, Step, TwoArcs, TwoLines
 
 STEP_OF_DERIVATIVE = 1e-5
 
@@ -74,12 +64,14 @@ class Expected:
         moved = at + spin * self.at
         rotate = np.kron(np.eye(len(self.at)), np.array([[spin.real, -spin.imag], [spin.imag, spin.real]]))
         arm = moved - at
-        free = np.column_stack([
-            _pairs(np.full(len(moved), slack.shift_mm + 0j)),
-            _pairs(np.full(len(moved), slack.shift_mm * 1j)),
-            _pairs(1j * slack.turn_rad * arm),
-            _pairs(slack.relative * arm),
-        ])
+        free = np.column_stack(
+            [
+                _pairs(np.full(len(moved), slack.shift_mm + 0j)),
+                _pairs(np.full(len(moved), slack.shift_mm * 1j)),
+                _pairs(1j * slack.turn_rad * arm),
+                _pairs(slack.relative * arm),
+            ]
+        )
         return Expected(self.names, moved, rotate @ self.cov @ rotate.T + free @ free.T, self.edges)
 
 

@@ -10,9 +10,10 @@ from grader.reading.fitting import Fit, fit_nodes
 from grader.reading.lines import Lines
 from grader.reading.matching import BEAM, Ends, Explanation, explain
 from grader.reading.placing import Place, Search, places
-from reference.construction import Construction, Given, Normal, ancestors
+from reference.construction import Construction, ancestors
 from reference.geometry import ComplexArray
 from reference.mistakes import Drawing, Mistake, affected, commit, single_mistakes
+from reference.steps import Given, Normal
 
 HAND = Hand()
 PLAN_ENDS = Ends()
@@ -25,13 +26,15 @@ POOR = 0.7
 """A plan supported over less of its length may be another one, drawn with a mistake."""
 BEAM_OF_MISTAKES = 4
 SMALLEST_MM, LARGEST_MM = 20.0, 280.0
+LEAST_FIRST_MM = 15.0
 """Of a plan's longest vector: what fits on a sheet and can be measured."""
 LEAST_LAID_MM = 4.0
 SPECK_MM = 1e-6
 WORSE = 0.3
 """Places supported by this much less of the plan's length are not looked at."""
-LEFT_OUT = "not drawn: normal component left out"
+LEFT_OUT = "not drawn: the normal component is left out"
 LEAST_SEEN_MM = 2.5
+LONG_MM = 8.0
 RIVALS = 25
 BEAM_OF_DOUBTS = 3
 LEAST_DOUBT = 15.0
@@ -105,22 +108,20 @@ def regular(drawing: Drawing, figure: str) -> list[Hypothesis]:
     return told
 
 
-def mistaken(drawing: Drawing, figure: str) -> Iterator[tuple[Hypothesis, Mistake]]:
-    """Every single mistake in either form; the search for its place turns and scales it anyway."""
-    for base in regular(drawing, figure):
-        for mistake in single_mistakes(base.drawing, figure):
-            if mistake.code in OF_THE_WHOLE:
-                continue
-            gone = dict(base.absent)
-            if mistake.code == "normal_missing":
-                gone[mistake.at] = LEFT_OUT
-            if mistake.at in base.absent:
-                continue
-            try:
-                changed = commit(mistake, base.drawing)
-            except ValueError:
-                continue
-            yield Hypothesis(_told(mistake), changed, gone, base.cost + COST_OF_MISTAKE), mistake
+def mistaken(base: Hypothesis, figure: str) -> Iterator[tuple[Hypothesis, Mistake]]:
+    """Every single mistake on top of a hypothesis; the search for its place turns and scales it anyway."""
+    for mistake in single_mistakes(base.drawing, figure):
+        if mistake.code in OF_THE_WHOLE or mistake.at in base.absent:
+            continue
+        gone = dict(base.absent)
+        if mistake.code == "normal_missing":
+            gone[mistake.at] = LEFT_OUT
+        try:
+            changed = commit(mistake, base.drawing)
+        except ValueError:
+            continue
+        told = _told(mistake) if base.cost < COST_OF_MISTAKE else f"{base.label}, {_told(mistake)}"
+        yield Hypothesis(told, changed, gone, base.cost + COST_OF_MISTAKE), mistake
 
 
 def _told(mistake: Mistake) -> str:
@@ -161,17 +162,27 @@ def regular_plans(
     return sorted(plans, key=lambda plan: -plan.score)
 
 
-def best_plan(
-    plans: list[Plan], lines: Lines, drawing: Drawing, figure: str, given: Mapping[str, ComplexArray]
-) -> Plan | None:
-    """The best of the regular plans and of the same with a mistake made; the others are its rivals."""
+def best_plan(plans: list[Plan], lines: Lines, figure: str, given: Mapping[str, ComplexArray]) -> Plan | None:
+    """The best of the regular plans and of the same with mistakes made; the others are its rivals."""
     if not plans:
         return None
-    everything = [*plans, *_with_mistakes(plans, drawing, figure, lines, given)]
+    bases = list({plan.hypothesis.label: plan.hypothesis for plan in plans}.values())
+    everything = [*plans, *_with_mistakes(plans[0], bases, figure, lines, given)]
+    best = max(everything, key=lambda plan: plan.score)
+    if best.hypothesis.cost >= COST_OF_MISTAKE and _leaves_long_ones(best):
+        everything.extend(_with_mistakes(best, [best.hypothesis], figure, lines, given))
     everything.sort(key=lambda plan: -plan.score)
     best = everything[0]
-    doubts = _without_each_stroke(best)
-    return replace(best, rivals=(*everything[1:RIVALS], *doubts))
+    return replace(best, rivals=(*everything[1:RIVALS], *_without_each_stroke(best)))
+
+
+def _leaves_long_ones(plan: Plan) -> bool:
+    """Whether a vector too long to be overlooked has no stroke."""
+    at = plan.found.expected.at
+    return any(
+        row < 0 and abs(at[edge.head] - at[edge.tail]) > LONG_MM
+        for edge, row in zip(plan.found.expected.edges, plan.found.stroke, strict=True)
+    )
 
 
 def _without_each_stroke(plan: Plan) -> list[Plan]:
@@ -197,14 +208,12 @@ def _without_each_stroke(plan: Plan) -> list[Plan]:
 
 
 def _with_mistakes(
-    bases: list[Plan], drawing: Drawing, figure: str, lines: Lines, given: Mapping[str, ComplexArray]
+    best: Plan, bases: list[Hypothesis], figure: str, lines: Lines, given: Mapping[str, ComplexArray]
 ) -> Iterator[Plan]:
-    """The same plan with a mistake made, where its regular form was found; elsewhere if that is poor."""
-    best = bases[0]
-    fit = best.fit
-    poor = best.place.score < POOR
-    suspect = None if poor else _suspects(best, fit)
-    for hypothesis, mistake in mistaken(drawing, figure):
+    """The same plan with a mistake made, where it was found; elsewhere too if that is poor."""
+    poor = best.place.score < POOR and best.hypothesis.cost < COST_OF_MISTAKE
+    suspect = None if poor else _suspects(best, best.fit)
+    for hypothesis, mistake in (one for base in bases for one in mistaken(base, figure)):
         if suspect is not None and mistake.at not in suspect:
             continue
         expected = _expected(hypothesis, figure, given)
@@ -213,9 +222,8 @@ def _with_mistakes(
         if poor:
             for place in sorted(_laid(expected, lines, count=1), key=lambda place: -place.score)[:2]:
                 yield from _read(hypothesis, expected, place, lines, BEAM_OF_MISTAKES)
-        else:
-            moved = affected(mistake, hypothesis.drawing.construction)
-            yield from _read(hypothesis, expected, best.refined, lines, BEAM_OF_MISTAKES, (best, moved))
+        moved = affected(mistake, hypothesis.drawing.construction)
+        yield from _read(hypothesis, expected, best.refined, lines, BEAM_OF_MISTAKES, (best, moved))
 
 
 def _suspects(plan: Plan, fit: Fit) -> frozenset[str]:
@@ -232,9 +240,7 @@ def _suspects(plan: Plan, fit: Fit) -> frozenset[str]:
     return ancestors(plan.hypothesis.drawing.construction, odd)
 
 
-def _expected(
-    hypothesis: Hypothesis, figure: str, given: Mapping[str, ComplexArray]
-) -> Expected | None:
+def _expected(hypothesis: Hypothesis, figure: str, given: Mapping[str, ComplexArray]) -> Expected | None:
     edges = vectors_of(_tied(hypothesis), figure, hypothesis.absent)
     expected = expect(hypothesis.drawing, figure, given, HAND, edges)
     return expected if np.isfinite(expected.at).all() else None
@@ -263,7 +269,9 @@ def _laid(expected: Expected, lines: Lines, count: int = 2) -> list[Place]:
     if largest < SPECK_MM:
         return []
     long = lines.take(lines.length > LEAST_LAID_MM)
-    bounds = {"smallest": SMALLEST_MM / largest, "largest": LARGEST_MM / largest}
+    first = _first_length(expected)
+    smallest = max(SMALLEST_MM / largest, LEAST_FIRST_MM / first)
+    bounds = {"smallest": smallest, "largest": max(smallest, LARGEST_MM / largest)}
     ways = (
         Search(sizes=(1.0,)),
         Search(sizes=(0.0,), **bounds),
@@ -272,6 +280,12 @@ def _laid(expected: Expected, lines: Lines, count: int = 2) -> list[Place]:
     found = [place for way in ways for place in places(expected, long, way, count=count)]
     best = max((place.score for place in found), default=0.0)
     return [place for place in found if place.score > best - WORSE]
+
+
+def _first_length(expected: Expected) -> float:
+    """The length of the plan's first vector, which the student chose so that it can be measured."""
+    edge = min((one for one in expected.edges if one.tail == 0), key=lambda one: one.head)
+    return max(float(abs(expected.at[edge.head] - expected.at[edge.tail])), SPECK_MM)
 
 
 def _read(
@@ -322,7 +336,10 @@ def _near(lines: Lines, placed: Expected) -> np.ndarray:
     high = complex(placed.at.real.max() + margin, placed.at.imag.max() + margin)
     middle = lines.middle
     return np.asarray(
-        (middle.real > low.real) & (middle.imag > low.imag) & (middle.real < high.real) & (middle.imag < high.imag)
+        (middle.real > low.real)
+        & (middle.imag > low.imag)
+        & (middle.real < high.real)
+        & (middle.imag < high.imag)
     )
 
 

@@ -13,9 +13,9 @@ from grader.reading.matching import Ends, Explanation, explain
 from grader.reading.placing import Place, Search, places
 from grader.records import FloatArray
 from reference.assignment import Assignment, Scales, Variant
-from reference.construction import ArcAndLine
 from reference.derivation import construction_of, parameters_of
 from reference.mistakes import Drawing, commit, single_mistakes
+from reference.steps import ArcAndLine
 
 SURE = 0.8
 """A sketch supported so well over its length ends the search among other students' variants."""
@@ -87,7 +87,11 @@ def find_sketch(
     best.sort(key=lambda one: -one[0])
     read = [_read(drawing, place, lines, circles) for _, drawing, place in best[:5]]
     regular = {id(drawing.construction) for drawing in own}
-    return max(read, key=lambda one: one.score - COST_OF_OTHER * (id(one.drawing.construction) not in regular), default=None)
+    return max(
+        read,
+        key=lambda one: one.score - COST_OF_OTHER * (id(one.drawing.construction) not in regular),
+        default=None,
+    )
 
 
 def _top(best: list[tuple[float, Drawing, Place]]) -> float:
@@ -117,7 +121,10 @@ def _read(drawing: Drawing, place: Place, lines: Lines, circles: FloatArray) -> 
     slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03)
     expected = _expected(drawing).placed(place.at, place.size, place.turn_rad, slack)
     reach = 30.0
-    near = (np.abs(lines.middle - expected.at.mean()) < np.ptp(expected.at.real) + np.ptp(expected.at.imag) + reach)
+    near = (
+        np.abs(lines.middle - expected.at.mean())
+        < np.ptp(expected.at.real) + np.ptp(expected.at.imag) + reach
+    )
     around = lines.take(near & (lines.length > 4.0))  # noqa: PLR2004 - mm
     found = explain(expected, around, LINK_ENDS)[0]
     fit = fit_nodes(found, around, LINKS_END)

@@ -9,8 +9,9 @@ from grader.simulation.hand import MECHANISM, DrawnFigure, Nodes, Task
 from grader.simulation.settings import Student
 from grader.simulation.sketch import DASHES, Sketch
 from grader.simulation.strokes import arc
-from reference.construction import Divide, Given, Similar, TwoArcs, TwoLines, Vector, evaluate
+from reference.construction import Vector, evaluate
 from reference.mechanism import Dyad, Plate, PointOnLine, Slider
+from reference.steps import Divide, Given, Similar, TwoArcs, TwoLines
 
 TOO_SHORT_MM = 0.8
 
@@ -223,8 +224,11 @@ def _construction_lines(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -
             along = reach / abs(reach)
             past = sketch.rng.exponential(sketch.style.overrun_mm + 0.5, 2)
             before = past[0] if sketch.chance(0.4) else 0.0
-            sketch.line(sketch.pen("thin", plan=True), nodes[line.through] - before * along,
-                        nodes[step.node] + past[1] * along)
+            sketch.line(
+                sketch.pen("thin", plan=True),
+                nodes[line.through] - before * along,
+                nodes[step.node] + past[1] * along,
+            )
 
 
 def _unnamed_sides(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
@@ -271,5 +275,3 @@ def extent(nodes: Mapping[str, complex]) -> tuple[complex, complex]:
     """Low and high corner of the nodes."""
     points = np.array(list(nodes.values()))
     return (complex(points.real.min(), points.imag.min()), complex(points.real.max(), points.imag.max()))
-
-

@@ -12,20 +12,12 @@ import numpy as np
 from grader.simulation.settings import Hand, Student
 from grader.simulation.strokes import Rng
 from reference.assignment import Assignment, Scales, Variant
-from reference.construction import (
-    ArcAndLine,
-    Construction,
-    Divide,
-    Given,
-    Step,
-    TwoArcs,
-    TwoLines,
-    evaluate,
-)
+from reference.construction import Construction, evaluate
 from reference.derivation import construction_of, parameters_of
 from reference.geometry import FloatArray
 from reference.mechanism import Mechanism
 from reference.mistakes import RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
+from reference.steps import ArcAndLine, Divide, Given, Step, TwoArcs, TwoLines
 
 MECHANISM, VELOCITY, ACCELERATION = "mechanism", "velocity_plan", "acceleration_plan"
 PLANS = (VELOCITY, ACCELERATION)
@@ -139,9 +131,7 @@ def scalars(parameters: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     return {name: np.asarray(np.asarray(value).reshape(-1)[0]) for name, value in parameters.items()}
 
 
-def choose_mistake(
-    code: str, assignment: Assignment, variant: Variant, right: Drawing, rng: Rng
-) -> Mistake:
+def choose_mistake(code: str, assignment: Assignment, variant: Variant, right: Drawing, rng: Rng) -> Mistake:
     """A mistake of this kind, at a step chosen by lot.
 
     Raises ValueError where the drawing offers no place for it.
@@ -183,8 +173,13 @@ def _other_variant(assignment: Assignment, variant: Variant, rng: Rng) -> Mistak
     other = others[rng.integers(len(others))]
     scales = assignment.scales([other])
     parameters = scalars(parameters_of(assignment.mechanism([other]), scales.kL, scales.kv, scales.ka))
-    return Mistake("other_variant", "n" if other.n is not None else "position", n=other.n,
-                   position=other.position, parameters=parameters)
+    return Mistake(
+        "other_variant",
+        "n" if other.n is not None else "position",
+        n=other.n,
+        position=other.position,
+        parameters=parameters,
+    )
 
 
 # The hand -----------------------------------------------------------------------------------------
@@ -193,8 +188,13 @@ def _other_variant(assignment: Assignment, variant: Variant, rng: Rng) -> Mistak
 def slips(construction: Construction, hand: Hand, rng: Rng) -> dict[tuple[str, int, str], FloatArray]:
     """One draw of a hand's errors for every step, as `reference.construction.evaluate` takes them."""
     errors: dict[tuple[str, int, str], FloatArray] = {}
-    spread = {"angle": np.radians(hand.angle_deg), "shift": 0.5 * hand.place_mm, "length": hand.place_mm,
-              "x": hand.mark_mm, "y": hand.mark_mm}
+    spread = {
+        "angle": np.radians(hand.angle_deg),
+        "shift": 0.5 * hand.place_mm,
+        "length": hand.place_mm,
+        "x": hand.mark_mm,
+        "y": hand.mark_mm,
+    }
     for step in construction.steps:
         for slot, kind in _acts(step):
             tail = 2.0 if rng.random() < _HEAVY_TAIL else 1.0
@@ -253,4 +253,3 @@ def _figure(task: Task, name: str, nodes: Mapping[str, complex]) -> DrawnFigure:
     return DrawnFigure(
         name, {node: nodes[node] for node in own}, {node: complex(ideal[node]) for node in own}
     )
-

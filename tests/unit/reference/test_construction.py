@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from reference.assignment import load_assignment
-from reference.construction import Similar, ancestors, evaluate
+from reference.construction import ancestors, evaluate
 from reference.derivation import construction_of
 from reference.plan import exact_plan
+from reference.steps import Similar
 
 BUILT_IN = ["pump", "pump-230", "pump-collinear", "engine", "press"]
 SHARE_OF_PLAN = 1e-12
