@@ -6,6 +6,7 @@ import numpy as np
 
 from grader.pixels import Flat, cut_across
 from grader.records import FloatArray, Lens
+from grader.sheet.edges import bright_towards, edge_offsets
 from grader.sheet.fitting import Side, apply, gauss_newton, homography_of, homography_params, log_scale
 from grader.sheet.lens import straight
 from grader.sheet.longlines import RIDGE
@@ -13,7 +14,6 @@ from grader.sheet.longlines import RIDGE
 _BINS = 15
 _CUTS = 300
 _REACH_PX = 14.0
-_STEP_PX = 0.5
 _POINT_MM = 0.06
 """A ruled line's or a cut edge's own waves."""
 _BEND_SE = 0.02
@@ -81,7 +81,11 @@ def _traced(flat: Flat, side: Side) -> Trace | None:
     """Median places of a side in 15 bins along it; None where it is seen in too few."""
     ends = side.line.ends
     along = (np.arange(_CUTS) + 0.5) / _CUTS
-    offset = _ridge_offset(flat, ends) if side.line.kind == RIDGE else _step_offset(flat, side)
+    if side.line.kind == RIDGE:
+        offset = _ridge_offset(flat, ends)
+    else:
+        bright = bright_towards(ends, side.line.bright, across=side.line.across)
+        offset = edge_offsets(flat, ends, bright, _CUTS, _REACH_PX)
     bins = np.array_split(np.arange(_CUTS), _BINS)
     middles = np.array([along[one].mean() for one in bins])
     known = np.array([np.isfinite(offset[one]).mean() > 0.5 for one in bins])
@@ -100,27 +104,3 @@ def _ridge_offset(flat: Flat, ends: FloatArray) -> FloatArray:
     cuts = cut_across(flat, ends[None], _CUTS, _REACH_PX, np.array([0.8 * _REACH_PX]))
     usual = np.nanmedian(cuts.width)
     return np.asarray(np.where(cuts.width < 1.6 * usual, cuts.offset, np.nan)[0])
-
-
-def _step_offset(flat: Flat, side: Side) -> FloatArray:
-    """Where the brightness changes most, to the bright side that the line has, at each cut."""
-    ends = side.line.ends
-    span = ends[1] - ends[0]
-    u = span / np.hypot(*span)
-    normal = np.array([-u[1], u[0]])
-    across = np.arange(-_REACH_PX, _REACH_PX + _STEP_PX, _STEP_PX)
-    share = (np.arange(_CUTS) + 0.5) / _CUTS
-    at = ends[0] + share[:, None, None] * span + across[None, :, None] * normal
-    level = flat.brightness(at[..., 0], at[..., 1]).astype(np.float64)
-    kernel = np.ones(5) / 5.0
-    smooth = np.apply_along_axis(np.convolve, 1, level, kernel, mode="same")
-    towards = normal[1] if side.line.across else normal[0]
-    rise = (smooth[:, 4:] - smooth[:, :-4]) * side.line.bright * np.sign(towards)
-    rise, places = rise[:, 4:-4], across[6:-6]
-    best = rise.argmax(axis=1)
-    strong = rise.max(axis=1)
-    weight = np.clip(rise - 0.5 * strong[:, None], 0.0, None) * (
-        np.abs(np.arange(rise.shape[1]) - best[:, None]) < 6
-    )
-    offset = (weight * places).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-9)
-    return np.where(strong > 0.4 * np.median(strong), offset, np.nan)

@@ -22,8 +22,11 @@ _MATCH_MM = 2.0
 _TILT_MM = 2.0
 _UNEQUAL_SE = 0.004
 _DPI_SE = 0.005
+_WINDOW_SE = 0.02
+_HOPELESS = 12.0
+_FLAT = 1e-9
 _CAMERA_SE = 0.015
-_LOOKED_AT = 40
+_LOOKED_AT = 80
 _BLOCK_MM = 200.0
 _BLOCK_WORTH = 3.0
 """The title block's ruled lines count as much as three sides that agree."""
@@ -36,39 +39,45 @@ class Hypothesis:
     """A reading of the long lines: the map that it implies, and the sides that agree with it."""
 
     mm_to_px: FloatArray
-    sides: tuple[Side, ...]
-    frame: Model | None
     perspective: bool
     score: float
-    block_mm: float = 0.0
+    sides: tuple[Side, ...] = ()
+    frame: Model | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Resolution:
+    """The resolution to go by: as stated, or as the image's size and a usual dpi suggest."""
+
+    dpi: tuple[float, float]
+    stated: bool
 
 
 def hypotheses(
-    lines: list[LongLine], shape: tuple[int, int], dpi: tuple[float, float] | None
+    lines: list[LongLine], shape: tuple[int, int], resolution: Resolution | None
 ) -> list[Hypothesis]:
-    """All plausible readings, best first, in each of the four quarter turns.
+    """The most plausible readings, best first, in each of the four quarter turns.
 
     Half turns differ by the title block and, where the paper's edges are seen too, by the margins.
     """
     found: list[Hypothesis] = []
     for quad in _quadrilaterals(lines, shape):
-        kinds = [line.kind for line in quad]
+        corners = _corners(quad)
         for model in (PAPER, *FRAMES):
-            trust = _kind_trust(model, quad, kinds)
-            if trust <= 0.0:
-                continue
-            for turns in range(4):
-                hypothesis = _judged(quad, model, lines, shape, dpi, trust, turns)
-                if hypothesis is not None:
-                    found.append(hypothesis)
+            trust = _kind_trust(model, quad)
+            if trust > 0.0:
+                found += _in_each_turn(corners, model, trust, shape, resolution)
     drawn = drawn_ends(lines)
     best = sorted(found, key=lambda hypothesis: -hypothesis.score)[:_LOOKED_AT]
-    judged = [
-        replace(hypothesis, block_mm=block, score=hypothesis.score + min(block / _BLOCK_MM, _BLOCK_WORTH))
-        for hypothesis in best
-        for block in [title_block_mm(hypothesis.mm_to_px, drawn)]
-    ]
-    return sorted(judged, key=lambda hypothesis: -hypothesis.score)
+    return sorted((_agreed(one, lines, drawn) for one in best), key=lambda hypothesis: -hypothesis.score)
+
+
+def _agreed(hypothesis: Hypothesis, lines: list[LongLine], drawn: FloatArray) -> Hypothesis:
+    """With the sides that agree with it, and its score raised by them and by a title block in its place."""
+    sides, frame = match_sides(hypothesis.mm_to_px, lines)
+    block = min(title_block_mm(hypothesis.mm_to_px, drawn) / _BLOCK_MM, _BLOCK_WORTH)
+    score = hypothesis.score + sum(_worth(side) for side in sides) + block
+    return replace(hypothesis, sides=sides, frame=frame, score=score)
 
 
 def _quadrilaterals(lines: list[LongLine], shape: tuple[int, int]) -> list[tuple[LongLine, ...]]:
@@ -89,45 +98,49 @@ def _quadrilaterals(lines: list[LongLine], shape: tuple[int, int]) -> list[tuple
     return [(left, top, right, bottom) for left, right in pairs[0] for top, bottom in pairs[1]]
 
 
-def _kind_trust(model: Model, quad: tuple[LongLine, ...], kinds: list[str]) -> float:
+def _kind_trust(model: Model, quad: tuple[LongLine, ...]) -> float:
     """How well the looks of four lines fit a model: frames are drawn, edges are steps."""
+    kinds = [line.kind for line in quad]
     if model is not PAPER:
         return 1.0 if kinds.count(RIDGE) >= 3 else 0.0
-    inward = {0: 1, 1: 1, 2: -1, 3: -1}
-    outward_bright = any(
-        line.kind == STEP and line.bright != inward[index] for index, line in enumerate(quad)
-    )
+    inward = (1, 1, -1, -1)
+    if any(line.kind == STEP and line.bright != inner for line, inner in zip(quad, inward, strict=True)):
+        return 0.0
     # A copier shows paper edges as thin dark lines: possible, but less telling.
-    return 0.0 if outward_bright else 0.6 + 0.1 * kinds.count(STEP)
+    return 0.5 + 0.1 * kinds.count(STEP)
 
 
-def _judged(  # noqa: PLR0913
-    quad: tuple[LongLine, ...],
+def _in_each_turn(
+    corners: FloatArray,
     model: Model,
-    lines: list[LongLine],
-    shape: tuple[int, int],
-    dpi: tuple[float, float] | None,
     trust: float,
-    turns: int,
-) -> Hypothesis | None:
-    corners = np.roll(_corners(quad), turns, axis=0)
-    mm_to_px = cv2.getPerspectiveTransform(
+    shape: tuple[int, int],
+    resolution: Resolution | None,
+) -> list[Hypothesis]:
+    """Readings of four corners (left top, clockwise) as those of a model; half turns look alike."""
+    found = []
+    for turns in (0, 1):
+        map_px = _quad_map(model, np.roll(corners, turns, axis=0))
+        params = None if map_px is None else affine_params(map_px)
+        if map_px is None or params is None or not np.all(np.isfinite(params)):
+            continue
+        bend = np.abs(apply(affine_of(params), model.corners()) - apply(map_px, model.corners())).max()
+        perspective = bool(bend / np.exp(params[:2].mean()) > _SCAN_BEND_MM)
+        penalty = _camera_misfit(map_px, shape) if perspective else _scan_misfit(params, resolution)
+        if penalty < _HOPELESS:
+            turned = _quad_map(model, np.roll(corners, turns + 2, axis=0))
+            found.append(Hypothesis(map_px, perspective, trust - penalty))
+            found += [] if turned is None else [Hypothesis(turned, perspective, trust - penalty)]
+    return found
+
+
+def _quad_map(model: Model, corners: FloatArray) -> FloatArray | None:
+    """Homography from a model's corners to pixels; None for corners that span no area."""
+    matrix = cv2.getPerspectiveTransform(
         model.corners().astype(np.float32), corners.astype(np.float32)
     ).astype(np.float64)
-    if not np.all(np.isfinite(mm_to_px)) or abs(np.linalg.det(mm_to_px)) < 1e-9:
-        return None
-    params = affine_params(mm_to_px)
-    if not np.all(np.isfinite(params)):
-        return None
-    bend = np.abs(apply(affine_of(params), model.corners()) - apply(mm_to_px, model.corners())).max()
-    px_per_mm = float(np.exp(params[:2].mean()))
-    perspective = bool(bend / px_per_mm > _SCAN_BEND_MM)
-    penalty = _camera_misfit(mm_to_px, shape) if perspective else _scan_misfit(params, dpi)
-    if penalty > 12.0:
-        return None
-    sides, frame = match_sides(mm_to_px, lines)
-    score = trust + sum(_worth(side) for side in sides) - penalty
-    return Hypothesis(mm_to_px, sides, frame, perspective, score)
+    good = bool(np.all(np.isfinite(matrix))) and abs(np.linalg.det(matrix)) > _FLAT
+    return matrix if good else None
 
 
 def _corners(quad: tuple[LongLine, ...]) -> FloatArray:
@@ -142,12 +155,13 @@ def _meet(a: LongLine, b: LongLine) -> FloatArray:
     return np.asarray(p + s[0] * u)
 
 
-def _scan_misfit(params: FloatArray, dpi: tuple[float, float] | None) -> float:
+def _scan_misfit(params: FloatArray, resolution: Resolution | None) -> float:
     unequal = (params[0] - params[1]) / _UNEQUAL_SE
     penalty = 0.5 * unequal**2
-    if dpi is not None:
-        wrong = (params[:2] - np.log(np.array(dpi) / 25.4)) / _DPI_SE
-        penalty += min(3.0, 0.5 * float(wrong @ wrong) / 2.0)
+    if resolution is not None:
+        se, most = (_DPI_SE, 3.0) if resolution.stated else (_WINDOW_SE, 1.5)
+        wrong = (params[:2] - np.log(np.array(resolution.dpi) / 25.4)) / se
+        penalty += min(most, 0.25 * float(wrong @ wrong))
     return float(penalty)
 
 
@@ -172,7 +186,7 @@ def _camera_misfit(mm_to_px: FloatArray, shape: tuple[int, int]) -> float:
 def _worth(side: Side) -> float:
     length_mm = PAGE_MM[1 - side.axis]
     return float(np.clip(side.line.length * side.line.inked / max(length_mm, 1.0), 0.0, None) > 0) * (
-        1.0 if side.line.kind == RIDGE or side.model is PAPER else 0.4
+        1.0 if (side.line.kind == RIDGE) != (side.model is PAPER) else 0.5
     )
 
 
@@ -191,32 +205,29 @@ def on_sides(
     inverse: FloatArray, model: Model, lines: list[LongLine], within_mm: float = _MATCH_MM
 ) -> list[Side]:
     """For each side of a model the long line that lies on it best, where one does."""
+    if not lines:
+        return []
+    px = np.stack([line.ends for line in lines])
+    mm = apply(inverse, px.reshape(-1, 2)).reshape(-1, 2, 2)
+    brighter = _brighter_mm(inverse, lines, px)
+    drawn = np.array([line.kind == RIDGE for line in lines])
     x0, y0, x1, y1 = model.box
     found: list[Side] = []
     for axis, value, outer in ((0, x0, -1), (1, y0, -1), (0, x1, 1), (1, y1, 1)):
         length = (y1 - y0) if axis == 0 else (x1 - x0)
-        best: tuple[float, Side] | None = None
-        for line in lines:
-            ends = apply(inverse, line.ends)
-            along = abs(ends[1, 1 - axis] - ends[0, 1 - axis])
-            if abs(ends[1, axis] - ends[0, axis]) > _TILT_MM:
-                continue
-            off = float(np.abs(ends[:, axis] - value).max())
-            if off > within_mm or along < 0.5 * length or along > 1.1 * length:
-                continue
-            if model is not PAPER and line.kind != RIDGE:
-                continue
-            if line.kind == STEP and not _bright_inside(inverse, line, axis, outer):
-                continue
-            if best is None or off < best[0]:
-                best = (off, Side(line, model, axis, value))
-        if best is not None:
-            found.append(best[1])
+        along = np.abs(mm[:, 1, 1 - axis] - mm[:, 0, 1 - axis])
+        off = np.abs(mm[:, :, axis] - value).max(axis=1)
+        fits = (np.abs(mm[:, 1, axis] - mm[:, 0, axis]) <= _TILT_MM) & (off <= within_mm)
+        fits &= (along >= 0.5 * length) & (along <= 1.1 * length)
+        fits &= drawn if model is not PAPER else drawn | (brighter[:, axis] * outer < 0)
+        if fits.any():
+            best = int(np.where(fits, off, np.inf).argmin())
+            found.append(Side(lines[best], model, axis, value))
     return found
 
 
-def _bright_inside(inverse: FloatArray, line: LongLine, axis: int, outer: int) -> bool:
-    middle = line.ends.mean(axis=0)
-    step = np.array([0.0, 1.0]) if line.across else np.array([1.0, 0.0])
-    two = apply(inverse, np.array([middle, middle + 5.0 * line.bright * step]))
-    return bool((two[1, axis] - two[0, axis]) * outer < 0)
+def _brighter_mm(inverse: FloatArray, lines: list[LongLine], px: FloatArray) -> FloatArray:
+    """(n, 2) the way on the sheet from each line to its bright side; 0 for drawn lines."""
+    middle = px.mean(axis=1)
+    step = np.array([[0.0, 5.0 * line.bright] if line.across else [5.0 * line.bright, 0.0] for line in lines])
+    return apply(inverse, middle + step) - apply(inverse, middle)

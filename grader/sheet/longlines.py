@@ -1,6 +1,6 @@
 """Long straight lines that run nearly along the image's axes: frame, paper edges, title block."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from grader.pixels import Flat, cut_across, robust_lines, shrink
 from grader.records import FloatArray, GreyImage
+from grader.sheet.edges import bright_towards, edge_offsets
 
 _LONG_SIDE_PX = 1400
 """About 3.3 px/mm on A3: a frame's stroke is still two pixels wide."""
@@ -22,6 +23,7 @@ _STROKE_PX = (0.3, 6.5)
 """Distance of the two borders of a drawn line at the reduced resolution."""
 
 _CUTS = 400
+_STEP_REACH = 3.0
 _LEAST_CUTS = 20
 
 RIDGE = "ridge"
@@ -72,7 +74,7 @@ def long_lines(flat: Flat) -> list[LongLine]:
         chains = {sign: _chains(edges[edges[:, 4] == sign], small.shape, across=across) for sign in (-1, 1)}
         found += _paired(chains, across=across)
     full = [_full_size(line, scale) for line in found]
-    steps = [line for line in full if line.kind == STEP]
+    steps = [_settled_step(flat, line, 1.0 / scale) for line in full if line.kind == STEP]
     drawn = _refined(flat, [line for line in full if line.kind == RIDGE], 1.0 / scale)
     return sorted(steps + drawn, key=lambda line: -line.length * line.inked)
 
@@ -196,6 +198,25 @@ def _full_size(line: LongLine, scale: float) -> LongLine:
     return LongLine(line.across, line.kind, line.bright, ends, line.inked)
 
 
+def _settled_step(flat: Flat, line: LongLine, full_per_small: float) -> LongLine:
+    """A border between bright and dark, through its steepest places at full resolution."""
+    bright = bright_towards(line.ends, line.bright, across=line.across)
+    offset = edge_offsets(flat, line.ends, bright, _CUTS, _STEP_REACH * full_per_small)
+    along = (np.arange(_CUTS) + 0.5) * (line.length / _CUTS)
+    known = np.isfinite(offset)
+    if known.sum() < _LEAST_CUTS:
+        return line
+    fit = robust_lines(along[None], offset[None], known[None].astype(np.float64), 0.1)
+    return _shifted(line, float(fit.a[0]), float(fit.b[0]))
+
+
+def _shifted(line: LongLine, a: float, b: float) -> LongLine:
+    """The line moved across by a at its start, and b px more for each px along."""
+    u = (line.ends[1] - line.ends[0]) / line.length
+    shift = a + b * np.array([0.0, line.length])
+    return replace(line, ends=line.ends + shift[:, None] * np.array([-u[1], u[0]]))
+
+
 def _refined(flat: Flat, lines: list[LongLine], full_per_small: float) -> list[LongLine]:
     """Drawn lines through the middle of their ink, at full resolution."""
     if not lines:
@@ -211,11 +232,6 @@ def _refined(flat: Flat, lines: list[LongLine], full_per_small: float) -> list[L
         if good[index].sum() < _LEAST_CUTS:
             refined.append(line)
             continue
-        u = (line.ends[1] - line.ends[0]) / line.length
-        shift = fit.a[index] + fit.b[index] * np.array([0.0, line.length])
-        moved = line.ends + shift[:, None] * np.array([-u[1], u[0]])
-        width = float(usual[index])
-        refined.append(
-            LongLine(line.across, line.kind, line.bright, moved, float(good[index].mean()), width)
-        )
+        moved = _shifted(line, float(fit.a[index]), float(fit.b[index]))
+        refined.append(replace(moved, inked=float(good[index].mean()), width=float(usual[index])))
     return refined

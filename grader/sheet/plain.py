@@ -8,7 +8,7 @@ from grader.pixels import Flat, flatten
 from grader.records import FloatArray, Page, Problem, Sheet, Unread
 from grader.sheet.bend import find_lens
 from grader.sheet.fitting import Fit, affine_of, apply, fit_sides
-from grader.sheet.hypotheses import Hypothesis, hypotheses, on_sides
+from grader.sheet.hypotheses import Hypothesis, Resolution, hypotheses, on_sides
 from grader.sheet.longlines import LongLine, long_lines
 from grader.sheet.models import PAGE_MM, PAPER, Model, drawable
 from grader.sheet.upright import drawn_ends, title_block_mm
@@ -18,7 +18,7 @@ _LEAST_PX_PER_MM = 3.0
 _USUAL_DPI = (100.0, 150.0, 200.0, 240.0, 250.0, 300.0, 400.0, 500.0, 600.0, 800.0, 1200.0)
 _UNSET_DPI = (72.0, 96.0)
 """What programs write when they do not know; no evidence either way."""
-_A3_SLACK_MM = (16.0, 14.0)
+_A3_SLACK_MM = (40.0, 22.0)
 """A scanner's window may be this much larger than the sheet; paper that is cut off is not A3."""
 _A3_SHORT_MM = 5.0
 _WINDOW_SE = 0.004
@@ -33,14 +33,6 @@ _EDGE_WITHIN_MM = 6.0
 _ASSUMED_PAPER_SE = 0.004
 
 
-@dataclass(frozen=True, slots=True)
-class Resolution:
-    """The resolution to start from: as stated, or as the image's size and a usual dpi suggest."""
-
-    dpi: tuple[float, float]
-    stated: bool
-
-
 def register_plain(page: Page) -> Sheet | Unread:
     """The map of a plain sheet, or why there is none."""
     long_px = max(page.grey.shape)
@@ -52,7 +44,7 @@ def register_plain(page: Page) -> Sheet | Unread:
     resolution = _resolution(page, problems)
     dpi = resolution.dpi if resolution is not None and resolution.stated else None
     shape = (page.grey.shape[0], page.grey.shape[1])
-    ranked = hypotheses(lines, shape, dpi)
+    ranked = hypotheses(lines, shape, resolution)
     if ranked:
         sheet = _from_lines(page, ranked[0], lines, dpi, problems)
         return _with_lens(flat, sheet, ranked[0]) if sheet and ranked[0].perspective else sheet

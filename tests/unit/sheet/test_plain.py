@@ -1,0 +1,238 @@
+"""Plain sheets painted with a known map, registered again: scans, copies and photos."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from grader.intake import page_of, pages_of
+from grader.records import Page
+from grader.sheet import rectify, straighten
+from grader.sheet.lens import straightened
+
+SHARED = Path(__file__).resolve().parents[4] / "shared"
+RULED_MM = 0.06
+"""Bound on the place of any point: everything ruled exactly, 150 dpi."""
+HAND_MM = 0.6
+SCALE_SES = 3.5
+ISO, GOST = (20, 10, 410, 287), (20, 5, 415, 292)
+PX_PER_MM = 150 / 25.4
+SUBPIXEL = 6
+GRID_MM = np.stack(np.meshgrid(np.linspace(10, 410, 6), np.linspace(10, 287, 5)), axis=-1).reshape(-1, 2)
+
+
+def apply(matrix, points):
+    points = np.asarray(points, dtype=float)
+    mapped = np.c_[points, np.ones(len(points))] @ np.asarray(matrix).T
+    return mapped[:, :2] / mapped[:, 2:]
+
+
+def scanner(*, turns=0, skew_deg=0.0, scale=(1.0, 1.0), bed_mm=0.0):
+    """(map from mm to px, image shape) of a sheet laid askew on a bed `bed_mm` larger on each side."""
+    wide, high = (420, 297) if turns % 2 == 0 else (297, 420)
+    shape = round((high + 2 * bed_mm) * PX_PER_MM), round((wide + 2 * bed_mm) * PX_PER_MM)
+    angle = np.radians(skew_deg - 90 * turns)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    linear = PX_PER_MM * np.diag(scale) @ turn
+    middle = np.array([shape[1] - 1, shape[0] - 1]) / 2
+    shift = middle - linear @ [210, 148.5]
+    return np.vstack([np.c_[linear, shift], [0, 0, 1]]), shape
+
+
+def painted(matrix, shape, *, frame=ISO, block=True, bed=250, errors=None, noise=2.0):
+    """A sheet with frame, title block and a few strokes, seen through `matrix`."""
+    grey = np.full(shape, bed, dtype=np.uint8)
+    outline = [(0, 0), (420, 0), (420, 297), (0, 297)]
+    cv2.fillConvexPoly(grey, fixed(apply(matrix, outline)), 248, cv2.LINE_AA, SUBPIXEL)
+    lines = [((60, 80), (150, 60)), ((150, 60), (110, 160)), ((250, 100), (330, 170))]
+    if frame is not None:
+        x0, y0, x1, y1 = frame
+        corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
+        corners += 0.0 if errors is None else errors
+        lines += list(zip(corners, np.roll(corners, -1, axis=0), strict=True))
+    if block:
+        right, bottom = (410, 287) if frame is None else frame[2:]
+        lines += [((right - 150, bottom - h), (right, bottom - h)) for h in (0, 9, 18, 27)]
+        lines += [((right - x, bottom - 27), (right - x, bottom)) for x in (150, 0)]
+    for start, end in lines:
+        cv2.polylines(grey, [fixed(apply(matrix, [start, end]))], False, 60, 3, cv2.LINE_AA, SUBPIXEL)
+    soft = cv2.GaussianBlur(grey, (0, 0), 0.6)
+    noisy = soft + np.random.default_rng(0).normal(0, noise, shape)
+    return np.clip(noisy, 0, 255).astype(np.uint8)
+
+
+def fixed(points):
+    return np.rint(np.asarray(points) * 2**SUBPIXEL).astype(np.int32)
+
+
+def off_mm(sheet, matrix):
+    """Largest distance on the sheet between where points are and where the registration says."""
+    return np.hypot(*(apply(np.linalg.inv(matrix), apply(sheet.mm_to_px, GRID_MM)) - GRID_MM).T).max()
+
+
+def scale_off(sheet, matrix):
+    """Relative error of lengths, in standard errors."""
+    found = np.sqrt(abs(np.linalg.det(sheet.mm_to_px[:2, :2]) / np.linalg.det(matrix[:2, :2])))
+    return abs(found - 1.0) / sheet.scale_se
+
+
+@pytest.mark.parametrize("frame", [ISO, GOST])
+@pytest.mark.parametrize("turns", [0, 1, 2, 3])
+def test_a_ruled_frame_tells_place_scale_and_which_way_up(frame, turns):
+    matrix, shape = scanner(turns=turns, skew_deg=0.9)
+    sheet = rectify(Page("a.png", 1, painted(matrix, shape, frame=frame), (150.0, 150.0)))
+    assert off_mm(sheet, matrix) < RULED_MM
+    assert (sheet.rotation_deg - (0.9 - 90 * turns) + 180) % 360 - 180 == pytest.approx(0, abs=0.03)
+    assert sheet.drawable_mm == (frame[0], frame[1], frame[2] - frame[0], frame[3] - frame[1])
+    assert sheet.method == "combined"
+    assert not sheet.problems
+
+
+def test_unequal_scales_of_a_scanner_are_found():
+    matrix, shape = scanner(scale=(1.003, 0.998))
+    sheet = rectify(Page("a.png", 1, painted(matrix, shape, errors=None), None))
+    assert off_mm(sheet, matrix) < 2 * RULED_MM
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_hand_ruled_frame_misleads_no_further_than_is_said(seed):
+    rng = np.random.default_rng(seed)
+    matrix, shape = scanner(skew_deg=-0.6, scale=tuple(1 + rng.normal(0, 0.0015, 2)))
+    grey = painted(matrix, shape, errors=rng.normal(0, 0.25, (4, 2)))
+    sheet = rectify(Page("a.png", 1, grey, (150.0, 150.0)))
+    assert off_mm(sheet, matrix) < HAND_MM
+    assert scale_off(sheet, matrix) < SCALE_SES
+    assert 2e-4 < sheet.scale_se < 3e-3
+
+
+def test_a_false_resolution_is_told_and_not_followed():
+    matrix, shape = scanner()
+    sheet = rectify(Page("a.png", 1, painted(matrix, shape), (200.0, 200.0)))
+    assert off_mm(sheet, matrix) < RULED_MM
+    assert [problem.code for problem in sheet.problems] == ["resolution_wrong"]
+
+
+@pytest.mark.parametrize("bed", [30, 215])
+def test_the_papers_edges_do_without_a_frame(bed):
+    matrix, shape = scanner(skew_deg=0.7, bed_mm=7)
+    sheet = rectify(Page("a.png", 1, painted(matrix, shape, frame=None, bed=bed), (150.0, 150.0)))
+    # A filled polygon is half a pixel larger all round than its corners say.
+    assert off_mm(sheet, matrix) < 3 * RULED_MM
+    assert sheet.drawable_mm == (10, 10, 400, 277)
+
+
+def test_a_shadow_along_the_edge_lies_outside_the_paper():
+    matrix, shape = scanner(bed_mm=6)
+    grey = painted(matrix, shape, frame=None, bed=249)
+    outer = apply(matrix, [(-0.3, -0.3), (420.3, -0.3), (420.3, 297.3), (-0.3, 297.3)])
+    cv2.polylines(grey, [fixed(outer)], True, 120, 4, cv2.LINE_AA, SUBPIXEL)
+    sheet = rectify(Page("a.png", 1, grey, (150.0, 150.0)))
+    assert off_mm(sheet, matrix) < 4 * RULED_MM
+    assert scale_off(sheet, matrix) < SCALE_SES
+
+
+def test_the_resolution_alone_gives_a_scale_and_says_so():
+    matrix, shape = scanner(skew_deg=0.4)
+    sheet = rectify(Page("a.png", 1, painted(matrix, shape, frame=None, bed=248), (150.0, 150.0)))
+    assert sheet.px_per_mm == pytest.approx(PX_PER_MM, rel=2e-3)
+    assert sheet.rotation_deg == pytest.approx(0.4, abs=0.1)
+    assert "frame_missing" in {problem.code for problem in sheet.problems}
+    assert sheet.scale_se >= 1e-3
+
+
+@pytest.mark.parametrize("dpi", [None, (72.0, 72.0)])
+def test_a_usual_resolution_is_assumed_where_none_is_stated_and_said_to_be(dpi):
+    matrix, shape = scanner()
+    sheet = rectify(Page("a.png", 1, painted(matrix, shape, frame=None, bed=248), dpi))
+    assert {"resolution_assumed", "frame_missing"} <= {problem.code for problem in sheet.problems}
+    assert sheet.scale_se >= 3e-3
+
+
+def photo():
+    corners = np.float32([(310, 160), (2700, 240), (2790, 1990), (190, 1900)])
+    outline = np.float32([(0, 0), (420, 0), (420, 297), (0, 297)])
+    return cv2.getPerspectiveTransform(outline, corners).astype(float), (2200, 3000)
+
+
+@pytest.mark.parametrize("frame", [ISO, None])
+def test_a_photo_is_registered_through_its_perspective(frame):
+    matrix, shape = photo()
+    sheet = rectify(Page("a.jpg", 1, painted(matrix, shape, frame=frame, bed=90), None))
+    assert off_mm(sheet, matrix) < 3 * RULED_MM
+    assert ("paper_assumed" in {problem.code for problem in sheet.problems}) == (frame is None)
+
+
+@pytest.mark.parametrize("bend", [-0.012, 0.01])
+def test_a_bent_photo_is_straightened(bend):
+    matrix, shape = photo()
+    # The inverse of a small bend is, to first order, the opposite bend.
+    bent = straightened(painted(matrix, shape, bed=90), -bend)
+    page = Page("a.jpg", 1, bent, None)
+    sheet = rectify(page)
+    assert sheet.lens is not None
+    assert sheet.lens.bend == pytest.approx(bend, abs=0.0015)
+    _, straight = straighten(page, sheet)
+    assert off_mm(straight, matrix) < 0.2
+    assert off_mm(straight, matrix) < 0.4 * off_mm(sheet, matrix)
+
+
+def test_squared_paper_has_no_title_block():
+    matrix, shape = scanner()
+    grey = painted(matrix, shape, frame=None, block=False, bed=248)
+    for x in range(0, 420, 10):
+        cv2.polylines(grey, [fixed(apply(matrix, [(x, 0), (x, 297)]))], False, 150, 2, cv2.LINE_AA, SUBPIXEL)
+    for y in range(0, 297, 10):
+        cv2.polylines(grey, [fixed(apply(matrix, [(0, y), (420, y)]))], False, 150, 2, cv2.LINE_AA, SUBPIXEL)
+    refusal = rectify(Page("a.png", 1, grey, None))
+    assert not refusal
+    assert refusal.reason
+
+
+@pytest.mark.parametrize(
+    ("shape", "dpi"),
+    [((1754, 2480), None), ((2480, 3508), None), ((2480, 3508), (300.0, 300.0)), ((300, 400), None)],
+)
+def test_paper_with_nothing_on_it_is_refused_with_a_reason(shape, dpi):
+    refusal = rectify(Page("a.png", 1, np.full(shape, 250, dtype=np.uint8), dpi))
+    assert not refusal
+    assert len(refusal.reason) > 20
+
+
+@pytest.mark.skipif(not (SHARED / "real").is_dir(), reason="the folder ../shared/real is absent")
+def test_no_foreign_image_is_taken_for_a_sheet():
+    pictures = [
+        path for path in sorted((SHARED / "real").rglob("*.*")) if path.suffix.lower() in {".jpg", ".png"}
+    ]
+    taken = [path.name for path in pictures for page in pages_of(path) if rectify(page)]
+    assert pictures
+    assert taken == []
+
+
+SCANS = [
+    "pump-flatbed/s01.jpg",
+    "pump-flatbed/s11.jpg",
+    "pump-copy/s04.png",
+    "press-mix/s05.jpg",
+    "pump-phone/s04.jpg",
+]
+WORST_MM = {"pump-flatbed": 0.7, "pump-copy": 0.7, "press-mix": 0.7, "pump-phone": 0.2}
+
+
+@pytest.mark.skipif(not (SHARED / "sheets").is_dir(), reason="the folder ../shared/sheets is absent")
+@pytest.mark.parametrize("name", SCANS)
+def test_scans_of_others_are_registered_upright(name):
+    folder, file = name.split("/")
+    lines = (SHARED / "sheets" / folder / "truth.jsonl").read_text().splitlines()
+    truth = next(one for one in map(json.loads, lines) if one["class_file"] == file)
+    page = page_of(SHARED / "sheets" / name, 1)
+    page, sheet = straighten(page, rectify(page))
+    known = np.array(truth["grid_mm_px"])
+    pixels = known[:, 1]
+    if sheet.lens is not None:
+        from grader.sheet.lens import straight
+
+        pixels = straight(pixels, sheet.lens.bend, page.grey.shape)
+    off = np.hypot(*(apply(np.linalg.inv(sheet.mm_to_px), pixels) - known[:, 0]).T)
+    assert off.max() < WORST_MM[folder]
