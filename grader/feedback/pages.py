@@ -14,6 +14,7 @@ from grader.documents import (
     QuantityDocument,
     ReportDocument,
     ResultsDocument,
+    SheetDocument,
     ToleranceDocument,
 )
 from grader.feedback import statistics, words
@@ -85,7 +86,7 @@ def feedback_page(  # noqa: PLR0913 - all that the file holds
         mistakes=_mistakes(report, speaker, level, names),
         problems=[problem_sentence(problem, speaker) for problem in report.problems],
         scales=_scales(report, speaker, names),
-        sheets=_sheets(pictures, speaker),
+        sheets=_sheets(report, pictures, speaker, level),
         score=_score(report, speaker),
         colours=COLOURS,
     )  # fmt: skip
@@ -269,9 +270,27 @@ def _scales(
     ]
 
 
-def _sheets(pictures: Sequence[Picture], speaker: Tongue) -> list[tuple[Picture, list[View]]]:
+def _sheets(
+    report: ReportDocument, pictures: Sequence[Picture], speaker: Tongue, level: Level
+) -> list[tuple[Picture, list[View], str]]:
+    """Each page's picture, its looks, and for instructors how its millimetres were found."""
     captions = {kind: speaker.gettext(text) for kind, text in {**PLACES, "sheet": SHEET}.items()}
-    return [(picture, views(picture, number, captions)) for number, picture in enumerate(pictures, start=1)]
+    placed = {(one.source, one.page): one.sheet for one in report.reading.sheets if level == "full"}
+    return [
+        (
+            picture,
+            views(picture, number, captions),
+            _placed(placed.get((picture.source, picture.page)), speaker),
+        )
+        for number, picture in enumerate(pictures, start=1)
+    ]
+
+
+def _placed(sheet: SheetDocument | None, speaker: Tongue) -> str:
+    if sheet is None or sheet.method not in words.METHODS:
+        return ""
+    method = speaker.gettext(words.METHODS[sheet.method])
+    return f"{method}, ±{speaker.quantity(sheet.residual_mm, 2, 'mm')}"
 
 
 __all__ = ["feedback_page", "folders_of", "index_page", "write_feedback", "write_index"]

@@ -20,12 +20,16 @@ STATES = {
     "unreadable": N_("unreadable"),
     "missing": N_("nothing handed in"),
 }
+METHODS = {
+    "markers": N_("placed by its markers"),
+    "combined": N_("placed by frame, paper and resolution together"),
+}
 STATE_MARKS = {"graded": "✓", "needs_review": "?", "unreadable": "✗", "missing": "–"}
 
 _GREEK = {"omega": "ω", "epsilon": "ε"}
 _NAME = re.compile(
     r"\b(?:(?P<vector>[van])_(?P<points>[A-Z][A-Za-z0-9]{0,7})(?:_(?P<part>[nt])\b)?"
-    r"|(?P<rate>omega|epsilon)_(?P<link>\w{1,4})|k(?P<scale>[Lva])\b)"
+    r"|(?P<rate>omega|epsilon)_(?P<link>\w{1,4})|(?P<letter>[kμ])(?P<scale>[Llva])\b)"
 )
 
 
@@ -45,4 +49,4 @@ def _symbol(found: re.Match[str]) -> Markup:
         return Markup("<i>{}</i><sub>{}</sub>{}").format(found["vector"], found["points"], part)
     if found["rate"]:
         return Markup("<i>{}</i><sub>{}</sub>").format(_GREEK[found["rate"]], found["link"])
-    return Markup("<i>k</i><sub>{}</sub>").format(found["scale"])
+    return Markup("<i>{}</i><sub>{}</sub>").format(found["letter"], found["scale"])

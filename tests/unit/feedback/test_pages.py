@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from grader.documents import ProblemDocument
+from grader.documents import ProblemDocument, ReadingDocument, ReadSheets, SheetDocument
 from grader.feedback import write_feedback, write_index
 from grader.feedback.pages import feedback_page, folders_of, index_page
 from grader.i18n import LANGUAGES
@@ -174,6 +174,16 @@ def test_pictures_of_an_earlier_run_do_not_stay_behind(tmp_path):
     write_feedback(report(), [picture(), picture("s07_2.jpg")], tmp_path, "en")
     write_feedback(report(), [picture()], tmp_path, "en")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["feedback.html", "overlay.png"]
+
+
+def test_instructors_are_told_how_a_sheet_was_placed_and_students_are_not():
+    sheet = SheetDocument(
+        method="markers", px_per_mm=11.8, rotation_deg=0.0, residual_mm=0.034, mm_to_px=[[1, 0, 0]] * 3
+    )
+    read = ReadingDocument(source="s07.jpg", page=1, student_id="s07", sheet=sheet, figures={})
+    told = report(reading=ReadSheets(sheets=[read]))
+    assert "placed by its markers, ±0.03\u00a0mm" in feedback_page(told, [picture()], "en")
+    assert "placed by" not in feedback_page(told, [picture()], "en", "hint")
 
 
 # The class ----------------------------------------------------------------------------------------

@@ -1,0 +1,42 @@
+"""Names of vectors in running text."""
+
+import html
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.feedback.words import symbols
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("v_BA", "<i>v</i><sub>BA</sub>"),
+        ("a_BA_n", "<i>a</i><sub>BA</sub><sup>n</sup>"),
+        ("n_BA", "<i>n</i><sub>BA</sub>"),
+        ("omega_3", "<i>ω</i><sub>3</sub>"),
+        ("epsilon_2", "<i>ε</i><sub>2</sub>"),
+        ("kL", "<i>k</i><sub>L</sub>"),
+        ("μv", "<i>μ</i><sub>v</sub>"),
+        ("the end of v_A.", "the end of <i>v</i><sub>A</sub>."),
+    ],
+)
+def test_names_are_set_with_their_indices(text, shown):
+    assert symbols(text) == shown
+
+
+@pytest.mark.parametrize("text", ["vase", "kv2", "a_b", "nova_A", "skL", "omega"])
+def test_other_words_are_left_alone(text):
+    assert symbols(text) == text
+
+
+@given(st.text())
+def test_any_text_keeps_its_letters_and_can_add_no_tag(text):
+    shown = str(symbols(text))
+    assert set(re.findall(r"<[^>]*>", shown)) <= {"<i>", "</i>", "<sub>", "</sub>", "<sup>", "</sup>"}
+    bare = html.unescape(re.sub(r"</?(?:i|sub|sup)>", "", shown))
+    assert bare.replace("ω", "omega").replace("ε", "epsilon").replace("_", "") == (
+        text.replace("ω", "omega").replace("ε", "epsilon").replace("_", "")
+    )
