@@ -105,7 +105,11 @@ def _student(drawing: Drawing, assignment: Assignment, text: PageText, tongue: T
     sheet = tongue.gettext(N_("sheet {number} of {count}")).format(number=text.sheet, count=text.sheets)
     name = wrap(text.name, BOLD, 12.0, wide)[:1] or [""]
     drawing.text((x, y + 17.0), name[0], 12.0, BOLD)
-    drawing.text((x, y + 23.0), ",  ".join([identity.student_id, *variant]), 10.0)
+    size, lines = fitted(
+        [",  ".join([identity.student_id, *variant])], REGULAR, (10.0, 8.0, 6.5), (wide, 5.0)
+    )
+    for row, line in enumerate(lines):
+        drawing.text((x, y + 23.0 + row * 1.2 * size * _PT), line, size)
     drawing.text((x, y + 29.0), f"{tongue.gettext(KINDS[identity.kind])}, {sheet}", 9.0)
 
 

@@ -1,11 +1,12 @@
 """Answer sheets of a class, and the layout that all of them share."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from grader.answer_sheet.drawing import Drawing
 from grader.answer_sheet.fit import Fit, best_template, construction_for
 from grader.answer_sheet.page import PageForm, PageText, draw_page
+from grader.answer_sheet.words import unprintable
 from grader.i18n import tongue
 from grader.layout import MAX_FIELDS, SCALE_BOXES, Layout, PageLayout, field_boxes, marker_places
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, Identity, Problem
@@ -61,7 +62,16 @@ def make_sheets(
             identity = Identity(assignment.id, row.student_id, variant.n, variant.position, plan.table.kind)
             text = PageText(identity, row.name, number, len(plans))
             draw_page(drawing, assignment, text, plan.form, tongue(row.lang or lang))
-    return Sheets(drawing.finish(), Layout(pages=[_layout(plan) for plan in plans]), problems)
+    layout = Layout(pages=[_layout(plan) for plan in plans])
+    return Sheets(drawing.finish(), layout, (*problems, *_unprintable(rows, roster)))
+
+
+def _unprintable(rows: Sequence[RosterRow], roster: str) -> Iterator[Problem]:
+    for row in rows:
+        letters = unprintable(row.name)
+        if letters:
+            told = f"line {row.line}: the font has no {letters}; {row.student_id}'s name has boxes instead"
+            yield Problem("sheet_letters", told, roster)
 
 
 def page_layouts(assignment: Assignment) -> Layout:

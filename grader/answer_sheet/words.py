@@ -29,6 +29,15 @@ def width_mm(text: str, font: str, size_pt: float) -> float:
     return float(pdfmetrics.stringWidth(text, font, size_pt) / mm)
 
 
+def unprintable(text: str) -> str:
+    """Letters of a text that the font does not have."""
+    embed_fonts()
+    known = pdfmetrics.getFont(BOLD).face.charToGlyph
+    return "".join(
+        dict.fromkeys(letter for letter in text if not letter.isspace() and ord(letter) not in known)
+    )
+
+
 def number(value: float, lang: str) -> str:
     """A datum to six significant digits, as it is written in a language."""
     text = f"{value:.6g}"

@@ -249,3 +249,26 @@ def test_lines_are_never_wider_than_the_box():
     lines = wrap(text, "DejaVuSansCondensed", 8.0, 60.0)
     assert all(width_mm(line, "DejaVuSansCondensed", 8.0) <= 60.0 for line in lines)
     assert "".join(lines).replace(" ", "") == text.replace(" ", "")
+
+
+def test_letters_that_the_font_lacks_are_told_and_the_languages_are_complete():
+    rows = [
+        RosterRow("s1", "王 Ana", 1, line=2),
+        RosterRow("s2", "ĂÂÎȘȚăâîșțŞŢşţ Ёё Щщ Ґґ Її ωπφμ", 2, line=3),
+    ]
+    (problem,) = make_sheets(load_assignment("pump"), rows).problems
+    assert problem.code == "sheet_letters"
+    assert "line 2" in problem.message
+    assert "王" in problem.message
+
+
+@pytest.mark.parametrize("lang", ["en", "ro", "ru"])
+def test_long_names_and_ids_stay_in_their_column(lang):
+    sheets = make_sheets(
+        load_assignment("pump"), [RosterRow("W" * 64, "Wolfeschlegelsteinhausen " * 6, 30)], lang
+    )
+    image = pypdfium2.PdfDocument(sheets.pdf)[0].render(scale=10 / (72 / 25.4), grayscale=True).to_numpy()
+    grey = image.reshape(image.shape[:2])
+    # The quiet zone of the marker beside the column.
+    assert grey[110:280, int(142.2 * 10) : int(143.8 * 10)].min() == 255
+    assert grey[455:480, 380:1430].min() == 255
