@@ -48,6 +48,7 @@ def expectations(
     found = []
     if vector.scale in wrong_scales:
         found.append(Expectation(task.drawn(name, followed), "scale", vector.scale, wrong_scales))
+    found.extend(_turned_plan(task, evidence, vector, followed))
     found.extend(_from_own(task, evidence, vector, used))
     if wrong_scales:
         found.extend(
@@ -57,6 +58,22 @@ def expectations(
     for one in found:
         if not _is_trivial(task, name, one.vector, (used, followed)):
             yield one
+
+
+def _turned_plan(
+    task: Task, evidence: Evidence, vector: Vector, scales: Mapping[str, float]
+) -> Iterator[Expectation]:
+    """The vector in a plan that is turned as a whole by quarter turns, as the crank's vector tells."""
+    crank = f"{vector.name[0]}_{task.pin}"
+    own = evidence.vector(crank)
+    if vector.name == crank or own is None or own.direction_rad is None:
+        return
+    off = math.remainder(own.direction_rad - cmath.phase(task.real[crank]), math.tau)
+    quarters = round(off / (math.pi / 2.0))
+    slack = math.radians(task.rubric.tolerance.direction_deg * task.rubric.tolerance.partial_factor)
+    if quarters and abs(off - quarters * math.pi / 2.0) <= slack:
+        head = task.construction.vectors[crank].head
+        yield Expectation(task.drawn(vector.name, scales) * 1j**quarters, "vector", crank, frozenset({head}))
 
 
 def _from_own(

@@ -289,6 +289,27 @@ def test_a_reversed_velocity_costs_once():
     ]
 
 
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+@pytest.mark.parametrize("plan", ["velocity_plan", "acceleration_plan"])
+def test_a_plan_turned_as_a_whole_costs_once(plan, quarters):
+    reading = measured(PUMP, mistakes=(Mistake("figure_rotated", plan, quarters=quarters),))
+    comparison = compare(PUMP, Submission(measured=reading))
+    none = [
+        name for name, verdict in verdicts(comparison).items() if verdict in {"none", "partial", "review"}
+    ]
+    assert none == ["v_A" if plan == "velocity_plan" else "a_A"]
+
+
+def test_a_crooked_plan_is_no_turned_one():
+    reading = measured(PUMP)
+    for name in PUMP.construction.vectors:
+        if name.startswith("v"):
+            degrees = reading.figures["velocity_plan"].vectors[name].direction_deg
+            reading = changed(reading, name, direction_deg=(degrees + 70.0) % 360.0)
+    found = verdicts(compare(PUMP, Submission(measured=reading)))
+    assert found["v_D"] == "none"
+
+
 def test_another_assembly_costs_once_although_no_criterion_is_the_mechanism():
     reading = sheet(PUMP, mistakes=(Mistake("other_assembly", "D"),))
     comparison = compare(PUMP, Submission(readings=(reading,)))

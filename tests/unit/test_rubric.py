@@ -1,0 +1,101 @@
+"""Rubric files: what is understood, and every fault told with its path."""
+
+import pytest
+
+from grader.rubric import check_rubric, load_rubric, rubric_of
+from reference.assignment import built_in, library, load_assignment
+from reference.derivation import construction_of
+from reference.errors import AuthoredFileError, CallError
+
+HEAD = 'schema_version = 1\nid = "r"\ntitle = { en = "r" }\n'
+
+
+def criterion(text, name="v_A"):
+    return f'[[criterion]]\nid = "{name}"\ntitle = {{ en = "x" }}\npoints = 1.0\n{text}\n'
+
+
+@pytest.fixture
+def rubric(tmp_path):
+    """Writes a rubric and loads it."""
+
+    def load(text):
+        path = tmp_path / "r.rubric.toml"
+        path.write_text(HEAD + text, encoding="utf-8")
+        return load_rubric(str(path))
+
+    return load
+
+
+def test_a_small_rubric_has_the_tolerances_of_marking_practice(rubric):
+    found = rubric(criterion('vector = "v_A"') + criterion('scale = "kv"', "kv"))
+    tolerance = found.tolerance
+    assert (tolerance.length_mm, tolerance.length_relative) == (1.0, 0.02)
+    assert (tolerance.direction_deg, tolerance.across_mm, tolerance.partial_factor) == (1.5, 0.5, 2.0)
+    assert found.max_score == 2.0
+    assert found.vectors == ("v_A",)
+    assert [one.name for one in found.criterion] == ["v_A", "kv"]
+    assert not found.needs_accelerations
+
+
+@pytest.mark.parametrize("text", ['vector = "a_A"', 'angular = "epsilon_3"', 'scale = "ka"'])
+def test_what_needs_accelerations_is_known(rubric, text):
+    assert rubric(criterion(text)).needs_accelerations
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "what"),
+    [
+        (criterion(""), r"$.criterion[0]", "exactly one of"),
+        (criterion('vector = "v_A"\nangular = "omega_2"'), r"$.criterion[0]", "exactly one of"),
+        (criterion('vector = "v_A"\npoint = 3'), r"$.criterion[0].point", "did you mean points?"),
+        (criterion('scale = "kq"'), r"$.criterion[0].scale", "kL"),
+        (criterion('vector = "v_A"').replace("1.0", "-1.0"), r"$.criterion[0].points", "greater than 0"),
+        (criterion('vector = "v_A"') * 2, r"$.criterion[1].id", "there already"),
+        (
+            "[tolerance]\npartial_factor = 0.5\n" + criterion('vector = "v_A"'),
+            r"$.tolerance.partial_factor",
+            "1",
+        ),
+        ("criterion = []\n", r"$.criterion", "at least 1"),
+    ],
+)
+def test_a_fault_is_told_with_its_path(rubric, text, where, what):
+    with pytest.raises(AuthoredFileError) as caught:
+        rubric(text)
+    assert where in caught.value.message
+    assert what in caught.value.message
+
+
+def test_names_that_the_mechanism_does_not_have_are_faults(rubric):
+    found = rubric(criterion('vector = "v_X"') + criterion('angular = "omega_9"', "w"))
+    assignment = load_assignment("pump")
+    construction = construction_of(assignment.mechanism(assignment.variants()[:1]))
+    faults = [finding.path for finding in check_rubric(found, construction)]
+    assert faults == ["$.criterion[0].vector", "$.criterion[1].angular"]
+
+
+def test_an_assignment_with_a_rubric_of_another_mechanism_is_refused(tmp_path):
+    text = (library() / "press.assignment.toml").read_text(encoding="utf-8")
+    path = tmp_path / "mixed.assignment.toml"
+    path.write_text(text.replace('rubric = "press"', 'rubric = "pump"'), encoding="utf-8")
+    with pytest.raises(AuthoredFileError, match="v_CA is not in this mechanism"):
+        rubric_of(load_assignment(str(path)))
+
+
+def test_an_unknown_rubric_is_a_wrong_call():
+    with pytest.raises(CallError, match="no rubric 'none'"):
+        load_rubric("none")
+
+
+def test_a_rubric_file_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(AuthoredFileError, match="no such file"):
+        load_rubric(str(tmp_path / "none.toml"))
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_every_built_in_assignment_has_a_rubric_in_three_languages(name):
+    found = rubric_of(load_assignment(name))
+    for one in found.criterion:
+        assert all(one.title.in_language(language) for language in ("en", "ro", "ru"))
+        assert one.title.ro
+        assert one.title.ru
