@@ -1,8 +1,11 @@
 """Records of what was read, with confidences and reasons."""
 
+import math
+
 import numpy as np
 
 from grader.reading import confidence
+from grader.reading.expected import Edge
 from grader.reading.fitting import Fit
 from grader.reading.plans import Plan
 from grader.reading.sketch import Sketch
@@ -22,9 +25,11 @@ def figure_of_sketch(sketch: Sketch) -> Figure:
     return Figure(nodes, {})
 
 
-def figure_of_plan(plan: Plan, figure: str) -> tuple[Figure, list[Unread]]:
-    """Nodes and vectors of a plan; what is not drawn, with the reason."""
-    del figure
+def figure_of_plan(plan: Plan, scale_se: float) -> tuple[Figure, list[Unread]]:
+    """Nodes and vectors of a plan; what is not drawn, with the reason.
+
+    Arguments: `scale_se` is the sheet's relative standard error of lengths.
+    """
     names = plan.found.expected.names
     fit = plan.fit
     sure = _node_confidence(plan, fit)
@@ -34,7 +39,7 @@ def figure_of_plan(plan: Plan, figure: str) -> tuple[Figure, list[Unread]]:
         for index, name in enumerate(names)
         if name not in absent and np.isfinite(fit.at[index])
     }
-    vectors, unread = _vectors(plan, fit, sure)
+    vectors, unread = _vectors(plan, fit, sure, scale_se)
     unread.extend(Unread(name, reason) for name, reason in absent.items())
     for vector in plan.hypothesis.drawing.construction.vectors_of(figure_name(plan)):
         gone = next((absent[end] for end in (vector.head, vector.tail) if end in absent), None)
@@ -65,7 +70,9 @@ def _node_confidence(plan: Plan, fit: Fit) -> FloatArray:
     return np.asarray(np.minimum(named * placed * support, confidence.HIGHEST))
 
 
-def _vectors(plan: Plan, fit: Fit, sure: FloatArray) -> tuple[dict[str, ReadVector], list[Unread]]:
+def _vectors(
+    plan: Plan, fit: Fit, sure: FloatArray, scale_se: float
+) -> tuple[dict[str, ReadVector], list[Unread]]:
     vectors: dict[str, ReadVector] = {}
     unread: list[Unread] = []
     for index, edge in enumerate(plan.found.expected.edges):
@@ -78,20 +85,22 @@ def _vectors(plan: Plan, fit: Fit, sure: FloatArray) -> tuple[dict[str, ReadVect
         if plan.found.shared[index]:
             off = float(np.abs(fit.residual_mm[index]).max())
             sureness = min(sureness, confidence.SHARED_CLOSELY if off < CLOSE_MM else confidence.SHARED_STROKE)
-        vectors[edge.name] = _vector(fit, edge.tail, edge.head, span, sureness)
+        vectors[edge.name] = _vector(fit, edge, span, sureness, scale_se)
     return vectors, unread
 
 
-def _vector(fit: Fit, tail: int, head: int, span: complex, sureness: float) -> ReadVector:
+def _vector(fit: Fit, edge: Edge, span: complex, sureness: float, scale_se: float) -> ReadVector:
     """Length and direction node to node, errors from the joint covariance of the two."""
     difference = np.zeros((2, fit.cov.shape[0]))
     for axis in (0, 1):
-        difference[axis, 2 * head + axis], difference[axis, 2 * tail + axis] = 1.0, -1.0
+        difference[axis, 2 * edge.head + axis], difference[axis, 2 * edge.tail + axis] = 1.0, -1.0
     cov = difference @ fit.cov @ difference.T
     length = abs(span)
     along = np.array([span.real, span.imag]) / max(length, 1e-9)
     across = np.array([-along[1], along[0]])
     se_along, se_across = (float(np.sqrt(max(axis @ cov @ axis, 0.0))) for axis in (along, across))
+    se_along = float(np.hypot(se_along, scale_se * length))
     se_deg = float(np.degrees(np.arctan2(se_across, max(length, 1e-9))))
     direction = float(np.degrees(np.angle(span)) % 360.0) if length > se_across else None
+    sureness *= math.erf(confidence.NEAR_MM / (math.sqrt(2.0) * max(scale_se * length, 1e-6)))
     return ReadVector(length, se_along, direction, se_deg, sureness)

@@ -28,6 +28,8 @@ LEAST_PLAN = 12.0
 """Nats: what less is explained by may be chance."""
 
 CLEAR = 0.85
+SAME_SCALE = 0.95
+WILD = 3.0
 
 Given = dict[str, ComplexArray]
 
@@ -69,9 +71,9 @@ def read_figures(  # noqa: PLR0913 - what is known of the drawing
         if sketch is not None and sketch.score >= LEAST_SKETCH:
             page.sketch = sketch
     drawing = own[0]
-    velocity = _find(pages, drawing, VELOCITY_PLAN, {})
+    velocity = _find(pages, [drawing], VELOCITY_PLAN, {})
     known = {} if velocity is None else _nodes(velocity)
-    paced = drawing if velocity is None else _paced(drawing, known)
+    paced = [drawing] if velocity is None else _paced(drawing, known)
     if _asks_accelerations(wanted, drawing):
         _find(pages, paced, ACCELERATION_PLAN, known)
     return _readings(pages, drawing, wanted)
@@ -108,20 +110,23 @@ def _turned(page: _Page, pages: Sequence[_Page], drawing: Drawing) -> Drawing:
     return Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(turn)})
 
 
-def _find(pages: Sequence[_Page], drawing: Drawing, figure: str, known: Mapping[str, ComplexArray]) -> Plan | None:
-    """The plan on the sheet that explains it best, kept there."""
+def _find(
+    pages: Sequence[_Page], paced: Sequence[Drawing], figure: str, known: Mapping[str, ComplexArray]
+) -> Plan | None:
+    """The plan on the sheet that explains it best, kept there. `paced`: the drawing at likely scales."""
     laid = []
     for page in pages:
         given = {**_given(page, pages), **known}
-        plans = regular_plans(page.lines, _turned(page, pages, drawing), figure, given)
-        if plans:
-            laid.append((page, given, plans))
+        for drawing in paced:
+            plans = regular_plans(page.lines, _turned(page, pages, drawing), figure, given)
+            if plans:
+                laid.append((page, given, plans))
     laid.sort(key=lambda one: -one[2][0].score)
     # Where no sheet shows the plan as it should be, a mistaken one may be on either.
     clear = bool(laid) and laid[0][2][0].place.score > CLEAR
     best: tuple[_Page, Plan] | None = None
     for page, given, plans in laid[:1] if clear else laid:
-        plan = best_plan(plans, page.lines, _turned(page, pages, drawing), figure, given)
+        plan = best_plan(plans, page.lines, figure, given)
         if plan is not None and (best is None or plan.score > best[1].score):
             best = page, plan
     if best is None or best[1].score < LEAST_PLAN:
@@ -134,15 +139,23 @@ def _nodes(plan: Plan) -> Given:
     return {name: np.asarray(at) for name, at in zip(plan.found.expected.names, plan.fit.at, strict=True)}
 
 
-def _paced(drawing: Drawing, at: Given) -> Drawing:
-    """The drawing at the velocity scale that the drawn plan follows, whatever was declared."""
+def _paced(drawing: Drawing, at: Given) -> list[Drawing]:
+    """The drawing at the velocity scale that the drawn plan follows, and at the one declared.
+
+    Normal components are taken from drawn velocities: with a wrong scale they come out wrong.
+    """
     vectors = [v for v in drawing.construction.vectors_of(VELOCITY_PLAN) if v.name in drawing.parameters]
+    declared = float(np.ravel(drawing.parameters["kv"])[0])
     for vector in vectors:
         real = float(np.ravel(drawing.parameters[vector.name])[0])
         drawn = abs(complex(at[vector.head] - at[vector.tail]))
         if drawn > 1.0 and real:
-            return Drawing(drawing.construction, {**drawing.parameters, "kv": np.array([abs(real) / drawn])})
-    return drawing
+            followed = abs(real) / drawn
+            if SAME_SCALE < followed / declared < 1.0 / SAME_SCALE:
+                return [drawing]
+            own = Drawing(drawing.construction, {**drawing.parameters, "kv": np.array([followed])})
+            return [own, drawing] if followed / declared < WILD and declared / followed < WILD else [own]
+    return [drawing]
 
 
 def _readings(pages: Sequence[_Page], drawing: Drawing, wanted: Collection[str]) -> list[Reading]:
@@ -155,7 +168,7 @@ def _readings(pages: Sequence[_Page], drawing: Drawing, wanted: Collection[str])
         if page.sketch is not None:
             figures[MECHANISM] = figure_of_sketch(page.sketch)
         for figure, plan in page.plans.items():
-            figures[figure], missing = figure_of_plan(plan, figure)
+            figures[figure], missing = figure_of_plan(plan, page.sheet.scale_se)
             unread.extend(one for one in missing if not wanted or one.name in wanted)
         named.update(name for one in figures.values() for name in (*one.nodes, *one.vectors))
         named.update(one.name for one in unread)
