@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from grader.labels import Label, labels_of
 from grader.outcomes import Outcome
 from grader.records import Box, FloatArray, GreyImage, Page, Reading, Sheet
 from grader.scene import (
@@ -24,10 +25,8 @@ from grader.scene import (
     Arrow,
     Dot,
     Ghost,
-    Label,
     Picture,
     Scene,
-    labels_of,
     scene_of,
 )
 from reference.construction import Vector

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from markupsafe import Markup
 
+from grader.labels import Label, labels_of
 from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Box
 from grader.scene import (
     ARROW_WIDTH_MM,
@@ -18,10 +19,8 @@ from grader.scene import (
     Arrow,
     Dot,
     Ghost,
-    Label,
     Picture,
     Scene,
-    labels_of,
 )
 
 CLOSE_UP_MARGIN_MM = 12.0

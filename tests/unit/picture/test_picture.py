@@ -4,10 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
+from grader.labels import labels_of
 from grader.outcomes import Outcome, Quantity, Tolerance
 from grader.picture import overlay, paint
 from grader.records import Figure, Page, Reading, ReadNode, ReadVector, Sheet
-from grader.scene import COLOURS, MARKS, Arrow, Ghost, Scene, labels_of, scene_of
+from grader.scene import COLOURS, MARKS, Arrow, Ghost, Scene, scene_of
 from reference.construction import Vector
 
 PAGE_MM = (420.0, 297.0)
