@@ -78,6 +78,7 @@ class Desk:
 
     def _plain(self, sketch: Sketch, sheet: DrawnSheet, number: tuple[int, int]) -> dict[str, Any]:
         written: dict[str, str] = {}
+        page.print_squares(sketch)
         frame = page.draw_frame(sketch)
         room, taken = self._room()
         corner = frame.corners[2] if frame.corners else complex(room[0] + room[2], -room[1] - room[3])

@@ -112,6 +112,7 @@ def any_page(rng: Rng) -> PageStyle:
         vector_labels=float(rng.choice([0.0, 0.5, 1.0])),
         end_labels=float(rng.choice([0.0, 0.5, 1.0])),
         bar_over_vectors=bool(rng.random() < 0.2),
+        squared_mm=float(rng.choice([0.0, 5.0], p=[0.95, 0.05])),
     )
 
 
@@ -148,6 +149,7 @@ def _copier(rng: Rng, scan: Scan) -> Scan:
     return replace(
         scan, mode="bilevel", container=rng.choice(["tif", "png"]), dpi=max(scan.dpi, 200.0),
         copy_scale=float(rng.choice([1.0, 0.98, 0.995, 1.01])), dust=scan.dust * 3,
+        streaks=int(rng.choice([0, 1, 3], p=[0.7, 0.2, 0.1])),
         dpi_tag=max(scan.dpi, 200.0) if scan.dpi_tag == scan.dpi else scan.dpi_tag,
     )
 
@@ -156,6 +158,7 @@ def _phone(rng: Rng, scan: Scan) -> Scan:
     desk: Colour = ((128, 96, 66), (60, 58, 56), (206, 200, 190), (92, 104, 112))[rng.integers(4)]
     return replace(
         scan, mode="colour", container="jpg", dpi=float(rng.uniform(190.0, 235.0)), dpi_tag=72.0, bed=desk,
+        curl_mm=float(rng.choice([0.0, rng.uniform(0.2, 1.2)], p=[0.8, 0.2])),
         tilt_deg=float(rng.uniform(1.0, 11.0)), lens_k1=float(rng.normal(0.0, 0.02)),
         shading=float(rng.uniform(0.1, 0.3)), shadow=float(rng.uniform(0.0, 0.35)),
         blur_px=float(rng.uniform(0.6, 1.2)), jpeg_quality=int(rng.integers(75, 94)),

@@ -9,8 +9,8 @@ from grader.records import Box
 from grader.simulation import wording
 from grader.simulation.figures import extent
 from grader.simulation.hand import DrawnFigure, Task
-from grader.simulation.sketch import Sketch
-from grader.simulation.strokes import Rng
+from grader.simulation.sketch import SQUARES_LAYER, Sketch
+from grader.simulation.strokes import Pen, Rng, straight
 
 PAPER_MM = (420.0, 297.0)
 FRAMES_MM: Mapping[str, Box] = {
@@ -30,6 +30,21 @@ class Frame:
     kind: str
     by: str
     corners: tuple[complex, ...] | None
+
+
+def print_squares(sketch: Sketch) -> None:
+    """The fine lines of squared paper, printed a little askew to its edges."""
+    pitch = sketch.page.squared_mm
+    if pitch <= 0.0:
+        return
+    pen = Pen(SQUARES_LAYER, 0.12, 0.6, 0.0, 0.0)
+    turn = complex(np.exp(1j * sketch.rng.normal(0.0, 0.003)))
+    start = sketch.rng.uniform(0.0, pitch, 2)
+    w, h = PAPER_MM
+    lines = [(complex(x, 4.0), complex(x, -h - 4.0)) for x in np.arange(start[0], w, pitch)]
+    lines += [(complex(-4.0, -y), complex(w + 4.0, -y)) for y in np.arange(start[1], h, pitch)]
+    for p, q in lines:
+        sketch.strokes.append(straight(sketch.rng, pen, p * turn, q * turn))
 
 
 def draw_frame(sketch: Sketch) -> Frame:

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from grader.records import FloatArray, GreyImage
 from grader.simulation.raster import render
 from grader.simulation.settings import Colour, PenStyle, Scan
-from grader.simulation.sketch import MAIN_LAYER, PLAN_LAYER, PRINT_LAYER
+from grader.simulation.sketch import MAIN_LAYER, PLAN_LAYER, PRINT_LAYER, SQUARES_LAYER
 from grader.simulation.strokes import Rng, Stroke
 from grader.simulation.view import View
 
 Float32Array = NDArray[np.float32]
 _TONER: Colour = (22, 22, 24)
+_SQUARES: Colour = (150, 190, 225)
 _COARSE = 8
 """Pixels per sample of the soft faults (light, smudges, folds)."""
 
@@ -83,14 +84,15 @@ def _inks(
 ) -> list[tuple[Float32Array, Colour]]:
     """Coverage 0..1 and colour of each layer that is on the sheet."""
     colours: Mapping[str, Colour] = {
-        MAIN_LAYER: pens.colour, PLAN_LAYER: pens.plan_colour or pens.colour, PRINT_LAYER: _TONER
+        MAIN_LAYER: pens.colour, PLAN_LAYER: pens.plan_colour or pens.colour, PRINT_LAYER: _TONER,
+        SQUARES_LAYER: _SQUARES,
     }
     inks = []
     for layer, colour in colours.items():
         own = [stroke for stroke in strokes if stroke.layer == layer]
         if own:
             cover = render(own, view.to_px, view.size).astype(np.float32) / np.float32(255.0)
-            if layer != PRINT_LAYER and pens.grain > 0:
+            if layer in {MAIN_LAYER, PLAN_LAYER} and pens.grain > 0:
                 _grain(cover, pens.grain, view.px_per_mm, rng)
             inks.append((cover, colour))
     return inks
@@ -119,7 +121,7 @@ def _printed(background: Background, view: View) -> Float32Array:
         page = np.asarray(cv2.resize(page, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     pitch = np.array([page.shape[1] / background.grey.shape[1], page.shape[0] / background.grey.shape[0]])
     pitch = pitch * background.px_per_mm
-    if view.k1 == 0.0:
+    if view.k1 == 0.0 and view.curl_mm == 0.0:
         to_page = np.array([[pitch[0], 0.0, -0.5], [0.0, pitch[1], -0.5], [0.0, 0.0, 1.0]])
         warp = view.homography @ np.linalg.inv(to_page)
         seen = cv2.warpPerspective(page, warp, view.size[::-1], flags=cv2.INTER_LINEAR, borderValue=255)
@@ -266,6 +268,10 @@ def _dust(scan: Scan, size: tuple[int, int], rng: Rng) -> list[_Speck]:
     """Specks and hairs, dark or bright."""
     pitch = scan.dpi / 25.4
     specks = []
+    for _ in range(scan.streaks):
+        x = rng.uniform(0.0, size[1])
+        line = np.array([[x, -9.0], [x + rng.normal(0.0, 0.5), size[0] + 9.0]])
+        specks.append(_Speck(line, 1.0, float(rng.uniform(110.0, 200.0))))
     for _ in range(scan.dust):
         place = rng.uniform(0.0, 1.0, 2) * np.array([size[1], size[0]])
         value = float(rng.choice([60.0, 120.0, 180.0, 252.0]))

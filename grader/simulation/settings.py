@@ -40,7 +40,7 @@ class Student:
     kv_ratio, ka_ratio : scales used, as a multiple of the assignment's rule
     similarity : third points of plates by similar triangles; None as the assignment says
     turn_deg : how far the sketch of the mechanism is turned
-    mistakes : codes of mistakes to make, each where it is first possible, or ``at=`` chosen by lot
+    mistakes : codes of mistakes to make, each at a step chosen by lot among those that admit it
     sheets : 1 for all figures on one sheet, 2 for velocities and accelerations apart
     vectors_on_mechanism : v_A and a_A drawn at the crank's pin as well
     altitude : right-triangle construction of a normal component on the mechanism
@@ -103,7 +103,10 @@ class PenStyle:
 
 @dataclass(frozen=True, slots=True)
 class PageStyle:
-    """The page: frame, title block, language, what is written."""
+    """The page: frame, title block, language, what is written.
+
+    `squared_mm` is the pitch of paper with printed squares, 0 for plain paper.
+    """
 
     frame: Literal["iso", "gost", "none"] = "iso"
     frame_by: Literal["hand", "print"] = "hand"
@@ -117,6 +120,7 @@ class PageStyle:
     vector_labels: float = 0.6
     end_labels: float = 0.3
     bar_over_vectors: bool = False
+    squared_mm: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +136,8 @@ class Scan:
     stretch : unequal scale, standard deviation of x and y against the dpi
     copy_scale : a copier's enlargement of the drawing
     dpi_tag : what the file says; None for nothing
+    streaks : faint lines along the whole image from dirt on the glass
+    curl_mm : how far a photographed sheet's bow moves its middle against a flat one
     """
 
     device: Literal["flatbed", "copier", "phone"] = "flatbed"
@@ -152,11 +158,13 @@ class Scan:
     tint_grain: float = 1.5
     bed: Colour = (236, 238, 240)
     dust: int = 12
+    streaks: int = 0
     fold: bool = False
     show_through: float = 0.0
     punched: bool = False
     lens_k1: float = 0.0
     tilt_deg: float = 0.0
+    curl_mm: float = 0.0
     shadow: float = 0.0
 
 

@@ -10,7 +10,7 @@ from grader.simulation.settings import Hand, PageStyle, PenStyle
 from grader.simulation.strokes import ComplexArray, Dash, Pen, Rng, Stroke, dashed, inked, straight
 
 Segment = tuple[complex, complex]
-PRINT_LAYER, MAIN_LAYER, PLAN_LAYER = "print", "main", "plan"
+PRINT_LAYER, MAIN_LAYER, PLAN_LAYER, SQUARES_LAYER = "print", "main", "plan", "squares"
 CHAIN = Dash(9.0, 1.6, 0.5)
 DASHES = Dash(4.0, 1.8)
 

@@ -109,6 +109,7 @@ def scan_truth(view: View, frame: Frame | None, settings: Settings) -> dict[str,
     return {
         "homography": [[float(cell) for cell in row] for row in view.homography],
         "lens": lens,
+        "curl_mm": view.curl_mm,
         "grid_mm_px": [[a.tolist(), np.round(b, 4).tolist()] for a, b in zip(grid, pixels, strict=True)],
         "image_size": [view.size[1], view.size[0]],
         "px_per_mm": round(view.px_per_mm, 5),

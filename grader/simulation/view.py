@@ -31,6 +31,7 @@ class View:
     k1 : of the lens, 0 for none
     turns : quarter turns counter-clockwise by which the stored image is turned
     paper_mm : the sheet's outline x0, y0, x1, y1 in its own millimetres
+    curl_mm : a bow across the sheet, on top of the homography: its middle lies so far higher
     """
 
     homography: FloatArray
@@ -38,6 +39,7 @@ class View:
     k1: float
     turns: int
     paper_mm: tuple[float, float, float, float]
+    curl_mm: float = 0.0
 
     @property
     def centre(self) -> FloatArray:
@@ -51,7 +53,7 @@ class View:
 
     def to_px(self, xy_mm: FloatArray) -> FloatArray:
         """Sheet millimetres (n, 2) to stored pixels (n, 2)."""
-        flat = projected(self.homography, xy_mm)
+        flat = projected(self.homography, xy_mm - self._bow(xy_mm))
         if self.k1 == 0.0:
             return flat
         arm = flat - self.centre
@@ -66,7 +68,13 @@ class View:
         if self.k1 != 0.0:
             arm = arm * (1.0 + self.k1 * (arm**2).sum(axis=1, keepdims=True) / self.radius**2)
         back = np.asarray(np.linalg.inv(self.homography), dtype=np.float64)
-        return projected(back, np.asarray(arm + self.centre))
+        flat = projected(back, np.asarray(arm + self.centre))
+        return np.asarray(flat + self._bow(flat))
+
+    def _bow(self, xy_mm: FloatArray) -> FloatArray:
+        """How far the sheet's bow lifts its points, mm along y."""
+        lift = self.curl_mm * np.sin(np.pi * np.clip(xy_mm[:, 0] / PAPER_MM[0], 0.0, 1.0))
+        return np.column_stack([np.zeros_like(lift), lift])
 
     @property
     def px_per_mm(self) -> float:
@@ -94,8 +102,9 @@ def view_of(scan: Scan, rng: Rng) -> View:
     w, h = PAPER_MM
     grow = (1.0 / scan.copy_scale - 1.0) / 2.0
     paper = (-grow * w, -grow * h, (1 + grow) * w, (1 + grow) * h)
-    k1 = scan.lens_k1 if scan.device == "phone" else 0.0
-    return View(homography, size, k1, scan.quarter_turns % 4, paper)
+    phone = scan.device == "phone"
+    k1, curl = (scan.lens_k1, scan.curl_mm) if phone else (0.0, 0.0)
+    return View(homography, size, k1, scan.quarter_turns % 4, paper, curl)
 
 
 def _glass(scan: Scan, rng: Rng) -> tuple[FloatArray, tuple[int, int]]:
