@@ -52,6 +52,10 @@ class Flat:
         share = _sampled(self.grey, x, y) / np.maximum(level, np.float32(1.0))[:, None]
         return np.clip(np.float32(1.0) - share, np.float32(0.0), np.float32(1.0))
 
+    def brightness(self, x: FloatArray, y: FloatArray) -> Float32Array:
+        """Pixels as stored, 0..255, at points (r, m) given in pixels."""
+        return _sampled(self.grey, x, y)
+
     def _paper_at(self, x: FloatArray, y: FloatArray) -> Float32Array:
         """(r,) brightness of the paper at points given in pixels."""
         reduced = (x + 0.5) / self.step[0] - 0.5, (y + 0.5) / self.step[1] - 0.5
@@ -61,7 +65,7 @@ class Flat:
         """Contrast of the whole page at `scale` times its resolution, 0 = paper .. 255 = black."""
         small = shrink(self.grey, scale)
         level = cv2.resize(self.paper, (small.shape[1], small.shape[0]), interpolation=cv2.INTER_LINEAR)
-        return np.asarray(cv2.subtract(255, cv2.divide(small, level, scale=255)), dtype=np.uint8)
+        return np.asarray(255 - np.asarray(cv2.divide(small, level, scale=255)), dtype=np.uint8)
 
 
 def flatten(grey: GreyImage) -> Flat:
@@ -110,7 +114,7 @@ class Cuts:
         return self.right - self.left
 
 
-def cut_across(  # noqa: PLR0913
+def cut_across(  # noqa: PLR0913, PLR0917
     flat: Flat,
     ends: FloatArray,
     count: int,
@@ -130,7 +134,7 @@ def cut_across(  # noqa: PLR0913
     u = span / length[:, None]
     normal = np.column_stack([-u[:, 1], u[:, 0]])
     half = int(np.ceil(reach_px / _ACROSS_STEP_PX))
-    across = np.arange(-half, half + 1) * _ACROSS_STEP_PX
+    across = np.asarray(np.arange(-half, half + 1) * _ACROSS_STEP_PX, dtype=np.float64)
     middle = ends[:, None, 0] + share[None, :, None] * span[:, None, :]
     contrast = _contrast_across(flat, middle, normal, across)
     k, n, m = contrast.shape
@@ -160,9 +164,7 @@ def _sampled(image: GreyImage, x: FloatArray | Float32Array, y: FloatArray | Flo
     result = np.empty(x.shape, dtype=np.float32)
     for first in range(0, len(x), _REMAP_ROWS):
         part = slice(first, first + _REMAP_ROWS)
-        result[part] = cv2.remap(
-            image, x[part], y[part], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-        )
+        result[part] = cv2.remap(image, x[part], y[part], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return result
 
 

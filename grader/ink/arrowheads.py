@@ -63,7 +63,7 @@ class Own:
     clear: FloatArray
 
 
-def _best_shift(  # noqa: PLR0913
+def _best_shift(  # noqa: PLR0913, PLR0917
     flat: Flat, strokes: Strokes, tips: FloatArray, outward: FloatArray, own: Own, mm_to_px: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """(score of the best head at each end, 0 for none; how far along the stroke its tip is, mm)."""
@@ -84,7 +84,7 @@ def _best_shift(  # noqa: PLR0913
 
 @dataclass(frozen=True, slots=True)
 class Passing:
-    """Strokes that pass a tip and go on: (p,) row of the tip, (p,) angle of the way on, from straight back."""
+    """Strokes that pass a tip and go on: (p,) row of the tip, (p,) angle of the way from straight back."""
 
     row: NDArray[np.intp]
     angle: FloatArray
@@ -118,13 +118,15 @@ def _clear_of_others(runs: FloatArray, angles: FloatArray, others: Passing, clea
 
 
 def _barb(runs: FloatArray, clear_of_others: BoolArray, clear: FloatArray) -> FloatArray:
-    """(k, 2) length and angle in degrees of the barb on one side; zeros for none, or where another
-    stroke not known of spoils the side."""
-    sideways = np.sin(np.radians(_ANGLE_DEG))[None, :]
+    """(k, 2) length and angle in degrees of the barb on one side.
+
+    Zeros for none, or where another stroke not known of spoils the side.
+    """
+    sideways = np.asarray(np.sin(np.radians(_ANGLE_DEG)))[None, :]
     barb = (
         (runs >= _BARB_MM[0]) & (runs <= _BARB_MM[1]) & (runs * sideways >= clear[:, None]) & clear_of_others
     )
-    spoiled = ((runs > _BARB_MM[1]) & clear_of_others).any(axis=1)
+    spoiled = np.asarray(((runs > _BARB_MM[1]) & clear_of_others).any(axis=1))
     length = np.where(barb, runs, 0.0).max(axis=1)
     longest = barb & (runs >= 0.8 * length[:, None])
     angle = (longest * _ANGLE_DEG).sum(axis=1) / np.maximum(longest.sum(axis=1), 1)
@@ -139,7 +141,7 @@ def _symmetric(left: FloatArray, right: FloatArray) -> FloatArray:
     return np.where(both, score, 0.0)
 
 
-def _runs(  # noqa: PLR0913
+def _runs(  # noqa: PLR0913, PLR0917
     flat: Flat,
     tips: FloatArray,
     outward: FloatArray,

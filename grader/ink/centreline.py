@@ -129,8 +129,11 @@ def _lone_width(cuts: Cuts, weight: FloatArray, width: FloatArray) -> FloatArray
 
 
 def standard_errors(fitted: Fitted, px_per_mm: float) -> tuple[FloatArray, FloatArray]:
-    """(across at the middle in px, direction in radians): the wobble is averaged only over pieces
-    longer than its own waves, and the pixels' and paper's own error stays."""
+    """(across at the middle in px, direction in radians), (k,) each.
+
+    The wobble is averaged only over pieces longer than its own waves, and the pixels' and paper's
+    own error stays.
+    """
     length = fitted.length
     independent = np.maximum(1.0, fitted.support * length / (_WOBBLE_MM * px_per_mm))
     noise = np.maximum(fitted.noise, _FLOOR_MM * px_per_mm)

@@ -91,13 +91,13 @@ def _meeting_points(seeds: Seeds, where: BoolArray) -> FloatArray:
     x = ((column[:, None] + reach[None, :] * gx[:, None]) / _CELL_PX).astype(np.intp)
     y = ((row[:, None] + reach[None, :] * gy[:, None]) / _CELL_PX).astype(np.intp)
     inside = (x >= 0) & (y >= 0) & (x < wide) & (y < high)
-    votes = np.bincount((y * wide + x)[inside], minlength=high * wide).reshape(high, wide).astype(np.float32)
-    votes = cv2.boxFilter(votes, -1, (3, 3), normalize=False)
+    counted = np.bincount((y * wide + x)[inside], minlength=high * wide).reshape(high, wide)
+    votes = np.asarray(cv2.boxFilter(counted.astype(np.float32), -1, (3, 3), normalize=False))
     full = 2.0 * 2.0 * np.pi * _RADIUS_MM[0] * PX_PER_MM * 3.0 * _CELL_PX
     peak = (votes == cv2.dilate(votes, np.ones((5, 5), np.uint8))) & (votes > _VOTES * full)
     at = np.argwhere(peak)
     order = np.argsort(-votes[at[:, 0], at[:, 1]])[:_MOST]
-    return (at[order][:, ::-1] + 0.5) * _CELL_PX
+    return np.asarray((at[order][:, ::-1] + 0.5) * _CELL_PX, dtype=np.float64)
 
 
 def _refined(flat: Flat, centres: FloatArray, px_per_mm: float) -> FloatArray:
@@ -149,8 +149,10 @@ def _best_ring(ring: FloatArray) -> np.ndarray:
 def _ring_middle(
     polar: FloatArray, inked: BoolArray, radial: FloatArray, radius: FloatArray, px_per_mm: float
 ) -> tuple[FloatArray, BoolArray, BoolArray]:
-    """((g, angles) distance of the ring's ink near the radius, where there is such ink, and where a
-    stroke along the ray hides it)."""
+    """Distance of the ring's ink near the radius, (g, angles), and where it is known.
+
+    The third array tells where a stroke along the ray hides the ring.
+    """
     near = np.abs(radial[None, :] - radius[:, None]) <= 0.45 * px_per_mm
     here = inked & near[:, None, :]
     weight = polar * here

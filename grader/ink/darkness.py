@@ -1,6 +1,7 @@
 """A vector drawn over its construction line: the dark part and the light parts are strokes of their own."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grader.ink.centreline import Fitted
 from grader.pixels import Flat
@@ -16,7 +17,7 @@ _LEAST_LIGHT_MM = 1.5
 _LEAST_PART_MM = 2.0
 
 
-def split_by_darkness(flat: Flat, fitted: Fitted, px_per_mm: float) -> tuple[FloatArray, FloatArray]:
+def split_by_darkness(flat: Flat, fitted: Fitted, px_per_mm: float) -> tuple[FloatArray, NDArray[np.intp]]:
     """((m, 2, 2) ends in pixels, (m,) row of the stroke that each part is of).
 
     Light runs at either end of a stroke are cut off it; those of 2 mm and more stay as strokes.

@@ -18,8 +18,11 @@ _WEIGHT_RATIO = 1.35
 
 
 def hatching(strokes: Strokes) -> BoolArray:
-    """Which strokes are hatching: at least five short or seven long parallel ones of like length, each within
-    6 mm of the next, side by side. A plan has no such family."""
+    """Which strokes are hatching.
+
+    At least five short or seven long parallel ones of like length and weight, each within 6 mm of
+    the next, side by side. A plan has no such family.
+    """
     span = strokes.ends[:, 1] - strokes.ends[:, 0]
     length = np.hypot(span[:, 0], span[:, 1])
     rows = np.flatnonzero(length < _LONGEST_MM)

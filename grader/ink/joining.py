@@ -28,8 +28,7 @@ class Pieces:
 
 
 def join(ends: FloatArray, width: FloatArray, off_px: float, gap_px: float) -> Pieces:
-    """Longest first, take in all free pieces that lie within `off_px` of its line without a gap
-    over `gap_px`."""
+    """Join, longest first, all free pieces within `off_px` of its line and no gap over `gap_px`."""
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
     free = np.ones(len(ends), dtype=bool)
     joined: list[FloatArray] = []

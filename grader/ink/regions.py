@@ -108,7 +108,7 @@ def _ruled(ends: FloatArray, sheet: Sheet) -> FloatArray:
     ruled &= (high[:, 0] < right - _EDGE_MM) & (high[:, 1] < bottom - _EDGE_MM)
     lines = join(ends[ruled], np.ones(int(ruled.sum())), _OFF_MM, _BROKEN_MM).ends
     size = np.abs(lines[:, 1] - lines[:, 0]).max(axis=1)
-    return lines[size >= _RULED_MM]
+    return np.asarray(lines[size >= _RULED_MM])
 
 
 def _in_box(points: FloatArray, box: Box) -> BoolArray:
@@ -120,7 +120,7 @@ def _in_box(points: FloatArray, box: Box) -> BoolArray:
 
 def to_mm(sheet: Sheet, points: FloatArray) -> FloatArray:
     """(..., 2) full pixels to sheet millimetres."""
-    return _mapped(np.linalg.inv(sheet.mm_to_px), points)
+    return _mapped(np.asarray(np.linalg.inv(sheet.mm_to_px), dtype=np.float64), points)
 
 
 def to_px(sheet: Sheet, points: FloatArray) -> FloatArray:

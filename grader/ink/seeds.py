@@ -17,7 +17,6 @@ PX_PER_MM = 6.0
 _FAINT = 20
 """Of 255: fainter than a construction line drawn with a hard pencil is paper."""
 _PEAK_WINDOW_PX = 7
-_HALF = 0.5
 _DARK = 0.62
 _DARK_QUANTILE = 0.85
 _POLYGON_PX = 1.0
@@ -101,10 +100,12 @@ def dark_mask(soft: GreyImage, mask: GreyImage) -> GreyImage:
 
 
 def ink_mask(soft: GreyImage) -> GreyImage:
-    """Ink as 1: darker than half of the darkest ink nearby, so that faint and dark strokes both keep
-    their width and neighbours their gap."""
+    """Ink as 1: darker than half of the darkest ink nearby.
+
+    So faint and dark strokes both keep their width, and neighbours their gap.
+    """
     peak = cv2.dilate(soft, np.ones((_PEAK_WINDOW_PX, _PEAK_WINDOW_PX), np.uint8))
-    half = cv2.multiply(peak, _HALF)
+    half = np.asarray(peak) // 2
     return np.asarray(((soft >= half) & (soft >= _FAINT)).astype(np.uint8))
 
 
@@ -130,7 +131,7 @@ def _band_width(mask: GreyImage, edges: FloatArray) -> tuple[FloatArray, FloatAr
     direction /= np.hypot(*direction.T)[:, None]
     normal = np.column_stack([-direction[:, 1], direction[:, 0]])
     points = edges[:, None, 0] + share[None, :, None] * (edges[:, None, 1] - edges[:, None, 0])
-    depth = np.arange(1, _WIDEST_PX + 1)
+    depth = np.arange(1.0, _WIDEST_PX + 1.0)
     both = [_run(mask, points, sign * normal, depth) for sign in (1.0, -1.0)]
     ink_side = np.where(np.median(both[0], axis=1) >= np.median(both[1], axis=1), 1.0, -1.0)
     inner = np.where(ink_side[:, None] > 0, both[0], both[1])

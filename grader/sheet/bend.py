@@ -7,7 +7,15 @@ import numpy as np
 from grader.pixels import Flat, cut_across
 from grader.records import FloatArray, Lens
 from grader.sheet.edges import bright_towards, edge_offsets
-from grader.sheet.fitting import Side, apply, gauss_newton, homography_of, homography_params, log_scale
+from grader.sheet.fitting import (
+    Side,
+    apply,
+    gauss_newton,
+    homography_of,
+    homography_params,
+    inverted,
+    log_scale,
+)
 from grader.sheet.lens import straight
 from grader.sheet.longlines import RIDGE
 
@@ -44,7 +52,7 @@ def find_lens(flat: Flat, stored: FloatArray, sides: list[Side]) -> Lens | None:
     start = np.concatenate([homography_params(stored), [0.0], np.zeros(2 * len(traces))])
 
     def residuals(params: FloatArray) -> FloatArray:
-        inverse = np.linalg.inv(homography_of(params[:8]))
+        inverse = inverted(homography_of(params[:8]))
         own = params[9:].reshape(-1, 2)
         parts = [params[8:9] / _BEND_SE]
         for trace, (offset, tilt) in zip(traces, own, strict=True):
@@ -56,7 +64,7 @@ def find_lens(flat: Flat, stored: FloatArray, sides: list[Side]) -> Lens | None:
     params, jacobian = gauss_newton(residuals, start)
     final = residuals(params)
     inflate = max(1.0, float(final @ final) / (len(final) - len(params)))
-    covariance = np.linalg.pinv(jacobian.T @ jacobian) * inflate
+    covariance: FloatArray = np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * inflate, dtype=np.float64)
     bend = float(params[8])
     if abs(bend) < _WORTH * np.sqrt(covariance[8, 8]):
         return None

@@ -49,6 +49,11 @@ class Fit:
     side_mm: FloatArray
 
 
+def inverted(homography: FloatArray) -> FloatArray:
+    """The inverse homography."""
+    return np.asarray(np.linalg.inv(homography), dtype=np.float64)
+
+
 def apply(homography: FloatArray, points: FloatArray) -> FloatArray:
     """(n, 2) points through a homography."""
     mapped = np.column_stack([points, np.ones(len(points))]) @ homography.T
@@ -68,8 +73,8 @@ def affine_params(homography: FloatArray) -> FloatArray:
     """The nearest scanner's map to a homography, at the sheet's middle."""
     centre = apply(homography, _CENTRE_MM[None, :])[0]
     step = 100.0
-    dx = (apply(homography, (_CENTRE_MM + [step, 0.0])[None, :])[0] - centre) / step
-    dy = (apply(homography, (_CENTRE_MM + [0.0, step])[None, :])[0] - centre) / step
+    dx = (apply(homography, (_CENTRE_MM + np.array([step, 0.0]))[None, :])[0] - centre) / step
+    dy = (apply(homography, (_CENTRE_MM + np.array([0.0, step]))[None, :])[0] - centre) / step
     angle = np.arctan2(dx[1] - dy[0], dx[0] + dy[1])
     c, s = np.cos(angle), np.sin(angle)
     # Rows of diag(sx, sy) R are sx (c, -s) and sy (s, c).
@@ -102,7 +107,7 @@ def fit_sides(
     stated = None if dpi is None or perspective else np.log(np.array(dpi) / _MM_PER_INCH)
 
     def residuals(p: FloatArray) -> FloatArray:
-        inverse = np.linalg.inv(to_matrix(p))
+        inverse = inverted(to_matrix(p))
         parts = [_off(inverse, side) / (side.model.side_se_mm * np.sqrt(_POINTS / 2.0)) for side in sides]
         if stated is not None:
             parts.append((p[:2] - stated) / DPI_SE)
@@ -113,7 +118,7 @@ def fit_sides(
     final = residuals(params)
     freedom = 2 * len(sides) + (2 if stated is not None else 0) - len(params)
     chi2 = float(final @ final)
-    inverse = np.linalg.inv(matrix)
+    inverse = inverted(matrix)
     off = np.array([_off(inverse, side) for side in sides]).reshape(-1, _POINTS)
     inflate = max(1.0, chi2 / max(freedom, 1))
     covariance = np.linalg.pinv(jacobian.T @ jacobian) * inflate

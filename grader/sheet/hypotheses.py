@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from grader.records import FloatArray
-from grader.sheet.fitting import Side, affine_of, affine_params, apply
+from grader.sheet.fitting import Side, affine_of, affine_params, apply, inverted
 from grader.sheet.longlines import RIDGE, STEP, LongLine
 from grader.sheet.models import FRAMES, PAGE_MM, PAPER, Model
 from grader.sheet.upright import drawn_ends, title_block_mm
@@ -166,8 +166,11 @@ def _scan_misfit(params: FloatArray, resolution: Resolution | None) -> float:
 
 
 def _camera_misfit(mm_to_px: FloatArray, shape: tuple[int, int]) -> float:
-    """How unlike a photo of a flat sheet: the two sheet axes must be at right angles and equal in scale
-    before a camera of some focal length (Zhang 2000, principal point at the image's middle)."""
+    """How unlike a photo of a flat sheet.
+
+    The sheet's axes must be at right angles and equal in scale before a camera of some focal length
+    (Zhang 2000, principal point at the image's middle).
+    """
     high, wide = shape
     long_side = max(high, wide)
     shift = np.array([[1.0, 0.0, -wide / 2.0], [0.0, 1.0, -high / 2.0], [0.0, 0.0, 1.0]])
@@ -192,7 +195,7 @@ def _worth(side: Side) -> float:
 
 def match_sides(mm_to_px: FloatArray, lines: list[LongLine]) -> tuple[tuple[Side, ...], Model | None]:
     """Long lines that lie on a side of the paper or of one frame, and which frame that is."""
-    inverse = np.linalg.inv(mm_to_px)
+    inverse = inverted(mm_to_px)
     by_model = {model.name: on_sides(inverse, model, lines) for model in (PAPER, *FRAMES)}
     frame = max(FRAMES, key=lambda model: len(by_model[model.name]))
     frame_sides = by_model[frame.name]

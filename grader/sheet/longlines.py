@@ -104,7 +104,8 @@ def _bright_side(image: GreyImage, ends: FloatArray) -> FloatArray:
     column = np.clip(np.rint(x), 0, wide - 1).astype(int)
 
     def level(shift: float) -> FloatArray:
-        return image[np.clip(np.rint(y + shift), 0, high - 1).astype(int), column].mean(axis=1)
+        row = np.clip(np.rint(y + shift), 0, high - 1).astype(int)
+        return np.asarray(image[row, column].mean(axis=1), dtype=np.float64)
 
     return np.where(level(1.2) >= level(-1.2), 1.0, -1.0)
 
@@ -202,7 +203,7 @@ def _settled_step(flat: Flat, line: LongLine, full_per_small: float) -> LongLine
     """A border between bright and dark, through its steepest places at full resolution."""
     bright = bright_towards(line.ends, line.bright, across=line.across)
     offset = edge_offsets(flat, line.ends, bright, _CUTS, _STEP_REACH * full_per_small)
-    along = (np.arange(_CUTS) + 0.5) * (line.length / _CUTS)
+    along = np.asarray((np.arange(_CUTS) + 0.5) * (line.length / _CUTS), dtype=np.float64)
     known = np.isfinite(offset)
     if known.sum() < _LEAST_CUTS:
         return line

@@ -7,7 +7,7 @@ import numpy as np
 from grader.pixels import Flat, flatten
 from grader.records import FloatArray, Page, Problem, Sheet, Unread
 from grader.sheet.bend import find_lens
-from grader.sheet.fitting import Fit, affine_of, apply, fit_sides
+from grader.sheet.fitting import Fit, affine_of, apply, fit_sides, inverted
 from grader.sheet.hypotheses import Hypothesis, Resolution, hypotheses, on_sides
 from grader.sheet.longlines import LongLine, long_lines
 from grader.sheet.models import PAGE_MM, PAPER, Model, drawable
@@ -22,7 +22,6 @@ _A3_SLACK_MM = (40.0, 22.0)
 """A scanner's window may be this much larger than the sheet; paper that is cut off is not A3."""
 _A3_SHORT_MM = 5.0
 _WINDOW_SE = 0.004
-_DPI_OFF = 0.02
 _BAD_FIT = 4.0
 _NO_FIT_MM = 1.5
 _VAGUE_SE = 0.02
@@ -47,7 +46,9 @@ def register_plain(page: Page) -> Sheet | Unread:
     ranked = hypotheses(lines, shape, resolution)
     if ranked:
         sheet = _from_lines(page, ranked[0], lines, dpi, problems)
-        return _with_lens(flat, sheet, ranked[0]) if sheet and ranked[0].perspective else sheet
+        if isinstance(sheet, Unread) or not ranked[0].perspective:
+            return sheet
+        return _with_lens(flat, sheet, ranked[0])
     if resolution is None:
         return Unread("sheet", "no drawing frame, no paper edges and no resolution that fits A3 were found")
     return _from_resolution(page, resolution, lines, problems)
@@ -186,7 +187,7 @@ def _from_resolution(
 
 def _placed(matrix: FloatArray, resolution: Resolution, lines: list[LongLine], scale_se: float) -> Fit:
     """The map moved to the paper's edges, where one to three of them are seen."""
-    edges = on_sides(np.linalg.inv(matrix), PAPER, lines, _EDGE_WITHIN_MM)
+    edges = on_sides(inverted(matrix), PAPER, lines, _EDGE_WITHIN_MM)
     if not edges:
         return Fit(matrix, 0.0, 0, 0.0, scale_se, np.zeros(0))
     return fit_sides(matrix, edges, resolution.dpi, perspective=False)
@@ -211,8 +212,8 @@ def _tilt(lines: list[LongLine]) -> float:
 def _sheet(fit: Fit, frame: Model | None, scale_se: float, problems: list[Problem]) -> Sheet:
     matrix = fit.mm_to_px / fit.mm_to_px[2, 2]
     middle = np.array([[PAGE_MM[0] / 2.0, PAGE_MM[1] / 2.0]])
-    right = apply(matrix, middle + [10.0, 0.0]) - apply(matrix, middle)
-    down = apply(matrix, middle + [0.0, 10.0]) - apply(matrix, middle)
+    right = apply(matrix, middle + np.array([10.0, 0.0])) - apply(matrix, middle)
+    down = apply(matrix, middle + np.array([0.0, 10.0])) - apply(matrix, middle)
     px_per_mm = float(np.sqrt(abs(right[0, 0] * down[0, 1] - right[0, 1] * down[0, 0])) / 10.0)
     # Seen with y down, the sheet's x axis points at this angle; turning back by it is counter-clockwise.
     rotation = float(np.degrees(np.arctan2(right[0, 1], right[0, 0])))

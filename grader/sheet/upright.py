@@ -3,7 +3,7 @@
 import numpy as np
 
 from grader.records import FloatArray
-from grader.sheet.fitting import apply
+from grader.sheet.fitting import apply, inverted
 from grader.sheet.longlines import RIDGE, LongLine
 from grader.sheet.models import PAGE_MM
 
@@ -26,7 +26,7 @@ def title_block_mm(mm_to_px: FloatArray, drawn: FloatArray) -> float:
 
     What the other corners have too (squared paper has it everywhere) does not count.
     """
-    mm = apply(np.linalg.inv(mm_to_px), drawn.reshape(-1, 2)).reshape(-1, 2, 2)
+    mm = apply(inverted(mm_to_px), drawn.reshape(-1, 2)).reshape(-1, 2, 2)
     page = np.array(PAGE_MM)
     own = _ruled_mm(mm)
     turned = (
