@@ -20,6 +20,11 @@ from reference.mechanism import Crank, Dyad, Group, Mechanism, Plate, PointOnLin
 IN_LINE_TOLERANCE = 1e-9
 """Relative: lengths that sum up this nearly are meant to be in line."""
 
+LARGEST = 1e9
+SHORTEST_M = 1e-9
+"""No number of an authored file is larger, no length shorter: their squares then neither over- nor
+underflow."""
+
 SIDES = {"left": 1, "right": -1, "ahead": 1, "behind": -1}
 
 
@@ -89,13 +94,18 @@ class _Numbers:
         self.values, self.count, self.unit_m = values, count, unit_m
 
     def number(self, formula: Formula) -> FloatArray:
-        return np.broadcast_to(formula(self.values), (self.count,)).astype(np.float64)
+        numbers = np.broadcast_to(formula(self.values), (self.count,)).astype(np.float64)
+        if np.any(np.abs(numbers) > LARGEST):
+            raise FormulaError(f"'{formula.text}' is larger than {LARGEST:g}: beyond any mechanism")
+        return numbers
 
     def length(self, formula: Formula, what: str) -> FloatArray:
         # Division by the unit's inverse: 30 cm is then exactly the double nearest to 0.3 m.
         lengths = self.number(formula) / round(1.0 / self.unit_m)
         if np.any(lengths <= 0.0):
             raise FormulaError(f"'{formula.text}' ({what}) must be a positive length")
+        if np.any(lengths < SHORTEST_M):
+            raise FormulaError(f"'{formula.text}' ({what}) is shorter than {SHORTEST_M:g} m")
         return lengths
 
     def point(self, point: list[Formula]) -> ComplexArray:

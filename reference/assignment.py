@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from reference import authored
-from reference.assembly import build_mechanism, check_mechanism
+from reference.assembly import LARGEST, build_mechanism, check_mechanism
 from reference.authored import AssignmentFile, MechanismFile
 from reference.errors import AuthoredFileError, CallError, Finding
 from reference.formula import FormulaError, Value
@@ -190,10 +190,17 @@ def _check_formulas(assignment: Assignment) -> list[Finding]:
     if not variants:
         return [Finding("$.variant", "the range of n or position is empty: 'from' must not exceed 'to'")]
     findings: list[Finding] = []
+
+    def proposed_scales(variants: list[Variant]) -> None:
+        scales = assignment.scales(variants)
+        for name in ("kL", "kv", "ka"):
+            if not np.all((getattr(scales, name) > 1.0 / LARGEST) & (getattr(scales, name) < LARGEST)):
+                raise FormulaError(f"{name} must be above zero for every variant")
+
     for what, path in (
         (assignment.values, "$.variant.values"),
         (assignment.mechanism, "$.mechanism"),
-        (assignment.scales, "$.scales"),
+        (proposed_scales, "$.scales"),
     ):
         try:
             what(variants)

@@ -2,15 +2,19 @@
 
 import copy
 import os
+import random
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from reference.assembly import check_mechanism
-from reference.assignment import built_in, library, load_assignment
+from reference.assignment import Assignment, _check_formulas, built_in, library, load_assignment
 from reference.authored import AssignmentFile, MechanismFile, load, validate
-from reference.errors import AuthoredFileError, CallError, MechanismError
+from reference.canvas import svg
+from reference.draw import reference_drawing
+from reference.errors import AuthoredFileError, CallError, MechanismError, PlanmarkError
 from reference.plan import exact_plan
 
 
@@ -189,6 +193,86 @@ def test_a_fault_of_the_mechanism_names_the_mechanisms_file(assignment):
 def test_a_length_that_some_variant_makes_negative_is_a_fault_of_the_file(assignment):
     with pytest.raises(AuthoredFileError, match="must be a positive length"):
         load_assignment(assignment(mechanism=(("length = 20", 'length = "20 - n"'),)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('kv = "omega * kL"', "kv = 0", "kv must be above zero"),
+        ('kv = "omega * kL"', 'kv = "1e300*kL"', "kv must be above zero"),
+        ("crank_mm = 60", "crank_mm = 0", "does not give a finite number"),
+        ("crank_mm = 60", "crank_mm = -60", "kL must be above zero"),
+    ],
+)
+def test_scales_that_draw_nothing_are_faults_of_the_file(assignment, old, new, words):
+    with pytest.raises(AuthoredFileError, match=words) as error:
+        load_assignment(assignment((old, new)))
+    assert error.value.findings[0].path == "$.scales"
+
+
+@pytest.mark.parametrize("length", ["1e-12", "1e300"])
+def test_lengths_beyond_any_mechanism_are_faults_of_the_file(assignment, length):
+    with pytest.raises(AuthoredFileError, match=r"shorter than|larger than"):
+        load_assignment(assignment(mechanism=(("length = 30\n", f"length = {length}\n"),)))
+
+
+def damaged(tables: tuple[dict, dict], rng: random.Random) -> tuple[dict, dict]:
+    """The two tables with one to three entries taken out, replaced, or overwritten by another's."""
+
+    def paths(table, path=()):
+        entries = (
+            table.items() if isinstance(table, dict) else enumerate(table) if isinstance(table, list) else ()
+        )
+        for key, value in entries:
+            yield (*path, key)
+            yield from paths(value, (*path, key))
+
+    def owner(table, path):
+        for key in path[:-1]:
+            table = table[key]
+        return table
+
+    damage = copy.deepcopy(tables)
+    for _ in range(rng.choice([1, 1, 2, 3])):
+        table = rng.choice(damage)
+        path, other = (rng.choice(list(paths(table))) for _ in range(2))
+        act = rng.random()
+        if act < 0.25:
+            del owner(table, path)[path[-1]]
+        elif act < 0.85:
+            owner(table, path)[path[-1]] = rng.choice(DAMAGE)
+        else:
+            owner(table, path)[path[-1]] = copy.deepcopy(owner(table, other)[other[-1]])
+    return damage
+
+
+DAMAGE = [
+    0, -1, 2.5, 1e308, 1e-308, float("nan"), float("inf"), 10**400, "", "n", "x", "pi/0", "1e400", "nan",
+    "sqrt(-1)", "tan(90)", "99*n", "n-15", True, None, [], {}, [1, 2], "left", "A", "O1", "Z",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["pump", "press", "engine", "pump-collinear"])
+def test_a_damaged_file_gives_a_plan_or_a_told_error_and_nothing_else(name):
+    rng = random.Random(name)
+    whole = (table(f"{name}.assignment.toml"), table(f"{name}.mechanism.toml"))
+    drawn = 0
+    for _ in range(150):
+        own, mechanism = damaged(whole, rng)
+        try:
+            file = validate(AssignmentFile, {**own, "mechanism": mechanism}, "the file")
+            if not isinstance(file.mechanism, MechanismFile) or list(check_mechanism(file.mechanism)):
+                continue
+            assignment = Assignment(file, file.mechanism, Path("the file"))
+            if _check_formulas(assignment):
+                continue
+            plan = exact_plan(assignment, assignment.variants()[:3])
+        except PlanmarkError:
+            continue
+        assert all(np.all(np.isfinite(vector)) for vector in plan.vectors_si.values())
+        assert svg([sheet.shapes for sheet in reference_drawing(assignment, plan)])
+        drawn += 1
+    assert drawn > 5
 
 
 def test_an_empty_range_of_variants_is_a_fault_of_the_file(assignment):
