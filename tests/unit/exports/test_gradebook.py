@@ -6,10 +6,11 @@ import io
 import pytest
 
 from grader.exports import Person, export, read_results
+from grader.exports.comments import comment
 from grader.exports.grades import grades_of
 from grader.exports.moodle_gradebook import gradebook_text
 from reference.errors import CallError, InputFileError
-from tests.unit.exports.classroom import report, results
+from tests.unit.exports.classroom import criterion, report, results
 
 
 def rows(text):
@@ -76,6 +77,36 @@ def test_several_positions_need_a_choice():
     assert [grade.score for grade in grades_of(both, combine="sum")] == [9.0]
     assert [(g.score, g.max_score) for g in grades_of(both, combine="mean")] == [(4.5, 10.0)]
     assert [grade.score for grade in grades_of(both, position=2)] == [5.0]
+
+
+@pytest.mark.parametrize(
+    ("choice", "told"),
+    [
+        ({"combine": "best"}, "sum or mean"),
+        ({"combine": "sum", "position": 1}, "not both"),
+        ({"position": 7}, "no report"),
+    ],
+)
+def test_a_choice_that_is_none_is_refused(choice, told):
+    with pytest.raises(CallError, match=told):
+        grades_of(results(report("s01", 4.0, position=1)), **choice)
+
+
+def test_a_rubric_without_points_cannot_be_rescaled():
+    with pytest.raises(CallError, match="maximum is 0"):
+        gradebook(report("s01", 0.0, max_score=0.0), maximum=10.0, rescale=True)
+
+
+def test_comments_on_several_positions_say_which_is_which():
+    both = [
+        report("s01", 4.0, position=1, criteria=[criterion("v_A", "full", 5.0)]),
+        report("s01", 5.0, position=2, criteria=[criterion("v_B", "none", 0.0, "Too long.")]),
+    ]
+    told = comment(both, "ro")
+    assert told == (
+        "<p><b>Poziție 1</b></p><p>Totul este corect.</p>"
+        "<p><b>Poziție 2</b></p><ul><li>✗ <b>Vector v_B</b>: Too long.</li></ul>"
+    )
 
 
 def test_a_sum_waits_for_all_its_parts():
