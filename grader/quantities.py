@@ -15,6 +15,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 MAX_LENGTH = 120
+LEAST_PER_MM, MOST_PER_MM = 1e-9, 1e9
+"""No drawing has a scale beyond these, SI per millimetre."""
 MAX_EXPONENT = 6
 MAX_DEPTH = 6
 PAPER_MM_PER_M = 1000.0
@@ -136,8 +138,10 @@ def _parse_chain(name: str, parts: list[str], bare_unit: str | None) -> ParsedSc
 
 
 def _positive(value: float, text: str) -> float:
-    if not 0.0 < value < float("inf"):
+    if not value > 0.0:
         raise _NotUnderstoodError(f"'{text}': a scale is a positive number")
+    if not LEAST_PER_MM <= value <= MOST_PER_MM:
+        raise _NotUnderstoodError(f"'{text}' is no scale that anything could be drawn at")
     return value
 
 

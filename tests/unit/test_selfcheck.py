@@ -25,14 +25,7 @@ def test_right_values_are_right_at_every_level(level):
 def test_a_symbol_says_right_or_off_and_nothing_else():
     checked = self_check(PUMP, Submission(measured=TOO_LONG), "symbol")
     one = found(checked, "v_D")
-    assert one.result == "off"
-    assert (one.reasons, one.measured, one.expected, one.tolerance, one.mistake) == (
-        (),
-        None,
-        None,
-        None,
-        None,
-    )
+    assert one == Checked("v_D", "v_D", "off")
     assert not is_all_right(checked)
 
 

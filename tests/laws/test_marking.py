@@ -1,0 +1,99 @@
+"""What holds for every submission, however odd."""
+
+import json
+
+import jsonschema
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.comparison import Submission
+from grader.documents import schema
+from grader.judging import judge, report_of
+from grader.records import Figure, Reading, ReadVector
+from reference.mistakes import Mistake
+from tests.hands import changed, drawn_nodes, measured, sheet, task_for
+
+TASKS = (task_for("pump", 7), task_for("press", position=0), task_for("pump-collinear", 16))
+SCHEMA = schema("report")
+
+lengths = st.floats(0.0, 2000.0)
+degrees = st.floats(0.0, 360.0, exclude_max=True)
+vectors = st.builds(
+    ReadVector,
+    length_mm=st.none() | lengths,
+    se_mm=st.floats(0.0, 5.0),
+    direction_deg=st.none() | degrees,
+    se_deg=st.none() | st.floats(0.0, 90.0),
+    confidence=st.floats(0.0, 1.0),
+)
+scales = st.sampled_from(
+    ["", "1:5", "0.2", "0.2 (m/s)/mm", "1e-9 (m/s)/mm", "1e9 m/s2·mm", "ω²kL", "kv = omega kL"]
+)
+finite = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@st.composite
+def submissions(draw):
+    task = draw(st.sampled_from(TASKS))
+    figures = {}
+    for plan in task.construction.poles:
+        names = [vector.name for vector in task.construction.vectors_of(plan)]
+        figures[plan] = Figure({}, draw(st.dictionaries(st.sampled_from(names), vectors)))
+    values = st.dictionaries(st.sampled_from([*task.real, *task.rates]), finite, max_size=4)
+    declared = draw(st.dictionaries(st.sampled_from(["kL", "kv", "ka"]), scales))
+    return task, Submission(measured=Reading(figures), values=draw(values), declared=declared)
+
+
+@given(submissions())
+def test_every_submission_is_judged_and_its_report_holds_to_the_schema(case):
+    task, submission = case
+    judgement = judge(task, submission)
+    score = judgement.score
+    assert 0.0 <= score.low <= score.high <= score.maximum
+    assert (score.total is None) or (score.low == score.high == score.total)
+    assert {one.criterion for one in judgement.outcomes} == {one.id for one in task.rubric.criterion}
+    report = report_of(task, judgement, "s01")
+    jsonschema.validate(json.loads(report.model_dump_json()), SCHEMA)
+
+
+@given(st.floats(-180.0, 180.0), st.floats(0.5, 2.0))
+def test_marks_do_not_depend_on_the_sheets_turn_and_the_scale_drawn_at(turn_deg, factor):
+    task = TASKS[0]
+    own = {name: float(task.parameters[name]) / factor for name in ("kL", "kv", "ka")}
+    declared = {"kL": f"{own['kL']!r} m/mm", "kv": f"{own['kv']!r} m/s/mm", "ka": f"{own['ka']!r} m/s2/mm"}
+    reading = sheet(task, own, turn_deg=turn_deg)
+    judgement = judge(task, Submission(readings=(reading,), declared=declared))
+    assert judgement.score.total == judgement.score.maximum
+
+
+@given(st.sampled_from(["v_A", "v_B", "v_D", "a_B", "a_D"]), st.floats(2.2, 20.0))
+def test_a_larger_error_never_gives_a_better_mark(name, off_mm):
+    task = TASKS[0]
+    right = measured(task)
+    plan = "velocity_plan" if name.startswith("v") else "acceleration_plan"
+    length = right.figures[plan].vectors[name].length_mm
+    totals = [
+        judge(task, Submission(measured=changed(right, name, length_mm=length + share * off_mm))).score.high
+        for share in (0.0, 0.3, 0.6, 1.0)
+    ]
+    assert totals == sorted(totals, reverse=True)
+
+
+@pytest.mark.parametrize(
+    ("node", "slot"), [("b", 0), ("b", 1), ("c", 0), ("c", 1), ("d", 0), ("b'", 0), ("c'", 1)]
+)
+def test_a_mistake_costs_the_node_where_it_was_made_and_what_became_trivial(node, slot):
+    task = TASKS[0]
+    mistake = Mistake("parallel_for_perpendicular", node, slot)
+    judgement = judge(task, Submission(readings=(sheet(task, mistakes=(mistake,)),)))
+    right, own = drawn_nodes(task), drawn_nodes(task, mistakes=(mistake,))
+    vectors = task.construction.vectors
+    lost = {one.name for one in judgement.outcomes if one.verdict in {"none", "partial"}}
+    assert lost
+    for name in lost:
+        head, tail = vectors[name].head, vectors[name].tail
+        least = max(
+            task.rubric.tolerance.least_mm, task.rubric.least_followed_share * abs(right[head] - right[tail])
+        )
+        assert head == node or abs(own[head] - own[tail]) < least
