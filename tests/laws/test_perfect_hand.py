@@ -66,7 +66,7 @@ def perturbations(task, share):
 def test_a_tolerance_is_where_the_rubric_has_it(name):
     assignment = load_assignment(name)
     rubric = rubric_of(assignment)
-    lot = random.Random(name)  # noqa: S311 - a sample, no secret
+    lot = random.Random(name)
     variants = assignment.variants()
     for _ in range(SAMPLE):
         task = task_of(assignment, rubric, lot.choice(variants))

@@ -52,7 +52,9 @@ def test_a_second_run_marks_only_what_changed(class_folder, tmp_path):
     out = tmp_path / "out"
     first, _ = run(class_folder, out)
     before = {name: (out / name / "report.json").stat().st_mtime_ns for name in ("s1", "s2")}
-    (class_folder / "s2.json").write_text(json.dumps({"student_id": "s2", **perfect(9), "segments_mm": {"v_A": 1}}))
+    (class_folder / "s2.json").write_text(
+        json.dumps({"student_id": "s2", **perfect(9), "segments_mm": {"v_A": 1}})
+    )
     second, _ = run(class_folder, out)
     after = {name: (out / name / "report.json").stat().st_mtime_ns for name in ("s1", "s2")}
     assert after["s1"] == before["s1"]

@@ -95,7 +95,7 @@ def test_a_right_drawing_is_accused_of_nothing():
 def test_a_careless_hand_is_accused_of_nothing(name):
     assignment = load_assignment(name)
     rubric = rubric_of(assignment)
-    lot = random.Random(name)  # noqa: S311 - a sample, no secret
+    lot = random.Random(name)
     for _ in range(6):
         task = task_of(assignment, rubric, lot.choice(assignment.variants()))
         moved = {step.node: complex(lot.gauss(0, 0.7), lot.gauss(0, 0.7)) for step in task.construction.steps}
