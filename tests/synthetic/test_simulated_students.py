@@ -156,3 +156,36 @@ def test_every_stroke_of_a_vector_joins_its_nodes():
                 for end, node in zip(vector["line_mm"], ("tail", "head"), strict=True):
                     gap = np.subtract(end, figure["nodes"][vector[node]])
                     assert np.hypot(*gap) < 6 * settings.hand.redraw_mm
+
+
+@pytest.mark.parametrize("name", ["pump", "press", "engine"])
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_a_mixed_class_draws_inside_its_paper(name, seed):
+    assignment = load_assignment(name)
+    settings = any_settings(seed, mistakes=0.0)
+    settings = replace(settings, scan=replace(settings.scan, dpi=12.0, dust=0))
+    variants = assignment.variants()
+    sheets = simulate(assignment, variants[seed % len(variants)], seed, settings)
+    seen = {figure for sheet in sheets for figure in sheet.truth["figures"]}
+    assert seen == {"mechanism", "velocity_plan", "acceleration_plan"}
+    for sheet in sheets:
+        places = [at for figure in sheet.truth["figures"].values() for at in figure["nodes"].values()]
+        assert np.all(np.min(places, axis=0) > [15.0, 5.0])
+        assert np.all(np.max(places, axis=0) < [415.0, 292.0])
+
+
+def test_a_bowed_sheet_is_told_by_its_grid_of_points():
+    assignment = load_assignment("pump")
+    scan = Scan(device="phone", dpi=30.0, tilt_deg=5.0, lens_k1=0.02, curl_mm=4.0)
+    truth = simulate(assignment, assignment.variant(8), 5, Settings(scan=scan))[0].truth
+    grid = np.array(truth["grid_mm_px"])
+    lifted = np.column_stack([grid[:, 0], np.ones(len(grid))]) @ np.array(truth["homography"]).T
+    flat = lifted[:, :2] / lifted[:, 2:]
+    arm = grid[:, 1] - truth["lens"]["centre"]
+    undistorted = truth["lens"]["centre"] + arm * (
+        1 + truth["lens"]["k1"] * (arm**2).sum(axis=1, keepdims=True) / truth["lens"]["r"] ** 2
+    )
+    miss_mm = np.hypot(*(undistorted - flat).T) / truth["px_per_mm"]
+    middle = np.abs(grid[:, 0, 0] - 210.0) < 50.0
+    assert 3.0 < miss_mm[middle].mean() < 5.0
+    assert miss_mm[~middle].min() < 0.5
