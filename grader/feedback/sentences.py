@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Literal
 
 from grader.feedback.mistakes import MISTAKES
+from grader.feedback.reasons import told_reason
 from grader.i18n import N_, Tongue, tongue
 from grader.outcomes import Mistake, Outcome, Param, Reason
 
@@ -185,7 +186,9 @@ def _speak(params: Mapping[str, Param], speaker: Tongue, names: Mapping[str, str
     said: dict[str, str] = {}
     for key, value in params.items():
         stem, _, suffix = key.rpartition("_")
-        if isinstance(value, str):
+        if key == "reason":
+            said[key] = told_reason(str(value), speaker)
+        elif isinstance(value, str):
             said[key] = names.get(value, value)
         elif suffix in {"mm", "deg"} and stem:
             said[stem] = _UNIT_WRITERS[suffix](speaker, value)

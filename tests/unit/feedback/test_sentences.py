@@ -87,6 +87,19 @@ def test_what_waits_for_a_person_says_why():
     assert told == "It was read with too little certainty (62\u00a0%)."
 
 
+@pytest.mark.parametrize(
+    ("reason", "told"),
+    [
+        ("no stroke between o' and b' could be told apart", "nu s-a distins nicio linie între o' și b'"),
+        ("no velocity plan was found on the sheets", "nu s-a găsit planul vitezelor"),
+        ("not drawn: c found by similarity", "c a fost găsit prin asemănare"),
+        ("something new", "something new"),
+    ],
+)
+def test_why_something_was_not_read_is_told_in_the_language(reason, told):
+    assert told in reason_sentence(Reason("unread", {"reason": reason}), tongue("ro"), "full")
+
+
 def test_of_several_limits_that_are_near_one_is_told():
     near = [
         Reason("near_limit", {"what": "length", "off": 1.0, "tolerance": 1.0, "se": se}) for se in (0.2, 0.3)
