@@ -171,6 +171,7 @@ class Layout(_Told):
     """`layout.json`: millimetres from the upright sheet's top left corner, x right, y down."""
 
     schema_version: Literal[1] = 1
+    marker_dictionary: Literal["DICT_4X4_250"] = "DICT_4X4_250"
     page_mm: tuple[float, float] = PAGE_MM
     pages: list[PageLayout]
 

@@ -52,7 +52,9 @@ _FLAT_MM = 0.12
 """Misfit from which paper that is not flat is told; printers and flatbeds stay under 0.1."""
 _MM_PER_INCH = 25.4
 _SCALE_TOLD = 0.004
-_SCALE_PLAUSIBLE = 0.1
+_SCALE_NEAR = 0.1
+_SCALE_FAR = 1.6
+"""Between A3 and A4 lies a factor of 1.41; what is farther off is a wrong resolution."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +197,7 @@ def _sheet(page: Page, template: Template, agreed: _Agreed) -> Sheet:
     ends = _apply(fit.mm_to_px, middle + np.array([(-50.0, 0.0), (50.0, 0.0)]))
     right = ends[1] - ends[0]
     px_per_mm = float(np.sqrt(np.mean(np.abs(_local_scales(fit.mm_to_px)) ** 2)))
-    printed_se, problems = _against_resolution(page, px_per_mm)
+    printed_se, problems = _against_resolution(page, fit, px_per_mm)
     lens = _lens(page, agreed, printed_se)
     return Sheet(
         mm_to_px=fit.mm_to_px,
@@ -236,16 +238,21 @@ def _told(page: Page, template: Template, plain: Projection | None) -> Iterator[
         yield Problem("sheet_not_flat", f"{off}: the sheet was not flat", page.source)
 
 
-def _against_resolution(page: Page, px_per_mm: float) -> tuple[float, tuple[Problem, ...]]:
-    """Scale error by the stated resolution: a printer that fits pages to its paper shrinks them."""
-    if page.dpi is None:
+def _against_resolution(page: Page, fit: Projection, px_per_mm: float) -> tuple[float, tuple[Problem, ...]]:
+    """Scale error by the stated resolution: a printer that fits pages to its paper shrinks them.
+
+    A camera's resolution means nothing, and it is known by its slanted view.
+    """
+    if page.dpi is None or fit.is_slanted:
         return _PRINTER_SCALE_SE, ()
     stated = float(np.sqrt(page.dpi[0] * page.dpi[1])) / _MM_PER_INCH
-    off = px_per_mm / stated - 1.0
-    if not _SCALE_TOLD < abs(off) < _SCALE_PLAUSIBLE:
+    size = px_per_mm / stated
+    if abs(size - 1.0) < _SCALE_TOLD or not 1.0 / _SCALE_FAR < size < _SCALE_FAR:
         return _PRINTER_SCALE_SE, ()
     told = (
-        f"by the file's resolution the printed sheet has {100 * (1 + off):.1f} % of its size:"
+        f"by the file's resolution the printed sheet has {100 * size:.1f} % of its size:"
         " it was printed or copied at another scale, or the resolution is wrong"
     )
-    return float(np.hypot(_PRINTER_SCALE_SE, off / 2.0)), (Problem("print_scaled", told, page.source),)
+    # Another format of paper cannot pass for the right size; a few per cent can.
+    unsure = abs(size - 1.0) / 2.0 if abs(size - 1.0) < _SCALE_NEAR else 0.0
+    return float(np.hypot(_PRINTER_SCALE_SE, unsure)), (Problem("print_scaled", told, page.source),)

@@ -67,6 +67,11 @@ class Projection:
     centre: FloatArray
     size: float
 
+    @property
+    def is_slanted(self) -> bool:
+        """Whether a perspective was needed: a camera's picture, no scanner's."""
+        return len(self.params) == _FREEDOMS[-1]
+
     def se_mm(self, points_mm: FloatArray) -> FloatArray:
         """(n,) standard error of the place of points (n, 2)."""
         unit = (points_mm - self.centre) / self.size
