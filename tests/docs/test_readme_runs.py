@@ -1,0 +1,65 @@
+"""The README's commands, run one after another in a folder prepared as the README supposes."""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from reference.assignment import library, load_assignment
+from reference.plan import exact_plan
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+COMMANDS = [line.strip() for line in README.splitlines() if re.match(r" +planmark ", line)]
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory) -> Path:
+    """A roster, a folder with one student's measurements, a scan, and an assignment of one's own."""
+    here = tmp_path_factory.mktemp("desk")
+    (here / "roster.csv").write_text("student_id,name,n\ns07,Student 7,7\n", encoding="utf-8")
+    shutil.copy(ROOT / "samples" / "pump" / "s01_1.jpg", here / "scan.jpg")
+    shutil.copy(library() / "engine.assignment.toml", here / "my.assignment.toml")
+    pump = load_assignment("pump")
+    plan = exact_plan(pump, [pump.variant(7)])
+    scales = {
+        name: f"{float(getattr(plan.scales, name)[0])} {unit}"
+        for name, unit in (("kL", "m/mm"), ("kv", "(m/s)/mm"), ("ka", "(m/s^2)/mm"))
+    }
+    lengths = {name: round(float(abs(plan.drawn_mm(name)[0])), 3) for name in plan.vectors_si}
+    measured = json.dumps({"student_id": "s07", "n": 7, "scales": scales, "segments_mm": lengths})
+    (here / "mine.json").write_text(measured, encoding="utf-8")
+    (here / "folder").mkdir()
+    shutil.copy(here / "mine.json", here / "folder" / "s07.json")
+    return here
+
+
+def test_every_command_of_the_readme_does_what_it_says(desk):
+    assert len(COMMANDS) > 8
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    for command in COMMANDS:
+        arguments = shlex.split(command)[1:]
+        ran = subprocess.run(  # noqa: S603 - our own program
+            [sys.executable, "-m", "grader", *arguments],
+            cwd=desk,
+            env=environment,
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+            timeout=300,
+            check=False,
+        )
+        # Lint and reading find things that need a person: that is status 1; all else here is right.
+        expected = {0, 1} if arguments[0] in {"lint", "read", "match"} else {0}
+        assert ran.returncode in expected, f"{command}\n{ran.stdout}\n{ran.stderr}"
+        assert ran.stdout
+    written = {path.name for path in desk.iterdir()}
+    assert {"plan.svg", "sheets.pdf", "marks", "draft.csv"} <= written
+    assert (desk / "marks" / "index.html").is_file()
+    assert (desk / "marks" / "s07" / "feedback.html").is_file()
