@@ -78,6 +78,12 @@ def test_what_students_write_is_never_run(text):
     assert text.count("<script") <= 1
 
 
+def test_a_students_page_runs_no_script_at_all():
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', feedback_page(report(), [], "en"))
+    assert "default-src 'none'" in policy[1]
+    assert "script-src" not in policy[1]
+
+
 @pytest.mark.parametrize("text", everything())
 def test_links_within_a_page_lead_somewhere(text):
     page = Page(text)
