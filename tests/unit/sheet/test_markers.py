@@ -217,11 +217,18 @@ def bent(grey, bend):
         off = (points - centre) / radius
         return centre + (points - centre) * (1 + bend * (off**2).sum(axis=-1, keepdims=True))
 
-    stored = np.stack(np.meshgrid(np.arange(wide), np.arange(high)), axis=-1).astype(np.float64)
-    source = stored.copy()
-    for _ in range(10):
-        source += stored - put(source)
-    x, y = np.moveaxis(source, -1, 0).astype(np.float32)
+    table = np.linspace(0.0, 1.2, 4000)
+    x, y = (
+        (axis.astype(np.float32) - middle) / radius
+        for axis, middle in zip(np.meshgrid(np.arange(wide), np.arange(high)), centre, strict=True)
+    )
+    stored = np.hypot(x, y)
+    # The model gives where a point is stored; the picture needs where a stored point comes from.
+    share = np.interp(stored, table * (1 + bend * table**2), table) / np.maximum(stored, 1e-9)
+    x, y = (
+        (middle + axis * share * radius).astype(np.float32)
+        for axis, middle in zip((x, y), centre, strict=True)
+    )
     return cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderValue=255), put
 
 
