@@ -25,8 +25,6 @@ from reference import mistakes as operators
 from reference.assignment import Assignment, Variant
 from reference.construction import ancestors, evaluate
 from reference.derivation import parameters_of
-from reference.errors import PlanmarkError
-from reference.geometry import FloatArray
 from reference.mistakes import Drawing
 from reference.steps import Nodes
 
@@ -100,7 +98,7 @@ class _Stage:
 
     def costs(self, drawing: Drawing) -> list[float]:
         """What each observed vector costs if this was the drawing meant."""
-        whole = evaluate(drawing.construction, drawing.parameters)
+        whole = {} if self.own else evaluate(drawing.construction, drawing.parameters)
         return [_cost(one, self.meant(drawing, whole, one)) for one in self.case.observed]
 
     def costs_with(self, operator: operators.Mistake, before: Sequence[float]) -> list[float]:
@@ -117,11 +115,11 @@ class _Stage:
     def meant(self, drawing: Drawing, whole: Nodes, one: Observed) -> complex:
         """A vector drawn from the student's own earlier nodes where they are known."""
         vector = drawing.construction.vectors[one.vector]
-        upstream = ancestors(drawing.construction, [vector.head, vector.tail]) - {vector.head}
-        own = {name: np.asarray(place) for name, place in self.own.items() if name in upstream}
         nodes = whole
-        if own or not whole:
+        if self.own:
             ends = [vector.head, vector.tail]
+            upstream = ancestors(drawing.construction, ends) - {vector.head}
+            own = {name: np.asarray(place) for name, place in self.own.items() if name in upstream}
             nodes = evaluate(drawing.construction, drawing.parameters, given=own, wanted=ends)
         return complex(nodes[vector.head]) - complex(nodes[vector.tail])
 
@@ -132,7 +130,7 @@ def diagnose(case: Case) -> tuple[Mistake, ...]:
     stage = _Stage(case, case.drawing, {}, lost)
     found: list[Mistake] = []
     stage = _explain(stage, found, _of_the_whole)
-    stage = _Stage(case, stage.drawing, _renamed(case.own, found), stage.lost)
+    stage = _Stage(case, stage.drawing, _renamed(case, found), stage.lost)
     _explain(stage, found, _of_steps)
     return tuple(sorted(found, key=lambda mistake: -mistake.confidence))
 
@@ -159,8 +157,6 @@ def _best(stage: _Stage, candidates: "_Candidates") -> tuple[operators.Mistake, 
     for operator in candidates(stage):
         costs = stage.costs_with(operator, before)
         tried.append((_sum(costs) + RARITY.get(operator.code, USUAL_RARITY), operator, costs))
-    if not tried:
-        return None
     tried.sort(key=lambda one: one[0])
     cost, operator, costs = tried[0]
     explained = [
@@ -216,9 +212,10 @@ def _cost(one: Observed, meant: complex) -> float:
     return cost
 
 
-def _renamed(own: Mapping[str, complex], found: Iterable[Mistake]) -> dict[str, complex]:
-    """The student's nodes under their right names, where two were found swapped."""
-    nodes = dict(own)
+def _renamed(case: Case, found: Iterable[Mistake]) -> dict[str, complex]:
+    """The student's nodes but the poles, under their right names where two were found swapped."""
+    poles = case.drawing.construction.poles.values()
+    nodes = {name: place for name, place in case.own.items() if name not in poles}
     for mistake in found:
         if mistake.code == "labels_swapped":
             first, second = str(mistake.detail["first"]), str(mistake.detail["second"])
@@ -301,19 +298,14 @@ def _swaps(drawing: Drawing) -> Iterator[operators.Mistake]:
 
 def _other_variants(case: Case) -> Iterator[operators.Mistake]:
     """Another student's data, all else right."""
-    for variant in case.assignment.variants():
-        if variant == case.variant:
-            continue
-        try:
-            parameters = _parameters(case.assignment, variant)
-        except PlanmarkError:
-            continue
-        yield operators.Mistake(
-            "other_variant", "mechanism", n=variant.n, position=variant.position, parameters=parameters
-        )
-
-
-def _parameters(assignment: Assignment, variant: Variant) -> dict[str, FloatArray]:
-    scales = assignment.scales([variant])
-    found = parameters_of(assignment.mechanism([variant]), scales.kL, scales.kv, scales.ka)
-    return {name: np.asarray(np.ravel(value)[0]) for name, value in found.items()}
+    variants = case.assignment.variants()
+    scales = case.assignment.scales(variants)
+    together = parameters_of(case.assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
+    spread = {name: np.broadcast_to(value, (len(variants),)) for name, value in together.items()}
+    for index, variant in enumerate(variants):
+        if variant != case.variant:
+            parameters = {name: value[index] for name, value in spread.items()}
+            n, position = variant.n, variant.position
+            yield operators.Mistake(
+                "other_variant", "mechanism", n=n, position=position, parameters=parameters
+            )

@@ -4,7 +4,7 @@ import json
 
 import jsonschema
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.comparison import Submission
@@ -67,6 +67,7 @@ def test_marks_do_not_depend_on_the_sheets_turn_and_the_scale_drawn_at(turn_deg,
     assert judgement.score.total == judgement.score.maximum
 
 
+@settings(max_examples=8)
 @given(st.sampled_from(["v_A", "v_B", "v_D", "a_B", "a_D"]), st.floats(2.2, 20.0))
 def test_a_larger_error_never_gives_a_better_mark(name, off_mm):
     task = TASKS[0]
