@@ -104,6 +104,7 @@ class Desk:
 
     def _layout(self, sheet: DrawnSheet) -> dict[str, complex] | None:
         room, taken = self._room()
+        # A stream of its own for each kind of sheet: asked twice, it gives the same layout.
         rng = np.random.default_rng([self.seed, 4, len(sheet.kind)])
         return page.place_figures(sheet.figures, room, taken, rng)
 

@@ -41,9 +41,6 @@ class Handwriting:
     forms: tuple[tuple[str, int], ...] = ()
 
 
-PRINTED = Handwriting(slant=0.0, aspect=0.9, jitter=0.0, unevenness=0.0, gap=0.16)
-
-
 def any_handwriting(rng: Rng) -> Handwriting:
     """Somebody's handwriting."""
     forms = tuple((letter, int(rng.integers(len(ways)))) for letter, ways in GLYPHS.items() if len(ways) > 1)

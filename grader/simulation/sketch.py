@@ -113,10 +113,3 @@ class Sketch:
             return min(float(np.abs(ink - centre).min()), 3.5) + float(self.rng.normal(0.0, 0.5))
 
         return room
-
-
-def box_of(strokes: list[Stroke]) -> tuple[complex, complex]:
-    """Low and high corners of strokes."""
-    points = np.concatenate([stroke.points for stroke in strokes])
-    low = complex(points.real.min(), points.imag.min())
-    return low, complex(points.real.max(), points.imag.max())
