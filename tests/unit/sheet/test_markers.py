@@ -80,6 +80,13 @@ def test_a_scanned_sheet_is_placed_to_a_few_hundredths_of_a_millimetre(dpi):
     assert sheet.px_per_mm == pytest.approx(dpi / 25.4, rel=1e-3)
 
 
+def test_a_sheet_out_of_focus_still_says_whose_it_is():
+    grey, truth = printed(150)
+    sheet = register(Page("s.jpg", 1, scanned(grey, blur=2.5)))
+    assert sheet.identity == STUDENT
+    assert off_mm(sheet, truth) < HARD_MM
+
+
 def test_the_markers_say_where_the_zones_are():
     layout = make_sheets(load_assignment("pump"), [RosterRow("s07", "Ana", 7)]).layout
     for number, page in enumerate(layout.pages):
