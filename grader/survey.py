@@ -8,7 +8,7 @@ from grader.documents import UnmatchedDocument
 from grader.intake import count_pages, is_blank, page_of
 from grader.measurements import Measurements, Names, read_measurements
 from grader.ownership import PageSource
-from grader.sheet.identity import identify
+from grader.sheet import whose
 from reference.errors import InputFileError
 
 MEASUREMENT_TYPES = {".csv", ".json"}
@@ -52,4 +52,4 @@ def _pages(path: Path, name: str, count: int) -> Iterator[PageSource]:
             yield PageSource(name, number, count)
             continue
         blank = is_blank(page)
-        yield PageSource(name, number, count, blank, None if blank else identify(page))
+        yield PageSource(name, number, count, blank, None if blank else whose(page))

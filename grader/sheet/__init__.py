@@ -5,15 +5,25 @@ edges and the file's stated resolution are weighed together by their uncertainty
 is missing is told as `Problem`, and what cannot be settled is refused with the reason.
 """
 
-from grader.records import Page, Sheet, Unread
+from grader.records import Identity, Page, Sheet, Unread
 from grader.sheet import markers
+from grader.sheet.identity import identify
 from grader.sheet.lens import straighten
 from grader.sheet.plain import register_plain
 
-__all__ = ["rectify", "straighten"]
+__all__ = ["rectify", "straighten", "whose"]
 
 
 def rectify(page: Page) -> Sheet | Unread:
     """The page's map from millimetres to pixels, or, false in a condition, why there is none."""
     sheet = markers.register(page)
     return register_plain(page) if sheet is None else sheet
+
+
+def whose(page: Page) -> Identity | None:
+    """Whose page it is by its code: a quick look first, then one where a printed sheet has it."""
+    found = identify(page)
+    if found is not None:
+        return found
+    sheet = markers.register(page)
+    return None if sheet is None else sheet.identity
