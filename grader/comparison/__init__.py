@@ -2,8 +2,10 @@
 
 `compare(task, submission)` is the whole of it. Each criterion is marked against the original data
 at the student's scales first, then against what follows from the student's own earlier values; the
-better counts, and the mistake that the later ones follow from costs once. Verdicts are `Outcome`s
-with structured reasons (`grader.outcomes`); nothing here speaks a human language.
+better counts. The mistake that later ones follow from costs once: where it was made, or, where no
+criterion asks for that, at the first criterion that shows it. Small errors that are each within
+their tolerance and add up in a later node are no mistake. Verdicts are `Outcome`s with structured
+reasons (`grader.outcomes`); nothing here speaks a human language.
 
 - `task`: the variant's exact plan and its rubric
 - `evidence`: readings and measurements brought into one frame, the assignment's

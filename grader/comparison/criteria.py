@@ -13,9 +13,6 @@ from grader.comparison.task import Task, unit_of
 from grader.outcomes import Outcome, Quantity, Reason, Tolerance, UsedScale
 from grader.rubric import CriterionTable
 
-DEVIATING_SHARE = 0.25
-"""Of the length tolerance: a node nearer to its right place than this is right."""
-
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
@@ -46,20 +43,25 @@ def compare(task: Task, submission: Submission) -> Comparison:
 
 
 def _deviating(task: Task, evidence: Evidence, used: Mapping[str, float]) -> frozenset[str]:
-    """The student's own nodes that are not where they should be: what can be followed through from."""
+    """The student's own nodes that are further from their right places than a length may be off."""
     crank = evidence.crank_mm
     scales = dict(used) if crank is None else {**used, "kL": task.crank_m / crank[0]}
     exact = task.nodes(scales)
-    least = DEVIATING_SHARE * task.rubric.tolerance.length_mm
-    return frozenset(name for name, own in evidence.nodes.items() if abs(own - exact[name]) > least)
+    tolerance = task.rubric.tolerance
+    return frozenset(
+        name
+        for name, own in evidence.nodes.items()
+        if abs(own - exact[name]) > length_tolerance(tolerance, abs(exact[name]))
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class _Session:
     """One submission while it is being marked.
 
-    `charged` holds the nodes and scales whose mistake has cost something already: only what relies
-    on one of them may follow through. `doubtful` holds those whose verdict is open.
+    What relies on a wrong node or scale may follow through only when that mistake has cost something:
+    `charged` holds those. `cleared` holds the nodes that were judged and are within their tolerance,
+    `doubtful` the nodes and scales whose verdict is open.
     """
 
     task: Task
@@ -69,6 +71,7 @@ class _Session:
     followed: Mapping[str, float]
     deviating: frozenset[str]
     charged: set[str] = field(default_factory=set)
+    cleared: set[str] = field(default_factory=set)
     doubtful: set[str] = field(default_factory=set)
 
     def outcome(self, criterion: CriterionTable) -> Outcome:
@@ -216,22 +219,31 @@ class _Session:
         Returns the mark, the expectation that it was held against, and whether that follows.
         """
         task, name = self.task, criterion.name
-        chosen, followed = task.drawn(name, self.used), False
-        mark = original = against(chosen)
+        exact = chosen = task.drawn(name, self.used)
+        mark = original = against(exact)
+        is_drift = False
         if original.worst != "full" and task.rubric.follow_through:
             for one in expectations(task, self.evidence, name, self.used, self.followed):
                 candidate = self.allowed(one.relies_on, against(one.vector))
                 if verdicts.is_better(candidate, mark):
                     mark = verdicts.the_better(candidate, original, *self.why(one))
-                    chosen, followed = one.vector, True
+                    chosen, is_drift = one.vector, not self.wrong(one.relies_on)
         self.remember(task.construction.vectors[name].head, mark)
-        return mark, chosen, followed
+        if is_drift and mark.worst == "full" and original.level != "none":
+            # Every earlier step is within its tolerance, and so is this one: nothing is wrong.
+            return Mark("full", "full", "full"), exact, False
+        return mark, chosen, chosen is not exact
+
+    def wrong(self, relies_on: frozenset[str]) -> frozenset[str]:
+        """What is wrong of the nodes and scales relied on: off, and not judged to be within tolerance."""
+        off = relies_on & self.deviating | relies_on - self.evidence.nodes.keys()
+        return frozenset(off - self.cleared | relies_on & self.charged)
 
     def allowed(self, relies_on: frozenset[str], mark: Mark) -> Mark:
         """Credit for following only where the earlier mistake has been charged; else it is charged here."""
-        wrong = relies_on & self.deviating | relies_on - self.evidence.nodes.keys()
-        is_doubtful = bool(wrong & self.doubtful & self.settled.keys())
-        if wrong & self.charged and not is_doubtful:
+        wrong = self.wrong(relies_on)
+        has_doubtful_scale = bool(wrong & self.doubtful & self.settled.keys())
+        if not wrong or (wrong & self.charged and not has_doubtful_scale):
             return mark
         if wrong & self.doubtful:
             return Mark("none", "none", mark.best, mark.reasons)
@@ -240,11 +252,13 @@ class _Session:
         return Mark("none", "none", "none", mark.reasons)
 
     def remember(self, name: str, mark: Mark) -> None:
-        """Whether a node or scale has cost something, or may have."""
+        """Whether a node or scale has cost something, or may have, or is right."""
         if not mark.is_certain:
             self.doubtful.add(name)
         elif mark.level != "full":
             self.charged.add(name)
+        else:
+            self.cleared.add(name)
 
     def why(self, one: Expectation) -> tuple[Reason, ...]:
         """What an expectation follows from, and that its scale is not known where it is not."""

@@ -348,6 +348,45 @@ def test_nothing_follows_from_own_nodes_that_determine_nothing():
     assert outcome_of(compare(PUMP, Submission(readings=(folded,))), "v_D").verdict == "none"
 
 
+def drawn_from(task, moved):
+    """A sheet on which some nodes are off a little and all later ones are drawn from them exactly."""
+    nodes = drawn_nodes(task)
+    own = {name: np.asarray(nodes[name] + shift) for name, shift in moved.items()}
+    own |= {name: np.asarray(nodes[name]) for name in nodes if name in task.construction.poles.values()}
+    followed = task.nodes(rule_scales(task), own)
+    return sheet(task, moved={name: followed[name] - nodes[name] for name in nodes}, se_mm=0.005)
+
+
+def worst_conditioned():
+    """Of all variants, the one where small errors of b and c move d the most."""
+    moved = {"b": 0.6 + 0.3j, "c": -0.5 - 0.5j}
+
+    def off(n):
+        task = task_for("pump", n)
+        reading = drawn_from(task, moved)
+        plan = reading.figures["velocity_plan"].nodes
+        return abs((plan["d"].at - plan["o"].at) - task.drawn("v_D", rule_scales(task)))
+
+    task = task_for("pump", max(range(1, 31), key=off))
+    return task, drawn_from(task, moved), off(task.variant.n)
+
+
+def test_errors_within_tolerance_that_add_up_in_a_later_node_cost_nothing():
+    task, reading, off_mm = worst_conditioned()
+    outcome = outcome_of(compare(task, Submission(readings=(reading,))), "v_D")
+    assert off_mm > 1.0
+    assert outcome.verdict in {"full", "follow_through"}
+    strict = with_rubric(task, follow_through=False)
+    assert outcome_of(compare(strict, Submission(readings=(reading,))), "v_D").verdict != "full"
+
+
+def test_an_error_of_its_own_is_not_excused_by_small_earlier_ones():
+    task, reading, _ = worst_conditioned()
+    plan = reading.figures["velocity_plan"]
+    longer = changed(reading, "v_D", length_mm=plan.vectors["v_D"].length_mm + 4.0)
+    assert outcome_of(compare(task, Submission(readings=(longer,))), "v_D").verdict in {"partial", "none"}
+
+
 def test_a_trivial_earlier_answer_gives_no_credit():
     reading = measured(PUMP, directions=False)
     reading = changed(reading, "v_BA", length_mm=2.0)
