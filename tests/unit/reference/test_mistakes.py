@@ -137,3 +137,28 @@ def test_a_mistake_that_cannot_be_made_at_a_step_is_refused():
     plan = a_plan()
     with pytest.raises(ValueError, match="cannot be made at the step of b"):
         commit(Mistake("normal_missing", "b"), plan.drawing)
+
+
+def test_a_missing_vector_is_missing_by_name_and_moves_nothing():
+    plan = a_plan()
+    drawing = commit(Mistake("vector_missing", "v_DC"), plan.drawing)
+    assert set(plan.construction.vectors) - set(drawing.construction.vectors) == {"v_DC"}
+    assert max(shifts(plan, Mistake("vector_missing", "v_DC")).values()) == 0.0
+
+
+def test_swapped_labels_exchange_the_ends_of_vectors_and_move_nothing():
+    plan = a_plan()
+    drawing = commit(Mistake("labels_swapped", "b", other=("b", "c")), plan.drawing)
+    vectors = drawing.construction.vectors
+    assert (vectors["v_B"].tail, vectors["v_B"].head) == ("o", "c")
+    assert (vectors["v_DC"].tail, vectors["v_DC"].head) == ("b", "d")
+    assert (vectors["v_CB"].tail, vectors["v_CB"].head) == ("c", "b")
+    assert vectors["v_A"] == plan.construction.vectors["v_A"]
+
+
+def test_an_arithmetic_slip_changes_the_length_that_was_computed():
+    plan = a_plan()
+    drawing = commit(Mistake("arithmetic", "n_B", factor=1.3), plan.drawing)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    right = evaluate(plan.construction, plan.drawing.parameters)
+    np.testing.assert_allclose(nodes["n_B"] - nodes["o'"], 1.3 * (right["n_B"] - right["o'"]), atol=1e-12)
