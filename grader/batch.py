@@ -19,7 +19,7 @@ from grader.files import write_whole
 from grader.folder import submissions
 from grader.judging import unjudged_report
 from grader.measurements import names_of
-from grader.ownership import assign_pages
+from grader.ownership import Unmatched, assign_pages
 from grader.pipeline import Work, mark
 from grader.records import Problem
 from grader.roster import Roster, read_roster
@@ -125,18 +125,19 @@ def _works(
     )
     paths = {path.relative_to(batch.folder).as_posix(): path for path in files}
     works, strangers = works_of(batch.assignment, roster, ownership, measured, paths, batch.lang)
-    unmatched = [
-        UnmatchedDocument(
-            file=one.source.file, page=one.source.page, code=one.problem.code, message=one.problem.message
-        )
-        for one in ownership.unmatched
-    ]
+    broken = {source: why for one in surveys for source, why in one.broken.items()}
+    unmatched = [_unmatched(one, broken.get(one.source)) for one in ownership.unmatched]
     told = [
         UnmatchedDocument(file=one.file or "", code=one.code, message=one.message)
         for one in ownership.problems
     ]
     refused = [one.refused for one in surveys if one.refused is not None]
     return works, [*refused, *unmatched, *strangers, *told]
+
+
+def _unmatched(one: Unmatched, broken: str | None) -> UnmatchedDocument:
+    told = one.problem.message if broken is None else f"{one.problem.message}; {broken}"
+    return UnmatchedDocument(file=one.source.file, page=one.source.page, code=one.problem.code, message=told)
 
 
 # Marking ------------------------------------------------------------------------------------------

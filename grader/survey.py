@@ -1,7 +1,7 @@
 """What a folder holds, before anything is marked: files, pages, blank backs, QR codes, measurements."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from grader.documents import UnmatchedDocument
@@ -22,11 +22,13 @@ class Survey:
     ----------
     pages : a source for each page; a page that cannot be decoded has one too, so that its owner is told
     measurements : of a measurement file
-    refused : a file that cannot be used at all
+    broken : why a page cannot be decoded, by its source
+    refused : a measurement file that cannot be used at all
     """
 
     pages: tuple[PageSource, ...] = ()
     measurements: tuple[Measurements, ...] = ()
+    broken: Mapping[PageSource, str] = field(default_factory=dict)
     refused: UnmatchedDocument | None = None
 
 
@@ -37,19 +39,20 @@ def survey(path: Path, name: str, names: Names) -> Survey:
             return Survey(measurements=read_measurements(path, names))
         count = count_pages(path)
     except InputFileError as error:
-        page = PageSource(name, 1, 1)
         if path.suffix.lower() in MEASUREMENT_TYPES:
             return Survey(refused=UnmatchedDocument(file=name, code=error.code, message=error.message))
-        return Survey(pages=(page,))
-    return Survey(pages=tuple(_pages(path, name, count)))
+        page = PageSource(name, 1, 1)
+        return Survey(pages=(page,), broken={page: error.message})
+    found = [_look(path, PageSource(name, number, count)) for number in range(1, count + 1)]
+    broken = {source: told for source, told in found if told is not None}
+    return Survey(pages=tuple(source for source, _ in found), broken=broken)
 
 
-def _pages(path: Path, name: str, count: int) -> Iterator[PageSource]:
-    for number in range(1, count + 1):
-        try:
-            page = page_of(path, number)
-        except InputFileError:
-            yield PageSource(name, number, count)
-            continue
-        blank = is_blank(page)
-        yield PageSource(name, number, count, blank, None if blank else whose(page))
+def _look(path: Path, source: PageSource) -> tuple[PageSource, str | None]:
+    """What is seen on one page, or why it cannot be decoded."""
+    try:
+        page = page_of(path, source.page)
+    except InputFileError as error:
+        return source, error.message
+    blank = is_blank(page)
+    return replace(source, blank=blank, identity=None if blank else whose(page)), None

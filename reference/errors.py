@@ -1,10 +1,10 @@
 """Errors of authored files and of mechanisms that cannot be solved.
 
 PlanmarkError            caught once, at the rim
-|- AuthoredFileError     a mechanism, assignment or rubric file is wrong (exit status 2)
+|- AuthoredFileError     a mechanism, assignment, rubric or roster is wrong (exit status 2)
 |- CallError             the call is wrong: unknown assignment, n out of range (exit status 2)
 |- MechanismError        the mechanism does not assemble, or is singular there (exit status 3)
-|- InputFileError        a scan, roster or measurement file cannot be used (exit status 2 where the
+|- InputFileError        a scan or measurement file cannot be used (exit status 2 where the
                          call names it; in a folder that is graded, a problem of its report)
 """
 

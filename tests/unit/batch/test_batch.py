@@ -72,6 +72,14 @@ def test_a_broken_file_stops_nobody_else(class_folder, tmp_path):
     assert [one.file for one in results.unmatched] == ["s9.json"]
 
 
+def test_a_file_that_is_nobodys_and_no_drawing_is_told_as_both(class_folder, tmp_path):
+    (class_folder / "notes.txt").write_text("hello")
+    results, _ = run(class_folder, tmp_path / "out")
+    (told,) = [one.message for one in results.unmatched if one.file == "notes.txt"]
+    assert "nothing says whose it is" in told
+    assert "JPEG, PNG, TIFF or PDF" in told
+
+
 def test_progress_is_told_to_the_end(class_folder, tmp_path):
     _, told = run(class_folder, tmp_path / "out")
     assert told[-1] == ("marking", 3, 3)
