@@ -20,6 +20,7 @@ SE_END_MM = 0.2
 LONG_MM = 12.0
 ENOUGH = 6
 THIN = 0.62
+MOST_PIECES = 5
 JOIN_OFF_MM = 0.45
 JOIN_GAP_MM = 14.0
 JOIN_TURN_RAD = 0.03
@@ -41,7 +42,7 @@ class Lines:
     se_end : (n, 2) standard errors along, of start and end (mm)
     darkness, width : means over the stroke
     thin : much thinner or fainter than the long strokes of its sheet
-    members : (n, 2) the strokes it is made of, by their number; the same twice for a single one
+    members : (n, k) the strokes it is made of, by their number, repeated to fill the row
     """
 
     start: ComplexArray
@@ -94,7 +95,7 @@ def lines_of(ink: Ink) -> Lines:
         darkness=strokes.darkness[kept],
         width=strokes.width[kept],
         thin=_thin(strokes.width[kept] * strokes.darkness[kept], length),
-        members=np.column_stack([number, number]),
+        members=np.repeat(number[:, None], MOST_PIECES, axis=1),
     )
     return _with_joined(single)
 
@@ -116,32 +117,56 @@ def _without_caps(ends: ComplexArray, width: FloatArray) -> ComplexArray:
 
 
 def _with_joined(single: Lines) -> Lines:
-    """Add, for every two strokes on one line, the stroke from the one's far end to the other's."""
+    """Add the strokes that pieces on one line make: every two, and every longest chain of more."""
     first, second = _in_line(single)
-    if not len(first):
+    chains = [[int(one), int(other)] for one, other in zip(first, second, strict=True)]
+    chains.extend(_longest_chains(chains))
+    if not chains:
         return single
-    ends = np.stack([single.start[first], single.end[first], single.start[second], single.end[second]])
-    along = single.along[first]
-    place = (ends * np.conj(along)).real
-    lowest, highest = place.argmin(axis=0), place.argmax(axis=0)
-    pick = np.arange(len(first))
-    start, end = ends[lowest, pick], ends[highest, pick]
-    errors = np.concatenate([single.se_end[first].T, single.se_end[second].T])
-    length = np.abs(end - start)
-    joined = Lines(
-        start=start,
-        end=end,
-        along=(end - start) / length,
-        length=length,
-        se_offset=np.maximum(single.se_offset[first], single.se_offset[second]),
-        se_angle=SE_OFFSET_MM / length + np.maximum(single.se_offset[first], single.se_offset[second]) / length,
-        se_end=np.column_stack([errors[lowest, pick], errors[highest, pick]]),
-        darkness=np.minimum(single.darkness[first], single.darkness[second]),
-        width=np.minimum(single.width[first], single.width[second]),
-        thin=single.thin[first] | single.thin[second],
-        members=np.column_stack([single.members[first, 0], single.members[second, 0]]),
+    joined = [_joined(single, chain) for chain in chains]
+    return Lines(
+        *(
+            np.concatenate([getattr(single, name), np.array([one[name] for one in joined])])
+            for name in Lines.__slots__
+        )
     )
-    return Lines(*(np.concatenate([getattr(single, name), getattr(joined, name)]) for name in Lines.__slots__))
+
+
+def _longest_chains(pairs: list[list[int]]) -> list[list[int]]:
+    """Pieces that are linked by pairs, where more than two are."""
+    group: dict[int, set[int]] = {}
+    for one, other in pairs:
+        merged = group.get(one, {one}) | group.get(other, {other})
+        for piece in merged:
+            group[piece] = merged
+    longest = {tuple(sorted(pieces)) for pieces in group.values() if 2 < len(pieces) <= MOST_PIECES}  # noqa: PLR2004
+    return [list(pieces) for pieces in sorted(longest)]
+
+
+def _joined(single: Lines, chain: list[int]) -> dict[str, object]:
+    """One stroke from the one far end of its pieces to the other."""
+    pieces = np.array(chain)
+    along = single.along[pieces[np.argmax(single.length[pieces])]]
+    ends = np.concatenate([single.start[pieces], single.end[pieces]])
+    errors = np.concatenate([single.se_end[pieces, 0], single.se_end[pieces, 1]])
+    place = (ends * np.conj(along)).real
+    low, high = int(np.argmin(place)), int(np.argmax(place))
+    length = float(abs(ends[high] - ends[low]))
+    offset = float(single.se_offset[pieces].max())
+    members = np.resize(single.members[pieces, 0], MOST_PIECES)
+    return {
+        "start": ends[low],
+        "end": ends[high],
+        "along": (ends[high] - ends[low]) / length,
+        "length": length,
+        "se_offset": offset,
+        "se_angle": (SE_OFFSET_MM + offset) / length,
+        "se_end": np.array([errors[low], errors[high]]),
+        "darkness": single.darkness[pieces].min(),
+        "width": single.width[pieces].min(),
+        "thin": bool(single.thin[pieces].any()),
+        "members": members,
+    }
 
 
 def _in_line(single: Lines) -> tuple[IntArray, IntArray]:

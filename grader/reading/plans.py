@@ -1,5 +1,6 @@
 """A velocity or acceleration plan: the hypotheses of how it was drawn, held against the strokes."""
 
+import math
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -10,6 +11,7 @@ from grader.reading.fitting import Fit, fit_nodes
 from grader.reading.lines import Lines
 from grader.reading.matching import BEAM, Ends, Explanation, explain
 from grader.reading.placing import Place, Search, places
+from grader.records import FloatArray
 from reference.construction import Construction, ancestors
 from reference.geometry import ComplexArray
 from reference.mistakes import Drawing, Mistake, affected, commit, single_mistakes
@@ -18,6 +20,7 @@ from reference.steps import Given, Normal
 HAND = Hand()
 PLAN_ENDS = Ends()
 QUARTERS = (np.pi / 2, -np.pi / 2, np.pi)
+REGULAR = ("as constructed", "plates by similarity")
 COST_OF_TURN = 6.0
 COST_OF_SIZE = 4.0
 COST_OF_MISTAKE = 8.0
@@ -101,10 +104,10 @@ class Plan:
 def regular(drawing: Drawing, figure: str) -> list[Hypothesis]:
     """As it should be: by perpendiculars throughout, and with plates by similarity."""
     by_similarity = similar(drawing.construction, figure)
-    told = [Hypothesis("as constructed", drawing, {}, 0.0)]
+    told = [Hypothesis(REGULAR[0], drawing, {}, 0.0)]
     if by_similarity is not None:
         changed, absent = by_similarity
-        told.append(Hypothesis("plates by similarity", Drawing(changed, drawing.parameters), absent, 0.7))
+        told.append(Hypothesis(REGULAR[1], Drawing(changed, drawing.parameters), absent, 0.7))
     return told
 
 
@@ -120,7 +123,7 @@ def mistaken(base: Hypothesis, figure: str) -> Iterator[tuple[Hypothesis, Mistak
             changed = commit(mistake, base.drawing)
         except ValueError:
             continue
-        told = _told(mistake) if base.cost < COST_OF_MISTAKE else f"{base.label}, {_told(mistake)}"
+        told = _told(mistake) if base.label in REGULAR else f"{base.label}, {_told(mistake)}"
         yield Hypothesis(told, changed, gone, base.cost + COST_OF_MISTAKE), mistake
 
 
@@ -153,8 +156,21 @@ def regular_plans(
     drawing : construction and parameters of the student's variant
     given : nodes already read (mechanism, velocity plan), complex mm, y up
     """
+    plans = _as_regular(regular(drawing, figure), lines, figure, given)
+    sizes = {round(math.log(plan.place.size), 1): plan.place.size for plan in plans[:3]}
+    for size in (one for one in sizes.values() if abs(math.log(one)) > SAME_SIZE):
+        # The hand's errors are millimetres on paper: expect the plan again at the size it has there.
+        resized = Drawing(drawing.construction, _resized(drawing, figure, size))
+        bases = [replace(one, cost=one.cost + COST_OF_SIZE) for one in regular(resized, figure)]
+        plans.extend(_as_regular(bases, lines, figure, given))
+    return sorted(plans, key=lambda plan: -plan.score)
+
+
+def _as_regular(
+    bases: list[Hypothesis], lines: Lines, figure: str, given: Mapping[str, ComplexArray]
+) -> list[Plan]:
     plans: list[Plan] = []
-    for hypothesis in regular(drawing, figure):
+    for hypothesis in bases:
         expected = _expected(hypothesis, figure, given)
         if expected is not None:
             for place in _laid(expected, lines):
@@ -162,14 +178,21 @@ def regular_plans(
     return sorted(plans, key=lambda plan: -plan.score)
 
 
+def _resized(drawing: Drawing, figure: str, size: float) -> dict[str, FloatArray]:
+    """The parameters at the scale at which the plan comes out `size` times as large."""
+    scale = next(v.scale for v in drawing.construction.vectors_of(figure))
+    return {**drawing.parameters, scale: np.asarray(drawing.parameters[scale] / size)}
+
+
 def best_plan(plans: list[Plan], lines: Lines, figure: str, given: Mapping[str, ComplexArray]) -> Plan | None:
     """The best of the regular plans and of the same with mistakes made; the others are its rivals."""
     if not plans:
         return None
-    bases = list({plan.hypothesis.label: plan.hypothesis for plan in plans}.values())
+    first = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
+    bases = list(first.values())
     everything = [*plans, *_with_mistakes(plans[0], bases, figure, lines, given)]
     best = max(everything, key=lambda plan: plan.score)
-    if best.hypothesis.cost >= COST_OF_MISTAKE and _leaves_long_ones(best):
+    if best.hypothesis.label not in REGULAR and _leaves_long_ones(best):
         everything.extend(_with_mistakes(best, [best.hypothesis], figure, lines, given))
     everything.sort(key=lambda plan: -plan.score)
     best = everything[0]
@@ -211,7 +234,7 @@ def _with_mistakes(
     best: Plan, bases: list[Hypothesis], figure: str, lines: Lines, given: Mapping[str, ComplexArray]
 ) -> Iterator[Plan]:
     """The same plan with a mistake made, where it was found; elsewhere too if that is poor."""
-    poor = best.place.score < POOR and best.hypothesis.cost < COST_OF_MISTAKE
+    poor = best.place.score < POOR and best.hypothesis.label in REGULAR
     suspect = None if poor else _suspects(best, best.fit)
     for hypothesis, mistake in (one for base in bases for one in mistaken(base, figure)):
         if suspect is not None and mistake.at not in suspect:

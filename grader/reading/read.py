@@ -28,6 +28,8 @@ LEAST_PLAN = 12.0
 """Nats: what less is explained by may be chance."""
 
 CLEAR = 0.85
+LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
+"""Of the vectors given at the start of a plan."""
 SAME_SCALE = 0.95
 WILD = 3.0
 
@@ -70,7 +72,7 @@ def read_figures(  # noqa: PLR0913 - what is known of the drawing
         sketch = find_sketch(page.lines, page.ink.circles, own, others)
         if sketch is not None and sketch.score >= LEAST_SKETCH:
             page.sketch = sketch
-    drawing = own[0]
+    drawing = _measurable(own[0], assignment, variant)
     velocity = _find(pages, [drawing], VELOCITY_PLAN, {})
     known = {} if velocity is None else _nodes(velocity)
     paced = [drawing] if velocity is None else _paced(drawing, known)
@@ -88,6 +90,20 @@ def _drawings(
         return drawings(assignment, everybody, scales), []
     others = [one for one in everybody if one != variant]
     return drawings(assignment, [variant], scales), drawings(assignment, others, None)
+
+
+def _measurable(drawing: Drawing, assignment: Assignment, variant: Variant | None) -> Drawing:
+    """The drawing at the declared scales, or at the assignment's own where those would not fit the paper."""
+    usual = assignment.scales([variant or assignment.variants()[0]])
+    parameters = dict(drawing.parameters)
+    for vector in drawing.construction.vectors.values():
+        real = parameters.get(vector.name, parameters.get(f"{vector.name}_n"))
+        if real is None:
+            continue
+        drawn = abs(float(np.ravel(real)[0]) / float(np.ravel(parameters[vector.scale])[0]))
+        if drawn and not LEAST_DRAWN_MM < drawn < MOST_DRAWN_MM:
+            parameters[vector.scale] = getattr(usual, vector.scale)
+    return Drawing(drawing.construction, parameters)
 
 
 def _asks_accelerations(wanted: Collection[str], drawing: Drawing) -> bool:

@@ -17,7 +17,13 @@ from reference.derivation import construction_of, parameters_of
 from reference.mistakes import Drawing, commit, single_mistakes
 from reference.steps import ArcAndLine
 
-SURE = 0.8
+LEAST_LINK_MM = 6.0
+HARDLY = 0.4
+SHORT_LIST = 8
+COST_IN_SUPPORT = 0.05
+WEIGHT_OF_CIRCLES = 0.25
+ROUGHLY_MM = 4.0
+SURE = 0.7
 """A sketch supported so well over its length ends the search among other students' variants."""
 LINK_ENDS = Ends(at_mm=1.5, at_share=0.7, beyond_mm=4.0, beyond_share=0.15, short_mm=3.0, short_share=0.15)
 """Links stop at joint circles, short of the joint by the circle's radius."""
@@ -73,25 +79,19 @@ def find_sketch(
     lines: Lines, circles: FloatArray, own: list[Drawing], others: list[Drawing]
 ) -> Sketch | None:
     """The sketch that explains most strokes: the student's own variant first, then others."""
-    best: list[tuple[float, Drawing, Place]] = []
     upright = Search(sizes=(1.0, 0.0), smallest=0.4, largest=2.0)
-    long = lines.take(lines.length > 6.0)  # noqa: PLR2004 - mm, links are longer
-    for drawing, cost in _candidates(own):
-        best.extend(_laid(drawing, long, upright, cost))
-    if _top(best) < SURE:
-        for drawing in others:
-            best.extend(_laid(drawing, long, upright, 0.05))
-    if _top(best) < 0.5 and own:  # noqa: PLR2004 - under half its length seen: not there
+    long = lines.take(lines.length > LEAST_LINK_MM)
+    laid = [one for drawing, cost in _candidates(own) for one in _laid(drawing, long, circles, upright, cost)]
+    if _top(laid) < SURE:
+        laid.extend(one for drawing in others for one in _laid(drawing, long, circles, upright, COST_IN_SUPPORT))
+    if _top(laid) < HARDLY and own:
         turned = Search(turns_rad=ANY_TURN, give_rad=float(np.radians(2.5)), sizes=(1.0,))
-        best.extend(_laid(own[0], long, turned, 0.05))
-    best.sort(key=lambda one: -one[0])
-    read = [_read(drawing, place, lines, circles) for _, drawing, place in best[:5]]
+        laid.extend(_laid(own[0], long, circles, turned, COST_IN_SUPPORT))
+    laid.sort(key=lambda one: -one[0])
     regular = {id(drawing.construction) for drawing in own}
-    return max(
-        read,
-        key=lambda one: one.score - COST_OF_OTHER * (id(one.drawing.construction) not in regular),
-        default=None,
-    )
+    read = [_read(drawing, place, lines, circles, id(drawing.construction) in regular)
+            for _, drawing, place in laid[:SHORT_LIST]]
+    return max(read, key=lambda one: one.score, default=None)
 
 
 def _top(best: list[tuple[float, Drawing, Place]]) -> float:
@@ -111,13 +111,22 @@ def _expected(drawing: Drawing) -> Expected:
     return expect(drawing, "mechanism", {}, HAND, links_of(drawing.construction))
 
 
-def _laid(drawing: Drawing, lines: Lines, search: Search, cost: float) -> list[tuple[float, Drawing, Place]]:
-    return [
-        (place.score - cost, drawing, place) for place in places(_expected(drawing), lines, search, count=2)
-    ]
+def _laid(
+    drawing: Drawing, lines: Lines, circles: FloatArray, search: Search, cost: float
+) -> list[tuple[float, Drawing, Place]]:
+    """Places with their support by strokes and by joint circles, less the cost."""
+    expected = _expected(drawing)
+    centres = circles[:, 0] - 1j * circles[:, 1]
+    laid = []
+    for place in places(expected, lines, search, count=4):
+        joints = place.at + place.size * np.exp(1j * place.turn_rad) * expected.at
+        off = np.abs(joints[:, None] - centres).min(axis=1) if len(centres) else np.full(len(joints), np.inf)
+        circled = float(np.mean(off < ROUGHLY_MM))
+        laid.append((place.score + WEIGHT_OF_CIRCLES * (circled - 1.0) - cost, drawing, place))
+    return laid
 
 
-def _read(drawing: Drawing, place: Place, lines: Lines, circles: FloatArray) -> Sketch:
+def _read(drawing: Drawing, place: Place, lines: Lines, circles: FloatArray, regular: bool) -> Sketch:  # noqa: FBT001
     slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03)
     expected = _expected(drawing).placed(place.at, place.size, place.turn_rad, slack)
     reach = 30.0
@@ -132,7 +141,7 @@ def _read(drawing: Drawing, place: Place, lines: Lines, circles: FloatArray) -> 
     fit = fit_nodes(found, around, LINKS_END, centres)
     exact = _expected(drawing).at
     turn = float(np.angle(np.sum((fit.at - fit.at.mean()) * np.conj(exact - exact.mean()))))
-    score = found.score + WORTH_OF_CIRCLE * len(centres)
+    score = found.score + WORTH_OF_CIRCLE * len(centres) - (0.0 if regular else COST_OF_OTHER)
     return Sketch(drawing, found, fit, turn, _guide_turn(drawing, found, fit, lines, turn), place, score)
 
 
