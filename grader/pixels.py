@@ -155,7 +155,8 @@ def _contrast_across(flat: Flat, middle: FloatArray, normal: FloatArray, across:
     centre, aside, step = (array.astype(np.float32) for array in (middle, normal, across))
     x = centre[:, :, 0, None] + (aside[:, 0, None] * step[None, :])[:, None, :]
     y = centre[:, :, 1, None] + (aside[:, 1, None] * step[None, :])[:, None, :]
-    return flat.contrast(x.reshape(k * n, -1), y.reshape(k * n, -1)).reshape(k, n, -1)
+    m = len(across)
+    return flat.contrast(x.reshape(k * n, m), y.reshape(k * n, m)).reshape(k, n, m)
 
 
 def _sampled(image: GreyImage, x: FloatArray | Float32Array, y: FloatArray | Float32Array) -> Float32Array:

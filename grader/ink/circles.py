@@ -29,6 +29,9 @@ _HOLLOW = 0.55
 _HOLLOW_AT = 0.55
 _EDGE_BYTES = 12.0
 _ARC_MM = 0.45
+_CHORD = 0.5
+_CHORD_MM = 5.0
+_CHORD_PAST_MM = 2.0
 
 
 def find_circles(flat: Flat, seeds: Seeds, components: Components, field: Field) -> FloatArray:
@@ -63,15 +66,15 @@ def led_to(circles: FloatArray, strokes: Strokes) -> BoolArray:
 
 
 def arcs(strokes: Strokes, circles: FloatArray) -> BoolArray:
-    """Which strokes are short chords along a circle, pieces of its ring."""
+    """Which strokes are short chords or tangents of a circle, pieces of its ring."""
     result = np.zeros(len(strokes), dtype=bool)
-    middle = strokes.ends.mean(axis=1)
-    length = np.hypot(*(strokes.ends[:, 1] - strokes.ends[:, 0]).T)
+    span = strokes.ends[:, 1] - strokes.ends[:, 0]
+    length = np.hypot(span[:, 0], span[:, 1])
+    points = strokes.ends[:, None, 0] + np.linspace(0.0, 1.0, 11)[None, :, None] * span[:, None, :]
     for x, y, radius in circles:
-        away = np.hypot(strokes.ends[..., 0] - x, strokes.ends[..., 1] - y)
-        near = np.abs(away - radius).max(axis=1) < _ARC_MM
-        centred = np.abs(np.hypot(middle[:, 0] - x, middle[:, 1] - y) - radius) < _ARC_MM
-        result |= near & centred & (length < 1.5 * radius)
+        away = np.hypot(points[..., 0] - x, points[..., 1] - y)
+        on_ring = (np.abs(away - radius) < _ARC_MM).mean(axis=1)
+        result |= (on_ring >= _CHORD) & (length < _CHORD_MM) & (away.max(axis=1) < radius + _CHORD_PAST_MM)
     return result
 
 
@@ -83,6 +86,8 @@ def _meeting_points(seeds: Seeds, where: BoolArray) -> FloatArray:
     gx = cv2.Sobel(soft, cv2.CV_32F, 1, 0, scale=0.25)[row, column]
     gy = cv2.Sobel(soft, cv2.CV_32F, 0, 1, scale=0.25)[row, column]
     size = np.hypot(gx, gy)
+    if len(size) == 0:
+        return np.zeros((0, 2))
     strong = size > _EDGE_BYTES
     row, column, gx, gy = row[strong], column[strong], gx[strong] / size[strong], gy[strong] / size[strong]
     reach = np.arange(_RADIUS_MM[0] * PX_PER_MM, _RADIUS_MM[1] * PX_PER_MM, 1.0)

@@ -13,8 +13,11 @@ from grader.records import FloatArray
 
 _MARK_MM = 8.0
 _LONG_SEED_MM = 4.5
+"""Ink without a straight border of this length holds letters, compass arcs and the like."""
 _LEAST_STROKE_MM = 1.2
-_THIN = 1.7
+_THIN = 0.5
+"""Spread across a stroke in pens: 0.29 for an even one."""
+_LONG = 2.5
 _LONE_MM = 6.0
 _NEIGHBOUR_MM = 5.0
 _NEIGHBOURS = 2
@@ -43,18 +46,35 @@ def find_components(seeds: Seeds) -> Components:
     """Label the ink and tell marks from what can hold strokes."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(seeds.mask, connectivity=8)
     box = stats[1:, :4].astype(np.float64)
-    area = stats[1:, cv2.CC_STAT_AREA].astype(np.float64)
     of_seed = labels[seeds.border[:, 0], seeds.border[:, 1]].astype(np.intp) - 1
     size = np.hypot(box[:, 2], box[:, 3]) / PX_PER_MM
     longest = np.zeros(len(box))
     length = np.hypot(*(seeds.ends[:, 1] - seeds.ends[:, 0]).T) / PX_PER_MM
     np.maximum.at(longest, of_seed, length)
-    small = (box[:, 2:].max(axis=1) < _MARK_MM * PX_PER_MM) & (longest < _LONG_SEED_MM)
-    thin = area <= _THIN * seeds.pen_px * size * PX_PER_MM
-    stroke_like = thin & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
-    written = small & ~stroke_like & (size > _DUST_MM * 2)
+    major, minor = _spread(labels, len(box))
+    straight = (minor <= _THIN * seeds.pen_px) & (major >= _LONG * minor)
+    small = longest < _LONG_SEED_MM
+    stroke_like = straight & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
+    written = small & ~stroke_like & (size > 2.0 * _DUST_MM) & (size < _MARK_MM)
     text = small & stroke_like & (size < _LONE_MM) & _beside(box, written)
     return Components(box, small & ~stroke_like, text, of_seed)
+
+
+def _spread(labels: NDArray[np.int32], count: int) -> tuple[FloatArray, FloatArray]:
+    """Standard deviations of each piece's pixels along and across it, (count,) each, px."""
+    row, column = np.nonzero(labels)
+    label = labels[row, column] - 1
+    number = np.maximum(np.bincount(label, minlength=count), 1)
+
+    def mean(values: FloatArray) -> FloatArray:
+        return np.asarray(np.bincount(label, weights=values, minlength=count) / number)
+
+    x, y = column.astype(np.float64), row.astype(np.float64)
+    mx, my = mean(x), mean(y)
+    x, y = x - mx[label], y - my[label]
+    xx, yy, xy = mean(x * x), mean(y * y), mean(x * y)
+    half, root = (xx + yy) / 2.0, np.sqrt(((xx - yy) / 2.0) ** 2 + xy**2)
+    return np.sqrt(half + root), np.sqrt(np.maximum(half - root, 0.0))
 
 
 def _beside(box: FloatArray, written: BoolArray) -> BoolArray:

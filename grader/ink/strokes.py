@@ -24,6 +24,9 @@ _LEAST_DASHED_MM = 7.0
 _LEAST_MM = 1.0
 _LEAST_SUPPORT = 0.3
 _SAME_MM = 0.2
+_PROBES = 13
+_SHORT_MM = 6.0
+_COVERED = 0.85
 _SE_END_MM = 0.2
 _SE_MERGED_MM = 1.0
 
@@ -65,7 +68,8 @@ def _settled(flat: Flat, pieces: Pieces, unit: float) -> tuple[Fitted, BoolArray
     once = distinct(fitted, unit)
     fitted, merged = fitted.take(once), merged[once]
     final = fit_centre(flat, fitted.ends, fitted.width, unit)
-    good = (final.support >= _LEAST_SUPPORT) & (final.length >= _LEAST_MM * unit)
+    # A short guess across a joint or a letter may have slid onto a stroke that is there already.
+    good = (final.support >= _LEAST_SUPPORT) & (final.length >= _LEAST_MM * unit) & distinct(final, unit, _COVERED)
     return final.take(good), merged[good]
 
 
@@ -73,23 +77,32 @@ def _sound(fitted: Fitted, unit: float) -> Fitted:
     return fitted.take((fitted.support >= _LEAST_SUPPORT) & (fitted.length >= 0.8 * _LEAST_MM * unit))
 
 
-def distinct(fitted: Fitted, unit: float) -> BoolArray:
-    """Which strokes do not lie within the ink of a longer one."""
-    keep = np.ones(len(fitted), dtype=bool)
-    order = np.argsort(-fitted.length)
-    for position, longer in enumerate(order):
-        if not keep[longer]:
-            continue
-        shorter = order[position + 1 :]
-        shorter = shorter[keep[shorter]]
-        origin, span = fitted.ends[longer, 0], fitted.ends[longer, 1] - fitted.ends[longer, 0]
-        length = float(np.hypot(*span))
-        u = span / max(length, 1e-9)
-        relative = fitted.ends[shorter] - origin
-        t, d = relative @ u, relative @ np.array([-u[1], u[0]])
-        within = (t > -0.5 * unit).all(axis=1) & (t < length + 0.5 * unit).all(axis=1)
-        keep[shorter[within & (np.abs(d) < _SAME_MM * unit).all(axis=1)]] = False
+def distinct(fitted: Fitted, unit: float, covered_share: float = 1.0) -> BoolArray:
+    """Which strokes, longest first, have ink of their own.
+
+    A stroke that lies along a longer one is the same ink; a short one mostly inside others is what
+    a joint, an arrowhead or a letter left over.
+    """
+    keep = np.zeros(len(fitted), dtype=bool)
+    share = np.linspace(0.04, 0.96, _PROBES)
+    for row in np.argsort(-fitted.length):
+        taken = np.flatnonzero(keep)
+        points = fitted.ends[row, 0] + share[:, None] * (fitted.ends[row, 1] - fitted.ends[row, 0])
+        off = _distance(points, fitted.ends[taken])
+        along = (off < _SAME_MM * unit).all(axis=0).any()
+        covered = (off < 0.6 * fitted.width[taken]).any(axis=1).mean()
+        short = fitted.length[row] < _SHORT_MM * unit
+        keep[row] = not along and not (short and covered > covered_share)
     return keep
+
+
+def _distance(points: FloatArray, ends: FloatArray) -> FloatArray:
+    """(p, k) distances of points (p, 2) from segments (k, 2, 2)."""
+    span = ends[:, 1] - ends[:, 0]
+    squared = np.maximum((span**2).sum(axis=1), 1e-9)
+    relative = points[:, None, :] - ends[None, :, 0]
+    along = np.clip((relative * span).sum(axis=2) / squared, 0.0, 1.0)
+    return np.asarray(np.hypot(*np.moveaxis(relative - along[..., None] * span, 2, 0)))
 
 
 def _records(flat: Flat, fitted: Fitted, merged: BoolArray, sheet: Sheet) -> Strokes:

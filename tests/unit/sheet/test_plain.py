@@ -10,7 +10,7 @@ import pytest
 from grader.intake import page_of, pages_of
 from grader.records import Page
 from grader.sheet import rectify, straighten
-from grader.sheet.lens import straightened
+from grader.sheet.lens import straight, straightened
 
 SHARED = Path(__file__).resolve().parents[4] / "shared"
 RULED_MM = 0.06
@@ -57,7 +57,15 @@ def painted(matrix, shape, *, frame=ISO, block=True, bed=250, errors=None, noise
         lines += [((right - 150, bottom - h), (right, bottom - h)) for h in (0, 9, 18, 27)]
         lines += [((right - x, bottom - 27), (right - x, bottom)) for x in (150, 0)]
     for start, end in lines:
-        cv2.polylines(grey, [fixed(apply(matrix, [start, end]))], False, 60, 3, cv2.LINE_AA, SUBPIXEL)
+        cv2.polylines(
+            grey,
+            [fixed(apply(matrix, [start, end]))],
+            isClosed=False,
+            color=60,
+            thickness=3,
+            lineType=cv2.LINE_AA,
+            shift=SUBPIXEL,
+        )
     soft = cv2.GaussianBlur(grey, (0, 0), 0.6)
     noisy = soft + np.random.default_rng(0).normal(0, noise, shape)
     return np.clip(noisy, 0, 255).astype(np.uint8)
@@ -127,7 +135,9 @@ def test_a_shadow_along_the_edge_lies_outside_the_paper():
     matrix, shape = scanner(bed_mm=6)
     grey = painted(matrix, shape, frame=None, bed=249)
     outer = apply(matrix, [(-0.3, -0.3), (420.3, -0.3), (420.3, 297.3), (-0.3, 297.3)])
-    cv2.polylines(grey, [fixed(outer)], True, 120, 4, cv2.LINE_AA, SUBPIXEL)
+    cv2.polylines(
+        grey, [fixed(outer)], isClosed=True, color=120, thickness=4, lineType=cv2.LINE_AA, shift=SUBPIXEL
+    )
     sheet = rectify(Page("a.png", 1, grey, (150.0, 150.0)))
     assert off_mm(sheet, matrix) < 4 * RULED_MM
     assert scale_off(sheet, matrix) < SCALE_SES
@@ -173,18 +183,34 @@ def test_a_bent_photo_is_straightened(bend):
     sheet = rectify(page)
     assert sheet.lens is not None
     assert sheet.lens.bend == pytest.approx(bend, abs=0.0015)
-    _, straight = straighten(page, sheet)
-    assert off_mm(straight, matrix) < 0.2
-    assert off_mm(straight, matrix) < 0.4 * off_mm(sheet, matrix)
+    _, flat = straighten(page, sheet)
+    assert off_mm(flat, matrix) < 0.2
+    assert off_mm(flat, matrix) < 0.4 * off_mm(sheet, matrix)
 
 
 def test_squared_paper_has_no_title_block():
     matrix, shape = scanner()
     grey = painted(matrix, shape, frame=None, block=False, bed=248)
     for x in range(0, 420, 10):
-        cv2.polylines(grey, [fixed(apply(matrix, [(x, 0), (x, 297)]))], False, 150, 2, cv2.LINE_AA, SUBPIXEL)
+        cv2.polylines(
+            grey,
+            [fixed(apply(matrix, [(x, 0), (x, 297)]))],
+            isClosed=False,
+            color=150,
+            thickness=2,
+            lineType=cv2.LINE_AA,
+            shift=SUBPIXEL,
+        )
     for y in range(0, 297, 10):
-        cv2.polylines(grey, [fixed(apply(matrix, [(0, y), (420, y)]))], False, 150, 2, cv2.LINE_AA, SUBPIXEL)
+        cv2.polylines(
+            grey,
+            [fixed(apply(matrix, [(0, y), (420, y)]))],
+            isClosed=False,
+            color=150,
+            thickness=2,
+            lineType=cv2.LINE_AA,
+            shift=SUBPIXEL,
+        )
     refusal = rectify(Page("a.png", 1, grey, None))
     assert not refusal
     assert refusal.reason
@@ -231,8 +257,6 @@ def test_scans_of_others_are_registered_upright(name):
     known = np.array(truth["grid_mm_px"])
     pixels = known[:, 1]
     if sheet.lens is not None:
-        from grader.sheet.lens import straight
-
         pixels = straight(pixels, sheet.lens.bend, page.grey.shape)
     off = np.hypot(*(apply(np.linalg.inv(sheet.mm_to_px), pixels) - known[:, 0]).T)
     assert off.max() < WORST_MM[folder]
