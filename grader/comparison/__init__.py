@@ -13,6 +13,7 @@ reasons (`grader.outcomes`); nothing here speaks a human language.
 - `scales`: declared scales against the rule, the drawn crank, v_A and a_A
 - `marking`: one vector, value or scale against one expectation
 - `following`: the expectations that a student's own earlier values give
+- `ledger`: what earlier mistakes have cost, and what may follow through from them
 - `criteria`: all criteria of a rubric, in the order of construction
 """
 

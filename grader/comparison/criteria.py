@@ -1,14 +1,15 @@
 """All criteria of a rubric, marked in the order of construction so that earlier mistakes are known."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 from grader.comparison import verdicts
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
-from grader.comparison.following import Expectation, expectations, from_rate
+from grader.comparison.following import from_rate
+from grader.comparison.ledger import Ledger, open_ledger
 from grader.comparison.limits import Mark
 from grader.comparison.marking import length_tolerance, mark_value, mark_vector, tolerances
-from grader.comparison.scales import Scale, followed_scales, settle, used_scales
+from grader.comparison.scales import Scale, settle
 from grader.comparison.task import Task, unit_of
 from grader.outcomes import Outcome, Quantity, Reason, Tolerance, UsedScale
 from grader.rubric import CriterionTable
@@ -29,50 +30,28 @@ def compare(task: Task, submission: Submission) -> Comparison:
     """Mark every criterion of the task's rubric."""
     evidence = gather(task, submission)
     settled = settle(task, evidence, submission.declared)
-    used = used_scales(settled)
-    deviating = _deviating(task, evidence, used)
-    session = _Session(task, evidence, settled, used, followed_scales(settled), deviating)
-    # What was drawn contradicts a scale that nobody declared, or that nobody understood.
-    session.doubtful.update(name for name, scale in settled.items() if scale.other and scale.used.assumed)
+    session = _Session(task, evidence, settled, open_ledger(task, evidence, settled))
     order = [*settled, *task.construction.vectors, *task.construction.rates]
     criteria = sorted(task.rubric.criterion, key=lambda criterion: order.index(criterion.name))
     found = {criterion.id: session.outcome(criterion) for criterion in criteria}
     outcomes = tuple(found[criterion.id] for criterion in task.rubric.criterion)
     scales = {name: scale.used for name, scale in settled.items()}
-    return Comparison(outcomes, scales, session.followed, evidence)
-
-
-def _deviating(task: Task, evidence: Evidence, used: Mapping[str, float]) -> frozenset[str]:
-    """The student's own nodes that are further from their right places than a length may be off."""
-    crank = evidence.crank_mm
-    scales = dict(used) if crank is None else {**used, "kL": task.crank_m / crank[0]}
-    exact = task.nodes(scales)
-    tolerance = task.rubric.tolerance
-    return frozenset(
-        name
-        for name, own in evidence.nodes.items()
-        if abs(own - exact[name]) > length_tolerance(tolerance, abs(exact[name]))
-    )
+    return Comparison(outcomes, scales, session.ledger.followed, evidence)
 
 
 @dataclass(frozen=True, slots=True)
 class _Session:
-    """One submission while it is being marked.
-
-    What relies on a wrong node or scale may follow through only when that mistake has cost something:
-    `charged` holds those. `cleared` holds the nodes that were judged and are within their tolerance,
-    `doubtful` the nodes and scales whose verdict is open.
-    """
+    """One submission while it is being marked."""
 
     task: Task
     evidence: Evidence
     settled: Mapping[str, Scale]
-    used: Mapping[str, float]
-    followed: Mapping[str, float]
-    deviating: frozenset[str]
-    charged: set[str] = field(default_factory=set)
-    cleared: set[str] = field(default_factory=set)
-    doubtful: set[str] = field(default_factory=set)
+    ledger: Ledger
+
+    @property
+    def used(self) -> Mapping[str, float]:
+        """The scales used."""
+        return self.ledger.used
 
     def outcome(self, criterion: CriterionTable) -> Outcome:
         """The verdict on one criterion; what it costs is remembered for the later ones."""
@@ -99,13 +78,13 @@ class _Session:
         """A declared scale, as it was settled."""
         name, unit = criterion.name, unit_of(criterion.name)
         scale = self.settled[name]
-        right = self.followed[name]
+        right = self.ledger.followed[name]
         expected = Quantity(value=right, unit=unit)
         if scale.mark is None:
             if scale.used.text is None and not criterion.optional:
                 return self.absent(criterion, expected)
             return verdicts.unjudged(criterion, "not_judged", scale.reasons, expected=expected)
-        self.remember(name, scale.mark)
+        self.ledger.remember(name, scale.mark)
         measured = Quantity(value=scale.used.declared, unit=unit)
         allowed = Tolerance(value=self.task.tolerance(criterion).scale_relative * right)
         return verdicts.outcome(criterion, scale.mark, measured, expected, allowed)
@@ -121,7 +100,9 @@ class _Session:
             found = mark_vector(drawn, expected, tolerance, with_direction=criterion.direction)
             return verdicts.with_confidence(found, drawn.confidence, least)
 
-        mark, expected, followed = self.best(criterion, against)
+        mark, expected, followed = self.ledger.best(name, against)
+        if drawn is self.evidence.drawn.get(name):
+            mark = self.ledger.opened(name, mark)
         scale = self.used[self.task.scale_of(name)]
         value = drawn.length_mm * scale
         wrong_value = None
@@ -175,7 +156,7 @@ class _Session:
             right = abs(expected) * scale
             return mark_value(value, right, allowed, tolerance.partial_factor, unit_of(name))
 
-        mark, expected, followed = self.best(criterion, against)
+        mark, expected, followed = self.ledger.best(name, against)
         right = Quantity(value=abs(expected) * scale, unit=unit_of(name))
         measured = Quantity(value=self.evidence.values[name], unit=unit_of(name))
         allowed = Tolerance(value=length_tolerance(tolerance, abs(expected)) * scale)
@@ -201,76 +182,13 @@ class _Session:
         own = from_rate(task, self.evidence, rate, per_mm) if task.rubric.follow_through else None
         if mark.level != "full" and own is not None:
             head = task.construction.vectors[rate.vector].head
-            candidate = self.allowed(frozenset({head}), against(own))
+            candidate = self.ledger.allowed(frozenset({head}), against(own))
             if verdicts.is_better(candidate, mark):
                 follows = Reason("follows", {"what": "vector", "of": rate.vector})
                 mark, right, followed = verdicts.the_better(candidate, mark, follows), own, True
         allowed = Tolerance(value=length_tolerance(tolerance, abs(right) / per_mm) * per_mm)
         measured, expected = Quantity(value=value, unit=unit), Quantity(value=right, unit=unit)
         return verdicts.outcome(criterion, mark, measured, expected, allowed, followed=followed)
-
-    # Following through ----------------------------------------------------------------------------
-
-    def best(
-        self, criterion: CriterionTable, against: Callable[[complex], Mark]
-    ) -> tuple[Mark, complex, bool]:
-        """The mark on the original data, or a better one on what follows from own earlier values.
-
-        Returns the mark, the expectation that it was held against, and whether that follows.
-        """
-        task, name = self.task, criterion.name
-        exact = chosen = task.drawn(name, self.used)
-        mark = original = against(exact)
-        is_drift = False
-        if original.worst != "full" and task.rubric.follow_through:
-            for one in expectations(task, self.evidence, name, self.used, self.followed):
-                candidate = self.allowed(one.relies_on, against(one.vector))
-                if verdicts.is_better(candidate, mark):
-                    mark = verdicts.the_better(candidate, original, *self.why(one))
-                    chosen, is_drift = one.vector, not self.wrong(one.relies_on)
-        self.remember(task.construction.vectors[name].head, mark)
-        if is_drift and mark.worst == "full" and original.level != "none":
-            # Every earlier step is within its tolerance, and so is this one: nothing is wrong.
-            return Mark("full", "full", "full"), exact, False
-        return mark, chosen, chosen is not exact
-
-    def wrong(self, relies_on: frozenset[str]) -> frozenset[str]:
-        """What is wrong of the nodes and scales relied on: off, and not judged to be within tolerance."""
-        off = relies_on & self.deviating | relies_on - self.evidence.nodes.keys()
-        return frozenset(off - self.cleared | relies_on & self.charged)
-
-    def allowed(self, relies_on: frozenset[str], mark: Mark) -> Mark:
-        """Credit for following only where the earlier mistake has been charged; else it is charged here."""
-        wrong = self.wrong(relies_on)
-        has_doubtful_scale = bool(wrong & self.doubtful & self.settled.keys())
-        if not wrong or (wrong & self.charged and not has_doubtful_scale):
-            return mark
-        if wrong & self.doubtful:
-            return Mark("none", "none", mark.best, mark.reasons)
-        if mark.worst == "full":
-            self.charged.update(wrong)
-        return Mark("none", "none", "none", mark.reasons)
-
-    def remember(self, name: str, mark: Mark) -> None:
-        """Whether a node or scale has cost something, or may have, or is right."""
-        if not mark.is_certain:
-            self.doubtful.add(name)
-        elif mark.level != "full":
-            self.charged.add(name)
-        else:
-            self.cleared.add(name)
-
-    def why(self, one: Expectation) -> tuple[Reason, ...]:
-        """What an expectation follows from, and that its scale is not known where it is not."""
-        follows = Reason("follows", {"what": one.what, "of": one.of or self.named(one)})
-        assumed = self.settled[one.of].reasons if one.what == "scale" and one.of in self.doubtful else ()
-        return (*assumed, follows)
-
-    def named(self, one: Expectation) -> str:
-        """The last vector charged that an expectation relies on, or the mechanism."""
-        blamed = one.relies_on & (self.charged | self.doubtful)
-        names = [v.name for v in self.task.construction.vectors.values() if v.head in blamed]
-        return names[-1] if names else "mechanism"
 
     # What is not there ----------------------------------------------------------------------------
 
@@ -287,7 +205,7 @@ class _Session:
             return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
         if criterion.vector is not None:
             # Later criteria may hang on what nobody has seen.
-            self.doubtful.add(self.task.construction.vectors[criterion.vector].head)
+            self.ledger.doubtful.add(self.task.construction.vectors[criterion.vector].head)
         verdict = self.task.rubric.missing if unread is None else "review"
         return verdicts.unjudged(criterion, verdict, (reason,), expected=expected)
 

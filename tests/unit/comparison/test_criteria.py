@@ -348,43 +348,45 @@ def test_nothing_follows_from_own_nodes_that_determine_nothing():
     assert outcome_of(compare(PUMP, Submission(readings=(folded,))), "v_D").verdict == "none"
 
 
-def drawn_from(task, moved):
-    """A sheet on which some nodes are off a little and all later ones are drawn from them exactly."""
-    nodes = drawn_nodes(task)
-    own = {name: np.asarray(nodes[name] + shift) for name, shift in moved.items()}
-    own |= {name: np.asarray(nodes[name]) for name in nodes if name in task.construction.poles.values()}
-    followed = task.nodes(rule_scales(task), own)
-    return sheet(task, moved={name: followed[name] - nodes[name] for name in nodes}, se_mm=0.005)
-
-
-def worst_conditioned():
-    """Of all variants, the one where small errors of b and c move d the most."""
-    moved = {"b": 0.6 + 0.3j, "c": -0.5 - 0.5j}
-
-    def off(n):
-        task = task_for("pump", n)
-        reading = drawn_from(task, moved)
-        plan = reading.figures["velocity_plan"].nodes
-        return abs((plan["d"].at - plan["o"].at) - task.drawn("v_D", rule_scales(task)))
-
-    task = task_for("pump", max(range(1, 31), key=off))
-    return task, drawn_from(task, moved), off(task.variant.n)
+def doubled(extra_mm=0.0):
+    """v_B too long within its tolerance, and v_C, twice v_B, with it; an own error beside."""
+    task = min((task_for("press", position=p) for p in range(1, 4)), key=lambda task: abs(task.real["v_B"]))
+    reading = measured(task, directions=False)
+    vectors = reading.figures["velocity_plan"].vectors
+    reading = changed(reading, "v_B", length_mm=vectors["v_B"].length_mm + 0.9)
+    return task, changed(reading, "v_C", length_mm=vectors["v_C"].length_mm + 1.8 + extra_mm)
 
 
 def test_errors_within_tolerance_that_add_up_in_a_later_node_cost_nothing():
-    task, reading, off_mm = worst_conditioned()
-    outcome = outcome_of(compare(task, Submission(readings=(reading,))), "v_D")
-    assert off_mm > 1.0
-    assert outcome.verdict in {"full", "follow_through"}
+    task, reading = doubled()
+    outcome = outcome_of(compare(task, Submission(measured=reading)), "v_C")
+    assert outcome.verdict == "full"
+    assert codes(outcome) == ["right"]
     strict = with_rubric(task, follow_through=False)
-    assert outcome_of(compare(strict, Submission(readings=(reading,))), "v_D").verdict != "full"
+    assert outcome_of(compare(strict, Submission(measured=reading)), "v_C").verdict == "partial"
 
 
-def test_an_error_of_its_own_is_not_excused_by_small_earlier_ones():
-    task, reading, _ = worst_conditioned()
+def test_an_error_of_its_own_is_not_excused_by_a_small_earlier_one():
+    task, reading = doubled(extra_mm=1.5)
+    assert outcome_of(compare(task, Submission(measured=reading)), "v_C").verdict == "partial"
+
+
+def test_an_error_at_the_crank_is_not_excused_by_a_wrong_mechanism():
+    reading = sheet(PUMP, moved={"A": 8.0 + 0j, "a": 8.0 + 0j})
+    assert outcome_of(compare(PUMP, Submission(readings=(reading,))), "v_A").verdict == "none"
+
+
+def test_a_loss_is_open_while_what_it_may_follow_from_is_not_known():
+    reading = sheet(PUMP, moved={"d": 6.0 + 0j})
     plan = reading.figures["velocity_plan"]
-    longer = changed(reading, "v_D", length_mm=plan.vectors["v_D"].length_mm + 4.0)
-    assert outcome_of(compare(task, Submission(readings=(longer,))), "v_D").verdict in {"partial", "none"}
+    doubtful = {**plan.nodes, "c": replace(plan.nodes["c"], confidence=0.4)}
+    figures = {**reading.figures, "velocity_plan": Figure(doubtful, plan.vectors)}
+    comparison = compare(PUMP, Submission(readings=(replace(reading, figures=figures),)))
+    outcome = outcome_of(comparison, "v_D")
+    assert outcome.verdict == "review"
+    assert outcome.possible == ("none", "full")
+    assert "c, on which it hangs" in outcome.reasons[-1].params["reason"]
+    assert outcome_of(compare(PUMP, Submission(readings=(reading,))), "v_D").verdict == "none"
 
 
 def test_a_trivial_earlier_answer_gives_no_credit():
