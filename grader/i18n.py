@@ -26,7 +26,7 @@ DOMAIN = "planmark"
 ROOT_LANGUAGE = "en"
 
 
-def N_(text: str) -> str:  # noqa: N802 - gettext's own name for it
+def N_(text: str) -> str:
     """Mark a text for the catalogues where it is only kept, and translated later."""
     return text
 
