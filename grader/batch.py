@@ -278,12 +278,12 @@ def _guarded(function: Callable[..., Result], *call: object) -> Result | Problem
         return function(*call)
     except PlanmarkError as error:
         return Problem(error.code, error.message)
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - whatever a hostile file brings about stays with that file
         return Problem("internal_error", f"could not be processed ({type(error).__name__}: {error})")
 
 
 def _one_thread() -> None:
     """The processes share the machine: OpenCV must not start threads of its own in each."""
-    import cv2
+    import cv2  # noqa: PLC0415 - only in worker processes
 
     cv2.setNumThreads(1)

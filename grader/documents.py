@@ -257,7 +257,7 @@ class ResultsDocument(Document):
 class ScalesDocument(Document):
     """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm."""
 
-    kL: float
+    kL: float  # noqa: N815 - the field's own name for it
     kv: float
     ka: float
 
@@ -290,7 +290,7 @@ class PlanDocument(Document):
 
 
 def _models() -> dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]]:
-    from grader.rubric import RubricFile
+    from grader.rubric import RubricFile  # noqa: PLC0415 - rubrics know nothing of documents
 
     return {
         "measurements": (MeasurementsDocument, "validation"),

@@ -26,7 +26,7 @@ DOMAIN = "planmark"
 ROOT_LANGUAGE = "en"
 
 
-def N_(text: str) -> str:
+def N_(text: str) -> str:  # noqa: N802 - gettext's own name for it
     """Mark a text for the catalogues where it is only kept, and translated later."""
     return text
 

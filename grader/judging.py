@@ -94,7 +94,7 @@ def _with_mistake(outcome: Outcome, mistakes: Sequence[Mistake]) -> Outcome:
     return replace(outcome, mistake=found) if found and outcome.mistake is None else outcome
 
 
-def report_of(
+def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
     task: Task,
     judgement: Judgement,
     student_id: str,
@@ -144,7 +144,7 @@ def report_of(
     )
 
 
-def unjudged_report(
+def unjudged_report(  # noqa: PLR0913 - as above
     assignment: Assignment,
     rubric: RubricFile,
     variant: Variant,

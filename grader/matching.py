@@ -164,7 +164,7 @@ def _in_order(found: list[Suggestion], roster: Roster) -> list[Suggestion]:
             row = next((row for row in suggestion.among if place[id(row)] >= reached), None)
             if row is not None:
                 why = f"{suggestion.why}; by the roster's order {_who(row)}"
-                suggestion = replace(suggestion, row=row, why=why)
+                suggestion = replace(suggestion, row=row, why=why)  # noqa: PLW2901
         if row is not None:
             if place[id(row)] < reached:
                 return found

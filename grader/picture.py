@@ -56,7 +56,7 @@ JPEG_QUALITY = 78
 PNG_COMPRESSION = 1
 
 
-def overlay(
+def overlay(  # noqa: PLR0913 - a page and all that is known of it
     page: Page,
     sheet: Sheet | None,
     reading: Reading | None,

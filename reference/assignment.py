@@ -41,7 +41,7 @@ class Variant:
 class Scales:
     """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm."""
 
-    kL: FloatArray
+    kL: FloatArray  # noqa: N815 - the field's own name for it
     kv: FloatArray
     ka: FloatArray
 
@@ -102,7 +102,7 @@ class Assignment:
         variants: list[Variant],
         *,
         crank_mm: float | FloatArray | None = None,
-        kL: float | FloatArray | None = None,
+        kL: float | FloatArray | None = None,  # noqa: N803
         kv: float | FloatArray | None = None,
         ka: float | FloatArray | None = None,
     ) -> Scales:

@@ -36,7 +36,7 @@ def _read_formula(value: object) -> Formula:
     if isinstance(value, Formula):
         return value
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError('a number or a formula in quotes, such as "2*(30+n)", is expected')
+        raise ValueError('a number or a formula in quotes, such as "2*(30+n)", is expected')  # noqa: TRY004
     return formula.parse(value)
 
 
@@ -181,7 +181,7 @@ class ScalesTable(Authored):
     """
 
     crank_mm: FormulaText
-    kL: FormulaText
+    kL: FormulaText  # noqa: N815 - the field's own name for it
     kv: FormulaText
     ka: FormulaText
     bare_units: dict[Literal["kL", "kv", "ka"], str] = {}
@@ -269,7 +269,7 @@ def _path_part(part: str | int) -> str:
 
 
 def _near(name: str, model: type[BaseModel]) -> str:
-    import difflib
+    import difflib  # noqa: PLC0415 - only on the way to an error message
 
     fields = {field for kind in _models_in(model, set()) for field in kind.model_fields}
     near = difflib.get_close_matches(name, sorted(fields), n=1)
@@ -277,7 +277,7 @@ def _near(name: str, model: type[BaseModel]) -> str:
 
 
 def _models_in(model: type[BaseModel], seen: set[type[BaseModel]]) -> set[type[BaseModel]]:
-    from typing import get_args
+    from typing import get_args  # noqa: PLC0415
 
     if model in seen:
         return seen

@@ -127,7 +127,7 @@ def _check_exponent(exponent: ast.expr, text: str) -> None:
     raise FormulaError(f"'{text}': an exponent must be a number of at most {MAX_EXPONENT}")
 
 
-def _evaluate(node: ast.expr, values: Mapping[str, Value]) -> Any:
+def _evaluate(node: ast.expr, values: Mapping[str, Value]) -> Any:  # noqa: ANN401 - floats or arrays
     match node:
         case ast.Constant(value=value):
             return float(value)  # type: ignore[arg-type]

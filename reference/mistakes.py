@@ -137,7 +137,7 @@ def _changed_step(mistake: Mistake, construction: Construction) -> Step:
     raise ValueError(f"{mistake.code} cannot be made at the step of {mistake.at}")
 
 
-def _with_line(step: TwoLines, slot: int, change) -> TwoLines:  # type: ignore[no-untyped-def]
+def _with_line(step: TwoLines, slot: int, change) -> TwoLines:  # type: ignore[no-untyped-def]  # noqa: ANN001
     lines = [step.first, step.second]
     lines[slot] = change(lines[slot])
     return TwoLines(step.node, *lines)

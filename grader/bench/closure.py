@@ -109,7 +109,7 @@ def _solve(file: MechanismFile, values: Mapping[str, Any], start: Mapping[str, P
     motion = ExactMotion()
     unit = _UNITS[file.length_unit]
 
-    def number(formula: Formula) -> Any:
+    def number(formula: Formula) -> Any:  # noqa: ANN401 - mpf has no types
         return _number(formula.tree, values)
 
     for joint, (x, y) in file.ground.items():
@@ -134,7 +134,7 @@ def _drive(motion: ExactMotion, file: MechanismFile, values: Mapping[str, Any]) 
     motion.acceleration[crank.pin] = -epsilon * y - omega**2 * x, epsilon * x - omega**2 * y
 
 
-def _assemble(motion: ExactMotion, group: Any, number: Any, unit: int, start: Pair) -> None:
+def _assemble(motion: ExactMotion, group: Any, number: Any, unit: int, start: Pair) -> None:  # noqa: ANN401
     """Newton for the node's place, then the differentiated equations for its rates."""
     node, place = group.node, start
     motion.velocity[node] = motion.acceleration[node] = (mpf(0), mpf(0))
@@ -157,7 +157,7 @@ def _assemble(motion: ExactMotion, group: Any, number: Any, unit: int, start: Pa
     motion.acceleration[node] = _solve_2x2(first, second, first.acceleration, second.acceleration)
 
 
-def _rows(motion: ExactMotion, group: Any, number: Any, unit: int) -> tuple[_Row, _Row]:
+def _rows(motion: ExactMotion, group: Any, number: Any, unit: int) -> tuple[_Row, _Row]:  # noqa: ANN401
     match group:
         case DyadTable(pins=pins):
             lengths = [number(length) / unit for length in group.lengths]
@@ -180,7 +180,7 @@ def _rows(motion: ExactMotion, group: Any, number: Any, unit: int) -> tuple[_Row
     raise AssertionError(f"an unknown group {group!r}")
 
 
-def _link(motion: ExactMotion, node: str, pin: str, length: Any) -> _Row:
+def _link(motion: ExactMotion, node: str, pin: str, length: Any) -> _Row:  # noqa: ANN401
     """u.u = l^2 with u = N - P; u.(v_N - v_P) = 0; u.(a_N - a_P) = -(v_N - v_P).(v_N - v_P)."""
     arm = _minus(motion.position[node], motion.position[pin])
     relative = _minus(motion.velocity[node], motion.velocity[pin])
@@ -192,14 +192,14 @@ def _link(motion: ExactMotion, node: str, pin: str, length: Any) -> _Row:
     )
 
 
-def _guided(motion: ExactMotion, group: SliderTable, number: Any, unit: int) -> _Row:
+def _guided(motion: ExactMotion, group: SliderTable, number: Any, unit: int) -> _Row:  # noqa: ANN401
     angle = number(group.guide.angle_deg) * mp.pi / 180
     across = -mp.sin(angle), mp.cos(angle)
     through = number(group.guide.through[0]) / unit, number(group.guide.through[1]) / unit
     return _Row(across, _dot(across, _minus(motion.position[group.node], through)), mpf(0), mpf(0))
 
 
-def _divided(motion: ExactMotion, node: str, base: list[str], ratio: Any) -> tuple[_Row, _Row]:
+def _divided(motion: ExactMotion, node: str, base: list[str], ratio: Any) -> tuple[_Row, _Row]:  # noqa: ANN401
     """N = (1 - t) P + t Q, and so for both derivatives."""
     told = []
     for rates in (motion.position, motion.velocity, motion.acceleration):
@@ -212,7 +212,7 @@ def _divided(motion: ExactMotion, node: str, base: list[str], ratio: Any) -> tup
     )
 
 
-def _ratio_in_line(motion: ExactMotion, base: list[str], lengths: list[Any]) -> Any:
+def _ratio_in_line(motion: ExactMotion, base: list[str], lengths: list[Any]) -> Any:  # noqa: ANN401
     """Where a flat plate's point divides its base; None for a plate that is a triangle."""
     span = mp.hypot(*_minus(motion.position[base[1]], motion.position[base[0]]))
     first, second = lengths
@@ -226,13 +226,13 @@ def _ratio_in_line(motion: ExactMotion, base: list[str], lengths: list[Any]) -> 
     return None
 
 
-def _solve_2x2(first: _Row, second: _Row, p: Any, q: Any) -> Pair:
+def _solve_2x2(first: _Row, second: _Row, p: Any, q: Any) -> Pair:  # noqa: ANN401
     (a, b), (c, d) = first.gradient, second.gradient
     area = a * d - b * c
     return (p * d - b * q) / area, (a * q - c * p) / area
 
 
-def _number(node: ast.expr, values: Mapping[str, Any]) -> Any:
+def _number(node: ast.expr, values: Mapping[str, Any]) -> Any:  # noqa: ANN401
     """A formula of an authored file in 50 digits; decimals are taken as they are written."""
     match node:
         case ast.Constant(value=value):
@@ -269,11 +269,11 @@ def _minus(p: Pair, q: Pair) -> Pair:
     return p[0] - q[0], p[1] - q[1]
 
 
-def _dot(p: Pair, q: Pair) -> Any:
+def _dot(p: Pair, q: Pair) -> Any:  # noqa: ANN401
     return p[0] * q[0] + p[1] * q[1]
 
 
-def _cross(p: Pair, q: Pair) -> Any:
+def _cross(p: Pair, q: Pair) -> Any:  # noqa: ANN401
     return p[0] * q[1] - p[1] * q[0]
 
 

@@ -100,7 +100,7 @@ def _median_us(run: Callable[[], object], repeats: int) -> float:
 
 
 def _errors(assignment: Assignment) -> ErrorRow:
-    from grader.bench.closure import exact_motion
+    from grader.bench.closure import exact_motion  # noqa: PLC0415 - mpmath is an extra
 
     variants = assignment.variants()
     plan = exact_plan(assignment, variants)

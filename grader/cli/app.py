@@ -17,7 +17,7 @@ from reference.errors import PlanmarkError
 class Commands(TyperGroup):
     """The group of commands; errors of planmark end in one message and their exit status."""
 
-    def invoke(self, ctx: Any) -> Any:
+    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - click's own signature
         """Run a command, and tell a known error in words instead of a traceback."""
         try:
             return super().invoke(ctx)

@@ -61,7 +61,7 @@ def expected_quantity(name: str, expected: complex, scale: float, turn_rad: floa
     return quantity(name, abs(expected), direction, abs(expected) * scale)
 
 
-def outcome(
+def outcome(  # noqa: PLR0913 - one argument per field of the record
     criterion: CriterionTable,
     mark: Mark,
     measured: Quantity,

@@ -65,7 +65,7 @@ def read_results(out_dir: Path) -> ResultsDocument:
         ) from error
 
 
-def export(
+def export(  # noqa: PLR0913 - an option each of the command
     results: ResultsDocument,
     to: str,
     path: Path,
@@ -119,7 +119,7 @@ def export(
     return Delivery(path, written, _withheld(grades))
 
 
-def _worksheet(
+def _worksheet(  # noqa: PLR0913 - all that the file holds
     grades: list[Grade],
     people: Mapping[str, Person],
     comments: Mapping[str, str],

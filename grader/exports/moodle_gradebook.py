@@ -22,7 +22,7 @@ _SHAPES = {
 }
 
 
-def gradebook_text(
+def gradebook_text(  # noqa: PLR0913 - all that the file holds
     grades: list[Grade],
     people: Mapping[str, Person],
     *,

@@ -31,7 +31,7 @@ SHEET = N_("the sheet")
 _NO_NAMES: Mapping[str, str] = {}
 
 
-def write_feedback(
+def write_feedback(  # noqa: PLR0913 - all that the file holds
     report: ReportDocument,
     pictures: Sequence[Picture],
     out_dir: Path,
@@ -65,7 +65,7 @@ def write_feedback(
     write_whole(out_dir / "feedback.html", page)
 
 
-def feedback_page(
+def feedback_page(  # noqa: PLR0913 - all that the file holds
     report: ReportDocument,
     pictures: Sequence[Picture],
     lang: str,

@@ -65,7 +65,7 @@ def _dpi(page: tifffile.TiffPage) -> Dpi | None:
     return from_unit(x[0] / x[1], y[0] / y[1], int(_value(page, "ResolutionUnit", 2)))
 
 
-def _value(page: tifffile.TiffPage, name: str, default: Any) -> Any:
+def _value(page: tifffile.TiffPage, name: str, default: Any) -> Any:  # noqa: ANN401 - as tagged
     tag = page.tags.get(name)
     return default if tag is None else tag.value
 

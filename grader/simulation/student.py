@@ -46,7 +46,7 @@ class SimulatedSheet:
         return target
 
 
-def simulate(
+def simulate(  # noqa: PLR0913 - what identifies one student's work
     assignment: Assignment,
     variant: Variant,
     seed: int,

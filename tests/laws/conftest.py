@@ -78,5 +78,5 @@ def with_crank():
     return moved
 
 
-def pytest_configure(config):
+def pytest_configure(config):  # noqa: ARG001 - pytest's signature
     st.register_type_strategy(Mechanism, mechanisms())

@@ -19,7 +19,7 @@ from reference.motion import move
     ],
 )
 def test_an_error_is_the_same_after_a_journey_between_processes(error):
-    again = pickle.loads(pickle.dumps(error))
+    again = pickle.loads(pickle.dumps(error))  # noqa: S301 - our own pickle
     assert type(again) is type(error)
     assert (again.code, again.message, again.exit_status) == (error.code, error.message, error.exit_status)
     assert str(again) == str(error)
