@@ -114,7 +114,7 @@ class Cuts:
         return self.right - self.left
 
 
-def cut_across(  # noqa: PLR0913, PLR0917
+def cut_across(
     flat: Flat,
     ends: FloatArray,
     count: int,

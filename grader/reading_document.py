@@ -15,7 +15,7 @@ from grader.records import Figure, Problem, Reading, ReadNode, ReadVector, Sheet
 STAGES = ("decode", "sheet", "ink", "reading")
 
 
-def reading_document(  # noqa: PLR0913, PLR0917 - a page, what was made of it, and how long it took
+def reading_document(
     source: str,
     page: int,
     student_id: str | None,

@@ -26,7 +26,7 @@ class _Gathered:
     measured: list[Measurements] = field(default_factory=list)
 
 
-def works_of(  # noqa: PLR0913, PLR0917 - all that was found in a folder
+def works_of(
     assignment: Assignment,
     roster: Roster | None,
     ownership: Ownership,

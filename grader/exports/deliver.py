@@ -119,7 +119,7 @@ def export(  # noqa: PLR0913 - an option each of the command
     return Delivery(path, written, _withheld(grades))
 
 
-def _worksheet(  # noqa: PLR0913 - all that the file holds
+def _worksheet(
     grades: list[Grade],
     people: Mapping[str, Person],
     comments: Mapping[str, str],

@@ -75,7 +75,7 @@ class _Worksheet:
         return [row for row in range(1, len(self.table.rows)) if self.table.rows[row] != [""]]
 
 
-def fill(  # noqa: PLR0913 - all that the file holds
+def fill(
     data: bytes,
     file: str,
     grades: Sequence[Grade],

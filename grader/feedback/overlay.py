@@ -78,7 +78,7 @@ def _part(scene: Scene, figure: str) -> Scene:
     return replace(scene, arrows=tuple(arrow for arrow in scene.arrows if arrow.figure == figure))
 
 
-def _svg(  # noqa: PLR0913, PLR0917 - a look and what is in it
+def _svg(
     box: Box,
     image: Markup,
     scene: Scene,

@@ -63,7 +63,7 @@ class Own:
     clear: FloatArray
 
 
-def _best_shift(  # noqa: PLR0913, PLR0917
+def _best_shift(
     flat: Flat, strokes: Strokes, tips: FloatArray, outward: FloatArray, own: Own, mm_to_px: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """(score of the best head at each end, 0 for none; how far along the stroke its tip is, mm)."""
@@ -141,7 +141,7 @@ def _symmetric(left: FloatArray, right: FloatArray) -> FloatArray:
     return np.where(both, score, 0.0)
 
 
-def _runs(  # noqa: PLR0913, PLR0917
+def _runs(
     flat: Flat,
     tips: FloatArray,
     outward: FloatArray,

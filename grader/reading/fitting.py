@@ -132,7 +132,7 @@ def fit_nodes(
     return Fit(at, cov, redraw, _residuals(found, lines, at))
 
 
-def _sites(  # noqa: PLR0913
+def _sites(
     about: _Ends, state: FloatArray, cov: FloatArray, precision: FloatArray, pull: FloatArray, ends: EndModel
 ) -> tuple[FloatArray, FloatArray]:
     """The Gaussian that stands for each end: its precision, and precision times place."""

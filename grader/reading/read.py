@@ -47,7 +47,7 @@ class _Page:
     plans: dict[str, Plan] = field(default_factory=dict)
 
 
-def read_figures(  # noqa: PLR0913 - what is known of the drawing
+def read_figures(
     inks: Sequence[Ink],
     sheets: Sequence[Sheet],
     assignment: Assignment,

@@ -46,7 +46,7 @@ class SimulatedSheet:
         return target
 
 
-def simulate(  # noqa: PLR0913 - what identifies one student's work
+def simulate(
     assignment: Assignment,
     variant: Variant,
     seed: int,
