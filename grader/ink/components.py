@@ -51,7 +51,7 @@ def find_components(seeds: Seeds) -> Components:
     longest = np.zeros(len(box))
     length = np.hypot(*(seeds.ends[:, 1] - seeds.ends[:, 0]).T) / PX_PER_MM
     np.maximum.at(longest, of_seed, length)
-    major, minor = _spread(labels, len(box))
+    major, minor = _spread(labels.astype(np.int32, copy=False), len(box))
     straight = (minor <= _THIN * seeds.pen_px) & (major >= _LONG * minor)
     small = longest < _LONG_SEED_MM
     stroke_like = straight & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
