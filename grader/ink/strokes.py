@@ -26,6 +26,7 @@ _LEAST_SUPPORT = 0.3
 _SAME_MM = 0.2
 _PROBES = 13
 _SHORT_MM = 6.0
+_LONG_MM = 8.0
 _COVERED = 0.85
 _SE_END_MM = 0.2
 _SE_MERGED_MM = 1.0
@@ -36,7 +37,7 @@ def find_strokes(flat: Flat, seeds: Seeds, components: Components, field: Field)
     full = (seeds.ends + 0.5) / field.scale - 0.5
     usable = field.holds(to_mm(field.sheet, full.mean(axis=1))) & ~components.mark[components.of_seed]
     pieces = _lines(full, seeds, components, usable, field.scale)
-    fitted, merged = _settled(flat, pieces, field.sheet.px_per_mm)
+    fitted, merged = _settled(flat, pieces, field.sheet.px_per_mm, seeds.pen_px / field.scale)
     return _records(flat, fitted, merged, field.sheet)
 
 
@@ -57,20 +58,35 @@ def _lines(full: FloatArray, seeds: Seeds, components: Components, usable: BoolA
     return pieces.take(~(only_dashes & short))
 
 
-def _settled(flat: Flat, pieces: Pieces, unit: float) -> tuple[Fitted, BoolArray]:
+def _settled(flat: Flat, pieces: Pieces, unit: float, pen: float) -> tuple[Fitted, BoolArray]:
     """Fit, join what turns out to be one line, find the ends, fit again; no stroke twice."""
-    fitted = _sound(fit_centre(flat, pieces.ends, pieces.width, unit), unit)
+    fitted = _sound(fit_centre(flat, pieces.ends, pieces.width, unit, pen), unit)
+    pen = _pen(fitted, unit, pen)
     pieces = join(fitted.ends, fitted.width, _FITTED_OFF_MM * unit, _FITTED_GAP_MM * unit)
-    fitted = _sound(fit_centre(flat, pieces.ends, pieces.width, unit), unit)
+    fitted = _sound(fit_centre(flat, pieces.ends, pieces.width, unit, pen), unit)
     grown, merged = find_ends(flat, fitted, unit)
     parts, owners = split_by_darkness(flat, fitted.with_ends(grown), unit)
     fitted, merged = fitted.take(owners).with_ends(parts), merged[owners]
     once = distinct(fitted, unit)
     fitted, merged = fitted.take(once), merged[once]
-    final = fit_centre(flat, fitted.ends, fitted.width, unit)
+    final = fit_centre(flat, fitted.ends, fitted.width, unit, pen)
     # A short guess across a joint or a letter may have slid onto a stroke that is there already.
-    good = (final.support >= _LEAST_SUPPORT) & (final.length >= _LEAST_MM * unit) & distinct(final, unit, _COVERED)
+    good = (
+        (final.support >= _LEAST_SUPPORT)
+        & (final.length >= _LEAST_MM * unit)
+        & distinct(final, unit, _COVERED)
+    )
     return final.take(good), merged[good]
+
+
+def _pen(fitted: Fitted, unit: float, guess: float) -> float:
+    """Usual width of the long strokes, px; the guess where there are none."""
+    rows = np.flatnonzero(fitted.length >= _LONG_MM * unit)
+    if len(rows) == 0:
+        return guess
+    rows = rows[np.argsort(fitted.width[rows])]
+    cumulated = np.cumsum(fitted.length[rows])
+    return float(fitted.width[rows[np.searchsorted(cumulated, 0.4 * cumulated[-1])]])
 
 
 def _sound(fitted: Fitted, unit: float) -> Fitted:
