@@ -75,7 +75,7 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
         unit = "rad/s" if rate.startswith("omega") else "rad/s^2"
         table.add_row(rate, "", f"{value + 0.0:.4f}", unit, "")
     console.print(table)
-    worst = float(np.min(list(plan.motion.transmission.values())))
+    worst = min((float(np.min(sine)) for sine in plan.motion.transmission.values()), default=1.0)
     if worst < 0.2:
         console.print(
             f"near a singular position: the sine of a transmission angle is {worst:.3f}", style="yellow"

@@ -132,3 +132,42 @@ def test_lint_tells_all_that_is_unwise_in_an_assignment(planmark, tmp_path):
     assert found.stdout.splitlines()[-1].startswith("pump: 30 variants, ")
     (tmp_path / "broken.assignment.toml").write_text("id = 1\n", encoding="utf-8")
     assert planmark("lint", "broken.assignment.toml").returncode == 2
+
+
+CRANK_ALONE = """
+schema_version = 1
+id = "crank"
+rubric = "crank"
+title = { en = "Crank" }
+task = { en = "Draw it" }
+
+[mechanism]
+schema_version = 1
+id = "crank"
+title = { en = "Crank" }
+length_unit = "cm"
+ground = { O1 = [0, 0] }
+crank = { pivot = "O1", pin = "A", length = 10, angle_deg = 30, omega = -5, epsilon = 3 }
+
+[scales]
+crank_mm = 50
+kL = "crank_m / crank_mm"
+kv = "omega * kL"
+ka = "omega**2 * kL"
+
+[[page]]
+kind = "all"
+figures = ["mechanism", "velocity_plan", "acceleration_plan"]
+"""
+
+
+def test_a_crank_alone_that_turns_clockwise_and_speeds_down_is_a_mechanism_too(planmark, tmp_path):
+    (tmp_path / "crank.assignment.toml").write_text(CRANK_ALONE, encoding="utf-8")
+    table = planmark("plan", "crank.assignment.toml", "--svg", "crank.svg")
+    assert table.returncode == 0, table.stderr
+    vectors = json.loads(planmark("plan", "crank.assignment.toml", "--json").stdout)["vectors"]
+    assert vectors["v_A"]["drawn_mm"] == pytest.approx(50.0)
+    assert vectors["v_A"]["direction_deg"] == pytest.approx(300)
+    assert vectors["a_A_n"]["direction_deg"] == pytest.approx(210)
+    assert vectors["a_A_t"]["direction_deg"] == pytest.approx(120)
+    assert vectors["a_A_t"]["value"] == pytest.approx(0.3)
