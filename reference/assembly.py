@@ -1,6 +1,7 @@
 """From an authored mechanism file to a mechanism with numbers."""
 
 from collections.abc import Iterator, Mapping
+from itertools import permutations
 
 import numpy as np
 
@@ -47,10 +48,21 @@ def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
             yield Finding(f"{where}.node", f"{group.node} has a place already: over-constrained")
         placed.add(group.node)
         yield from _check_rigid(group, rigid, where)
+    yield from _read_alike(placed)
     lower = [joint.lower() for joint in placed]
     for joint in sorted(placed):
         if lower.count(joint.lower()) > 1:
             yield Finding("$", f"joint {joint}: another one has the same letters in another case")
+
+
+def _read_alike(joints: set[str]) -> Iterator[Finding]:
+    """Names that run together: v_BA is B about A, so no third joint may be called BA."""
+    read_as: dict[str, tuple[str, ...]] = {joint: (joint,) for joint in sorted(joints)}
+    for first, second in permutations(sorted(joints), 2):
+        other = read_as.setdefault(first + second, (first, second))
+        if other != (first, second):
+            told = f"{first + second} would mean both {' about '.join(other)} and {first} about {second}"
+            yield Finding("$", f"joints {', '.join(sorted({*other, first, second}))}: {told}; rename one")
 
 
 def _pins(group: DyadTable | SliderTable | PlateTable | PointOnLineTable) -> list[tuple[str, str]]:

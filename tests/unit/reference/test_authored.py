@@ -120,6 +120,13 @@ def test_the_crank_needs_a_ground_pivot_and_a_new_pin(mechanism):
     assert {"$.crank.pivot", "$.crank.pin"} <= set(structure(mechanism))
 
 
+@pytest.mark.parametrize("name", ["BA", "O2B"])
+def test_a_joint_whose_name_reads_like_two_joints_is_refused(mechanism, name):
+    mechanism["group"][2]["node"] = name
+    (message,) = structure(mechanism).values()
+    assert f"{name} would mean both {name} and {name[:-1]} about {name[-1]}" in message
+
+
 def test_letters_that_differ_by_case_alone_are_refused(mechanism):
     mechanism["group"][2]["node"] = "a"
     assert any("another case" in message for message in structure(mechanism).values())
