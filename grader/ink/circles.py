@@ -28,10 +28,10 @@ _LEAST_LINK_MM = 4.0
 _HOLLOW = 0.55
 _HOLLOW_AT = 0.55
 _EDGE_BYTES = 12.0
-_ARC_MM = 0.45
-_CHORD = 0.5
-_CHORD_MM = 5.0
-_CHORD_PAST_MM = 2.0
+_CHORD = 0.65
+_TANGENT_MM = 0.35
+_CHORD_MM = 6.0
+_CHORD_PAST_MM = 2.2
 
 
 def find_circles(flat: Flat, seeds: Seeds, components: Components, field: Field) -> FloatArray:
@@ -69,12 +69,15 @@ def arcs(strokes: Strokes, circles: FloatArray) -> BoolArray:
     """Which strokes are short chords or tangents of a circle, pieces of its ring."""
     result = np.zeros(len(strokes), dtype=bool)
     span = strokes.ends[:, 1] - strokes.ends[:, 0]
-    length = np.hypot(span[:, 0], span[:, 1])
-    points = strokes.ends[:, None, 0] + np.linspace(0.0, 1.0, 11)[None, :, None] * span[:, None, :]
+    length = np.maximum(np.hypot(span[:, 0], span[:, 1]), 1e-9)
+    u = span / length[:, None]
     for x, y, radius in circles:
-        away = np.hypot(points[..., 0] - x, points[..., 1] - y)
-        on_ring = (np.abs(away - radius) < _ARC_MM).mean(axis=1)
-        result |= (on_ring >= _CHORD) & (length < _CHORD_MM) & (away.max(axis=1) < radius + _CHORD_PAST_MM)
+        relative = np.array([x, y]) - strokes.ends[:, 0]
+        foot = (relative * u).sum(axis=1)
+        off = np.abs(relative[:, 0] * u[:, 1] - relative[:, 1] * u[:, 0])
+        tangent = (off > _CHORD * radius) & (off < radius + _TANGENT_MM) & (foot > 0) & (foot < length)
+        away = np.hypot(strokes.ends[..., 0] - x, strokes.ends[..., 1] - y).max(axis=1)
+        result |= tangent & (length < _CHORD_MM) & (away < radius + _CHORD_PAST_MM)
     return result
 
 
