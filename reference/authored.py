@@ -43,7 +43,7 @@ def _read_formula(value: object) -> Formula:
 def _check_joint(name: str) -> str:
     if not name.isalnum() or not name[0].isupper() or name.lower() in {"o", "n"}:
         # A joint's image in the plans is its name in lower case: the two must differ.
-        raise ValueError(f"'{name}' is no joint's name: a capital letter, then letters or digits (not O or N)")
+        raise ValueError(f"'{name}' is no joint's name: a capital, then letters or digits (not O or N)")
     return name
 
 
