@@ -83,16 +83,23 @@ def _check_rigid(
         case DyadTable():
             if group.pins[0] == group.pins[1]:
                 yield Finding(f"{where}.pins", "the two pins must be different joints")
-            for pin, link in zip(group.pins, group.links, strict=True):
-                rigid.setdefault(link, set()).update({pin, group.node})
+            for index, (pin, link) in enumerate(zip(group.pins, group.links, strict=True)):
+                yield from _add_link(link, {pin, group.node}, rigid, f"{where}.links[{index}]")
         case SliderTable():
-            rigid.setdefault(group.link, set()).update({group.pin, group.node})
+            yield from _add_link(group.link, {group.pin, group.node}, rigid, f"{where}.link")
         case _:
             members = rigid.setdefault(group.link, set())
             if not set(group.base) <= members or group.base[0] == group.base[1]:
                 held = ", ".join(sorted(members)) or "no joints yet"
                 yield Finding(f"{where}.base", f"must be two joints of link {group.link} ({held})")
             members.add(group.node)
+
+
+def _add_link(link: str, joints: set[str], rigid: dict[str, set[str]], where: str) -> Iterator[Finding]:
+    """A group's links are new bodies: under a name that is taken, two bodies would pass for one."""
+    if link in rigid:
+        yield Finding(where, f"there is a link {link} already: each link needs a name of its own")
+    rigid.setdefault(link, joints)
 
 
 def _unknown(joint: str, known: set[str], what: str) -> str:

@@ -99,7 +99,7 @@ def test_an_unknown_joint_is_told_with_those_placed_so_far(mechanism):
 
 
 def test_a_joint_with_two_places_is_over_constrained(mechanism):
-    mechanism["group"].append(dict(mechanism["group"][2], node="B", pin="C"))
+    mechanism["group"].append(dict(mechanism["group"][2], node="B", pin="C", link="5"))
     assert structure(mechanism) == {"$.group[3].node": "B has a place already: over-constrained"}
 
 
@@ -107,6 +107,19 @@ def test_the_base_of_a_plate_must_be_one_link(mechanism):
     mechanism["group"][1]["base"] = ["A", "O2"]
     told = structure(mechanism)
     assert told == {"$.group[1].base": "must be two joints of link 3 (A, B)"}
+
+
+@pytest.mark.parametrize(
+    ("group", "key", "links", "path"),
+    [
+        (0, "links", ["3", "3"], "$.group[0].links[1]"),
+        (0, "links", ["3", "1"], "$.group[0].links[1]"),
+        (2, "link", "2", "$.group[2].link"),
+    ],
+)
+def test_two_links_of_one_name_are_told(mechanism, group, key, links, path):
+    mechanism["group"][group][key] = links
+    assert "each link needs a name of its own" in structure(mechanism)[path]
 
 
 def test_the_two_pins_of_a_dyad_must_differ(mechanism):
