@@ -16,7 +16,8 @@ _NEAR_MM = 0.18
 _BUNDLED_WEIGHT = 0.3
 _WOBBLE_MM = 2.0
 """A hand's wobble along a ruler keeps its sign over about this length."""
-_FLOOR_MM = 0.008
+_FLOOR_MM = 0.015
+"""Strokes drawn over each other, and a pen that leans, shift the middle of the ink by this much."""
 _LEAST_CUTS = 6
 _SHORT_MM = 8.0
 _SHORT_PENS = 1.35
