@@ -1,4 +1,4 @@
-"""Measure again and put the figures into benchmarks.md: `python docs/make_benchmarks.py`, some ten minutes."""
+"""Measure and put the figures into benchmarks.md: `python docs/make_benchmarks.py`, some ten minutes."""
 
 import re
 from pathlib import Path
