@@ -26,7 +26,9 @@ class ToleranceTable(Authored):
     Length: the larger of `length_mm` and `length_relative` of the expected length. Direction: the
     larger of `direction_deg` and the angle at which the vector's end is `across_mm` off. Vectors
     shorter than `least_mm` (expected) have no direction that could be judged. Up to
-    `partial_factor` times the tolerance gives half points.
+    `partial_factor` times the tolerance gives half points. A verdict on a scan that is another one
+    within `certain_errors` standard errors of the reading goes to a person: 1.645 leaves one in
+    twenty that lie just at a limit on the wrong side of it.
     """
 
     length_mm: Positive = 1.0
@@ -35,6 +37,7 @@ class ToleranceTable(Authored):
     across_mm: NotNegative = 0.5
     least_mm: NotNegative = 3.0
     scale_relative: Positive = 0.02
+    certain_errors: NotNegative = 1.645
     partial_factor: Annotated[float, Field(ge=1.0, allow_inf_nan=False)] = 2.0
     partial_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
 

@@ -13,18 +13,18 @@ QUARTER_TURN = 1j
 
 
 def cross(u: ComplexArray, v: ComplexArray) -> FloatArray:
-    """U x v, positive when v lies to the left of u."""
+    """The cross product of u and v, positive when v lies to the left of u."""
     return np.asarray(u.real * v.imag - u.imag * v.real)
 
 
 def dot(u: ComplexArray, v: ComplexArray) -> FloatArray:
-    """U . v."""
+    """The scalar product of u and v."""
     return np.asarray(u.real * v.real + u.imag * v.imag)
 
 
 def unit(u: ComplexArray) -> ComplexArray:
-    """U / |u|; nan where u is zero, which has no direction."""
-    with np.errstate(invalid="ignore", divide="ignore"):
+    """The unit vector along u; nan where u is zero (or too small to divide by), which has no direction."""
+    with np.errstate(all="ignore"):
         return np.asarray(u / np.abs(u))
 
 
@@ -77,6 +77,6 @@ def arc_and_line(
 def similar(
     p: ComplexArray, q: ComplexArray, model_p: ComplexArray, model_q: ComplexArray, model_r: ComplexArray
 ) -> ComplexArray:
-    """R such that triangle p q r is directly similar to the model (Mehmke's image)."""
+    """The point r such that triangle p q r is directly similar to the model (Mehmke's image)."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(p + (q - p) * ((model_r - model_p) / (model_q - model_p)))

@@ -136,7 +136,7 @@ class _Session:
         marks = []
         for right in (real, abs(expected) * scale, drawn.length_mm * scale):
             allowed = length_tolerance(tolerance, right / scale) * scale
-            marks.append(mark_value(value, right, allowed, tolerance.partial_factor, unit_of(criterion.name)))
+            marks.append(mark_value(value, right, allowed, tolerance, unit_of(criterion.name)))
         best = marks[0]
         for mark in marks[1:]:
             best = mark if verdicts.is_better(mark, best) else best
@@ -154,7 +154,7 @@ class _Session:
         def against(expected: complex) -> Mark:
             allowed = length_tolerance(tolerance, abs(expected)) * scale
             right = abs(expected) * scale
-            return mark_value(value, right, allowed, tolerance.partial_factor, unit_of(name))
+            return mark_value(value, right, allowed, tolerance, unit_of(name))
 
         mark, expected, followed = self.ledger.best(name, against)
         right = Quantity(value=abs(expected) * scale, unit=unit_of(name))
@@ -176,7 +176,7 @@ class _Session:
 
         def against(expected: float) -> Mark:
             allowed = length_tolerance(tolerance, abs(expected) / per_mm) * per_mm
-            return mark_value(value, expected, allowed, tolerance.partial_factor, unit)
+            return mark_value(value, expected, allowed, tolerance, unit)
 
         mark, followed = against(right), False
         own = from_rate(task, self.evidence, rate, per_mm) if task.rubric.follow_through else None

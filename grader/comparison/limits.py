@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from grader.outcomes import Reason
+from grader.rubric import ToleranceTable
 
 Level = Literal["none", "partial", "full"]
 LEVELS: tuple[Level, ...] = ("none", "partial", "full")
-STANDARD_ERRORS = 2.0
-"""A verdict that could change within so many standard errors goes to a person."""
 ROUNDING = 1e-9
 """Relative: a deviation this little above its tolerance is on it."""
 
@@ -33,7 +32,8 @@ class Limit:
     what : ``length``, ``direction``, ``value`` or ``scale``
     off : deviation without its sign, in the unit of `tolerance`
     se : standard error of the deviation
-    factor : up to so many tolerances the verdict is partial
+    allowance : the tolerances that it is held against: the band of partial marks, and how many
+        standard errors a verdict must be away from changing
     reason : said where the verdict is not full
     """
 
@@ -41,7 +41,7 @@ class Limit:
     off: float
     tolerance: float
     se: float
-    factor: float
+    allowance: ToleranceTable
     reason: Reason
 
     def level_at(self, off: float) -> Level:
@@ -49,7 +49,7 @@ class Limit:
         limit = self.tolerance * (1.0 + ROUNDING)
         if off <= limit:
             return "full"
-        return "partial" if off <= limit * self.factor else "none"
+        return "partial" if off <= limit * self.allowance.partial_factor else "none"
 
     @property
     def level(self) -> Level:
@@ -59,12 +59,12 @@ class Limit:
     @property
     def worst(self) -> Level:
         """The verdict at the far end of the standard error."""
-        return self.level_at(self.off + STANDARD_ERRORS * self.se)
+        return self.level_at(self.off + self.allowance.certain_errors * self.se)
 
     @property
     def best(self) -> Level:
         """The verdict at the near end of the standard error."""
-        return self.level_at(max(self.off - STANDARD_ERRORS * self.se, 0.0))
+        return self.level_at(max(self.off - self.allowance.certain_errors * self.se, 0.0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,7 @@ def mark_vector(
     if with_direction and drawn.direction_rad is not None:
         allowed = direction_tolerance(tolerance, abs(expected))
         if allowed is not None and drawn.length_mm >= tolerance.least_mm:
-            limits.append(_direction_limit(drawn, expected, allowed, tolerance.partial_factor))
+            limits.append(_direction_limit(drawn, expected, allowed, tolerance))
         else:
             shorter = min(abs(expected), drawn.length_mm)
             told = {"length_mm": shorter, "least_mm": tolerance.least_mm}
@@ -56,10 +56,12 @@ def _length_limit(drawn: DrawnVector, expected_mm: float, tolerance: ToleranceTa
     else:
         told |= {"expected_mm": expected_mm, "off_mm": abs(off)}
         reason = Reason("too_long" if off > 0.0 else "too_short", told)
-    return Limit("length", abs(off), allowed, drawn.se_mm, tolerance.partial_factor, reason)
+    return Limit("length", abs(off), allowed, drawn.se_mm, tolerance, reason)
 
 
-def _direction_limit(drawn: DrawnVector, expected: complex, allowed_deg: float, factor: float) -> Limit:
+def _direction_limit(
+    drawn: DrawnVector, expected: complex, allowed_deg: float, tolerance: ToleranceTable
+) -> Limit:
     right = cmath.phase(expected)
     drawn_rad = drawn.direction_rad or 0.0
     off = math.degrees(math.remainder(drawn_rad - right, math.tau))
@@ -73,7 +75,7 @@ def _direction_limit(drawn: DrawnVector, expected: complex, allowed_deg: float, 
         reason = Reason("reversed", told)
     else:
         reason = Reason("turned_left" if off > 0.0 else "turned_right", told)
-    return Limit("direction", abs(off), allowed_deg, drawn.se_deg, factor, reason)
+    return Limit("direction", abs(off), allowed_deg, drawn.se_deg, tolerance, reason)
 
 
 def degrees(angle_rad: float) -> float:
@@ -81,7 +83,7 @@ def degrees(angle_rad: float) -> float:
     return math.degrees(angle_rad) % 360.0 % 360.0
 
 
-def mark_value(value: float, expected: float, allowed: float, factor: float, unit: str) -> Mark:
+def mark_value(value: float, expected: float, allowed: float, tolerance: ToleranceTable, unit: str) -> Mark:
     """A computed value against the expected one, SI; its sign counts where the expected one has any."""
     told: dict[str, float | str] = {"measured": value, "expected": expected, "unit": unit}
     off = abs(value - expected)
@@ -91,4 +93,4 @@ def mark_value(value: float, expected: float, allowed: float, factor: float, uni
         told |= {"off": off, "tolerance": allowed}
         large = abs(value) > abs(expected)
         reason = Reason("value_too_large" if large else "value_too_small", told)
-    return mark([Limit("value", off, allowed, 0.0, factor, reason)])
+    return mark([Limit("value", off, allowed, 0.0, tolerance, reason)])

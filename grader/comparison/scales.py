@@ -155,7 +155,7 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
         off=abs(real / scale.used - drawn_mm),
         tolerance=length_tolerance(tolerance, drawn_mm),
         se=se_mm,
-        factor=tolerance.partial_factor,
+        allowance=tolerance,
         reason=Reason("scale_off", told),
     )
     return Scale(scale, other, mark([limit]))
