@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+from skimage.feature import peak_local_max
 
 from grader.ink.components import Components
 from grader.ink.regions import Field, to_mm
@@ -102,10 +103,10 @@ def _meeting_points(seeds: Seeds, where: BoolArray) -> FloatArray:
     counted = np.bincount((y * wide + x)[inside], minlength=high * wide).reshape(high, wide)
     votes = np.asarray(cv2.boxFilter(counted.astype(np.float32), -1, (3, 3), normalize=False))
     full = 2.0 * 2.0 * np.pi * _RADIUS_MM[0] * PX_PER_MM * 3.0 * _CELL_PX
-    peak = (votes == cv2.dilate(votes, np.ones((5, 5), np.uint8))) & (votes > _VOTES * full)
-    at = np.argwhere(peak)
-    order = np.argsort(-votes[at[:, 0], at[:, 1]])[:_MOST]
-    return np.asarray((at[order][:, ::-1] + 0.5) * _CELL_PX, dtype=np.float64)
+    at = peak_local_max(  # type: ignore[no-untyped-call]
+        votes, min_distance=2, threshold_abs=_VOTES * full, num_peaks=_MOST, exclude_border=False
+    )
+    return np.asarray((at[:, ::-1] + 0.5) * _CELL_PX, dtype=np.float64)
 
 
 def _refined(flat: Flat, centres: FloatArray, px_per_mm: float) -> FloatArray:
