@@ -109,7 +109,7 @@ def expect(
 
 
 def _pairs(values: ComplexArray) -> FloatArray:
-    """x and y in turn."""
+    """X and y in turn."""
     return np.column_stack([values.real, values.imag]).ravel()
 
 

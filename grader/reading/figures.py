@@ -1,18 +1,19 @@
 """Records of what was read, with confidences and reasons."""
 
+import cmath
 import math
 
 import numpy as np
 
 from grader.reading import confidence
+from grader.reading.confidence import Signs, sureness
 from grader.reading.expected import Edge
 from grader.reading.fitting import Fit
+from grader.reading.hypotheses import REGULAR
 from grader.reading.plans import Plan
 from grader.reading.sketch import Sketch
 from grader.records import Figure, FloatArray, ReadNode, ReadVector, Unread
 
-CLOSE_MM = 0.35
-"""Two vectors on one stroke, both within this of it, could not be drawn any other way."""
 LEAST_VECTOR_MM = 2.0
 """A shorter vector is known by its nodes, whether or not it has a stroke."""
 
@@ -30,16 +31,16 @@ def figure_of_plan(plan: Plan, scale_se: float) -> tuple[Figure, list[Unread]]:
 
     Arguments: `scale_se` is the sheet's relative standard error of lengths.
     """
-    names = plan.found.expected.names
-    fit = plan.fit
-    sure = _node_confidence(plan, fit)
+    fit, names = plan.fit, plan.found.expected.names
+    named = _named(plan, fit)
+    placed = confidence.of_places(fit)
     absent = dict(plan.hypothesis.absent)
     nodes = {
-        name: _node(fit, index, float(sure[index]))
+        name: _node(fit, index, sureness(Signs(float(placed[index]), float(named[index]))))
         for index, name in enumerate(names)
         if name not in absent and np.isfinite(fit.at[index])
     }
-    vectors, unread = _vectors(plan, fit, sure, scale_se)
+    vectors, unread = _vectors(plan, fit, named, scale_se)
     unread.extend(Unread(name, reason) for name, reason in absent.items())
     for vector in plan.hypothesis.drawing.construction.vectors_of(figure_name(plan)):
         gone = next((absent[end] for end in (vector.head, vector.tail) if end in absent), None)
@@ -54,53 +55,61 @@ def figure_name(plan: Plan) -> str:
 
 
 def _node(fit: Fit, index: int, sure: float) -> ReadNode:
-    return ReadNode(complex(fit.at[index]), fit.cov[2 * index : 2 * index + 2, 2 * index : 2 * index + 2], sure)
+    rows = slice(2 * index, 2 * index + 2)
+    return ReadNode(complex(fit.at[index]), fit.cov[rows, rows], sure)
 
 
-def _node_confidence(plan: Plan, fit: Fit) -> FloatArray:
-    names = plan.found.expected.names
+def _named(plan: Plan, fit: Fit) -> FloatArray:
+    """How many of the explanations, by weight, have each node where it is read."""
     rivals = [
         confidence.Rival(dict(zip(other.found.expected.names, other.fit.at, strict=True)), other.score)
         for other in plan.rivals
         if other.score > plan.score - confidence.FARTHEST
     ]
-    named = confidence.of_names(names, fit.at, plan.score, rivals)
-    placed = confidence.of_places(fit)
-    support = min(1.0, max(0.0, (plan.place.score - 0.3) / 0.4))
-    return np.asarray(np.minimum(named * placed * support, confidence.HIGHEST))
+    return confidence.of_names(plan.found.expected.names, fit.at, plan.score, rivals)
 
 
 def _vectors(
-    plan: Plan, fit: Fit, sure: FloatArray, scale_se: float
+    plan: Plan, fit: Fit, named: FloatArray, scale_se: float
 ) -> tuple[dict[str, ReadVector], list[Unread]]:
     vectors: dict[str, ReadVector] = {}
     unread: list[Unread] = []
     for index, edge in enumerate(plan.found.expected.edges):
         span = complex(fit.at[edge.head] - fit.at[edge.tail])
+        row = int(plan.found.stroke[index])
         ends = f"{plan.found.expected.names[edge.tail]} and {plan.found.expected.names[edge.head]}"
-        if plan.found.stroke[index] < 0 and abs(span) > LEAST_VECTOR_MM:
+        if row < 0 and abs(span) > LEAST_VECTOR_MM:
             unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
             continue
-        sureness = float(min(sure[edge.tail], sure[edge.head]))
-        if plan.found.shared[index]:
-            off = float(np.abs(fit.residual_mm[index]).max())
-            sureness = min(sureness, confidence.SHARED_CLOSELY if off < CLOSE_MM else confidence.SHARED_STROKE)
-        vectors[edge.name] = _vector(fit, edge, span, sureness, scale_se)
+        cov = _difference_cov(fit, edge, span, scale_se)
+        signs = Signs(
+            placed=confidence.within(cov),
+            named=float(min(named[edge.tail], named[edge.head])),
+            off_mm=float(np.abs(fit.residual_mm[index]).max()) if row >= 0 else 0.0,
+            shared=bool(plan.found.shared[index]),
+            thin=row >= 0 and bool(plan.lines.thin[row]),
+            mistaken=plan.hypothesis.label not in REGULAR,
+            length_mm=abs(span),
+        )
+        vectors[edge.name] = _vector(span, cov, sureness(signs))
     return vectors, unread
 
 
-def _vector(fit: Fit, edge: Edge, span: complex, sureness: float, scale_se: float) -> ReadVector:
-    """Length and direction node to node, errors from the joint covariance of the two."""
+def _difference_cov(fit: Fit, edge: Edge, span: complex, scale_se: float) -> FloatArray:
+    """Covariance (2, 2) of a vector, from both its nodes and the sheet's scale."""
     difference = np.zeros((2, fit.cov.shape[0]))
     for axis in (0, 1):
         difference[axis, 2 * edge.head + axis], difference[axis, 2 * edge.tail + axis] = 1.0, -1.0
-    cov = difference @ fit.cov @ difference.T
-    length = abs(span)
+    scaled = scale_se * np.array([span.real, span.imag])
+    return np.asarray(difference @ fit.cov @ difference.T + np.outer(scaled, scaled))
+
+
+def _vector(span: complex, cov: FloatArray, sure: float) -> ReadVector:
+    """Length and direction with their standard errors."""
+    length = float(abs(span))
     along = np.array([span.real, span.imag]) / max(length, 1e-9)
     across = np.array([-along[1], along[0]])
-    se_along, se_across = (float(np.sqrt(max(axis @ cov @ axis, 0.0))) for axis in (along, across))
-    se_along = float(np.hypot(se_along, scale_se * length))
-    se_deg = float(np.degrees(np.arctan2(se_across, max(length, 1e-9))))
-    direction = float(np.degrees(np.angle(span)) % 360.0) if length > se_across else None
-    sureness *= math.erf(confidence.NEAR_MM / (math.sqrt(2.0) * max(scale_se * length, 1e-6)))
-    return ReadVector(length, se_along, direction, se_deg, sureness)
+    se_along, se_across = (math.sqrt(max(float(axis @ cov @ axis), 0.0)) for axis in (along, across))
+    se_deg = math.degrees(math.atan2(se_across, max(length, 1e-9)))
+    direction = math.degrees(cmath.phase(span)) % 360.0 if length > se_across else None
+    return ReadVector(length, se_along, direction, se_deg, sure)

@@ -17,8 +17,12 @@ USUAL_REDRAW_MM = 0.25
 DOUBT = 4.0
 """The usual redraw error counts as much as this many spare observations."""
 SHARED_MM = 0.5
-AT_MM = 0.2
-"""How far a stroke that ends at its node ends from it."""
+AT_MM = 0.1
+"""How far a stroke that ends at its node ends from it, but for the error of seeing its end."""
+HONEST = 0.4
+"""Ends are seen this much better than their standard errors say, where they are seen at all."""
+HIDDEN_MM = 0.5
+"""Standard errors above this say that other ink goes on beyond the end."""
 END_REACH_MM = 5.0
 CENTRE_MM = 0.2
 """How far a circle drawn around a node is off it."""
@@ -30,30 +34,43 @@ LOOSE_MM = 6.0
 class EndModel:
     """Where strokes end about their nodes: at it, run on a little or far, or short of it.
 
-    Shares of `at`, `little`, `far`, `short` and the mean lengths (mm) of the last three.
+    Attributes
+    ----------
+    at_mm : how far a stroke that ends at its node ends from it
+    shares : of ends at the node, run on a little, run on far, and short of it
+    reach_mm : mean lengths of the last three
+    merged : the same two where other ink hides the end
     """
 
     at_mm: float = AT_MM
-    shares: tuple[float, float, float, float] = (0.45, 0.28, 0.2, 0.07)
-    reach_mm: tuple[float, float, float] = (0.7, 5.0, 1.2)
+    shares: tuple[float, float, float, float] = (0.45, 0.3, 0.2, 0.05)
+    reach_mm: tuple[float, float, float] = (0.6, 4.0, 1.2)
+    merged_shares: tuple[float, float, float, float] = (0.35, 0.25, 0.2, 0.2)
+    merged_reach_mm: tuple[float, float, float] = (1.0, 4.0, 2.5)
 
     def density(self, gap: FloatArray, se_end: FloatArray) -> FloatArray:
         """Per mm, of ends `gap` mm beyond their nodes; `se_end` is the end's own standard error."""
-        sigma = np.sqrt(self.at_mm**2 + se_end**2)
+        hidden = se_end > HIDDEN_MM
+        shares = np.where(hidden[None], _columns(self.merged_shares), _columns(self.shares))
+        little, far, short = np.where(hidden[None], _columns(self.merged_reach_mm), _columns(self.reach_mm))
+        sigma = np.hypot(self.at_mm, HONEST * se_end)
         at = np.exp(-0.5 * (gap / sigma) ** 2) / (sigma * np.sqrt(2.0 * np.pi))
         beyond = 1.0 / (1.0 + np.exp(-np.clip(1.7 * gap / sigma, -60.0, 60.0)))
-        little, far, short = self.reach_mm
-        over = np.maximum(gap, 0.0)
+        over, under = np.maximum(gap, 0.0), np.minimum(gap, 0.0)
         return np.asarray(
-            self.shares[0] * at
-            + self.shares[1] * beyond * np.exp(-over / (little + sigma)) / (little + sigma)
-            + self.shares[2] * beyond * np.exp(-over / far) / far
-            + self.shares[3] * (1.0 - beyond) * np.exp(np.minimum(gap, 0.0) / short) / short
+            shares[0] * at
+            + shares[1] * beyond * np.exp(-over / little) / little
+            + shares[2] * beyond * np.exp(-over / far) / far
+            + shares[3] * (1.0 - beyond) * np.exp(under / short) / short
         )
 
 
+def _columns(values: tuple[float, ...]) -> FloatArray:
+    return np.array(values)[:, None, None]
+
+
 PLAN_ENDS = EndModel()
-LINK_ENDS = EndModel(at_mm=1.5, shares=(0.7, 0.1, 0.1, 0.1), reach_mm=(2.0, 6.0, 3.0))
+LINK_ENDS = EndModel(1.5, (0.7, 0.1, 0.1, 0.1), (2.0, 6.0, 3.0), (0.7, 0.1, 0.1, 0.1), (2.0, 6.0, 3.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +105,7 @@ class _Lines:
 
 @dataclass(frozen=True, slots=True)
 class _Ends:
-    """Rows: a stroke ends about a node. Along the stroke's outward `design` direction, the end is at `end`."""
+    """Rows: a stroke ends about a node: along its outward direction, `design`, it ends at `end`."""
 
     design: FloatArray
     end: FloatArray
@@ -113,7 +130,7 @@ def fit_nodes(
     count = 2 * len(at)
     redraw = USUAL_REDRAW_MM
     about = _end_rows(found, lines, at)
-    precision, pull = np.zeros(len(about.end)), np.zeros(len(about.end))
+    sites = _Sites(np.zeros(len(about.end)), np.zeros(len(about.end)))
     cov = np.eye(count) * LOOSE_MM**2
     rows = _line_rows(found, lines, at, centres or {})
     for _ in range(ROUNDS):
@@ -122,35 +139,42 @@ def fit_nodes(
         weight = np.minimum(1.0, 2.0 / np.maximum(misfit, 1e-9)) / sigma**2
         normal = rows.design.T @ (rows.design * weight[:, None]) + np.eye(count) / LOOSE_MM**2
         right = rows.design.T @ (rows.goal * weight) + _pairs(found.expected.at) / LOOSE_MM**2
-        normal = normal + about.design.T @ (about.design * precision[:, None])
-        right = right + about.design.T @ pull
+        normal = normal + about.design.T @ (about.design * sites.precision[:, None])
+        right = right + about.design.T @ sites.pull
         cov = np.asarray(np.linalg.inv(normal), dtype=np.float64)
         state = cov @ right
         at = state[0::2] + 1j * state[1::2]
         redraw = _redraw((rows.goal - rows.design @ state)[rows.own], count)
-        precision, pull = _sites(about, state, cov, precision, pull, ends)
+        sites = _renewed(sites, about, state, cov, ends)
     return Fit(at, cov, redraw, _residuals(found, lines, at))
 
 
-def _sites(
-    about: _Ends, state: FloatArray, cov: FloatArray, precision: FloatArray, pull: FloatArray, ends: EndModel
-) -> tuple[FloatArray, FloatArray]:
+@dataclass(frozen=True, slots=True)
+class _Sites:
     """The Gaussian that stands for each end: its precision, and precision times place."""
+
+    precision: FloatArray
+    pull: FloatArray
+
+
+def _renewed(sites: _Sites, about: _Ends, state: FloatArray, cov: FloatArray, ends: EndModel) -> _Sites:
+    """Half a step towards the moments of each end's own density in the light of everything else."""
     if not len(about.end):
-        return precision, pull
+        return sites
     mean = about.design @ state
     variance = np.maximum(np.einsum("ij,jk,ik->i", about.design, cov, about.design), 1e-6)
-    rest = np.maximum(1.0 / variance - precision, 1.0 / LOOSE_MM**2)
-    rest_mean = (mean / variance - pull) / rest
-    grid = np.linspace(-4.0, 4.0, 81)
+    rest = np.maximum(1.0 / variance - sites.precision, 1.0 / LOOSE_MM**2)
+    rest_mean = (mean / variance - sites.pull) / rest
+    grid = np.linspace(-4.0, 4.0, 241)
     place = rest_mean[:, None] + grid / np.sqrt(rest)[:, None]
     weight = np.exp(-0.5 * grid**2) * ends.density(about.end[:, None] - place, about.se[:, None])
     weight /= weight.sum(axis=1, keepdims=True)
-    new_mean = (weight * place).sum(axis=1)
+    # The likeliest place, not the mean of "here" and "somewhat further in"; the spread is about it.
+    new_mean = np.take_along_axis(place, weight.argmax(axis=1)[:, None], axis=1)[:, 0]
     new_variance = np.maximum((weight * (place - new_mean[:, None]) ** 2).sum(axis=1), 1e-4)
     fresh = np.maximum(1.0 / new_variance - rest, 0.0)
     fresh_pull = np.where(fresh > 0.0, new_mean / new_variance - rest_mean * rest, 0.0)
-    return 0.5 * (precision + fresh), 0.5 * (pull + fresh_pull)
+    return _Sites(0.5 * (sites.precision + fresh), 0.5 * (sites.pull + fresh_pull))
 
 
 def _pairs(values: ComplexArray) -> FloatArray:
@@ -172,7 +196,8 @@ def _line_rows(
             arm = float(((at[node] - middle) * np.conj(along)).real)
             design.append(_row(len(at), node, 1j * along))
             goal.append(float((middle * np.conj(1j * along)).real))
-            sigma.append(float(np.sqrt(loose**2 + lines.se_offset[row] ** 2 + (lines.se_angle[row] * arm) ** 2)))
+            tilt = lines.se_angle[row] * arm
+            sigma.append(float(np.sqrt(loose**2 + lines.se_offset[row] ** 2 + tilt**2)))
             own.append(not found.shared[index])
     for node, centre in centres.items():
         for axis, value in ((1.0 + 0j, centre.real), (1j, centre.imag)):

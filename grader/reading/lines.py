@@ -139,7 +139,7 @@ def _longest_chains(pairs: list[list[int]]) -> list[list[int]]:
         merged = group.get(one, {one}) | group.get(other, {other})
         for piece in merged:
             group[piece] = merged
-    longest = {tuple(sorted(pieces)) for pieces in group.values() if 2 < len(pieces) <= MOST_PIECES}  # noqa: PLR2004
+    longest = {tuple(sorted(pieces)) for pieces in group.values() if 2 < len(pieces) <= MOST_PIECES}
     return [list(pieces) for pieces in sorted(longest)]
 
 

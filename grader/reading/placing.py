@@ -25,7 +25,7 @@ SPECK_MM = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A figure's origin on the sheet (complex mm), size relative to what is expected, turn, and score 0..1."""
+    """A figure's origin on the sheet (complex mm), its size relative to the expected, turn, score 0..1."""
 
     at: complex
     size: float
@@ -69,19 +69,16 @@ def places(expected: Expected, lines: Lines, search: Search, count: int = 3) -> 
 def _proposals(expected: Expected, lines: Lines, search: Search) -> FloatArray:
     """(m, 4) origin x, y, size, turn."""
     found: list[FloatArray] = []
-    for edge in _longest(expected):
-        tail, head = (complex(expected.at[end]) for end in (expected.edges[edge].tail, expected.edges[edge].head))
-        span = head - tail
+    for edge in (expected.edges[one] for one in _longest(expected)):
+        tail, head = complex(expected.at[edge.tail]), complex(expected.at[edge.head])
         # A stroke has no sense: it may lie either way.
         for start, end in ((lines.start, lines.end), (lines.end, lines.start)):
-            turn_all = np.angle((end - start) / span)
+            turn_all = np.angle((end - start) / (head - tail))
             for turn in search.turns_rad:
                 off = np.abs(np.angle(np.exp(1j * (turn_all - turn))))
                 turned = np.flatnonzero(off < search.give_rad)
                 for size in search.sizes:
-                    found.extend(
-                        _laid(tail, span, start[turned], end[turned], turn_all[turned], size, search)
-                    )
+                    found.extend(_laid((tail, head), (start[turned], end[turned]), size, search))
     return np.concatenate(found) if found else np.zeros((0, 4))
 
 
@@ -97,11 +94,12 @@ def _longest(expected: Expected) -> list[int]:
     return chosen
 
 
-def _laid(  # noqa: PLR0913 - one argument per thing that is fixed
-    tail: complex, span: complex, start: ComplexArray, end: ComplexArray, turn: FloatArray,
-    size: float, search: Search,
+def _laid(
+    edge: tuple[complex, complex], strokes: tuple[ComplexArray, ComplexArray], size: float, search: Search
 ) -> list[FloatArray]:
     """Origins with the edge's tail on the stroke's start, and with its head on the stroke's end."""
+    (tail, head), (start, end) = edge, strokes
+    span = head - tail
     drawn = np.abs(end - start)
     if size > 0.0:
         wanted = size * abs(span)
@@ -111,10 +109,11 @@ def _laid(  # noqa: PLR0913 - one argument per thing that is fixed
         sizes = drawn / abs(span)
         fits = (sizes > search.smallest) & (sizes < search.largest)
         sizes = sizes[fits]
-    start, end, turn = start[fits], end[fits], turn[fits]
+    start, end = start[fits], end[fits]
+    turn = np.angle((end - start) / span)
     spin = sizes * np.exp(1j * turn)
     by_tail = start - spin * tail
-    by_head = end - spin * (tail + span)
+    by_head = end - spin * head
     return [np.column_stack([at.real, at.imag, sizes, turn]) for at in (by_tail, by_head)]
 
 
@@ -162,7 +161,7 @@ def _apart(proposed: FloatArray, scores: FloatArray, radius: float, count: int) 
     spin = proposed[:, 2] * np.exp(1j * proposed[:, 3])
     for index in np.argsort(-scores):
         moved = [abs(origin[index] - origin[one]) + radius * abs(spin[index] - spin[one]) for one in chosen]
-        if all(distance > 4.0 for distance in moved):  # noqa: PLR2004 - mm, less is the same place
+        if all(distance > 4.0 for distance in moved):
             chosen.append(int(index))
         if len(chosen) == count:
             break
@@ -171,7 +170,3 @@ def _apart(proposed: FloatArray, scores: FloatArray, radius: float, count: int) 
         for one in chosen
     ]
 
-
-def best_of(found: Sequence[Place]) -> Place | None:
-    """The highest score."""
-    return max(found, key=lambda place: place.score, default=None)

@@ -6,27 +6,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.reading.expected import Edge, Expected, Hand, Slack, expect, vectors_of
+from grader.reading.belief import Ends
+from grader.reading.expected import Expected, Hand, Slack, expect, vectors_of
 from grader.reading.fitting import Fit, fit_nodes
-from grader.reading.lines import Lines
-from grader.reading.matching import BEAM, Ends, Explanation, explain
+from grader.reading.hypotheses import REGULAR, Hypothesis, mistaken, regular, resized, tied
+from grader.reading.lines import BoolArray, Lines
+from grader.reading.matching import Explanation, Settled, explain
 from grader.reading.placing import Place, Search, places
-from grader.records import FloatArray
-from reference.construction import Construction, ancestors
+from reference.construction import ancestors
 from reference.geometry import ComplexArray
-from reference.mistakes import Drawing, Mistake, affected, commit, single_mistakes
-from reference.steps import Given, Normal
+from reference.mistakes import Drawing, affected
 
 HAND = Hand()
 PLAN_ENDS = Ends()
 QUARTERS = (np.pi / 2, -np.pi / 2, np.pi)
-REGULAR = ("as constructed", "plates by similarity")
 COST_OF_TURN = 6.0
 COST_OF_SIZE = 4.0
-COST_OF_MISTAKE = 8.0
 SAME_SIZE = 0.06
 POOR = 0.7
 """A plan supported over less of its length may be another one, drawn with a mistake."""
+CLEARLY = 0.08
 BEAM_OF_MISTAKES = 4
 SMALLEST_MM, LARGEST_MM = 20.0, 280.0
 LEAST_FIRST_MM = 15.0
@@ -35,7 +34,6 @@ LEAST_LAID_MM = 4.0
 SPECK_MM = 1e-6
 WORSE = 0.3
 """Places supported by this much less of the plan's length are not looked at."""
-LEFT_OUT = "not drawn: the normal component is left out"
 LEAST_SEEN_MM = 2.5
 LONG_MM = 8.0
 RIVALS = 25
@@ -47,25 +45,6 @@ ALTERNATIVES = 4
 NEARLY = 8.0
 """Nats: explanations of one place that are worse by more are no rivals."""
 ASTRAY_MM = 0.8
-OF_THE_WHOLE = {"figure_rotated", "scale_wrong", "rpm_not_converted", "vector_missing"}
-
-
-@dataclass(frozen=True, slots=True)
-class Hypothesis:
-    """One way in which the plan may have been drawn.
-
-    Attributes
-    ----------
-    label : for people
-    drawing : the construction as this student would follow it
-    absent : nodes that are not drawn then, with the reason
-    cost : nats, how unlikely before looking
-    """
-
-    label: str
-    drawing: Drawing
-    absent: Mapping[str, str]
-    cost: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,51 +80,6 @@ class Plan:
         return replace(self.place, at=complex(self.found.expected.at[0]))
 
 
-def regular(drawing: Drawing, figure: str) -> list[Hypothesis]:
-    """As it should be: by perpendiculars throughout, and with plates by similarity."""
-    by_similarity = similar(drawing.construction, figure)
-    told = [Hypothesis(REGULAR[0], drawing, {}, 0.0)]
-    if by_similarity is not None:
-        changed, absent = by_similarity
-        told.append(Hypothesis(REGULAR[1], Drawing(changed, drawing.parameters), absent, 0.7))
-    return told
-
-
-def mistaken(base: Hypothesis, figure: str) -> Iterator[tuple[Hypothesis, Mistake]]:
-    """Every single mistake on top of a hypothesis; the search for its place turns and scales it anyway."""
-    for mistake in single_mistakes(base.drawing, figure):
-        if mistake.code in OF_THE_WHOLE or mistake.at in base.absent:
-            continue
-        gone = dict(base.absent)
-        if mistake.code == "normal_missing":
-            gone[mistake.at] = LEFT_OUT
-        try:
-            changed = commit(mistake, base.drawing)
-        except ValueError:
-            continue
-        told = _told(mistake) if base.label in REGULAR else f"{base.label}, {_told(mistake)}"
-        yield Hypothesis(told, changed, gone, base.cost + COST_OF_MISTAKE), mistake
-
-
-def _told(mistake: Mistake) -> str:
-    return " ".join([mistake.code, mistake.at, *mistake.other])
-
-
-def similar(construction: Construction, figure: str) -> tuple[Construction, dict[str, str]] | None:
-    """The construction with every plate's image by similarity, and the nodes that vanish."""
-    steps = {step.node: step for step in construction.figures[figure]}
-    changed, absent = construction, {}
-    for node, image in construction.images.items():
-        if node not in steps or steps[node] == image:
-            continue
-        changed = changed.with_step(image)
-        for vector in construction.vectors_of(figure):
-            tail = steps.get(vector.tail)
-            if vector.head == node and isinstance(tail, Given) and isinstance(tail.length, Normal):
-                absent[vector.tail] = f"not drawn: {node} found by similarity"
-    return None if changed is construction else (changed, absent)
-
-
 def regular_plans(
     lines: Lines, drawing: Drawing, figure: str, given: Mapping[str, ComplexArray]
 ) -> list[Plan]:
@@ -160,8 +94,8 @@ def regular_plans(
     sizes = {round(math.log(plan.place.size), 1): plan.place.size for plan in plans[:3]}
     for size in (one for one in sizes.values() if abs(math.log(one)) > SAME_SIZE):
         # The hand's errors are millimetres on paper: expect the plan again at the size it has there.
-        resized = Drawing(drawing.construction, _resized(drawing, figure, size))
-        bases = [replace(one, cost=one.cost + COST_OF_SIZE) for one in regular(resized, figure)]
+        larger = Drawing(drawing.construction, resized(drawing, figure, size))
+        bases = [replace(one, cost=one.cost + COST_OF_SIZE) for one in regular(larger, figure)]
         plans.extend(_as_regular(bases, lines, figure, given))
     return sorted(plans, key=lambda plan: -plan.score)
 
@@ -176,12 +110,6 @@ def _as_regular(
             for place in _laid(expected, lines):
                 plans.extend(_read(hypothesis, expected, place, lines))
     return sorted(plans, key=lambda plan: -plan.score)
-
-
-def _resized(drawing: Drawing, figure: str, size: float) -> dict[str, FloatArray]:
-    """The parameters at the scale at which the plan comes out `size` times as large."""
-    scale = next(v.scale for v in drawing.construction.vectors_of(figure))
-    return {**drawing.parameters, scale: np.asarray(drawing.parameters[scale] / size)}
 
 
 def best_plan(plans: list[Plan], lines: Lines, figure: str, given: Mapping[str, ComplexArray]) -> Plan | None:
@@ -209,7 +137,7 @@ def _leaves_long_ones(plan: Plan) -> bool:
 
 
 def _without_each_stroke(plan: Plan) -> list[Plan]:
-    """For every edge the best explanation in which its stroke is not its stroke: what if it is not?"""
+    """For every edge the best explanation in which the stroke taken for it is not it."""
     edges = plan.found.expected.edges
     size = [abs(plan.found.expected.at[edge.head] - plan.found.expected.at[edge.tail]) for edge in edges]
     cost = plan.found.score - plan.score
@@ -224,7 +152,7 @@ def _without_each_stroke(plan: Plan) -> list[Plan]:
             for other, one in enumerate(edges)
             if other != index and (size[other] > SURE_MM or not {one.tail, one.head} & ends)
         }
-        found = explain(plan.placed, plan.lines, PLAN_ENDS, BEAM_OF_DOUBTS, kept, (index, row))[0]
+        found = explain(plan.placed, plan.lines, PLAN_ENDS, BEAM_OF_DOUBTS, Settled(kept, (index, row)))[0]
         if found.score > plan.found.score - LEAST_DOUBT:
             doubts.append(replace(plan, found=found, score=found.score - cost))
     return doubts
@@ -243,10 +171,10 @@ def _with_mistakes(
         if expected is None:
             continue
         if poor:
-            for place in sorted(_laid(expected, lines, count=1), key=lambda place: -place.score)[:2]:
-                yield from _read(hypothesis, expected, place, lines, BEAM_OF_MISTAKES)
+            for place in _better_laid(expected, lines, best.place):
+                yield from _read(hypothesis, expected, place, lines)
         moved = affected(mistake, hypothesis.drawing.construction)
-        yield from _read(hypothesis, expected, best.refined, lines, BEAM_OF_MISTAKES, (best, moved))
+        yield from _read(hypothesis, expected, best.refined, lines, _Known(best, moved))
 
 
 def _suspects(plan: Plan, fit: Fit) -> frozenset[str]:
@@ -264,23 +192,16 @@ def _suspects(plan: Plan, fit: Fit) -> frozenset[str]:
 
 
 def _expected(hypothesis: Hypothesis, figure: str, given: Mapping[str, ComplexArray]) -> Expected | None:
-    edges = vectors_of(_tied(hypothesis), figure, hypothesis.absent)
+    edges = vectors_of(tied(hypothesis), figure, hypothesis.absent)
     expected = expect(hypothesis.drawing, figure, given, HAND, edges)
     return expected if np.isfinite(expected.at).all() else None
 
 
-def _tied(hypothesis: Hypothesis) -> Construction:
-    """Vectors that would start from a normal component left out start where it would have started."""
-    construction = hypothesis.drawing.construction
-    vectors = dict(construction.vectors)
-    for node, reason in hypothesis.absent.items():
-        step = construction.step(node)
-        if reason != LEFT_OUT or not isinstance(step, Given):
-            continue
-        for name, vector in vectors.items():
-            if vector.tail == node:
-                vectors[name] = replace(vector, tail=step.start)
-    return replace(construction, vectors=vectors)
+def _better_laid(expected: Expected, lines: Lines, than: Place) -> list[Place]:
+    """Where a mistaken plan finds clearly more of its length drawn than the regular one did."""
+    search = Search(turns_rad=tuple({0.0, than.turn_rad}), sizes=tuple({1.0, than.size}))
+    found = places(expected, lines.take(lines.length > LEAST_LAID_MM), search, count=2)
+    return [place for place in found if place.score > than.score + CLEARLY]
 
 
 def _laid(expected: Expected, lines: Lines, count: int = 2) -> list[Place]:
@@ -311,21 +232,27 @@ def _first_length(expected: Expected) -> float:
     return max(float(abs(expected.at[edge.head] - expected.at[edge.tail])), SPECK_MM)
 
 
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """What is settled before a plan is read again with a mistake: the plan, and the nodes that move."""
+
+    plan: Plan
+    moved: Collection[str]
+
+
 def _read(
-    hypothesis: Hypothesis,
-    expected: Expected,
-    place: Place,
-    lines: Lines,
-    beam: int = BEAM,
-    base: tuple[Plan, Collection[str]] | None = None,
+    hypothesis: Hypothesis, expected: Expected, place: Place, lines: Lines, known_before: _Known | None = None
 ) -> list[Plan]:
     """The best explanations of a plan laid at a place: several, where they are nearly as good."""
     known = abs(np.log(place.size)) < SAME_SIZE
     slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03 if known else 0.08)
     placed = expected.placed(place.at, place.size, place.turn_rad, slack)
     around = lines.take(_near(lines, placed))
-    kept = None if base is None else _kept(*base, placed, around)
-    explained = explain(placed, around, PLAN_ENDS, beam, kept)
+    if known_before is None:
+        explained = explain(placed, around, PLAN_ENDS)
+    else:
+        settled = Settled(_kept(known_before.plan, known_before.moved, placed, around))
+        explained = explain(placed, around, PLAN_ENDS, BEAM_OF_MISTAKES, settled)
     cost = hypothesis.cost + (0.0 if known else COST_OF_SIZE)
     cost += 0.0 if abs(place.turn_rad) < np.pi / 4 else COST_OF_TURN
     return [
@@ -353,7 +280,7 @@ def _kept(base: Plan, moved: Collection[str], placed: Expected, lines: Lines) ->
     return kept
 
 
-def _near(lines: Lines, placed: Expected) -> np.ndarray:
+def _near(lines: Lines, placed: Expected) -> BoolArray:
     margin = 12.0
     low = complex(placed.at.real.min() - margin, placed.at.imag.min() - margin)
     high = complex(placed.at.real.max() + margin, placed.at.imag.max() + margin)
@@ -366,4 +293,4 @@ def _near(lines: Lines, placed: Expected) -> np.ndarray:
     )
 
 
-__all__ = ["Edge", "Hypothesis", "Plan", "best_plan", "regular_plans"]
+__all__ = ["Plan", "best_plan", "regular_plans"]

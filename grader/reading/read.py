@@ -72,7 +72,8 @@ def read_figures(
         sketch = find_sketch(page.lines, page.ink.circles, own, others)
         if sketch is not None and sketch.score >= LEAST_SKETCH:
             page.sketch = sketch
-    drawing = _measurable(own[0], assignment, variant)
+    followed = [page.sketch.drawing for page in pages if page.sketch is not None] if variant is None else []
+    drawing = _measurable((followed or own)[0], assignment, variant)
     velocity = _find(pages, [drawing], VELOCITY_PLAN, {})
     known = {} if velocity is None else _nodes(velocity)
     paced = [drawing] if velocity is None else _paced(drawing, known)

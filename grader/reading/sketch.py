@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from grader.reading.belief import Ends
 from grader.reading.expected import Expected, Hand, Slack, expect, links_of
 from grader.reading.fitting import LINK_ENDS as LINKS_END
 from grader.reading.fitting import Fit, fit_nodes
 from grader.reading.lines import Lines
-from grader.reading.matching import Ends, Explanation, explain
+from grader.reading.matching import Explanation, explain
 from grader.reading.placing import Place, Search, places
 from grader.records import FloatArray
 from reference.assignment import Assignment, Scales, Variant
@@ -83,7 +84,8 @@ def find_sketch(
     long = lines.take(lines.length > LEAST_LINK_MM)
     laid = [one for drawing, cost in _candidates(own) for one in _laid(drawing, long, circles, upright, cost)]
     if _top(laid) < SURE:
-        laid.extend(one for drawing in others for one in _laid(drawing, long, circles, upright, COST_IN_SUPPORT))
+        for drawing in others:
+            laid.extend(_laid(drawing, long, circles, upright, COST_IN_SUPPORT))
     if _top(laid) < HARDLY and own:
         turned = Search(turns_rad=ANY_TURN, give_rad=float(np.radians(2.5)), sizes=(1.0,))
         laid.extend(_laid(own[0], long, circles, turned, COST_IN_SUPPORT))
@@ -126,7 +128,7 @@ def _laid(
     return laid
 
 
-def _read(drawing: Drawing, place: Place, lines: Lines, circles: FloatArray, regular: bool) -> Sketch:  # noqa: FBT001
+def _read(drawing: Drawing, place: Place, lines: Lines, circles: FloatArray, regular: bool) -> Sketch:
     slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03)
     expected = _expected(drawing).placed(place.at, place.size, place.turn_rad, slack)
     reach = 30.0
@@ -134,7 +136,7 @@ def _read(drawing: Drawing, place: Place, lines: Lines, circles: FloatArray, reg
         np.abs(lines.middle - expected.at.mean())
         < np.ptp(expected.at.real) + np.ptp(expected.at.imag) + reach
     )
-    around = lines.take(near & (lines.length > 4.0))  # noqa: PLR2004 - mm
+    around = lines.take(near & (lines.length > 4.0))
     found = explain(expected, around, LINK_ENDS)[0]
     fit = fit_nodes(found, around, LINKS_END)
     centres = _centres(fit, circles)

@@ -1,0 +1,187 @@
+"""Drawings whose truth is known, without pixels: are they named rightly, and as wrong as they are?"""
+
+import cmath
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grader.reading import read_figures
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Reading
+from reference.assignment import Assignment, Variant
+from reference.mistakes import Mistake, commit
+from tests.unit.reading.drawn import PLACES, Drawn, Pen, draw, ink_of, task
+
+SURE = 0.9
+NEAR_MM = 0.5
+SILENTLY_WRONG_MM = 1.0
+MEASURABLE_MM = 5.0
+
+
+def read(
+    drawn: Drawn, assignment: Assignment, variant: Variant | None, wanted: tuple[str, ...] = ()
+) -> Reading:
+    return read_figures([drawn.ink], [drawn.sheet], assignment, variant, None, wanted)[0]
+
+
+def vectors_read(reading: Reading) -> dict[str, tuple[complex, float]]:
+    """Vectors as complex numbers, and confidences."""
+    found = {}
+    for figure in reading.figures.values():
+        for name, vector in figure.vectors.items():
+            length, direction = vector.length_mm or 0.0, math.radians(vector.direction_deg or 0.0)
+            found[name] = cmath.rect(length, direction), vector.confidence
+    return found
+
+
+def right_share(drawn: Drawn, reading: Reading) -> float:
+    """Share of the measurable vectors that are read within half a millimetre."""
+    found = vectors_read(reading)
+    asked = [name for name, vector in drawn.vectors.items() if abs(vector) >= MEASURABLE_MM]
+    right = [name for name in asked if name in found and abs(found[name][0] - drawn.vectors[name]) < NEAR_MM]
+    return len(right) / len(asked)
+
+
+def silently_wrong(drawn: Drawn, reading: Reading) -> list[str]:
+    """Vectors given with confidence that are not what was drawn."""
+    return [
+        name
+        for name, (vector, sure) in vectors_read(reading).items()
+        if sure >= SURE and abs(vector - drawn.vectors.get(name, 0j)) > SILENTLY_WRONG_MM
+    ]
+
+
+@pytest.mark.parametrize("name", ["pump", "pump-230", "pump-collinear", "press", "engine"])
+def test_a_right_drawing_of_any_mechanism_is_read_whole(name):
+    assignment, _, _ = task(name)
+    variant = assignment.variants()[len(assignment.variants()) // 3]
+    _, _, drawing = task(name, variant)
+    drawn = draw(drawing)
+    reading = read(drawn, assignment, variant)
+    assert right_share(drawn, reading) == 1.0
+    assert not silently_wrong(drawn, reading)
+
+
+def test_joints_are_found_in_their_circles():
+    assignment, variant, drawing = task()
+    drawn = draw(drawing)
+    joints = read(drawn, assignment, variant).figures[MECHANISM].nodes
+    assert set(joints) == {"O1", "O2", "A", "B", "C", "D"}
+    assert max(abs(joint.at - drawn.nodes[name]) for name, joint in joints.items()) < NEAR_MM
+
+
+def test_most_of_a_careful_drawing_is_read_with_confidence():
+    assignment, variant, drawing = task()
+    found = vectors_read(read(draw(drawing, pen=Pen(redraw_mm=0.05)), assignment, variant))
+    sure = [name for name, (_, confidence) in found.items() if confidence >= SURE]
+    assert len(sure) > 0.6 * len(found)
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [
+        Mistake("parallel_for_perpendicular", "b"),
+        Mistake("sense_reversed", "a"),
+        Mistake("image_mirrored", "c"),
+        Mistake("normal_reversed", "n_B"),
+        Mistake("figure_rotated", ACCELERATION_PLAN, quarters=1),
+        Mistake("scale_wrong", "kv", factor=0.7),
+        Mistake("scale_wrong", "ka", factor=1.4),
+    ],
+    ids=lambda mistake: f"{mistake.code} {mistake.at}",
+)
+def test_a_wrong_drawing_is_read_as_wrong_as_it_is(mistake):
+    assignment, variant, drawing = task("pump", Variant(n=9))
+    wrong = commit(mistake, drawing)
+    drawn = draw(wrong)
+    reading = read(drawn, assignment, variant)
+    assert right_share(drawn, reading) >= 0.8
+    assert not silently_wrong(drawn, reading)
+
+
+def test_another_students_variant_is_read_as_drawn():
+    assignment, _, drawing = task("pump", Variant(n=20))
+    drawn = draw(drawing)
+    reading = read(drawn, assignment, Variant(n=12))
+    assert right_share(drawn, reading) >= 0.8
+    assert not silently_wrong(drawn, reading)
+
+
+def test_an_unknown_variant_is_read_too():
+    assignment, _, drawing = task("press", Variant(position=2))
+    drawn = draw(drawing)
+    assert right_share(drawn, read(drawn, assignment, None)) == 1.0
+
+
+def test_a_vector_that_is_not_drawn_is_unread_with_its_reason():
+    assignment, variant, drawing = task("pump", Variant(n=9))
+    drawn = draw(drawing, pen=Pen(left_out=frozenset({"v_C"})))
+    reading = read(drawn, assignment, variant, ("v_B", "v_C"))
+    reasons = {one.name: one.reason for one in reading.unread}
+    assert "v_C" in reasons or vectors_read(reading)["v_C"][1] < SURE
+    assert "v_B" not in reasons
+
+
+def test_sketch_and_plans_on_different_sheets_are_read_together():
+    assignment, variant, drawing = task()
+    first = draw(drawing, {name: PLACES[name] for name in (MECHANISM, VELOCITY_PLAN)})
+    second = draw(drawing, {ACCELERATION_PLAN: PLACES[ACCELERATION_PLAN]})
+    readings = read_figures(
+        [first.ink, second.ink], [first.sheet, second.sheet], assignment, variant, None, ()
+    )
+    assert set(readings[0].figures) == {MECHANISM, VELOCITY_PLAN}
+    assert set(readings[1].figures) == {ACCELERATION_PLAN}
+    assert right_share(second, readings[1]) == 1.0
+
+
+def test_an_empty_sheet_leaves_everything_unread_with_a_reason():
+    assignment, variant, drawing = task()
+    empty = draw(drawing, {})
+    wanted = tuple(drawing.construction.vectors)
+    reading = read(empty, assignment, variant, wanted)
+    assert not reading.figures
+    assert [one.name for one in reading.unread] == list(wanted)
+    assert all(one.reason for one in reading.unread)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lines_by_chance_are_read_as_nothing_sure(seed):
+    assignment, variant, drawing = task()
+    rng = np.random.default_rng(seed)
+    starts = rng.uniform(30, 390, 60) - 1j * rng.uniform(20, 280, 60)
+    lines = [(start, start + cmath.rect(rng.uniform(3, 60), rng.uniform(0, 6.3))) for start in starts]
+    drawn = draw(drawing, {})
+    chance = Drawn(ink_of(lines), drawn.sheet, {}, {})
+    found = vectors_read(read(chance, assignment, variant))
+    assert not [name for name, (_, sure) in found.items() if sure >= SURE]
+
+
+def test_only_velocities_are_looked_for_where_only_they_are_wanted():
+    assignment, variant, drawing = task()
+    reading = read(draw(drawing), assignment, variant, ("v_B", "v_D"))
+    assert ACCELERATION_PLAN not in reading.figures
+    assert VELOCITY_PLAN in reading.figures
+
+
+def test_every_vector_asked_for_is_read_or_unread():
+    assignment, variant, drawing = task("press")
+    wanted = (*drawing.construction.vectors, "v_X")
+    reading = read(draw(drawing), assignment, variant, wanted)
+    told = {*vectors_read(reading), *(one.name for one in reading.unread)}
+    assert set(wanted) <= told
+
+
+def test_the_position_is_complex_with_y_up():
+    assignment, variant, drawing = task()
+    drawn = draw(drawing)
+    pole = read(drawn, assignment, variant).figures[VELOCITY_PLAN].nodes["o"]
+    assert abs(pole.at - PLACES[VELOCITY_PLAN]) < NEAR_MM
+    assert pole.cov.shape == (2, 2)
+
+
+def test_a_sheet_of_unsure_scale_gives_no_confidence_in_long_vectors():
+    assignment, variant, drawing = task()
+    drawn = draw(drawing)
+    vague = Drawn(drawn.ink, replace(drawn.sheet, scale_se=0.02), drawn.nodes, drawn.vectors)
+    assert vectors_read(read(vague, assignment, variant))["v_A"][1] < SURE
