@@ -1,0 +1,151 @@
+"""Lines made of strokes, beliefs corrected by them, nodes placed by them."""
+
+import cmath
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grader.reading import confidence
+from grader.reading.belief import Ends, Taken, updated
+from grader.reading.confidence import Signs, sureness
+from grader.reading.expected import Edge, Expected, Hand, expect, links_of, vectors_of
+from grader.reading.fitting import fit_nodes
+from grader.reading.lines import Lines, lines_of
+from grader.reading.matching import Explanation, explain
+from grader.records import VELOCITY_PLAN
+from tests.unit.reading.drawn import ink_of, task
+
+PLACE_MM = 0.15
+
+
+def explanation(at: list[complex], edges: tuple[Edge, ...], rows: list[int]) -> Explanation:
+    """Nodes about where they are, each edge with its stroke."""
+    count = len(at)
+    names = tuple("oabcde"[:count])
+    expected = Expected(names, np.array(at), np.eye(2 * count), edges)
+    return Explanation(
+        expected, np.array(rows), np.zeros(len(edges), dtype=bool), np.ones((len(edges), 2), dtype=bool), 0.0
+    )
+
+
+def fan(*overruns: float) -> tuple[Lines, list[complex]]:
+    """Strokes from nodes 50 mm away to a pole at zero, two degrees apart, each run on past the pole."""
+    directions = [cmath.rect(1.0, np.radians(2.0 * index)) for index in range(len(overruns))]
+    lines = [(50.0 * u, -over * u) for u, over in zip(directions, overruns, strict=True)]
+    return lines_of(ink_of(lines)), [0.3 + 0j, *(50.0 * u for u in directions)]
+
+
+def fitted_fan(*overruns: float):
+    lines, at = fan(*overruns)
+    edges = tuple(Edge(f"v{head}", 0, head) for head in range(1, len(at)))
+    return fit_nodes(explanation(at, edges, list(range(len(edges)))), lines)
+
+
+def test_the_cap_of_the_pen_is_no_length():
+    (row,) = lines_of(ink_of([(0j, 40 + 0j)])).length
+    assert row == pytest.approx(40.0, abs=1e-9)
+
+
+def test_pieces_on_one_line_are_offered_joined():
+    lines = lines_of(ink_of([(0j, 20 + 0j), (22 + 0.1j, 45 + 0.1j), (0 - 9j, 30 - 9j)]))
+    assert any(length == pytest.approx(45.0, abs=0.2) for length in lines.length)
+    assert sum(length > 40 for length in lines.length) == 1
+
+
+def test_pieces_beside_one_another_are_not_joined():
+    lines = lines_of(ink_of([(0j, 20 + 0j), (22 + 1.2j, 45 + 1.2j)]))
+    assert len(lines) == 2
+
+
+def test_a_line_much_thinner_than_the_others_is_called_thin():
+    ink = ink_of([(10j * row, 30 + 10j * row) for row in range(8)])
+    width = ink.strokes.width.copy()
+    width[3] *= 0.4
+    thin = lines_of(replace(ink, strokes=replace(ink.strokes, width=width))).thin
+    assert thin.tolist() == [row == 3 for row in range(8)]
+
+
+def test_a_node_lies_where_strokes_end_together():
+    fit = fitted_fan(0.0, 0.0, 0.0)
+    assert abs(fit.at[0]) < PLACE_MM
+
+
+def test_one_stroke_run_on_past_the_node_does_not_move_it():
+    fit = fitted_fan(0.0, 0.0, 3.0)
+    assert abs(fit.at[0]) < PLACE_MM
+
+
+def test_ends_that_disagree_leave_the_node_unsure_along_the_bundle():
+    agreed, scattered = fitted_fan(0.0, 0.0, 0.0), fitted_fan(0.5, 1.4, 2.6)
+    assert scattered.cov[0, 0] > 2.0 * agreed.cov[0, 0]
+
+
+def test_crossing_lines_place_a_node_whatever_their_ends():
+    lines = lines_of(ink_of([(-40 + 0j, 6 + 0j), (-30j, 9j)]))
+    fit = fit_nodes(
+        explanation([0.4 + 0.2j, -40 + 0j, -30j], (Edge("v", 1, 0), Edge("w", 2, 0)), [0, 1]), lines
+    )
+    assert abs(fit.at[0]) < PLACE_MM
+
+
+def test_a_stroke_moves_what_is_believed_of_other_nodes():
+    cov = np.eye(4) + np.kron(np.ones((2, 2)), 9.0 * np.eye(2))
+    belief = Expected(("o", "a"), np.array([0j, 50 + 0j]), cov, (Edge("v", 0, 1),))
+    lines = lines_of(ink_of([(3j, 50 + 3j)]))
+    seen = updated(belief, 0, Taken(0), lines, Ends())
+    assert seen.at.imag == pytest.approx([3.0, 3.0], abs=0.2)
+    assert np.linalg.eigvalsh(seen.cov).min() > 0.0
+    assert np.trace(seen.cov) < np.trace(cov)
+
+
+def test_strokes_are_told_apart_by_where_they_should_lie():
+    _, _, drawing = task()
+    edges = vectors_of(drawing.construction, VELOCITY_PLAN)
+    expected = expect(drawing, VELOCITY_PLAN, {}, Hand(), edges)
+    at = dict(zip(expected.names, expected.at, strict=True))
+    names = [expected.names[edge.tail] + expected.names[edge.head] for edge in edges]
+    order = np.random.default_rng(0).permutation(len(edges))
+    strokes = [(complex(at[names[k][0]]), complex(at[names[k][1]])) for k in order]
+    found = explain(expected, lines_of(ink_of(strokes)), Ends())[0]
+    assert [int(order[row]) for row in found.stroke] == list(range(len(edges)))
+
+
+def test_an_edge_without_a_stroke_is_left_without():
+    _, _, drawing = task()
+    edges = vectors_of(drawing.construction, VELOCITY_PLAN)
+    expected = expect(drawing, VELOCITY_PLAN, {}, Hand(), edges)
+    ends = [(complex(expected.at[edge.tail]), complex(expected.at[edge.head])) for edge in edges]
+    found = explain(expected, lines_of(ink_of(ends[:-1])), Ends())[0]
+    assert found.stroke[-1] == -1 or found.shared[-1]
+
+
+def test_expectations_propagate_the_hands_errors():
+    _, _, drawing = task()
+    careless = expect(drawing, VELOCITY_PLAN, {}, Hand(angle_rad=0.02), ())
+    careful = expect(drawing, VELOCITY_PLAN, {}, Hand(angle_rad=0.001, length_mm=0.1, shift_mm=0.05), ())
+    d = 2 * careful.names.index("d")
+    assert careless.cov[d, d] > careful.cov[d, d] > 0.0
+    assert careless.at == pytest.approx(careful.at)
+
+
+def test_links_of_a_press_are_its_bars():
+    _, _, drawing = task("press")
+    assert {edge.name for edge in links_of(drawing.construction)} == {"O1A", "AB", "O2B", "O2C", "CD"}
+
+
+def test_probability_within_half_a_millimetre_falls_with_the_error():
+    shares = [confidence.within(np.diag([s**2, s**2])) for s in (0.05, 0.2, 0.5, 2.0)]
+    assert shares == sorted(shares, reverse=True)
+    assert shares[0] > 0.999
+    assert shares[-1] < 0.1
+
+
+@pytest.mark.parametrize(
+    "worse",
+    [{"placed": 0.6}, {"named": 0.3}, {"off_mm": 1.2}, {"thin": True}, {"length_mm": 2.0}],
+    ids=lambda worse: next(iter(worse)),
+)
+def test_every_bad_sign_lowers_the_confidence(worse):
+    good = Signs(placed=0.98, named=0.99)
+    assert sureness(replace(good, **worse)) < sureness(good)
