@@ -30,6 +30,9 @@ _SOME_SIDES = 2
 _FAR_OFF_MM = 1.5
 _EDGE_WITHIN_MM = 6.0
 _ASSUMED_PAPER_SE = 0.004
+_AS_LIKELY = 2.0
+"""Scores of readings that differ by less: either may be the right one."""
+_ANOTHER_SCALE = 0.012
 
 
 def register_plain(page: Page) -> Sheet | Unread:
@@ -45,13 +48,50 @@ def register_plain(page: Page) -> Sheet | Unread:
     shape = (page.grey.shape[0], page.grey.shape[1])
     ranked = hypotheses(lines, shape, resolution)
     if ranked:
+        rival = None if dpi is not None else _rival_scale(ranked)
         sheet = _from_lines(page, ranked[0], lines, dpi, problems)
+        if isinstance(sheet, Sheet) and rival is not None:
+            sheet = _with_rival(sheet, rival)
         if isinstance(sheet, Unread) or not ranked[0].perspective:
             return sheet
         return _with_lens(flat, sheet, ranked[0])
     if resolution is None:
         return Unread("sheet", "no drawing frame, no paper edges and no resolution that fits A3 were found")
     return _from_resolution(page, resolution, lines, problems)
+
+
+def _rival_scale(ranked: list[Hypothesis]) -> float | None:
+    """How far, relatively, the scale would be another one by a reading about as likely as the best.
+
+    A sheet's edge may pass for a frame, their sides are nearly in the same ratio; a stated resolution
+    tells them apart.
+    """
+    best = ranked[0]
+    off = [
+        abs(_log_scale(other) - _log_scale(best)) for other in ranked if other.score > best.score - _AS_LIKELY
+    ]
+    return max(off) if max(off) > _ANOTHER_SCALE else None
+
+
+def _log_scale(hypothesis: Hypothesis) -> float:
+    """Of the mean resolution, at the sheet's middle."""
+    middle = np.array([[PAGE_MM[0] / 2.0, PAGE_MM[1] / 2.0]])
+    at, right, down = (
+        apply(hypothesis.mm_to_px, middle + np.array(step)) for step in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+    )
+    u, v = (right - at)[0], (down - at)[0]
+    return float(0.5 * np.log(abs(u[0] * v[1] - u[1] * v[0])))
+
+
+def _with_rival(sheet: Sheet, rival: float) -> Sheet:
+    message = (
+        "frame and paper's edges cannot be told apart, and no resolution says which:"
+        f" lengths may be {100.0 * rival:.0f} % off; scan again with the stated resolution kept"
+    )
+    file = sheet.problems[0].file if sheet.problems else None
+    problem = Problem("registration_disagrees", message, file)
+    scale_se = float(np.hypot(sheet.scale_se, rival))
+    return replace(sheet, scale_se=scale_se, problems=(*sheet.problems, problem))
 
 
 def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:

@@ -1,0 +1,34 @@
+"""The sheet's scale is known as well as it says, also where the file's resolution is wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grader.intake import page_of
+from grader.records import Sheet
+from grader.sheet import rectify
+from grader.simulation import any_settings, simulate
+from reference.assignment import load_assignment
+
+PUMP = load_assignment("pump")
+STANDARD_ERRORS = 4.0
+
+
+def log_scale(mm_to_px) -> float:
+    """Of the resolution at the sheet's middle."""
+    corners = np.array([[210.0, 148.0, 1.0], [211.0, 148.0, 1.0], [210.0, 149.0, 1.0]]) @ np.asarray(mm_to_px).T
+    at, right, down = corners[:, :2] / corners[:, 2:]
+    return 0.5 * np.log(abs(np.linalg.det(np.column_stack([right - at, down - at]))))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_wrong_resolution_never_gives_a_wrong_scale_with_confidence(seed, tmp_path):
+    settings = any_settings(seed, device="flatbed", dpi=150, mistakes=0.0)
+    settings = replace(settings, scan=replace(settings.scan, dpi_tag=75.0))
+    (drawn, *_) = simulate(PUMP, PUMP.variant(7), seed, settings)
+    sheet = rectify(page_of(drawn.save(tmp_path / "s01"), 1))
+    if not isinstance(sheet, Sheet):
+        return  # refused with a reason: nobody is misled
+    off = abs(log_scale(sheet.mm_to_px) - log_scale(drawn.truth["homography"]))
+    assert off <= STANDARD_ERRORS * sheet.scale_se
