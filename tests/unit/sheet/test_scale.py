@@ -17,8 +17,9 @@ STANDARD_ERRORS = 4.0
 
 def log_scale(mm_to_px) -> float:
     """Of the resolution at the sheet's middle."""
-    corners = np.array([[210.0, 148.0, 1.0], [211.0, 148.0, 1.0], [210.0, 149.0, 1.0]]) @ np.asarray(mm_to_px).T
-    at, right, down = corners[:, :2] / corners[:, 2:]
+    corners = np.array([[210.0, 148.0, 1.0], [211.0, 148.0, 1.0], [210.0, 149.0, 1.0]])
+    found = corners @ np.asarray(mm_to_px).T
+    at, right, down = found[:, :2] / found[:, 2:]
     return 0.5 * np.log(abs(np.linalg.det(np.column_stack([right - at, down - at]))))
 
 
