@@ -17,10 +17,8 @@ USUAL_REDRAW_MM = 0.25
 DOUBT = 4.0
 """The usual redraw error counts as much as this many spare observations."""
 SHARED_MM = 0.5
-AT_MM = 0.1
+AT_MM = 0.2
 """How far a stroke that ends at its node ends from it, but for the error of seeing its end."""
-HONEST = 0.4
-"""Ends are seen this much better than their standard errors say, where they are seen at all."""
 HIDDEN_MM = 0.5
 """Standard errors above this say that other ink goes on beyond the end."""
 END_REACH_MM = 5.0
@@ -53,7 +51,7 @@ class EndModel:
         hidden = se_end > HIDDEN_MM
         shares = np.where(hidden[None], _columns(self.merged_shares), _columns(self.shares))
         little, far, short = np.where(hidden[None], _columns(self.merged_reach_mm), _columns(self.reach_mm))
-        sigma = np.hypot(self.at_mm, HONEST * se_end)
+        sigma = np.hypot(self.at_mm, se_end)
         at = np.exp(-0.5 * (gap / sigma) ** 2) / (sigma * np.sqrt(2.0 * np.pi))
         beyond = 1.0 / (1.0 + np.exp(-np.clip(1.7 * gap / sigma, -60.0, 60.0)))
         over, under = np.maximum(gap, 0.0), np.minimum(gap, 0.0)
@@ -169,8 +167,7 @@ def _renewed(sites: _Sites, about: _Ends, state: FloatArray, cov: FloatArray, en
     place = rest_mean[:, None] + grid / np.sqrt(rest)[:, None]
     weight = np.exp(-0.5 * grid**2) * ends.density(about.end[:, None] - place, about.se[:, None])
     weight /= weight.sum(axis=1, keepdims=True)
-    # The likeliest place, not the mean of "here" and "somewhat further in"; the spread is about it.
-    new_mean = np.take_along_axis(place, weight.argmax(axis=1)[:, None], axis=1)[:, 0]
+    new_mean = (weight * place).sum(axis=1)
     new_variance = np.maximum((weight * (place - new_mean[:, None]) ** 2).sum(axis=1), 1e-4)
     fresh = np.maximum(1.0 / new_variance - rest, 0.0)
     fresh_pull = np.where(fresh > 0.0, new_mean / new_variance - rest_mean * rest, 0.0)

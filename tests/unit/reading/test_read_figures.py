@@ -15,6 +15,8 @@ from tests.unit.reading.drawn import PLACES, Drawn, Pen, draw, ink_of, task
 
 SURE = 0.9
 NEAR_MM = 0.5
+ALONG_MM = 0.7
+"""A stroke's end that no other line crosses tells this much."""
 SILENTLY_WRONG_MM = 1.0
 MEASURABLE_MM = 5.0
 
@@ -39,7 +41,7 @@ def right_share(drawn: Drawn, reading: Reading) -> float:
     """Share of the measurable vectors that are read within half a millimetre."""
     found = vectors_read(reading)
     asked = [name for name, vector in drawn.vectors.items() if abs(vector) >= MEASURABLE_MM]
-    right = [name for name in asked if name in found and abs(found[name][0] - drawn.vectors[name]) < NEAR_MM]
+    right = [name for name in asked if name in found and abs(found[name][0] - drawn.vectors[name]) < ALONG_MM]
     return len(right) / len(asked)
 
 
