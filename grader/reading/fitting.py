@@ -17,6 +17,7 @@ USUAL_REDRAW_MM = 0.25
 DOUBT = 4.0
 """The usual redraw error counts as much as this many spare observations."""
 SHARED_MM = 0.5
+WIDE_MM = 0.7
 AT_MM = 0.2
 """How far a stroke that ends at its node ends from it, but for the error of seeing its end."""
 HIDDEN_MM = 0.5
@@ -168,6 +169,10 @@ def _renewed(sites: _Sites, about: _Ends, state: FloatArray, cov: FloatArray, en
     weight = np.exp(-0.5 * grid**2) * ends.density(about.end[:, None] - place, about.se[:, None])
     weight /= weight.sum(axis=1, keepdims=True)
     new_mean = (weight * place).sum(axis=1)
+    spread = np.sqrt((weight * (place - new_mean[:, None]) ** 2).sum(axis=1))
+    # Where little else tells, the likeliest place: the mean would lie where no end is likely.
+    likeliest = np.take_along_axis(place, weight.argmax(axis=1)[:, None], axis=1)[:, 0]
+    new_mean = np.where(spread > WIDE_MM, likeliest, new_mean)
     new_variance = np.maximum((weight * (place - new_mean[:, None]) ** 2).sum(axis=1), 1e-4)
     fresh = np.maximum(1.0 / new_variance - rest, 0.0)
     fresh_pull = np.where(fresh > 0.0, new_mean / new_variance - rest_mean * rest, 0.0)

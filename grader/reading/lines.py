@@ -16,7 +16,11 @@ LEAST_MM = 1.2
 """Shorter strokes are left out: dots, serifs, sides of arrowheads."""
 SE_OFFSET_MM = 0.04
 """No line of ink is known better: paper and pen are not ideal."""
-SE_END_MM = 0.2
+CLEAR_END_MM, HIDDEN_END_MM = 0.2, 1.0
+"""How well an end is seen: clear, or hidden in other ink. That strokes run on past nodes comes on top,
+and is what the larger part of an end's stated error is made of."""
+HIDDEN = 1.8
+"""Ends stated this many times worse than the sheet's good ones are hidden."""
 LONG_MM = 12.0
 ENOUGH = 6
 THIN = 0.62
@@ -91,13 +95,19 @@ def lines_of(ink: Ink) -> Lines:
         length=length,
         se_offset=np.maximum(strokes.se_offset[kept], SE_OFFSET_MM),
         se_angle=np.maximum(strokes.se_angle[kept], SE_OFFSET_MM / length),
-        se_end=np.maximum(strokes.se_end[kept], SE_END_MM),
+        se_end=_seen(strokes.se_end)[kept],
         darkness=strokes.darkness[kept],
         width=strokes.width[kept],
         thin=_thin(strokes.width[kept] * strokes.darkness[kept], length),
         members=np.repeat(number[:, None], MOST_PIECES, axis=1),
     )
     return _with_joined(single)
+
+
+def _seen(stated: FloatArray) -> FloatArray:
+    """How well ends are seen, from which of them are stated to be much worse than others."""
+    good = float(np.quantile(stated, 0.1)) if stated.size else 0.0
+    return np.where(stated > HIDDEN * good, HIDDEN_END_MM, CLEAR_END_MM)
 
 
 def _thin(ink: FloatArray, length: FloatArray) -> BoolArray:
