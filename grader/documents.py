@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from reference.authored import AssignmentFile, MechanismFile
 from reference.errors import CallError
+from reference.mistakes import Code
 
 SCHEMA_VERSION = 1
 
@@ -19,24 +20,6 @@ Verdict = Literal["full", "partial", "none", "follow_through", "review", "not_ju
 Status = Literal["graded", "needs_review", "unreadable", "missing"]
 ScaleName = Literal["kL", "kv", "ka"]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-MistakeCode = Literal[
-    "parallel_for_perpendicular",
-    "wrong_link",
-    "sense_reversed",
-    "rpm_not_converted",
-    "scale_wrong",
-    "normal_reversed",
-    "normal_missing",
-    "normal_from_absolute",
-    "other_variant",
-    "other_assembly",
-    "image_mirrored",
-    "wrong_intersection",
-    "vector_missing",
-    "labels_swapped",
-    "figure_rotated",
-    "arithmetic",
-]
 
 
 class Document(BaseModel):
@@ -187,7 +170,7 @@ class CriterionDocument(Document):
 class MistakeDocument(Document):
     """A mistake that explains what is off: its code, where it was made, the criteria it explains."""
 
-    code: MistakeCode
+    code: Code
     at: str
     explains: list[str]
     confidence: Share

@@ -8,6 +8,7 @@ codes are those of the published contract.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from reference.steps import (
     TwoLines,
 )
 
-CODES = (
+Code = Literal[
     "parallel_for_perpendicular",
     "wrong_link",
     "sense_reversed",
@@ -43,7 +44,8 @@ CODES = (
     "labels_swapped",
     "figure_rotated",
     "arithmetic",
-)
+]
+CODES: tuple[Code, ...] = get_args(Code)
 RPM_FACTOR = 30.0 / math.pi
 """omega = n instead of omega = pi n / 30."""
 

@@ -1,16 +1,15 @@
 """Reasons and mistakes as sentences."""
 
 import re
-from typing import get_args
 
 import pytest
 
 from grader import outcomes
-from grader.documents import MistakeCode
 from grader.feedback.mistakes import MISTAKES
 from grader.feedback.sentences import FULL, HINTS, criterion_feedback, mistake_feedback, reason_sentence
 from grader.i18n import LANGUAGES, tongue
 from grader.outcomes import Mistake, Outcome, Quantity, Reason, Tolerance
+from reference.mistakes import CODES
 
 TOO_LONG = Reason("too_long", {"measured_mm": 49.5, "expected_mm": 47.2, "off_mm": 2.3, "tolerance_mm": 1.0})
 VALUE = Reason(
@@ -39,7 +38,7 @@ def test_every_reason_that_judging_may_give_has_a_sentence():
 
 
 def test_every_mistake_of_the_contract_has_words():
-    assert set(MISTAKES) == set(get_args(MistakeCode))
+    assert set(MISTAKES) == set(CODES)
 
 
 @pytest.mark.parametrize(
