@@ -30,17 +30,17 @@ def compare(task: Task, submission: Submission) -> Comparison:
     """Mark every criterion of the task's rubric."""
     evidence = gather(task, submission)
     settled = settle(task, evidence, submission.declared)
-    session = _Session(task, evidence, settled, open_ledger(task, evidence, settled))
+    marking = _Marking(task, evidence, settled, open_ledger(task, evidence, settled))
     order = [*settled, *task.construction.vectors, *task.construction.rates]
     criteria = sorted(task.rubric.criterion, key=lambda criterion: order.index(criterion.name))
-    found = {criterion.id: session.outcome(criterion) for criterion in criteria}
+    found = {criterion.id: marking.outcome(criterion) for criterion in criteria}
     outcomes = tuple(found[criterion.id] for criterion in task.rubric.criterion)
     scales = {name: scale.used for name, scale in settled.items()}
-    return Comparison(outcomes, scales, session.ledger.followed, evidence)
+    return Comparison(outcomes, scales, marking.ledger.followed, evidence)
 
 
 @dataclass(frozen=True, slots=True)
-class _Session:
+class _Marking:
     """One submission while it is being marked."""
 
     task: Task
