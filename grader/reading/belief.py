@@ -32,12 +32,12 @@ def offsets(expected: Expected, tail: int, head: int, lines: Lines) -> tuple[Flo
     """(s, 2) distance of both nodes from each line, and their (s, 2, 2) covariance."""
     across = 1j * lines.along
     normal = np.column_stack([across.real, across.imag])
-    off = np.column_stack([
-        ((expected.at[node] - lines.start) * np.conj(lines.along)).imag for node in (tail, head)
-    ])
-    arm = np.column_stack([
-        ((expected.at[node] - lines.middle) * np.conj(lines.along)).real for node in (tail, head)
-    ])
+    off = np.column_stack(
+        [((expected.at[node] - lines.start) * np.conj(lines.along)).imag for node in (tail, head)]
+    )
+    arm = np.column_stack(
+        [((expected.at[node] - lines.middle) * np.conj(lines.along)).real for node in (tail, head)]
+    )
     spread = np.empty((len(lines), 2, 2))
     for a in (0, 1):
         for b in (0, 1):
@@ -66,9 +66,9 @@ def ends_at(
     """
     span = expected.at[head] - expected.at[tail]
     along = np.where((lines.along * np.conj(span)).real > 0, lines.along, -lines.along)
-    place = np.column_stack([
-        ((end - expected.at[tail]) * np.conj(along)).real for end in (lines.start, lines.end)
-    ])
+    place = np.column_stack(
+        [((end - expected.at[tail]) * np.conj(along)).real for end in (lines.start, lines.end)]
+    )
     first, last = place.min(axis=1), place.max(axis=1)
     size = (span * np.conj(along)).real
     kept = np.flatnonzero((last > 0.35 * size) & (first < 0.65 * size) & (last - first > 0.3 * size))

@@ -97,9 +97,9 @@ def of_names(names: Sequence[str], at: ComplexArray, score: float, rivals: Seque
 
 def of_places(fit: Fit) -> FloatArray:
     """Probability for every node that it lies within half a millimetre of where it was drawn."""
-    return np.array([
-        within(fit.cov[2 * node : 2 * node + 2, 2 * node : 2 * node + 2]) for node in range(len(fit.at))
-    ])
+    return np.array(
+        [within(fit.cov[2 * node : 2 * node + 2, 2 * node : 2 * node + 2]) for node in range(len(fit.at))]
+    )
 
 
 def lines_at(found: Explanation) -> list[int]:

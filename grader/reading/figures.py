@@ -2,6 +2,8 @@
 
 import cmath
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -46,7 +48,19 @@ def figure_of_plan(plan: Plan, scale_se: float) -> tuple[Figure, list[Unread]]:
         gone = next((absent[end] for end in (vector.head, vector.tail) if end in absent), None)
         if gone is not None and vector.name not in vectors:
             unread.append(Unread(vector.name, gone))
-    return Figure(nodes, vectors), unread
+    return Figure(_no_surer(nodes, vectors, plan), vectors), unread
+
+
+def _no_surer(
+    nodes: Mapping[str, ReadNode], vectors: Mapping[str, ReadVector], plan: Plan
+) -> dict[str, ReadNode]:
+    """A node is no surer than the surest vector that starts or ends there: else its plan may be another."""
+    best = dict.fromkeys(nodes, 0.0)
+    for name, read in vectors.items():
+        vector = plan.hypothesis.drawing.construction.vectors[name]
+        for end in (vector.tail, vector.head):
+            best[end] = max(best.get(end, 0.0), read.confidence)
+    return {name: replace(node, confidence=min(node.confidence, best[name])) for name, node in nodes.items()}
 
 
 def figure_name(plan: Plan) -> str:

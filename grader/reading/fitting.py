@@ -25,6 +25,9 @@ HIDDEN_MM = 0.5
 END_REACH_MM = 5.0
 CENTRE_MM = 0.2
 """How far a circle drawn around a node is off it."""
+SPREAD = 0.88
+"""Standard errors beside those of the model: over simulated students of four mechanisms, the errors of
+lengths that were read rightly have a root mean square of 0.65 to 0.9 of the model's standard errors."""
 LOOSE_MM = 6.0
 """Standard error of the belief that keeps unseen nodes from running away: it decides nothing else."""
 
@@ -145,7 +148,7 @@ def fit_nodes(
         at = state[0::2] + 1j * state[1::2]
         redraw = _redraw((rows.goal - rows.design @ state)[rows.own], count)
         sites = _renewed(sites, about, state, cov, ends)
-    return Fit(at, cov, redraw, _residuals(found, lines, at))
+    return Fit(at, SPREAD**2 * cov, redraw, _residuals(found, lines, at))
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,9 +186,7 @@ def _pairs(values: ComplexArray) -> FloatArray:
     return np.column_stack([values.real, values.imag]).ravel()
 
 
-def _line_rows(
-    found: Explanation, lines: Lines, at: ComplexArray, centres: Mapping[int, complex]
-) -> _Lines:
+def _line_rows(found: Explanation, lines: Lines, at: ComplexArray, centres: Mapping[int, complex]) -> _Lines:
     design, goal, sigma, own = [], [], [], []
     middles = lines.middle
     for index, edge in enumerate(found.expected.edges):

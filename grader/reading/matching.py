@@ -193,5 +193,3 @@ def _after(state: Explanation, edge: int, choice: _Choice, lines: Lines, ends: E
         return replace(state, stroke=stroke, score=choice.score)
     seen = updated(state.expected, edge, taken, lines, ends)
     return Explanation(seen, stroke, shared, ended, choice.score)
-
-

@@ -169,4 +169,3 @@ def _apart(proposed: FloatArray, scores: FloatArray, radius: float, count: int) 
         Place(complex(origin[one]), float(proposed[one, 2]), float(proposed[one, 3]), float(scores[one]))
         for one in chosen
     ]
-

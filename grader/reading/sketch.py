@@ -91,8 +91,10 @@ def find_sketch(
         laid.extend(_laid(own[0], long, circles, turned, COST_IN_SUPPORT))
     laid.sort(key=lambda one: -one[0])
     regular = {id(drawing.construction) for drawing in own}
-    read = [_read(drawing, place, lines, circles, id(drawing.construction) in regular)
-            for _, drawing, place in laid[:SHORT_LIST]]
+    read = [
+        _read(drawing, place, lines, circles, id(drawing.construction) in regular)
+        for _, drawing, place in laid[:SHORT_LIST]
+    ]
     return max(read, key=lambda one: one.score, default=None)
 
 

@@ -44,14 +44,14 @@ def task(name: str = "pump", variant: Variant | None = None) -> tuple[Assignment
     chosen = variant or assignment.variants()[0]
     scales = assignment.scales([chosen])
     mechanism = assignment.mechanism([chosen])
-    return assignment, chosen, Drawing(
-        construction_of(mechanism), parameters_of(mechanism, scales.kL, scales.kv, scales.ka)
+    return (
+        assignment,
+        chosen,
+        Drawing(construction_of(mechanism), parameters_of(mechanism, scales.kL, scales.kv, scales.ka)),
     )
 
 
-def draw(
-    drawing: Drawing, figures: Mapping[str, complex] | None = None, pen: Pen | None = None
-) -> Drawn:
+def draw(drawing: Drawing, figures: Mapping[str, complex] | None = None, pen: Pen | None = None) -> Drawn:
     """Draw the figures, each with its origin at a place on the sheet."""
     places, pen = PLACES if figures is None else figures, pen or Pen()
     exact = {name: complex(np.ravel(at)[0]) for name, at in evaluate(*_parts(drawing)).items()}
@@ -86,8 +86,14 @@ def _parts(drawing: Drawing) -> tuple[object, object]:
 def blank_sheet() -> Sheet:
     """An A3 sheet that is known exactly."""
     return Sheet(
-        mm_to_px=np.diag([10.0, 10.0, 1.0]), page_mm=(420.0, 297.0), method="markers", px_per_mm=10.0,
-        rotation_deg=0.0, residual_mm=0.0, scale_se=0.0, drawable_mm=(20.0, 10.0, 390.0, 277.0),
+        mm_to_px=np.diag([10.0, 10.0, 1.0]),
+        page_mm=(420.0, 297.0),
+        method="markers",
+        px_per_mm=10.0,
+        rotation_deg=0.0,
+        residual_mm=0.0,
+        scale_se=0.0,
+        drawable_mm=(20.0, 10.0, 390.0, 277.0),
     )
 
 

@@ -187,3 +187,19 @@ def test_a_sheet_of_unsure_scale_gives_no_confidence_in_long_vectors():
     drawn = draw(drawing)
     vague = Drawn(drawn.ink, replace(drawn.sheet, scale_se=0.02), drawn.nodes, drawn.vectors)
     assert vectors_read(read(vague, assignment, variant))["v_A"][1] < SURE
+
+
+@pytest.mark.parametrize("redraw_mm", [0.05, 0.4])
+def test_a_node_is_no_surer_than_the_surest_vector_that_ends_there(redraw_mm):
+    assignment, variant, drawing = task("pump", Variant(n=9))
+    reading = read(draw(drawing, pen=Pen(redraw_mm=redraw_mm)), assignment, variant)
+    construction = drawing.construction
+    for figure in (VELOCITY_PLAN, ACCELERATION_PLAN):
+        found = reading.figures[figure]
+        for name, node in found.nodes.items():
+            touching = [
+                found.vectors[vector.name].confidence
+                for vector in construction.vectors_of(figure)
+                if name in {vector.tail, vector.head} and vector.name in found.vectors
+            ]
+            assert node.confidence <= max(touching, default=0.0)
