@@ -15,7 +15,7 @@ from grader import __version__
 from grader.documents import ReportDocument, ResultsDocument, UnmatchedDocument
 from grader.exports import write_summary
 from grader.feedback import Level, write_feedback, write_index
-from grader.files import write_whole
+from grader.files import make_folder, write_whole
 from grader.folder import submissions
 from grader.judging import unjudged_report
 from grader.measurements import names_of
@@ -71,6 +71,7 @@ def grade(batch: Batch, progress: Progress) -> ResultsDocument:
     works, unmatched = _works(batch, roster, files, surveys)
     if not works and not unmatched:
         raise CallError("nothing_to_grade", f"{batch.folder}: there is nothing to grade in this folder")
+    make_folder(batch.out)
     reports = _marked(batch, works, progress)
     results = ResultsDocument(assignment=batch.assignment.id, reports=reports, unmatched=unmatched)
     _write_results(batch, results, works)

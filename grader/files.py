@@ -39,6 +39,20 @@ def write_whole(path: Path, data: bytes | str) -> None:
         raise
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it, before long work that will write there.
+
+    Raises OutputError with the system's reason.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            "cannot_write",
+            f"{path}: cannot be made ({error.strerror or error}); choose another place",
+        ) from error
+
+
 def _write_new(path: Path, content: bytes) -> None:
     with path.open("xb") as file:
         file.write(content)

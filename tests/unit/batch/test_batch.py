@@ -3,6 +3,7 @@ import json
 import pytest
 
 from grader.batch import Batch, folders_of, grade, needs_person
+from grader.files import OutputError
 from grader.pipeline import Work
 from grader.plan_document import plan_document
 from grader.rubric import load_rubric
@@ -111,6 +112,15 @@ def test_a_roster_with_faults_stops_before_anything_is_written(class_folder, tmp
     with pytest.raises(AuthoredFileError, match="line 2"):
         run(class_folder, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_results_that_cannot_be_written_are_told_before_anything_is_marked(class_folder, tmp_path):
+    (tmp_path / "taken").write_text("a file")
+    told = []
+    batch = Batch(PUMP, RUBRIC, class_folder, tmp_path / "taken" / "out")
+    with pytest.raises(OutputError, match="choose another place"):
+        grade(batch, lambda *progress: told.append(progress))
+    assert not any(what == "marking" for what, *_ in told)
 
 
 def test_several_positions_have_a_folder_each():
