@@ -5,12 +5,13 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from grader.cli.grading import check_language, checked_rubric
+from grader.cli.grading import check_language
 from grader.feedback import reason_sentence
 from grader.i18n import Tongue, tongue
 from grader.judging import Submission, task_of
 from grader.measurements import Measurements, names_of, read_measurements
 from grader.outcomes import Quantity
+from grader.rubric import rubric_of
 from grader.selfcheck import LEVELS, Checked, Level, is_all_right, self_check
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError
@@ -25,7 +26,7 @@ def check_measured(name: str, n: int | None, position: int | None, file: Path, l
     if wanted is None:
         raise CallError("unknown_level", f"--level {level}: known are {', '.join(LEVELS)}")
     assignment = load_assignment(name)
-    rubric = checked_rubric(assignment)
+    rubric = rubric_of(assignment)
     words = tongue(lang)
     console = Console()
     all_right = True

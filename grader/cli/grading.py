@@ -17,11 +17,10 @@ from grader.documents import ReadingDocument, ResultsDocument
 from grader.i18n import LANGUAGES
 from grader.intake import count_pages
 from grader.pipeline import Place, Seen, documents_of, read, see
-from grader.rubric import RubricFile, check_rubric, load_rubric
+from grader.rubric import rubric_of
 from grader.samples_folder import samples_folder
 from reference.assignment import Assignment, Variant, load_assignment
-from reference.derivation import construction_of
-from reference.errors import AuthoredFileError, CallError, InputFileError
+from reference.errors import CallError, InputFileError
 
 SHOWN = 12
 
@@ -41,7 +40,7 @@ def grade_folder(
     if pages_per_student is not None and pages_per_student < 1:
         raise CallError("pages_per_student", "--pages-per-student must be 1 or more")
     assignment = load_assignment(name)
-    rubric = checked_rubric(assignment)
+    rubric = rubric_of(assignment)
     batch = Batch(
         assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1, lang
     )
@@ -49,15 +48,6 @@ def grade_folder(
         results = grade(batch, tell)
     _tell(results, out)
     return needs_person(results)
-
-
-def checked_rubric(assignment: Assignment) -> RubricFile:
-    """The assignment's rubric. Raises AuthoredFileError where it names what the mechanism does not have."""
-    rubric = load_rubric(assignment.file.rubric, beside=assignment.path)
-    findings = check_rubric(rubric, construction_of(assignment.mechanism(assignment.variants()[:1])))
-    if findings:
-        raise AuthoredFileError(f"rubric {rubric.id}", tuple(findings))
-    return rubric
 
 
 def check_language(lang: str) -> None:
@@ -119,7 +109,7 @@ def read_scans(
     assignment = load_assignment(name)
     variant = _variant(assignment, n, position)
     seen = [see(place) for path in scans for place in _places(path)]
-    readings = read(seen, assignment, variant, {}, checked_rubric(assignment).vectors)
+    readings = read(seen, assignment, variant, {}, rubric_of(assignment).vectors)
     documents = documents_of(seen, readings, None)
     documents = [_identified(document, one) for document, one in zip(documents, seen, strict=True)]
     if as_json:
