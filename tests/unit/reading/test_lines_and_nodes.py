@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.reading import confidence
+from grader.reading import confidence, fitting
 from grader.reading.belief import Ends, Taken, updated
 from grader.reading.confidence import Signs, sureness
 from grader.reading.expected import Edge, Expected, Hand, expect, links_of, vectors_of
@@ -149,3 +149,14 @@ def test_probability_within_half_a_millimetre_falls_with_the_error():
 def test_every_bad_sign_lowers_the_confidence(worse):
     good = Signs(placed=0.98, named=0.99)
     assert sureness(replace(good, **worse)) < sureness(good)
+
+
+def test_ends_that_reach_a_node_side_by_side_count_as_one():
+    def outward(node, angle_deg):
+        row = np.zeros(4)
+        row[2 * node : 2 * node + 2] = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+        return row
+
+    rows = np.array([outward(0, 10), outward(0, 14), outward(0, 18), outward(0, 100), outward(1, 10)])
+    ends = fitting._Ends(rows, np.zeros(5), np.zeros(5))
+    assert fitting._repeated(ends) == pytest.approx([2 / 3, 2 / 3, 2 / 3, 0.0, 0.0])
