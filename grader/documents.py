@@ -269,6 +269,82 @@ class PlanDocument(Document):
     conditioning: dict[str, float | dict[str, float]]
 
 
+# Lint: an assignment held against every variant ---------------------------------------------------
+
+
+class VariantDocument(Document):
+    """A variant; null where the assignment has no such number."""
+
+    n: int | None
+    position: int | None
+
+
+class LintFindingDocument(Document):
+    """A finding: how grave, a stable code, where, what, for which variants (none: the files as such)."""
+
+    severity: Literal["fault", "warning", "hint"]
+    code: str
+    file: Literal["assignment", "mechanism", "rubric"]
+    path: str
+    message: str
+    variants: list[VariantDocument]
+
+
+class LintLeast(Document):
+    """The least of several figures, and whose it is."""
+
+    value: float
+    at: str
+
+
+class LintVariant(VariantDocument):
+    """One variant's figures; without figures where it cannot be solved, `problem` says why.
+
+    `transmission` is a sine, `room` how many times as large the tightest figure could be drawn in
+    its zone of the answer sheet.
+    """
+
+    assembles: bool
+    problem: str | None
+    transmission: LintLeast | None
+    crossing_deg: LintLeast | None
+    shortest_mm: LintLeast | None
+    under_8_mm: int
+    room: LintLeast | None
+
+
+class LintScales(Document):
+    """Scales, the least and the largest over all variants, and what they give."""
+
+    name: Literal["proposed", "round", "round_each"]
+    kL: tuple[float, float]  # noqa: N815 - the field's own name for it
+    kv: tuple[float, float]
+    ka: tuple[float, float]
+    room: float
+    shortest_mm: LintLeast | None
+    under_8_mm: int
+    asked: int
+    shortest_link_mm: float
+
+
+class LintWorst(VariantDocument):
+    """The variant that is hardest to draw."""
+
+    why: str
+
+
+class LintDocument(Document):
+    """What `planmark lint` found."""
+
+    schema_version: Version = 1
+    assignment: str
+    needs_a_person: bool
+    findings: list[LintFindingDocument]
+    variants: list[LintVariant]
+    scales: list[LintScales]
+    worst: LintWorst | None
+
+
 # Schemas ------------------------------------------------------------------------------------------
 
 
@@ -281,6 +357,7 @@ def _models() -> dict[str, tuple[type[BaseModel], Literal["validation", "seriali
         "report": (ReportDocument, "serialization"),
         "results": (ResultsDocument, "serialization"),
         "plan": (PlanDocument, "serialization"),
+        "lint": (LintDocument, "serialization"),
         "mechanism": (MechanismFile, "validation"),
         "assignment": (AssignmentFile, "validation"),
         "rubric": (RubricFile, "validation"),

@@ -1,6 +1,6 @@
 """Which division of the sheet suits an assignment: its figures' exact extents over all variants."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from reference.assignment import Assignment, Variant
 from reference.construction import Construction, evaluate
 from reference.derivation import construction_of, parameters_of
 
-_MARGIN_MM = 12.0
+MARGIN_MM = 12.0
 """Around a figure: letters, arrowheads, hatching of the guides."""
 
 
@@ -59,10 +59,13 @@ def extents_mm(
 
 def best_template(assignment: Assignment, figures: Sequence[str]) -> Fit:
     """The division with the most room for the figure that has the least; a sketch may be drawn smaller."""
-    extents = extents_mm(assignment, figures, assignment.variants())
-    need = {
-        figure: (wide + 2 * _MARGIN_MM, high + 2 * _MARGIN_MM) for figure, (wide, high) in extents.items()
-    }
+    return template_for(extents_mm(assignment, figures, assignment.variants()))
+
+
+def template_for(extents: Mapping[str, tuple[float, float]]) -> Fit:
+    """The same for figures whose largest width and height (millimetres) are known already."""
+    figures = tuple(extents)
+    need = {figure: (wide + 2 * MARGIN_MM, high + 2 * MARGIN_MM) for figure, (wide, high) in extents.items()}
 
     def room(template: Template, figure: str) -> float:
         _, _, wide, high = template.zones[figure]

@@ -27,11 +27,18 @@ def plan(
 
 
 @app.command()
-def lint(assignment: AssignmentArgument) -> None:
+def lint(
+    assignment: AssignmentArgument,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
+    svg: Annotated[
+        Path | None,
+        typer.Option("--svg", help="Draw the variant that is hardest to draw into this SVG file."),
+    ] = None,
+) -> None:
     """Hold an assignment and its rubric against every variant: all findings at once."""
     from grader.cli.linting import lint_assignment
 
-    raise typer.Exit(1 if lint_assignment(assignment) else 0)
+    raise typer.Exit(1 if lint_assignment(assignment, as_json=as_json, svg=svg) else 0)
 
 
 @app.command()

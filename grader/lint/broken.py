@@ -1,0 +1,64 @@
+"""Variants whose mechanism cannot be solved: which, at which group, by how much."""
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from grader.lint.findings import LintFinding
+from grader.lint.places import group_place
+from reference.assignment import Assignment, Variant
+from reference.errors import MechanismError
+from reference.plan import exact_plan
+
+_GAP = re.compile(r"\bby ([0-9.]+(?:e[-+]?[0-9]+)?) m\b")
+_GROUP = re.compile(r"the group of (\w+)")
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """A variant that cannot be solved, and why."""
+
+    variant: Variant
+    code: str
+    message: str
+
+
+def broken_variants(assignment: Assignment, variants: Sequence[Variant]) -> list[Broken]:
+    """The variants that do not assemble or are singular.
+
+    All at once on arrays; where that fails, by halves: b broken ones of N cost about b log N
+    evaluations.
+    """
+    try:
+        exact_plan(assignment, list(variants))
+    except MechanismError as error:
+        if len(variants) == 1:
+            # What the message says in brackets is about arrays: which index, how many of how many.
+            return [Broken(variants[0], error.code, re.sub(r" \(1 of 1 [^)]*\)", "", error.message))]
+        middle = len(variants) // 2
+        return [
+            *broken_variants(assignment, variants[:middle]),
+            *broken_variants(assignment, variants[middle:]),
+        ]
+    return []
+
+
+def broken_findings(assignment: Assignment, broken: Sequence[Broken]) -> Iterator[LintFinding]:
+    """A fault for each group and reason, with all its variants and the range of the gaps."""
+    alike: dict[tuple[str, str], list[Broken]] = defaultdict(list)
+    for one in broken:
+        alike[one.code, _GAP.sub("by {}", one.message)].append(one)
+    for (code, _), ones in alike.items():
+        group = _GROUP.search(ones[0].message)
+        file, path = group_place(assignment, group.group(1) if group else None)
+        variants = tuple(one.variant for one in ones)
+        yield LintFinding("fault", code, file, path, _together([one.message for one in ones]), variants)
+
+
+def _together(messages: Sequence[str]) -> str:
+    """Messages that differ only in the gap as one, with the gap's range."""
+    gaps = [float(found.group(1)) for message in messages if (found := _GAP.search(message))]
+    if not gaps or max(gaps) == min(gaps):
+        return messages[0]
+    return _GAP.sub(f"by {min(gaps):.3g} to {max(gaps):.3g} m", messages[0], count=1)

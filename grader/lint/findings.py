@@ -1,0 +1,78 @@
+"""What lint tells: findings with a severity and a place in a file, and variants named shortly."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.assignment import Variant
+
+Severity = Literal["fault", "warning", "hint"]
+"""fault: some student cannot be set or marked; warning: something a teacher should change or accept;
+hint: good to know."""
+SEVERITIES: tuple[Severity, ...] = ("fault", "warning", "hint")
+File = Literal["assignment", "mechanism", "rubric"]
+BoolArray = NDArray[np.bool_]
+NAMED = 6
+"""Ranges of numbers that are named before the rest is only counted."""
+
+
+@dataclass(frozen=True, slots=True)
+class LintFinding:
+    """One finding: how grave, a stable code, where (a path such as ``$.criterion[3]``), what, for whom.
+
+    `variants` is empty where the finding concerns the files as such.
+    """
+
+    severity: Severity
+    code: str
+    file: File
+    path: str
+    message: str
+    variants: tuple[Variant, ...] = ()
+
+    def __str__(self) -> str:
+        told = f" ({named(self.variants)})" if self.variants else ""
+        return f"{self.file} {self.path}: {self.message}{told}"
+
+
+def chosen(variants: Sequence[Variant], which: BoolArray) -> tuple[Variant, ...]:
+    """The variants where `which` (N,) is true."""
+    return tuple(variant for variant, is_so in zip(variants, which, strict=True) if is_so)
+
+
+def named(variants: Iterable[Variant]) -> str:
+    """Variants as people say them: ``n = 3..7, 12``; with positions ``n = 3, position = 0, 4; n = 4``."""
+    told = []
+    for n, group in groupby(variants, key=lambda variant: variant.n):
+        members = list(group)
+        positions = [variant.position for variant in members if variant.position is not None]
+        told.append((n, tuple(positions)))
+    if all(not positions for _, positions in told):
+        numbers = [n for n, _ in told if n is not None]
+        return f"n = {_ranges(numbers)}" if numbers else "the only variant"
+    parts = [
+        ("" if n is None else f"n = {n}, ") + f"position = {_ranges(positions)}" for n, positions in told
+    ]
+    more = len(parts) - NAMED
+    return "; ".join(parts[:NAMED]) + (f" and {more} more numbers" if more > 0 else "")
+
+
+def _ranges(numbers: Sequence[int]) -> str:
+    """Whole numbers in rising order, runs of three and more drawn together."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    told: list[str] = []
+    for run in runs:
+        told.extend([f"{run[0]}..{run[-1]}"] if len(run) > 2 else map(str, run))
+    if len(told) <= NAMED + 2:
+        return ", ".join(told)
+    counted = sum(len(run) for run in runs[NAMED:])
+    return ", ".join(told[:NAMED]) + f" and {counted} more"

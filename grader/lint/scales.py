@@ -1,0 +1,205 @@
+"""Round scales, as a drawing teacher writes them: the largest drawing that fits every variant."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grader.layout import TEMPLATES, Template
+from grader.lint.findings import LintFinding
+from grader.lint.lengths import WELL_READ_MM, Asked
+from grader.lint.room import Extents, PageRoom, growth, pages_of
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN
+from reference.assignment import Assignment, Scales
+from reference.geometry import FloatArray
+from reference.plan import Plan
+
+LENGTH_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+"""Of 1 : 10^k. ISO 5455 has 1, 2, 5; GOST 2.302 and SR EN practice add 2.5."""
+RATE_STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 10.0)
+"""Of 10^k (m/s)/mm and (m/s^2)/mm: factors by which a ruler's millimetres are easily multiplied."""
+LEAST_LINK_MM = 20.0
+"""The plans' directions are read off the sketch: a shorter link tells them less well than a hand draws."""
+SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """Scales and what they give, over all variants.
+
+    Attributes
+    ----------
+    name : ``proposed`` (by the assignment), ``round`` (one for all), ``round_each`` (each its own)
+    room : the least enlargement that any figure's zone has left; below 1 it does not fit
+    shortest_mm : the shortest asked vector that is not zero, with its name; None where none is asked
+    under_8_mm, asked : how many asked vectors are shorter than 8 mm, of how many
+    link_mm : the shortest link of the sketch
+    """
+
+    name: str
+    scales: Scales
+    room: float
+    shortest_mm: float | None
+    shortest: str
+    under_8_mm: int
+    asked: int
+    link_mm: float
+
+
+def round_up(values: FloatArray, steps: Sequence[float]) -> FloatArray:
+    """The least of the steps times a power of ten that is not below each value (positive, any shape)."""
+    decade = 10.0 ** np.floor(np.log10(values) + _SLACK)
+    ladder = decade[..., None] * np.asarray(steps)
+    reached = ladder >= values[..., None] * (1.0 - _SLACK)
+    return np.asarray(np.take_along_axis(ladder, np.argmax(reached, axis=-1)[..., None], axis=-1)[..., 0])
+
+
+def proposals(
+    assignment: Assignment, plan: Plan, extents: Extents, asked: Asked, rooms: Mapping[int, PageRoom]
+) -> list[Proposal]:
+    """The assignment's own scales, round ones for all, and round ones for each variant."""
+    own_room = min(
+        (float(np.min(one)) for room in rooms.values() for one in room.zones.values()), default=np.inf
+    )
+    pages = [figures for _, figures in pages_of(assignment, plan)]
+    links = _shortest_link_m(plan)
+    templates = [_best_template(figures, plan, extents, links) for figures in pages]
+    told = [_judged("proposed", plan.scales, plan, asked, own_room)]
+    for name in ("round", "round_each"):
+        scales = _round_scales(templates, plan, extents, together=name == "round")
+        told.append(_judged(name, scales, plan, asked, _room(templates, _redrawn(extents, plan, scales))))
+    return told
+
+
+def _shortest_link_m(plan: Plan) -> FloatArray:
+    """The shortest distance (m) that a direction of the plans is taken from, (N,)."""
+    at = plan.motion.position
+    links = {vector.link for vector in plan.construction.vectors.values() if vector.link}
+    lengths = [np.abs(at[head] - at[tail]) for tail, head in links if {tail, head} <= at.keys()]
+    count = len(plan.variants)
+    return (
+        np.min([np.broadcast_to(length, (count,)) for length in lengths], axis=0)
+        if lengths
+        else np.ones(count)
+    )
+
+
+def _needed(template: Template, plan: Plan, extents: Extents) -> dict[str, FloatArray]:
+    """The finest scale at which each figure of a template fits its zone, (N,)."""
+    needed = {}
+    for figure, box in template.zones.items():
+        factor = growth(box, *extents[figure])
+        # A figure that is a single point fits at any scale.
+        scale = getattr(plan.scales, SCALE_OF[figure])
+        needed[figure] = np.where(np.isfinite(factor), scale / factor, scale)
+    return needed
+
+
+def _best_template(figures: Sequence[str], plan: Plan, extents: Extents, links_m: FloatArray) -> Template:
+    """The division at which plans are largest, and the sketch not too small to take directions from."""
+
+    def worth(template: Template) -> tuple[float, ...]:
+        scales = {
+            figure: float(round_up(np.asarray(np.max(values)), steps_of(SCALE_OF[figure])))
+            for figure, values in _needed(template, plan, extents).items()
+        }
+        sketch = scales.pop(MECHANISM, None)
+        link_mm = LEAST_LINK_MM if sketch is None else float(np.min(links_m)) / sketch
+        plans = -sum(np.log(scale) for scale in scales.values())
+        return (min(link_mm, LEAST_LINK_MM), float(plans), link_mm)
+
+    return max((one for one in TEMPLATES if one.figures == set(figures)), key=worth)
+
+
+def steps_of(scale: str) -> tuple[float, ...]:
+    """The round steps of kL, kv or ka."""
+    return LENGTH_STEPS if scale == "kL" else RATE_STEPS
+
+
+def _round_scales(templates: Sequence[Template], plan: Plan, extents: Extents, *, together: bool) -> Scales:
+    """Round scales that fit every page; a scale that no page needs stays as it is."""
+    scales = {name: np.asarray(getattr(plan.scales, name)) for name in SCALE_OF.values()}
+    finest: dict[str, FloatArray] = {}
+    for template in templates:
+        for figure, values in _needed(template, plan, extents).items():
+            name = SCALE_OF[figure]
+            finest[name] = np.maximum(finest[name], values) if name in finest else values
+    for name, values in finest.items():
+        common = np.full_like(values, np.max(values)) if together else values
+        scales[name] = round_up(common, steps_of(name))
+    return Scales(scales["kL"], scales["kv"], scales["ka"])
+
+
+def _redrawn(extents: Extents, plan: Plan, scales: Scales) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """The figures' sizes at other scales."""
+    found = {}
+    for figure, (wide, high) in extents.items():
+        name = SCALE_OF[figure]
+        factor = getattr(plan.scales, name) / getattr(scales, name)
+        found[figure] = (wide * factor, high * factor)
+    return found
+
+
+def _room(templates: Sequence[Template], extents: Extents) -> float:
+    rooms = [
+        float(np.min(growth(box, *extents[figure])))
+        for template in templates
+        for figure, box in template.zones.items()
+    ]
+    return min(rooms, default=np.inf)
+
+
+def _judged(name: str, scales: Scales, plan: Plan, asked: Asked, room: float) -> Proposal:
+    lengths = np.array(asked.length_mm)
+    for row, vector in enumerate(asked.names):
+        own = plan.construction.vectors[vector].scale
+        lengths[row] *= getattr(plan.scales, own) / getattr(scales, own)
+    real = np.where(asked.is_zero, np.inf, lengths)
+    place = np.unravel_index(int(np.argmin(real)), real.shape) if real.size else None
+    known = place is not None and np.isfinite(real[place])
+    return Proposal(
+        name=name,
+        scales=scales,
+        room=room,
+        shortest_mm=float(real[place]) if place is not None and known else None,
+        shortest=asked.names[place[0]] if place is not None and known else "",
+        under_8_mm=int(np.sum(real < WELL_READ_MM)),
+        asked=int(real.size - asked.is_zero.sum()),
+        link_mm=float(np.min(_shortest_link_m(plan) / scales.kL)),
+    )
+
+
+def scale_findings(plan: Plan, told: Sequence[Proposal]) -> Iterator[LintFinding]:
+    """Round scales where the proposed ones are none, and whether normals can be built by the triangle."""
+    for name in SCALE_OF.values():
+        values = np.asarray(getattr(plan.scales, name))
+        if not np.allclose(round_up(values, steps_of(name)), values, rtol=1e-6):
+            own, round_, each = told
+            message = (
+                "the proposed scales are not round; these are, and fit every variant:"
+                f" {written(round_.scales)}; then {round_.under_8_mm} of {round_.asked} asked vectors are"
+                f" under {WELL_READ_MM:g} mm instead of {own.under_8_mm};"
+                f" with round scales of each variant's own {each.under_8_mm}"
+            )
+            yield LintFinding("hint", "round_scales", "assignment", "$.scales", message)
+            break
+    if "acceleration_plan" in plan.nodes_mm and any("_n" in name for name in plan.vectors_si):
+        ratio = plan.scales.kL * plan.scales.ka / plan.scales.kv**2
+        if not np.allclose(ratio, 1.0, rtol=1e-6):
+            message = (
+                "kL ka is not kv^2: normal components cannot be built by the right triangle (altitude) method"
+            )
+            yield LintFinding("hint", "no_altitude_method", "assignment", "$.scales", message)
+
+
+def written(scales: Scales, index: int = 0) -> str:
+    """The scales of one variant as people write them."""
+    kL, kv, ka = (float(np.ravel(getattr(scales, name))[index]) for name in ("kL", "kv", "ka"))  # noqa: N806
+    return f"kL = {ratio_text(kL)} ({kL:g} m/mm), kv = {kv:g} (m/s)/mm, ka = {ka:g} (m/s^2)/mm"
+
+
+def ratio_text(scale_m_per_mm: float) -> str:
+    """A scale of lengths as a ratio: 1:5, 1:2.5, 10:1."""
+    ratio = 1000.0 * scale_m_per_mm
+    return f"1:{ratio:.6g}" if ratio >= 1.0 - _SLACK else f"{1.0 / ratio:.6g}:1"

@@ -1,0 +1,74 @@
+"""Round scales: round, the finest that fit, and right once they stand in the file."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from grader.lint import lint
+from grader.lint.scales import LENGTH_STEPS, RATE_STEPS, ratio_text, round_up
+from grader.rubric import load_rubric
+from reference.assignment import built_in, library, load_assignment
+
+ROUNDING = 1e-9
+
+
+@pytest.mark.parametrize("steps", [LENGTH_STEPS, RATE_STEPS])
+def test_rounding_up_gives_the_least_round_number_that_is_not_below(steps):
+    values = np.geomspace(1e-6, 1e6, 2001)
+    rounded = round_up(values, steps)
+    assert np.all(rounded >= values * (1 - ROUNDING))
+    mantissa = rounded / 10.0 ** np.floor(np.log10(rounded) + ROUNDING)
+    assert np.all(np.min(np.abs(mantissa[:, None] - np.array(steps)), axis=1) < 1e-6)
+    np.testing.assert_allclose(round_up(rounded, steps), rounded, rtol=ROUNDING)
+    # The next step down is below the value.
+    ladder = np.sort(np.unique(np.outer(10.0 ** np.arange(-8, 8), steps).ravel().round(12)))
+    below = ladder[np.searchsorted(ladder, rounded * (1 - 1e-6)) - 1]
+    assert np.all(below < values)
+
+
+@pytest.mark.parametrize(
+    ("scale", "told"), [(0.005, "1:5"), (0.0025, "1:2.5"), (0.001, "1:1"), (1e-4, "10:1")]
+)
+def test_a_scale_of_lengths_is_told_as_a_ratio(scale, told):
+    assert ratio_text(scale) == told
+
+
+def with_round_scales(tmp_path: Path, name: str) -> Path:
+    """A built-in assignment with the round scales that lint proposes for it in its file."""
+    assignment = load_assignment(name)
+    found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
+    kL, kv, ka = (float(getattr(found.scales[1].scales, one)[0]) for one in ("kL", "kv", "ka"))  # noqa: N806
+    text = assignment.path.read_text(encoding="utf-8")
+    proposed = f'[scales]\ncrank_mm = "crank_m / {kL!r}"\nkL = {kL!r}\nkv = {kv!r}\nka = {ka!r}\n\n'
+    text, count = re.subn(r"\[scales\].*?(?=\n\[)", proposed, text, flags=re.DOTALL)
+    assert count == 1
+    (tmp_path / f"{name}.assignment.toml").write_text(text, encoding="utf-8")
+    return tmp_path / f"{name}.assignment.toml"
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_round_scales_put_into_the_file_fit_and_are_proposed_again(tmp_path, name):
+    assignment = load_assignment(with_round_scales(tmp_path, name))
+    found = lint(assignment, load_rubric(assignment.file.rubric, beside=library() / "any.toml"))
+    codes = {finding.code for finding in found.findings}
+    assert not codes & {"does_not_fit", "does_not_fit_a3", "round_scales"}
+    own, round_, _each = found.scales
+    for scale in ("kL", "kv", "ka"):
+        np.testing.assert_allclose(getattr(round_.scales, scale), getattr(own.scales, scale), rtol=ROUNDING)
+    assert own.under_8_mm == round_.under_8_mm
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_scales_of_each_variants_own_are_never_coarser_than_the_common_ones(name):
+    assignment = load_assignment(name)
+    found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
+    _own, together, each = found.scales
+    for scale in ("kL", "kv", "ka"):
+        own, common = getattr(each.scales, scale), getattr(together.scales, scale)
+        assert np.all(own <= common * (1 + ROUNDING))
+        assert np.min(own) > 0.0
+    assert together.room >= 1.0 - ROUNDING
+    assert each.room >= 1.0 - ROUNDING
+    assert each.under_8_mm <= together.under_8_mm
