@@ -1,14 +1,20 @@
 """Shapes on paper in millimetres (x right, y down), and their writing as SVG, true to size."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from xml.sax.saxutils import escape
+
+from reference.lettering import Text, rise_and_fall, set_pieces, width_of
 
 A3_MM = (420.0, 297.0)
 
 INK = "#1b1f24"
-CONSTRUCTION = "#9aa3ad"
+CONSTRUCTION = "#7d8791"
+PAPER = "#ffffff"
+FONTS = "'DejaVu Sans Condensed', 'DejaVu Sans', Arial, sans-serif"
 Point = tuple[float, float]
+Bounds = tuple[float, float, float, float]
+"""Left, top, right, bottom."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +36,7 @@ class Ring:
     radius: float
     width: float = 0.35
     colour: str = INK
-    fill: str = "#ffffff"
+    fill: str = PAPER
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,44 +50,118 @@ class Area:
 
 
 @dataclass(frozen=True, slots=True)
+class Curve:
+    """A line through many points, as an arc is drawn."""
+
+    points: tuple[Point, ...]
+    width: float = 0.35
+    colour: str = INK
+    dash: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Label:
-    """A text; `size` is the height of its line, `anchor` one of start, middle, end."""
+    """A text whose line starts, ends or has its middle `at` a point; `size` is the height of its line."""
 
     at: Point
-    text: str
+    text: Text
     size: float = 4.0
     anchor: str = "start"
     colour: str = INK
     italic: bool = False
 
+    @property
+    def left(self) -> float:
+        """Where its line starts."""
+        share = {"start": 0.0, "middle": 0.5, "end": 1.0}[self.anchor]
+        return self.at[0] - share * width_of(self.text, self.size)
 
-Shape = Stroke | Ring | Area | Label
+    @property
+    def bounds(self) -> Bounds:
+        """The box that its letters fill."""
+        rise, fall = rise_and_fall(self.text, self.size)
+        right = self.left + width_of(self.text, self.size)
+        return (self.left, self.at[1] - rise, right, self.at[1] + fall)
+
+
+Shape = Stroke | Ring | Area | Curve | Label
+
+
+def moved(shape: Shape, by: Point) -> Shape:
+    """The shape elsewhere on the sheet."""
+
+    def shifted(point: Point) -> Point:
+        return (point[0] + by[0], point[1] + by[1])
+
+    match shape:
+        case Stroke():
+            return replace(shape, start=shifted(shape.start), end=shifted(shape.end))
+        case Ring():
+            return replace(shape, centre=shifted(shape.centre))
+        case Area() | Curve():
+            return replace(shape, points=tuple(shifted(point) for point in shape.points))
+        case Label():
+            return replace(shape, at=shifted(shape.at))
+
+
+def bounds(shapes: Iterable[Shape]) -> Bounds:
+    """The box that shapes fill; raises ValueError for none."""
+    boxes = [_bounds_of(shape) for shape in shapes]
+    lows, highs = [box[:2] for box in boxes], [box[2:] for box in boxes]
+    left, top = (min(low[axis] for low in lows) for axis in (0, 1))
+    right, bottom = (max(high[axis] for high in highs) for axis in (0, 1))
+    return (left, top, right, bottom)
+
+
+def _bounds_of(shape: Shape) -> Bounds:
+    match shape:
+        case Label():
+            return shape.bounds
+        case Ring(centre=(x, y), radius=reach):
+            return (x - reach, y - reach, x + reach, y + reach)
+        case Stroke():
+            points: Sequence[Point] = (shape.start, shape.end)
+        case Area() | Curve():
+            points = shape.points
+    xs, ys = zip(*points, strict=True)
+    return (min(xs), min(ys), max(xs), max(ys))
 
 
 def svg(sheets: Sequence[Sequence[Shape]], page_mm: tuple[float, float] = A3_MM) -> str:
     """The sheets, one under another, as one SVG; one user unit is one millimetre."""
     width, height = page_mm
     total = height * len(sheets)
-    size = f'width="{width:g}mm" height="{total:g}mm" viewBox="0 0 {width:g} {total:g}"'
-    lines = [
-        '<?xml version="1.0" encoding="UTF-8"?>',
-        f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="DejaVu Sans, Arial, sans-serif">',
-        f'<rect width="{width:g}" height="{total:g}" fill="#ffffff"/>',
-    ]
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', _svg_tag((0.0, 0.0, width, total))]
+    lines.append(f'<rect width="{width:g}" height="{total:g}" fill="{PAPER}"/>')
     for row, shapes in enumerate(sheets):
         lines.append(f'<g transform="translate(0 {row * height:g})">')
-        lines.extend(_element(shape) for shape in shapes)
+        lines.extend(elements(shapes))
         lines.append("</g>")
     return "\n".join([*lines, "</svg>"]) + "\n"
+
+
+def picture_svg(shapes: Sequence[Shape], box: Bounds) -> str:
+    """Shapes as an SVG element of a page, true to size, cut at a box."""
+    return "\n".join([_svg_tag(box), *elements(shapes), "</svg>"])
+
+
+def _svg_tag(box: Bounds) -> str:
+    left, top, width, height = box[0], box[1], box[2] - box[0], box[3] - box[1]
+    size = f'width="{width:g}mm" height="{height:g}mm" viewBox="{left:g} {top:g} {width:g} {height:g}"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="{FONTS}">'
+
+
+def elements(shapes: Iterable[Shape]) -> Iterator[str]:
+    """Each shape as an element of an SVG."""
+    return (_element(shape) for shape in shapes)
 
 
 def _element(shape: Shape) -> str:
     match shape:
         case Stroke(start=(x1, y1), end=(x2, y2), width=width, colour=colour, dash=dash):
-            dashes = f' stroke-dasharray="{" ".join(f"{d:g}" for d in dash)}"' if dash else ""
             return (
                 f'<line x1="{x1:.3f}" y1="{y1:.3f}" x2="{x2:.3f}" y2="{y2:.3f}" stroke="{colour}"'
-                f' stroke-width="{width:g}" stroke-linecap="round"{dashes}/>'
+                f' stroke-width="{width:g}" stroke-linecap="round"{_dashes(dash)}/>'
             )
         case Ring(centre=(x, y), radius=radius, width=width, colour=colour, fill=fill):
             return (
@@ -89,12 +169,37 @@ def _element(shape: Shape) -> str:
                 f' stroke-width="{width:g}"/>'
             )
         case Area(points=points, fill=fill, width=width, colour=colour):
-            corners = " ".join(f"{x:.3f},{y:.3f}" for x, y in points)
             edge = f' stroke="{colour}" stroke-width="{width:g}"' if width else ""
-            return f'<polygon points="{corners}" fill="{fill}"{edge}/>'
-        case Label(at=(x, y), text=text, size=size, anchor=anchor, colour=colour, italic=italic):
-            style = ' font-style="italic"' if italic else ""
+            return f'<polygon points="{_corners(points)}" fill="{fill}"{edge}/>'
+        case Curve(points=points, width=width, colour=colour, dash=dash):
             return (
-                f'<text x="{x:.3f}" y="{y:.3f}" font-size="{size:g}" text-anchor="{anchor}"'
-                f' fill="{colour}"{style}>{escape(text)}</text>'
+                f'<polyline points="{_corners(points)}" fill="none" stroke="{colour}"'
+                f' stroke-width="{width:g}" stroke-linecap="round"{_dashes(dash)}/>'
             )
+        case Label():
+            return _text(shape)
+
+
+def _dashes(dash: tuple[float, ...]) -> str:
+    return f' stroke-dasharray="{" ".join(f"{d:g}" for d in dash)}"' if dash else ""
+
+
+def _corners(points: Sequence[Point]) -> str:
+    return " ".join(f"{x:.3f},{y:.3f}" for x, y in points)
+
+
+def _text(label: Label) -> str:
+    """A text, its indices as spans; each piece at its own place, so that every viewer stacks them alike."""
+    style = ' font-style="italic"' if label.italic else ""
+    placed = list(set_pieces(label.text, label.size))
+    x, y = label.left, label.at[1]
+    look = f'font-size="{label.size:g}" fill="{label.colour}"{style}'
+    if len(placed) == 1:
+        anchor = f'x="{label.at[0]:.3f}" y="{y:.3f}" text-anchor="{label.anchor}"'
+        return f"<text {anchor} {look}>{escape(placed[0].text)}</text>"
+    spans = (
+        f'<tspan x="{x + piece.right:.3f}" y="{y - piece.above:.3f}" font-size="{piece.size:g}">'
+        f"{escape(piece.text)}</tspan>"
+        for piece in placed
+    )
+    return f'<text x="{x:.3f}" y="{y:.3f}" {look}>{"".join(spans)}</text>'

@@ -8,9 +8,10 @@ from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 
 from grader import aruco
-from grader.answer_sheet.words import REGULAR, Piece, embed_fonts, width_mm
+from grader.answer_sheet.words import REGULAR, embed_fonts, width_mm
 from grader.layout import FRAME_MM, MARKER_CORNERS, MARKER_MM, PAGE_MM, Template
 from grader.records import Box
+from reference.lettering import Piece
 
 BLACK, GREY = 0.0, 0.55
 _FRAME_PEN_MM = 0.7

@@ -6,12 +6,13 @@ import numpy as np
 import segno
 
 from grader.answer_sheet.drawing import GREY, Drawing, runs
-from grader.answer_sheet.words import BOLD, REGULAR, Piece, fitted, number, pieces_of, pieces_width_mm, wrap
+from grader.answer_sheet.words import BOLD, REGULAR, fitted, number, pieces_width_mm, wrap
 from grader.i18n import N_, Tongue
 from grader.layout import CODE_MM, SCALE_BOXES, Template
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, Identity
 from grader.sheet_code import code_of
 from reference.assignment import Assignment, Variant
+from reference.lettering import Piece, pieces_of
 
 FIGURES = {
     MECHANISM: N_("Mechanism"),

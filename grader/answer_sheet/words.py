@@ -1,8 +1,6 @@
 """Text on the printed sheet: the embedded font, numbers, indices, wrapping."""
 
-import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
@@ -10,8 +8,9 @@ from reportlab.lib.units import mm
 from reportlab.pdfbase import pdfmetrics
 from reportlab.pdfbase.ttfonts import TTFont
 
+from reference.lettering import Piece
+
 REGULAR, BOLD = "DejaVuSansCondensed", "DejaVuSansCondensed-Bold"
-_INDEX_SIZE = 0.7
 _DECIMAL_COMMA = frozenset({"ro", "ru"})
 
 
@@ -44,31 +43,6 @@ def number(value: float, lang: str) -> str:
     if "e" in text and 1e-6 < abs(value) < 1e9:
         text = f"{value:.6f}".rstrip("0").rstrip(".") if abs(value) < 1.0 else f"{value:.0f}"
     return text.replace(".", ",") if lang in _DECIMAL_COMMA else text
-
-
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """A stretch of text on one height: 0 on the line, -1 an index below, +1 above."""
-
-    text: str
-    height: int = 0
-
-    def size(self, size_pt: float) -> float:
-        """Its own letter size."""
-        return size_pt if self.height == 0 else _INDEX_SIZE * size_pt
-
-    def rise(self, size_pt: float) -> float:
-        """How far it is raised, points."""
-        return {-1: -0.26, 0: 0.0, 1: 0.44}[self.height] * size_pt
-
-
-def pieces_of(name: str) -> tuple[Piece, ...]:
-    """A name as it is set: ``a_BA_n`` as a with BA below and n above, ``O1A`` with its 1 below."""
-    stem, *indices = name.split("_")
-    if indices and stem:
-        return (Piece(stem), *(Piece(index, height) for index, height in zip(indices, (-1, 1), strict=False)))
-    parts = re.split(r"(?<=[^\W\d_])(\d+)", name)
-    return tuple(Piece(part, -1 if index % 2 else 0) for index, part in enumerate(parts) if part)
 
 
 def pieces_width_mm(pieces: Iterable[Piece], font: str, size_pt: float) -> float:

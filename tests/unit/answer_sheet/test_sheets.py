@@ -7,11 +7,12 @@ import pytest
 
 from grader.answer_sheet import calibration_segments, make_calibration, make_sheets, page_layouts
 from grader.answer_sheet.fit import best_template, extents_mm
-from grader.answer_sheet.words import number, pieces_of, width_mm, wrap
+from grader.answer_sheet.words import number, width_mm, wrap
 from grader.layout import FRAME_MM, MARKER_CORNERS, PAGE_MM, SCALE_BOXES, TEMPLATES, Layout, field_boxes
 from grader.roster import RosterRow
 from reference.assignment import built_in, load_assignment
 from reference.errors import AuthoredFileError
+from reference.lettering import pieces_of
 
 A3_POINTS = (420.0 / 25.4 * 72.0, 297.0 / 25.4 * 72.0)
 QUIET_MM = 2.0

@@ -1,0 +1,73 @@
+"""A velocity or acceleration plan: its vectors with arrowheads, thin construction lines, letters."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from reference.canvas import CONSTRUCTION, Shape, Stroke
+from reference.drawing import symbols
+from reference.drawing.labelling import Wanted, place_labels, together
+from reference.drawing.sketch import captioned, joined
+from reference.drawing.subject import TOUCHING_MM, Figure, Part, Subject
+from reference.drawing.symbols import HAIR_MM, point
+from reference.steps import Step, TwoLines, View
+
+COLOURS = {"velocity_plan": "#1456a0", "acceleration_plan": "#a03014"}
+LETTER_MM, NORMAL_LETTER_MM = 4.2, 3.4
+OVERRUN_MM = 5.0
+"""A construction line goes on past its foot and past the node that it finds."""
+ABSOLUTE_MM, RELATIVE_MM = 0.5, 0.3
+"""Widths of vectors from the pole, and of all others."""
+
+
+def polygon(subject: Subject, figure: str) -> Figure:
+    """One plan of one variant."""
+    colour, nodes = COLOURS[figure], subject.nodes(figure)
+    drawn = [*_lines(subject, figure, nodes), *_vectors(subject, figure, nodes)]
+    pole = subject.plan.construction.poles[figure]
+    drawn.append(Part(pole, symbols.marked_point(nodes[pole], colour)))
+    letters = _letters(subject, nodes, drawn, colour)
+    return captioned(subject, figure, (*drawn, *letters), colour)
+
+
+def _lines(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator[Part]:
+    view = subject.view
+    for step in subject.plan.construction.figures[figure]:
+        for shape in construction_lines(step, view, nodes):
+            yield Part(step.node, shape)
+
+
+def construction_lines(step: Step, view: View, nodes: dict[str, complex]) -> Iterator[Shape]:
+    """The lines that a node is found by, thin, going on a little at both ends."""
+    if not isinstance(step, TwoLines):
+        return
+    for line in (step.first, step.second):
+        foot, node = nodes[line.through], nodes[step.node]
+        along = complex(line.along.at(view))
+        if not np.isfinite(along):
+            continue
+        sign = 1.0 if (np.conj(along) * (node - foot)).real >= 0.0 else -1.0
+        over = sign * OVERRUN_MM * along
+        yield Stroke(point(foot - over), point(node + over), HAIR_MM, CONSTRUCTION)
+
+
+def _vectors(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator[Part]:
+    """Each vector that is longer than nothing; of several along one line the longest undermost."""
+    pole, colour = subject.plan.construction.poles[figure], COLOURS[figure]
+    for vector in subject.plan.construction.vectors_of(figure):
+        if subject.is_zero(vector.name):
+            continue
+        width = ABSOLUTE_MM if vector.tail == pole else RELATIVE_MM
+        for shape in symbols.arrow(nodes[vector.tail], nodes[vector.head], width, colour):
+            yield Part(vector.head, shape)
+
+
+def _letters(subject: Subject, nodes: dict[str, complex], drawn: list[Part], colour: str) -> Iterator[Part]:
+    middle = sum(nodes.values()) / len(nodes)
+    wanted = []
+    for same, at in together(nodes, TOUCHING_MM):
+        size = NORMAL_LETTER_MM if all(node.startswith("n_") for node in same) else LETTER_MM
+        wanted.append(Wanted(same[-1], point(at), joined(subject, same), size, colour, 0.6, at - middle))
+    for standing in place_labels(wanted, [part.shape for part in drawn]):
+        for shape in standing.shapes:
+            yield Part(standing.wanted.node, shape)

@@ -1,0 +1,137 @@
+"""What is drawn: one variant of an assignment's plan, its names and numbers, and the words around them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from reference.assignment import Assignment, Variant
+from reference.canvas import Bounds, Shape, bounds
+from reference.geometry import FloatArray
+from reference.lettering import Piece, Text, pieces_of, scale_pieces
+from reference.plan import ZERO_SHARE, Plan
+from reference.steps import View
+
+SCALE_OF = {"mechanism": "kL", "velocity_plan": "kv", "acceleration_plan": "ka"}
+SCALE_UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}
+VECTOR_UNITS = {"kv": "m/s", "ka": "m/s²"}
+TOUCHING_MM = 0.05
+"""Nodes nearer than this are one point on paper."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wording:
+    """Words and the decimal mark of a language; English unless told otherwise."""
+
+    lang: str = "en"
+    decimal_mark: str = "."
+    titles: Mapping[str, str] = field(
+        default_factory=lambda: {
+            "mechanism": "Mechanism",
+            "velocity_plan": "Velocity plan",
+            "acceleration_plan": "Acceleration plan",
+        }
+    )
+    variant: Mapping[str, str] = field(default_factory=lambda: {"n": "n", "position": "position"})
+    given: str = "Given"
+    columns: tuple[str, str, str, str, str] = ("vector", "on paper", "mm", "real value", "direction")
+    too_large: str = "does not fit A3 at these scales"
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def unit(self, unit: str) -> str:
+        """A unit in the language's letters."""
+        return self.units.get(unit, unit)
+
+    def number(self, text: str) -> str:
+        """A number, written with a point, as the language writes it."""
+        return text.replace(".", self.decimal_mark).replace("-", "−")
+
+    def told(self, variant: Variant) -> str:
+        """The student's number and position."""
+        values = (("n", variant.n), ("position", variant.position))
+        return ", ".join(f"{self.variant[name]} = {value}" for name, value in values if value is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A shape of a figure and the node whose step draws it (none for what is there from the start)."""
+
+    node: str
+    shape: Shape
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure about its own origin, sheet millimetres, y down."""
+
+    name: str
+    parts: tuple[Part, ...]
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """All of it."""
+        return tuple(part.shape for part in self.parts)
+
+    @property
+    def bounds(self) -> Bounds:
+        """The box that it fills."""
+        return bounds(self.shapes)
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """The variant at an index of a plan's arrays."""
+
+    assignment: Assignment
+    plan: Plan
+    index: int = 0
+    wording: Wording = field(default_factory=Wording)
+
+    def one(self, values: FloatArray) -> float:
+        """The variant's number, of an array over variants or of a number common to all."""
+        return float(values[self.index] if np.ndim(values) else values)
+
+    def nodes(self, figure: str) -> dict[str, complex]:
+        """A figure's nodes, complex millimetres about its origin, y up."""
+        count = len(self.plan.variants)
+        return {
+            node: complex(np.broadcast_to(at, (count,))[self.index])
+            for node, at in self.plan.nodes_mm[figure].items()
+        }
+
+    @property
+    def view(self) -> View:
+        """All nodes and parameters of this variant, as steps see them."""
+        nodes = {
+            node: np.asarray(at) for figure in self.plan.nodes_mm for node, at in self.nodes(figure).items()
+        }
+        count = len(self.plan.variants)
+        known = {
+            name: np.broadcast_to(value, (count,))[self.index]
+            for name, value in self.plan.drawing.parameters.items()
+        }
+        return View(nodes, known)
+
+    def is_zero(self, vector: str) -> bool:
+        """Whether a vector is too short, against its plan, to have a direction."""
+        figure = self.plan.construction.figure_of(self.plan.construction.vectors[vector].head)
+        size = self.one(self.plan.size_mm(figure))
+        return self.one(np.abs(self.plan.drawn_mm(vector))) <= max(ZERO_SHARE * size, 1e-9)
+
+    def shown(self, name: str) -> str:
+        """A name as the assignment's students know it."""
+        return self.assignment.file.names.get(name, name)
+
+    def letter(self, name: str) -> tuple[Piece, ...]:
+        """A node's or a vector's name, set."""
+        return pieces_of(self.shown(name))
+
+    def scale_told(self, scale: str) -> tuple[Piece, ...]:
+        """A scale with its value: kL = 0.005 m/mm."""
+        value = self.wording.number(f"{self.one(getattr(self.plan.scales, scale)):.5g}")
+        unit = self.wording.unit(SCALE_UNITS[scale])
+        return (*scale_pieces(self.shown(scale)), Piece(f" = {value} {unit}"))
+
+    def caption(self, figure: str) -> Text:
+        """What stands above a figure."""
+        return (Piece(f"{self.wording.titles[figure]},  "), *self.scale_told(SCALE_OF[figure]))

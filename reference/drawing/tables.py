@@ -1,0 +1,147 @@
+"""The column beside the figures: title, given data, and the table of values."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from reference.canvas import INK, Bounds, Label, Shape, Stroke
+from reference.drawing import symbols
+from reference.drawing.subject import VECTOR_UNITS, Subject
+from reference.lettering import Piece, Text, pieces_of, width_of, wrapped
+
+COLUMN_MM = 96.0
+EDGE_MM = 3.0
+TITLE_MM, DATA_MM = 3.8, 3.2
+LINE_HEIGHT = 1.45
+ROW_MM, LEAST_ROW_MM = 4.6, 3.0
+LETTER_SHARE = 0.68
+"""Of a row's height."""
+COLUMNS_MM = (0.0, 19.0, 39.0, 54.0, 78.0, 96.0)
+RULE_COLOUR = "#9aa3ad"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of the table: name, where it stands on paper, drawn length, value, direction or sense."""
+
+    name: Text
+    segment: Text
+    drawn: str
+    value: str
+    direction: str
+    turns: float = 0.0
+    """Above zero counter-clockwise, below clockwise; zero for what is no rate, or does not turn."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """What stands beside the figures, how far down it reaches, and whether it has room."""
+
+    shapes: tuple[Shape, ...]
+    box: Bounds
+    fits: bool
+
+
+def column(subject: Subject, figures: Sequence[str], corner: tuple[float, float], bottom: float) -> Column:
+    """Title, data and table of a sheet's figures, from the column's top right corner down."""
+    left, top = corner[0] - COLUMN_MM, corner[1]
+    head, y = _heading(subject, (left + EDGE_MM, top + EDGE_MM))
+    rows = list(table_rows(subject, figures))
+    table: list[Shape] = []
+    height = min(ROW_MM, (bottom - y) / len(rows))
+    if len(rows) > 1:
+        table = list(_table(rows, (left, y), max(height, LEAST_ROW_MM)))
+        y += len(rows) * max(height, LEAST_ROW_MM)
+    rules = [Stroke((left, top), (left, y), 0.3), Stroke((left, y), (corner[0], y), 0.3)]
+    return Column((*rules, *head, *table), (left, top, corner[0], y), height >= LEAST_ROW_MM)
+
+
+def _heading(subject: Subject, at: tuple[float, float]) -> tuple[list[Shape], float]:
+    """Title, variant and given data; where they end."""
+    x, y = at
+    shapes: list[Shape] = []
+    lines: list[tuple[Text, float]] = []
+    lang = subject.wording.lang
+    title = subject.assignment.file.title.in_language(lang)
+    lines += [(line, TITLE_MM) for line in wrapped(title, TITLE_MM, COLUMN_MM - 2 * EDGE_MM)]
+    told = subject.wording.told(subject.plan.variants[subject.index])
+    if told:
+        lines.append((told, TITLE_MM))
+    lines += [(datum, DATA_MM) for datum in _flowed(given_data(subject), COLUMN_MM - 2 * EDGE_MM)]
+    for text, size in lines:
+        y += LINE_HEIGHT * size
+        shapes.append(Label((x, y), text, size))
+    return shapes, y + EDGE_MM
+
+
+def given_data(subject: Subject) -> Iterator[tuple[Piece, ...]]:
+    """The variant's data, each as label = value unit."""
+    values = subject.assignment.values([subject.plan.variants[subject.index]])
+    for datum in subject.assignment.file.given:
+        value = subject.wording.number(f"{float(np.ravel(datum.value(values))[0]):.6g}")
+        unit = subject.wording.unit(datum.unit)
+        gap = "" if unit in {"", "°"} else "\N{NO-BREAK SPACE}"
+        yield (*pieces_of(datum.label), Piece(f" = {value}{gap}{unit}"))
+
+
+def _flowed(data: Iterator[tuple[Piece, ...]], wide: float) -> list[tuple[Piece, ...]]:
+    """Data side by side in as many lines as they need."""
+    lines: list[tuple[Piece, ...]] = []
+    for datum in data:
+        longer = (*lines[-1], Piece(",  "), *datum) if lines else datum
+        if lines and width_of(longer, DATA_MM) <= wide:
+            lines[-1] = longer
+        else:
+            lines.append(datum)
+    return lines
+
+
+def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[Row]:
+    """Headings, the vectors of these figures, the rates that follow from them."""
+    wording, plan = subject.wording, subject.plan
+    yield Row(*wording.columns)
+    shown = [vector for figure in figures for vector in plan.construction.vectors_of(figure)]
+    for vector in shown:
+        drawn = subject.one(np.abs(plan.drawn_mm(vector.name)))
+        real = 0.0 if subject.is_zero(vector.name) else subject.one(np.abs(plan.vectors_si[vector.name]))
+        angle = f"{subject.one(plan.direction_deg(vector.name)):.2f}°"
+        yield Row(
+            subject.letter(vector.name),
+            (*subject.letter(vector.tail), Piece(" "), *subject.letter(vector.head)),
+            wording.number(f"{drawn:.2f}"),
+            wording.number(f"{four_digits(real)}") + f" {wording.unit(VECTOR_UNITS[vector.scale])}",
+            "–" if subject.is_zero(vector.name) else wording.number(angle),
+        )
+    names = {vector.name for vector in shown}
+    for name, values in plan.rates.items():
+        rate = plan.construction.rates[name]
+        if rate.vector in names:
+            turns = 0.0 if subject.is_zero(rate.vector) else subject.one(values)
+            unit = wording.unit("rad/s" if name.startswith("omega") else "rad/s²")
+            value = wording.number(f"{four_digits(abs(turns))}")
+            yield Row(subject.letter(name), "", "", f"{value} {unit}", "" if turns else "–", turns)
+
+
+def four_digits(value: float) -> str:
+    """A value of the table: four significant digits, the zeros among them kept."""
+    return f"{value:#.4g}".rstrip(".") if value else "0"
+
+
+def _table(rows: Sequence[Row], at: tuple[float, float], height: float) -> Iterator[Shape]:
+    left, top = at
+    size = LETTER_SHARE * height
+    for k, row in enumerate(rows):
+        y = top + k * height
+        base = y + 0.72 * height
+        yield Stroke((left, y), (left + COLUMN_MM, y), 0.13 if k > 1 else 0.3, RULE_COLOUR if k > 1 else INK)
+        yield Label((left + 1.5, base), row.name, size)
+        yield Label((left + COLUMNS_MM[1] + 1.5, base), row.segment, size)
+        for edge, text in zip(COLUMNS_MM[3:], (row.drawn, row.value, row.direction), strict=True):
+            if text:
+                yield Label((left + edge - 1.5, base), text, size, "end")
+        if row.turns:
+            yield from symbols.sense(complex(left + COLUMNS_MM[5] - 4.5, -(y + height / 2)), row.turns)
+    bottom = top + len(rows) * height
+    for edge in COLUMNS_MM[1:-1]:
+        yield Stroke((left + edge, top), (left + edge, bottom), 0.13, RULE_COLOUR)
