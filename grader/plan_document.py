@@ -19,6 +19,16 @@ def variant_numbers(variant: Variant) -> dict[str, int]:
 
 def plan_document(assignment: Assignment, plan: Plan, index: int = 0) -> PlanDocument:
     """The plan of the variant at an index of a plan's arrays."""
+    return _document(assignment, plan, index, conditioning(plan))
+
+
+def plan_documents(assignment: Assignment, plan: Plan) -> list[PlanDocument]:
+    """The plans of all variants, the conditioning evaluated once."""
+    told = conditioning(plan)
+    return [_document(assignment, plan, index, told) for index in range(len(plan.variants))]
+
+
+def _document(assignment: Assignment, plan: Plan, index: int, told: Mapping[str, FloatArray]) -> PlanDocument:
     count = len(plan.variants)
 
     def pick(values: FloatArray) -> float:
@@ -49,7 +59,7 @@ def plan_document(assignment: Assignment, plan: Plan, index: int = 0) -> PlanDoc
             for figure in plan.construction.poles
         },
         angular={name: pick(values) for name, values in plan.rates.items()},
-        conditioning=_grouped({name: pick(values) for name, values in conditioning(plan).items()}),
+        conditioning=_grouped({name: pick(values) for name, values in told.items()}),
     )
 
 

@@ -18,9 +18,29 @@ def plan(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan as JSON.")] = False,
     svg: Annotated[Path | None, typer.Option("--svg", help="Draw the plan into this SVG file.")] = None,
-    pdf: Annotated[Path | None, typer.Option("--pdf", help="Draw the plan into this PDF file.")] = None,
+    pdf: Annotated[
+        Path | None,
+        typer.Option("--pdf", help="Draw the plan into this PDF file; with --all the tables too."),
+    ] = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="All variants, for the instructor's own records.")
+    ] = False,
+    csv: Annotated[
+        Path | None, typer.Option("--csv", help="With --all: a table for spreadsheets, a row per variant.")
+    ] = None,
+    drawings: Annotated[
+        bool,
+        typer.Option("--drawings/--no-drawings", help="With --all --pdf: a drawing of each variant too."),
+    ] = True,
+    lang: LanguageOption = "en",
 ) -> None:
-    """The exact plan of a variant: a table, JSON, or a drawing true to scale."""
+    """The exact plan of a variant: a table, JSON, or a drawing true to scale; or those of all variants."""
+    if every or csv is not None:
+        from grader.cli.classes import refuse_single, show_class
+
+        refuse_single(every=every, options={"--n": n, "--position": position, "--svg": svg})
+        show_class(assignment, crank_mm, as_json=as_json, csv=csv, pdf=pdf, drawings=drawings, lang=lang)
+        return
     from grader.cli.plans import show_plan
 
     show_plan(assignment, n, position, crank_mm, as_json=as_json, svg=svg, pdf=pdf)
@@ -191,10 +211,13 @@ def export(
 
 @app.command()
 def bench(
-    quick: Annotated[bool, typer.Option("--quick", help="A few sheets only.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="A few sheets and cases only.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
+    solver: Annotated[
+        bool, typer.Option("--solver", help="The solver only: speed, errors, stability beside other programs.")
+    ] = False,
 ) -> None:
     """Run time against error, on generated sheets with known truth."""
     from grader.cli.benchmark import show_benchmark
 
-    show_benchmark(quick=quick, as_json=as_json)
+    show_benchmark(quick=quick, as_json=as_json, solver_only=solver)

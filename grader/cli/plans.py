@@ -27,10 +27,7 @@ def show_plan(
     pdf: Path | None,
 ) -> None:
     """Print the exact plan of a variant, and draw it where files are named."""
-    if crank_mm is not None and not 0.0 < crank_mm < 1000.0:
-        raise CallError(
-            "crank_mm", f"--crank-mm {crank_mm:g}: a length in mm above 0 and below 1000 is needed"
-        )
+    check_crank(crank_mm)
     assignment = load_assignment(name)
     variants = [assignment.variant(n, position)]
     plan = exact_plan(assignment, variants, assignment.scales(variants, crank_mm=crank_mm))
@@ -42,6 +39,14 @@ def show_plan(
     for file in (svg, pdf):
         if file is not None:
             typer.echo(f"Drawn in {file}")
+
+
+def check_crank(crank_mm: float | None) -> None:
+    """Refuse a drawn length that no crank on paper has."""
+    if crank_mm is not None and not 0.0 < crank_mm < 1000.0:
+        raise CallError(
+            "crank_mm", f"--crank-mm {crank_mm:g}: a length in mm above 0 and below 1000 is needed"
+        )
 
 
 def _draw(assignment: Assignment, plan: Plan, svg: Path | None, pdf: Path | None) -> None:
