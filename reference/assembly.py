@@ -1,22 +1,48 @@
 """From an authored mechanism file to a mechanism with numbers."""
 
-from collections.abc import Iterator, Mapping
-from itertools import permutations
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from reference import groups
 from reference.authored import (
     LENGTH_UNITS_M,
+    AnyGroupTable,
+    CrankTable,
+    CrossSliderTable,
+    DrivenSliderTable,
     DyadTable,
+    FixedGuideTable,
+    GuideTable,
     MechanismFile,
     PlateTable,
     PointOnLineTable,
+    PointTable,
     SliderTable,
+    SlottedLinkTable,
+    YokeTable,
 )
-from reference.errors import Finding
 from reference.formula import Formula, FormulaError, Value
 from reference.geometry import ComplexArray, FloatArray
-from reference.mechanism import Crank, Dyad, Group, Mechanism, Plate, PointOnLine, Slider
+from reference.mechanism import (
+    Crank,
+    CrossSlider,
+    DrivenSlider,
+    Driver,
+    Dyad,
+    FixedGuide,
+    Group,
+    Guide,
+    Mechanism,
+    MovingGuide,
+    Plate,
+    PointOnLine,
+    Slider,
+    SlotPoint,
+    SlottedLink,
+    Yoke,
+)
 
 IN_LINE_TOLERANCE = 1e-9
 """Relative: lengths that sum up this nearly are meant to be in line."""
@@ -27,83 +53,6 @@ SHORTEST_M = 1e-9
 underflow."""
 
 SIDES = {"left": 1, "right": -1, "ahead": 1, "behind": -1}
-
-
-def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
-    """What the file's own form cannot show: joints not yet placed, placed twice, bases of two links."""
-    placed = {*file.ground}
-    rigid: dict[str, set[str]] = {}
-    if file.crank.pivot not in file.ground:
-        yield Finding("$.crank.pivot", _unknown(file.crank.pivot, set(file.ground), "a ground pivot"))
-    if file.crank.pin in placed:
-        yield Finding("$.crank.pin", f"{file.crank.pin} is a ground pivot already")
-    placed.add(file.crank.pin)
-    rigid[file.crank.link] = {file.crank.pivot, file.crank.pin}
-    for index, group in enumerate(file.group):
-        where = f"$.group[{index}]"
-        for key, pin in _pins(group):
-            if pin not in placed:
-                yield Finding(f"{where}.{key}", _unknown(pin, placed, "placed above"))
-        if group.node in placed:
-            yield Finding(f"{where}.node", f"{group.node} has a place already: over-constrained")
-        placed.add(group.node)
-        yield from _check_rigid(group, rigid, where)
-    yield from _read_alike(placed)
-    lower = [joint.lower() for joint in placed]
-    for joint in sorted(placed):
-        if lower.count(joint.lower()) > 1:
-            yield Finding("$", f"joint {joint}: another one has the same letters in another case")
-
-
-def _read_alike(joints: set[str]) -> Iterator[Finding]:
-    """Names that run together: v_BA is B about A, so no third joint may be called BA."""
-    read_as: dict[str, tuple[str, ...]] = {joint: (joint,) for joint in sorted(joints)}
-    for first, second in permutations(sorted(joints), 2):
-        other = read_as.setdefault(first + second, (first, second))
-        if other != (first, second):
-            told = f"{first + second} would mean both {' about '.join(other)} and {first} about {second}"
-            yield Finding("$", f"joints {', '.join(sorted({*other, first, second}))}: {told}; rename one")
-
-
-def _pins(group: DyadTable | SliderTable | PlateTable | PointOnLineTable) -> list[tuple[str, str]]:
-    match group:
-        case DyadTable():
-            return [("pins[0]", group.pins[0]), ("pins[1]", group.pins[1])]
-        case SliderTable():
-            return [("pin", group.pin)]
-        case _:
-            return [("base[0]", group.base[0]), ("base[1]", group.base[1])]
-
-
-def _check_rigid(
-    group: DyadTable | SliderTable | PlateTable | PointOnLineTable, rigid: dict[str, set[str]], where: str
-) -> Iterator[Finding]:
-    """Plates and points on a line need a base that is one link."""
-    match group:
-        case DyadTable():
-            if group.pins[0] == group.pins[1]:
-                yield Finding(f"{where}.pins", "the two pins must be different joints")
-            for index, (pin, link) in enumerate(zip(group.pins, group.links, strict=True)):
-                yield from _add_link(link, {pin, group.node}, rigid, f"{where}.links[{index}]")
-        case SliderTable():
-            yield from _add_link(group.link, {group.pin, group.node}, rigid, f"{where}.link")
-        case _:
-            members = rigid.setdefault(group.link, set())
-            if not set(group.base) <= members or group.base[0] == group.base[1]:
-                held = ", ".join(sorted(members)) or "no joints yet"
-                yield Finding(f"{where}.base", f"must be two joints of link {group.link} ({held})")
-            members.add(group.node)
-
-
-def _add_link(link: str, joints: set[str], rigid: dict[str, set[str]], where: str) -> Iterator[Finding]:
-    """A group's links are new bodies: under a name that is taken, two bodies would pass for one."""
-    if link in rigid:
-        yield Finding(where, f"there is a link {link} already: each link needs a name of its own")
-    rigid.setdefault(link, joints)
-
-
-def _unknown(joint: str, known: set[str], what: str) -> str:
-    return f"{joint} is not {what}: known so far are {', '.join(sorted(known))}"
 
 
 class _Numbers:
@@ -119,89 +68,193 @@ class _Numbers:
         return numbers
 
     def length(self, formula: Formula, what: str) -> FloatArray:
-        # Division by the unit's inverse: 30 cm is then exactly the double nearest to 0.3 m.
-        lengths = self.number(formula) / round(1.0 / self.unit_m)
+        lengths = self.distance(formula)
         if np.any(lengths <= 0.0):
             raise FormulaError(f"'{formula.text}' ({what}) must be a positive length")
         if np.any(lengths < SHORTEST_M):
             raise FormulaError(f"'{formula.text}' ({what}) is shorter than {SHORTEST_M:g} m")
         return lengths
 
+    def distance(self, formula: Formula) -> FloatArray:
+        """A length with a sign."""
+        # Division by the unit's inverse: 30 cm is then exactly the double nearest to 0.3 m.
+        return np.asarray(self.number(formula) / round(1.0 / self.unit_m))
+
+    def angle(self, formula: Formula) -> FloatArray:
+        """Degrees to radians."""
+        return np.asarray(np.radians(self.number(formula)))
+
     def point(self, point: list[Formula]) -> ComplexArray:
-        x, y = (self.number(formula) / round(1.0 / self.unit_m) for formula in point)
+        x, y = (self.distance(formula) for formula in point)
         return np.asarray(x + 1j * y)
 
 
+@dataclass(slots=True)
+class _Bodies:
+    """Where each link carries its joints, in the link's own axes, metres; and the slotted links."""
+
+    axes: dict[str, dict[str, ComplexArray]] = field(default_factory=dict)
+    slots: dict[str, str] = field(default_factory=dict)
+    """By slotted link: its node."""
+
+    def carry(self, link: str, origin: str, joint: str, length: FloatArray) -> None:
+        """A new link from its origin to a joint, along its own x axis."""
+        self.axes[link] = {origin: np.zeros(np.shape(length), complex), joint: np.asarray(length + 0j)}
+
+    def link_of(self, joints: tuple[str, str]) -> str:
+        """The link that carries both joints."""
+        return next(link for link, held in self.axes.items() if set(joints) <= held.keys())
+
+
 def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int) -> Mechanism:
-    """The mechanism of `count` variants whose data are `values` (arrays of shape (count,))."""
+    """The mechanism of `count` variants whose data are `values` (arrays of shape (count,)).
+
+    Raises FormulaError for a number or length that no mechanism can have. The file must have passed
+    `reference.checking.check_mechanism`.
+    """
     numbers = _Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
-    crank = _crank(file, numbers)
-    spans: dict[frozenset[str], FloatArray] = {frozenset((crank.pivot, crank.pin)): crank.length_m}
+    bodies = _Bodies()
+    driver = _driver(file.crank or file.driven_slider, numbers)
+    if isinstance(driver, Crank):
+        bodies.carry(driver.link, driver.pivot, driver.pin, driver.length_m)
     ground = {joint: numbers.point(point) for joint, point in file.ground.items()}
-    groups = tuple(_group(table, numbers, spans) for table in file.group)
-    return Mechanism(ground, crank, groups)
+    return Mechanism(ground, driver, tuple(_group(table, numbers, bodies) for table in file.group))
 
 
-def _crank(file: MechanismFile, numbers: _Numbers) -> Crank:
-    table = file.crank
+def _driver(table: CrankTable | DrivenSliderTable | None, numbers: _Numbers) -> Driver:
     zero = np.zeros(numbers.count)
-    return Crank(
-        link=table.link,
-        pivot=table.pivot,
-        pin=table.pin,
-        length_m=numbers.length(table.length, "crank"),
-        angle_rad=np.radians(numbers.number(table.angle_deg)),
-        omega=numbers.number(table.omega),
-        epsilon=zero if table.epsilon is None else numbers.number(table.epsilon),
-        accelerated=table.epsilon is not None,
-    )
+    match table:
+        case CrankTable():
+            return Crank(
+                link=table.link,
+                pivot=table.pivot,
+                pin=table.pin,
+                length_m=numbers.length(table.length, "crank"),
+                angle_rad=numbers.angle(table.angle_deg),
+                omega=_speed(table, numbers),
+                epsilon=zero if table.epsilon is None else numbers.number(table.epsilon),
+                accelerated=table.epsilon is not None,
+            )
+        case DrivenSliderTable():
+            return DrivenSlider(
+                link=table.link,
+                pin=table.pin,
+                guide_m=numbers.point(table.guide.through),
+                guide_rad=numbers.angle(table.guide.angle_deg),
+                displacement_m=numbers.distance(table.displacement),
+                speed=numbers.distance(table.speed),
+                acceleration=zero if table.acceleration is None else numbers.distance(table.acceleration),
+            )
+    raise ValueError("a mechanism has one driven link")
 
 
-def _group(
-    table: DyadTable | SliderTable | PlateTable | PointOnLineTable,
-    numbers: _Numbers,
-    spans: dict[frozenset[str], FloatArray],
-) -> Group:
-    """One group; `spans` collects the known distances within links."""
+def _speed(crank: CrankTable, numbers: _Numbers) -> FloatArray:
+    """The crank's angular velocity, directly or from rev/min through a gear."""
+    if crank.omega is not None:
+        return numbers.number(crank.omega)
+    if crank.rpm is None:
+        raise ValueError("a crank has omega or rpm")
+    rpm = numbers.number(crank.rpm)
+    if crank.gear_ratio is not None:
+        ratio = numbers.number(crank.gear_ratio)
+        if np.any(ratio == 0.0):
+            raise FormulaError(f"'{crank.gear_ratio.text}' (gear_ratio) must not be zero")
+        rpm = rpm / ratio
+    return np.asarray(np.pi * rpm / 30.0)
+
+
+def _fixed(guide: FixedGuideTable | GuideTable, numbers: _Numbers) -> FixedGuide:
+    if guide.through is None or guide.angle_deg is None:
+        raise ValueError("a fixed guide has a point and a direction")
+    return FixedGuide(numbers.point(guide.through), numbers.angle(guide.angle_deg))
+
+
+def _guide(guide: GuideTable, numbers: _Numbers, bodies: _Bodies) -> Guide:
+    if guide.joints is None or guide.coincident is None:
+        return _fixed(guide, numbers)
+    base = (guide.joints[0], guide.joints[1])
+    return MovingGuide(bodies.link_of(base), base, guide.coincident)
+
+
+def _group(table: AnyGroupTable, numbers: _Numbers, bodies: _Bodies) -> Group:
+    """One group; `bodies` collects what each link carries."""
     node = table.node
+    if isinstance(table, PlateTable | PointOnLineTable | PointTable):
+        return _link_point(table, numbers, bodies)
     match table:
         case DyadTable():
+            (p, q), (link_p, link_q) = table.pins, table.links
             first, second = (numbers.length(length, node) for length in table.lengths)
-            p, q = table.pins
-            spans[frozenset((p, node))], spans[frozenset((q, node))] = first, second
-            links = (table.links[0], table.links[1])
-            return Dyad(node, (p, q), links, (first, second), SIDES[table.side])
+            bodies.carry(link_p, p, node, first)
+            bodies.carry(link_q, q, node, second)
+            return Dyad(node, (p, q), (link_p, link_q), (first, second), SIDES[table.side])
         case SliderTable():
             length = numbers.length(table.length, node)
-            spans[frozenset((table.pin, node))] = length
-            guide = numbers.point(table.guide.through)
-            angle = np.radians(numbers.number(table.guide.angle_deg))
-            return Slider(node, table.pin, table.link, length, guide, angle, SIDES[table.side])
+            guide = _guide(table.guide, numbers, bodies)
+            bodies.carry(table.link, table.pin, node, length)
+            return Slider(node, table.pin, table.link, length, guide, SIDES[table.side])
+        case SlottedLinkTable():
+            return _slotted_link(table, numbers, bodies)
+        case CrossSliderTable():
+            first_guide, second_guide = (_guide(guide, numbers, bodies) for guide in table.guides)
+            return CrossSlider(node, (first_guide, second_guide))
+        case YokeTable():
+            return Yoke(node, table.pin, numbers.angle(table.slot_deg), _fixed(table.guide, numbers))
+
+
+def _slotted_link(table: SlottedLinkTable, numbers: _Numbers, bodies: _Bodies) -> SlottedLink:
+    zero = np.zeros(numbers.count)
+    offset = zero if table.offset is None else numbers.distance(table.offset)
+    bodies.axes[table.link] = {table.pivot: np.zeros(numbers.count, complex)}
+    if table.foot is not None:
+        if np.any(offset == 0.0):
+            raise FormulaError(f"the offset of link {table.link} is zero: leave out offset and foot")
+        bodies.axes[table.link][table.foot] = np.asarray(1j * offset)
+    bodies.slots[table.link] = table.node
+    side = SIDES[table.side]
+    return SlottedLink(table.node, table.pin, table.pivot, table.link, offset, table.foot, side)
+
+
+def _link_point(
+    table: PlateTable | PointOnLineTable | PointTable, numbers: _Numbers, bodies: _Bodies
+) -> Group:
+    """A further point of a link: rigid with its base, however it is given."""
+    node, link, (p, q) = table.node, table.link, table.base
+    axes = bodies.axes[link]
+    if isinstance(table, PointTable) and q == bodies.slots.get(link):
+        axes[node] = numbers.point(table.at)
+        return SlotPoint(node, q, link, axes[node])
+    base = axes[q] - axes[p]
+    match table:
+        case PointOnLineTable():
+            ratio = numbers.number(table.ratio)
+            axes[node] = axes[p] + ratio * base
+            return PointOnLine(node, (p, q), link, ratio)
         case PlateTable():
             first, second = (numbers.length(length, node) for length in table.lengths)
-            p, q = table.base
-            base = spans.get(frozenset((p, q)))
-            ratio = None if base is None else _line_ratio(base, first, second)
-            spans[frozenset((p, node))], spans[frozenset((q, node))] = first, second
-            return Plate(node, (p, q), table.link, (first, second), SIDES[table.side], ratio)
-        case PointOnLineTable():
-            p, q = table.base
-            ratio = numbers.number(table.ratio)
-            base = spans.get(frozenset((p, q)))
-            if base is not None:
-                spans[frozenset((p, node))] = np.abs(ratio) * base
-                spans[frozenset((q, node))] = np.abs(1.0 - ratio) * base
-            return PointOnLine(node, (p, q), table.link, ratio)
+            side: int | FloatArray = SIDES[table.side]
+            shape = _shape(np.abs(base), first, second, SIDES[table.side])
+        case PointTable():
+            shape = np.asarray(numbers.point(table.at) / np.abs(base))
+            if np.all(shape.imag == 0.0):
+                axes[node] = axes[p] + shape * base
+                return PointOnLine(node, (p, q), link, np.asarray(shape.real))
+            side = np.where(shape.imag < 0.0, -1, 1)
+            first, second = np.abs(shape * base), np.abs((1.0 - shape) * base)
+    axes[node] = axes[p] + shape * base
+    return Plate(node, (p, q), link, (first, second), side, shape)
 
 
-def _line_ratio(base: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray | None:
-    """Where a plate's third point lies on the line of its base, None unless always in line."""
+def _shape(base: FloatArray, first: FloatArray, second: FloatArray, side: int) -> ComplexArray:
+    """A plate's third point over its base, (C - A) / (B - A); exactly real where it is in line."""
+    with np.errstate(all="ignore"):
+        along, across, _ = groups.rrr_place(base + 0j, first, second, side)
+        shape = np.asarray(along + 1j * across)
     slack = IN_LINE_TOLERANCE * (base + first + second)
     for gap, ratio in (
         (base - first - second, first / base),
         (first - base - second, first / base),
         (second - base - first, -first / base),
     ):
-        if np.all(np.abs(gap) <= slack):
-            return ratio
-    return None
+        shape = np.where(np.abs(gap) <= slack, ratio + 0j, shape)
+    return shape

@@ -5,6 +5,7 @@ by path. Everything is evaluated on arrays over variants.
 """
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -13,12 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from reference import authored
-from reference.assembly import LARGEST, build_mechanism, check_mechanism
+from reference.assembly import LARGEST, build_mechanism
 from reference.authored import AssignmentFile, MechanismFile
+from reference.checking import check_mechanism
 from reference.errors import AuthoredFileError, CallError, Finding
-from reference.formula import FormulaError, Value
+from reference.formula import Formula, FormulaError, Value
 from reference.geometry import FloatArray
-from reference.mechanism import Mechanism
+from reference.mechanism import Crank, Driver, Mechanism
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,19 +112,27 @@ class Assignment:
 
         A declared kL, or the drawn crank, replaces the proposed length of the crank.
         """
-        mechanism = self.mechanism(variants)
-        known = self.values(variants)
-        known["omega"], known["crank_m"] = np.abs(mechanism.crank.omega), mechanism.crank.length_m
+        known = {**self.values(variants), **_speeds(self.mechanism(variants).driver)}
         rule = self.file.scales
-        known["crank_mm"] = rule.crank_mm(known) if crank_mm is None else np.asarray(crank_mm, float)
+        if crank_mm is not None:
+            known["crank_mm"] = np.asarray(crank_mm, float)
+        elif rule.crank_mm is not None:
+            known["crank_mm"] = rule.crank_mm(known)
         declared = {"kL": kL, "kv": kv, "ka": ka}
         for name in ("kL", "kv", "ka"):
             given = declared[name]
             known[name] = getattr(rule, name)(known) if given is None else np.asarray(given, float)
-            if name == "kL" and given is not None:
-                known["crank_mm"] = mechanism.crank.length_m / known[name]
+            if name == "kL" and given is not None and "crank_m" in known:
+                known["crank_mm"] = np.asarray(known["crank_m"]) / known[name]
         shape = (len(variants),)
         return Scales(*(np.broadcast_to(known[name], shape) for name in ("kL", "kv", "ka")))
+
+
+def _speeds(driver: Driver) -> dict[str, Value]:
+    """What the rule for the scales knows of the driven link."""
+    if isinstance(driver, Crank):
+        return {"omega": np.abs(driver.omega), "crank_m": driver.length_m}
+    return {"speed": np.abs(driver.speed)}
 
 
 SUFFIXES = {"assignment": ".assignment.toml", "mechanism": ".mechanism.toml", "rubric": ".rubric.toml"}
@@ -197,10 +207,14 @@ def _check_formulas(assignment: Assignment) -> list[Finding]:
             if not np.all((getattr(scales, name) > 1.0 / LARGEST) & (getattr(scales, name) < LARGEST)):
                 raise FormulaError(f"{name} must be above zero for every variant")
 
+    def told(formula: Formula) -> Callable[[list[Variant]], object]:
+        return lambda variants: formula(assignment.values(variants))
+
     for what, path in (
         (assignment.values, "$.variant.values"),
         (assignment.mechanism, "$.mechanism"),
         (proposed_scales, "$.scales"),
+        *((told(one.value), f"$.given[{index}].value") for index, one in enumerate(assignment.file.given)),
     ):
         try:
             what(variants)

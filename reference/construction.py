@@ -13,19 +13,28 @@ its pole). It is data, a directed acyclic graph, and one evaluator answers every
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
 from reference.geometry import ComplexArray
 from reference.steps import Errors, Nodes, Parameters, Similar, Step, View
 
+Part = Literal["", "n", "t", "c", "r"]
+
 
 @dataclass(frozen=True, slots=True)
 class Vector:
     """A named vector of a plan, from node `tail` to node `head`.
 
-    `scale` is ``kv`` or ``ka``. `link` is the pair of joints (from, to) that it belongs to: it is
-    perpendicular or parallel to this link, and for a rotation gives its angular rate.
+    Attributes
+    ----------
+    scale : ``kv`` or ``ka``
+    link : the pair of joints (from, to) whose relative motion it is: of a turning link it is
+        perpendicular or parallel to the line between them, and gives its angular rate; of a slider
+        and the point under it (which lie in one place) it is along the guide
+    part : of an acceleration: ``n`` normal, ``t`` tangential, ``c`` Coriolis, ``r`` along a guide
+    turning : of a Coriolis component, the link that carries the guide
     """
 
     name: str
@@ -33,7 +42,13 @@ class Vector:
     head: str
     scale: str
     link: tuple[str, str] | None = None
-    is_normal: bool = False
+    part: Part = ""
+    turning: str | None = None
+
+    @property
+    def is_normal(self) -> bool:
+        """Whether it is a normal component."""
+        return self.part == "n"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +73,8 @@ class Construction:
     rates : angular velocities and accelerations by name
     images : for each image of a plate's third point, the step that finds it by similarity, whichever
         way the construction itself finds it
+    centres : on the sketch, by Mehmke's similarity from the finished plans: instantaneous centres
+        (``I3``) and acceleration poles (``J3``) of links that turn about no fixed pivot
     """
 
     figures: Mapping[str, tuple[Step, ...]]
@@ -65,6 +82,7 @@ class Construction:
     vectors: Mapping[str, Vector]
     rates: Mapping[str, AngularRate]
     images: Mapping[str, Similar] = field(default_factory=dict)
+    centres: Mapping[str, Similar] = field(default_factory=dict)
 
     @property
     def steps(self) -> tuple[Step, ...]:

@@ -1,30 +1,54 @@
 """The construction of a mechanism's plans, derived from the mechanism by one function.
 
 Node names: a joint's image is its letter in lower case (``B`` -> ``b``, ``b'`` in the acceleration
-plan), ground joints have the pole for their image, a normal component a_BA_n ends in ``n_BA``.
+plan), ground joints have the pole for their image, a normal component a_BA_n ends in ``n_BA``, a
+Coriolis component a_B3B_c in ``k_B3B``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from reference.construction import AngularRate, Construction, Vector
 from reference.geometry import FloatArray
-from reference.mechanism import Crank, Dyad, Group, Mechanism, Plate, PointOnLine, Slider
+from reference.mechanism import (
+    Crank,
+    CrossSlider,
+    DrivenSlider,
+    Driver,
+    Dyad,
+    FixedGuide,
+    Group,
+    Guide,
+    Mechanism,
+    Plate,
+    PointOnLine,
+    Slider,
+    SlotPoint,
+    SlottedLink,
+    Yoke,
+    moving_guides,
+)
 from reference.steps import (
     Along,
     ArcAndLine,
+    Coincide,
+    Coriolis,
     Divide,
     Fixed,
+    FixedLine,
     Given,
     Line,
+    Local,
     Normal,
+    OnGuide,
     Pivot,
     Pole,
     Scaled,
     Similar,
     Step,
+    Tangent,
     TwoArcs,
     TwoLines,
 )
@@ -80,7 +104,7 @@ def construction_of(
     draft.velocity.append(Pole(VELOCITY_POLE))
     draft.acceleration.append(Pole(ACCELERATION_POLE))
     draft.sketch.extend(Pivot(joint) for joint in mechanism.ground_m)
-    _draw_crank(draft, mechanism.crank)
+    _draw_driver(draft, mechanism.driver)
     for group in mechanism.groups:
         _draw_group(draft, group)
     figures: dict[str, tuple[Step, ...]] = {
@@ -96,7 +120,22 @@ def construction_of(
     ordered = sorted(draft.rates.values(), key=lambda rate: (rate.name.startswith("epsilon"), rate.name))
     rates = {rate.name: rate for rate in ordered if rate.vector in vectors}
     images = {node: step for node, step in draft.images.items() if node in keep}
-    return Construction(figures, poles, vectors, rates, images)
+    return Construction(figures, poles, vectors, rates, images, _centres(draft, rates))
+
+
+def _centres(draft: _Draft, rates: Mapping[str, AngularRate]) -> dict[str, Similar]:
+    """I: triangle I A B similar to o a b; J: triangle J A B similar to o' a' b' (Mehmke)."""
+    centres = {}
+    for name, rate in rates.items():
+        kind, _, link = name.partition("_")
+        tail, head = rate.link
+        if not draft.mechanism.is_ground(tail):
+            primed = kind == "epsilon"
+            images = (draft.image(tail, primed=primed), draft.image(head, primed=primed))
+            pole = ACCELERATION_POLE if primed else VELOCITY_POLE
+            centre = f"{'J' if primed else 'I'}{link}"
+            centres[centre] = Similar(centre, (tail, head), (*images, pole))
+    return centres
 
 
 def _in_order(draft: _Draft) -> list[str]:
@@ -113,6 +152,21 @@ def _in_order(draft: _Draft) -> list[str]:
     return sorted(draft.vectors, key=place)
 
 
+def _draw_driver(draft: _Draft, driver: Driver) -> None:
+    match driver:
+        case Crank():
+            _draw_crank(draft, driver)
+        case DrivenSlider(pin=pin):
+            guide = FixedLine(f"guide {pin}")
+            draft.sketch.append(OnGuide(pin, guide, Scaled(f"s {pin}", "kL")))
+            a, a_primed = draft.image(pin), draft.image(pin, primed=True)
+            draft.velocity.append(Given(a, VELOCITY_POLE, Scaled(f"v_{pin}", "kv"), guide.along))
+            draft.acceleration.append(
+                Given(a_primed, ACCELERATION_POLE, Scaled(f"a_{pin}", "ka"), guide.along)
+            )
+            _absolute(draft, pin)
+
+
 def _draw_crank(draft: _Draft, crank: Crank) -> None:
     pivot, pin = crank.pivot, crank.pin
     length = f"{pivot}{pin}"
@@ -127,8 +181,8 @@ def _draw_crank(draft: _Draft, crank: Crank) -> None:
         end = f"n_{pin}"
         draft.acceleration.append(Given(end, ACCELERATION_POLE, normal, inward))
         draft.acceleration.append(Given(a_primed, end, Scaled(f"a_{pin}_t", "ka"), across))
-        draft.vector(f"a_{pin}_n", ACCELERATION_POLE, end, link=(pivot, pin), is_normal=True)
-        draft.vector(f"a_{pin}_t", end, a_primed, link=(pivot, pin))
+        draft.vector(f"a_{pin}_n", ACCELERATION_POLE, end, link=(pivot, pin), part="n")
+        draft.vector(f"a_{pin}_t", end, a_primed, link=(pivot, pin), part="t")
     else:
         draft.acceleration.append(Given(a_primed, ACCELERATION_POLE, normal, inward))
     draft.vector(f"a_{pin}", ACCELERATION_POLE, a_primed)
@@ -139,25 +193,33 @@ def _draw_group(draft: _Draft, group: Group) -> None:
         case Dyad(node=node, pins=(p, q), links=(link_p, link_q)):
             radii = (Scaled(pair(p, node), "kL"), Scaled(pair(q, node), "kL"))
             draft.sketch.append(TwoArcs(node, (p, q), radii, group.side))
-            _rotations(draft, node, {p: link_p, q: link_q})
+            _images(draft, node, _rotations(draft, node, {p: link_p, q: link_q}))
         case Plate(node=node, base=(p, q), link=link):
-            if group.line_ratio is not None:
-                draft.sketch.append(Divide(node, (p, q), f"ratio {node}"))
-            else:
-                radii = (Scaled(pair(p, node), "kL"), Scaled(pair(q, node), "kL"))
-                draft.sketch.append(TwoArcs(node, (p, q), radii, group.side))
+            _draw_plate(draft, group)
             _note_similar_images(draft, node, (p, q))
-            if group.line_ratio is not None or draft.plate_by_similarity:
+            if group.is_ever_flat or draft.plate_by_similarity:
                 _similar_images(draft, node, (p, q))
             else:
-                _rotations(draft, node, {p: link, q: link})
+                _images(draft, node, _rotations(draft, node, {p: link, q: link}))
         case PointOnLine(node=node, base=(p, q)):
             draft.sketch.append(Divide(node, (p, q), f"ratio {node}"))
             _images_on_line(draft, node, (p, q))
-        case Slider(node=node, pin=pin, link=link):
+        case Slider(node=node, pin=pin, link=link, guide=guide):
             radius = Scaled(pair(pin, node), "kL")
-            draft.sketch.append(ArcAndLine(node, pin, radius, f"guide {node}", group.side))
-            _rotations(draft, node, {pin: link}, guide=Fixed(f"angle guide {node}"))
+            draft.sketch.append(ArcAndLine(node, pin, radius, _guide_line(node, guide), group.side))
+            rotations = _rotations(draft, node, {pin: link})
+            _images(draft, node, rotations + _slides(draft, node, (guide,)))
+        case CrossSlider(node=node, guides=guides):
+            draft.sketch.append(TwoLines(node, *(_guide_line(node, guide) for guide in guides)))
+            _images(draft, node, _slides(draft, node, guides))
+        case Yoke(node=node, pin=pin, guide=guide):
+            slot = Fixed(f"angle slot {node}")
+            draft.sketch.append(TwoLines(node, Line(pin, slot), _guide_line(node, guide)))
+            _images(draft, node, [_slot(draft, node, pin, slot), *_slides(draft, node, (guide,))])
+        case SlottedLink():
+            _draw_slotted_link(draft, group)
+        case SlotPoint(node=node):
+            _draw_slot_point(draft, group)
 
 
 def pair(pin: str, node: str) -> str:
@@ -165,33 +227,189 @@ def pair(pin: str, node: str) -> str:
     return f"{pin}{node}"
 
 
-def _rotations(draft: _Draft, node: str, links: Mapping[str, str], guide: Fixed | None = None) -> None:
-    """Both images of a node that turns about each pin (and, with a guide, slides along it)."""
-    lines = [Line(draft.image(pin), Along(pin, node, 1)) for pin in links]
-    ends = [_normal_component(draft, node, pin) for pin in links]
-    primed = [Line(end, Along(pin, node, 1)) for end, pin in zip(ends, links, strict=True)]
-    if guide is not None:
-        lines.append(Line(VELOCITY_POLE, guide))
-        primed.append(Line(ACCELERATION_POLE, guide))
+@dataclass(frozen=True, slots=True)
+class _Lines:
+    """One condition on a node: a line of each plan, and the vectors that lie along them.
+
+    `vectors` are names, tails and attributes; their heads are the node's images.
+    """
+
+    velocity: Line
+    acceleration: Line
+    vectors: tuple[tuple[str, str, Mapping[str, object]], ...]
+
+
+def _images(draft: _Draft, node: str, lines: Sequence[_Lines]) -> None:
+    """Both images of a node, where the two lines of each plan meet."""
     image, image_primed = draft.image(node), draft.image(node, primed=True)
-    draft.velocity.append(TwoLines(image, *lines))
-    draft.acceleration.append(TwoLines(image_primed, *primed))
-    for (pin, link), end in zip(links.items(), ends, strict=True):
-        about = draft.relative(node, pin)
-        draft.vector(f"v_{about}", draft.image(pin), image, link=(pin, node))
-        draft.vector(f"a_{about}_t", end, image_primed, link=(pin, node))
-        _rates(draft, link, about, (pin, node))
+    first, second = lines
+    draft.velocity.append(TwoLines(image, first.velocity, second.velocity))
+    draft.acceleration.append(TwoLines(image_primed, first.acceleration, second.acceleration))
+    for line in lines:
+        for name, tail, about in line.vectors:
+            draft.vector(name, tail, image if name.startswith("v") else image_primed, **about)
     _absolute(draft, node)
 
 
-def _normal_component(draft: _Draft, node: str, pin: str) -> str:
+def _rotations(draft: _Draft, node: str, links: Mapping[str, str]) -> list[_Lines]:
+    """A node that turns about each pin: across the link, from the pin's image."""
+    found = []
+    for pin, link in links.items():
+        across, about = Along(pin, node, 1), draft.relative(node, pin)
+        end = _normal_component(
+            draft, node, pin, Normal(draft.image(pin), draft.image(node), pair(pin, node))
+        )
+        found.append(_turning(draft, (pin, node), end, across))
+        _rates(draft, link, about, (pin, node))
+    return found
+
+
+def _turning(draft: _Draft, link: tuple[str, str], end: str, across: Along) -> _Lines:
+    pin, node = link
+    about = draft.relative(node, pin)
+    return _Lines(
+        Line(draft.image(pin), across),
+        Line(end, across),
+        (
+            (f"v_{about}", draft.image(pin), {"link": link}),
+            (f"a_{about}_t", end, {"link": link, "part": "t"}),
+        ),
+    )
+
+
+def _normal_component(draft: _Draft, node: str, pin: str, length: Normal) -> str:
     """Lay off a_(node about pin)^n from the pin's image towards the pin; its end."""
     about = draft.relative(node, pin)
     end, start = f"n_{about}", draft.image(pin, primed=True)
-    length = Normal(draft.image(pin), draft.image(node), pair(pin, node))
     draft.acceleration.append(Given(end, start, length, Along(node, pin)))
-    draft.vector(f"a_{about}_n", start, end, link=(pin, node), is_normal=True)
+    draft.vector(f"a_{about}_n", start, end, link=(pin, node), part="n")
     return end
+
+
+def _guide_line(node: str, guide: Guide) -> Line | FixedLine:
+    """A guide on the sketch."""
+    if isinstance(guide, FixedGuide):
+        return FixedLine(f"guide {node}")
+    return Line(guide.base[0], Along(*guide.base))
+
+
+def _slides(draft: _Draft, node: str, guides: Sequence[Guide]) -> list[_Lines]:
+    """A node that slides on guides: along each, from the image of the point under it."""
+    found = []
+    for guide in guides:
+        if isinstance(guide, FixedGuide):
+            along = FixedLine(f"guide {node}").along
+            found.append(_Lines(Line(VELOCITY_POLE, along), Line(ACCELERATION_POLE, along), ()))
+            continue
+        under, (g, h) = guide.coincident, guide.base
+        draft.sketch.append(Coincide(under, node))
+        for primed, steps in ((False, draft.velocity), (True, draft.acceleration)):
+            ends = (draft.image(g, primed=primed), draft.image(h, primed=primed))
+            steps.append(Similar(draft.image(under, primed=primed), ends, (g, h, under)))
+        _absolute(draft, under)
+        turn = (draft.image(g), draft.image(h))
+        found.append(_sliding(draft, (under, node), Along(g, h), turn, (guide.link, g, h)))
+    return found
+
+
+def _sliding(
+    draft: _Draft, link: tuple[str, str], guide: Along, turn: tuple[str, str], turning: tuple[str, str, str]
+) -> _Lines:
+    """The second joint slides about the first along a turning guide: Coriolis, then along the guide.
+
+    Arguments: `turn`, ends of a velocity that turns the guide's link; `turning`, that link and the two
+    joints of it that the velocity belongs to.
+    """
+    other, node = link
+    about, name = f"{node}{other}", turning[0]
+    start, end = draft.image(other, primed=True), f"k_{node}{other}"
+    length = Coriolis((draft.image(other), draft.image(node)), guide, turn, turning[1:])
+    draft.acceleration.append(Given(end, start, length, guide.perpendicular))
+    draft.vector(f"a_{about}_c", start, end, link=link, part="c", turning=name)
+    return _Lines(
+        Line(draft.image(other), guide),
+        Line(end, guide),
+        (
+            (f"v_{about}", draft.image(other), {"link": link}),
+            (f"a_{about}_r", end, {"link": link, "part": "r"}),
+        ),
+    )
+
+
+def _slot(draft: _Draft, node: str, pin: str, slot: Fixed) -> _Lines:
+    """A yoke's point about the block in its slot: along the slot, which does not turn."""
+    image, image_primed = draft.image(pin), draft.image(pin, primed=True)
+    link = (pin, node)
+    return _Lines(
+        Line(image, slot),
+        Line(image_primed, slot),
+        (
+            (f"v_{node}{pin}", image, {"link": link}),
+            (f"a_{node}{pin}_r", image_primed, {"link": link, "part": "r"}),
+        ),
+    )
+
+
+def _draw_plate(draft: _Draft, group: Plate) -> None:
+    node, (p, q) = group.node, group.base
+    if group.line_ratio is not None:
+        draft.sketch.append(Divide(node, (p, q), f"ratio {node}"))
+        return
+    radii = (Scaled(pair(p, node), "kL"), Scaled(pair(q, node), "kL"))
+    draft.sketch.append(TwoArcs(node, (p, q), radii, group.side))
+
+
+def _slot_axis(group: SlottedLink) -> Along:
+    """The direction of a slotted link's guide on the sketch."""
+    behind = bool(np.ravel(group.side)[0] < 0)
+    return Along(group.foot or group.pivot, group.pin, 2 if behind else 0)
+
+
+def _draw_slotted_link(draft: _Draft, group: SlottedLink) -> None:
+    node, pin, pivot = group.node, group.pin, group.pivot
+    if group.foot is not None:
+        offset = Scaled(f"offset {node}", "kL")
+        draft.sketch.append(Tangent(group.foot, pivot, offset, pin, group.side))
+    draft.sketch.append(Coincide(node, pin))
+    length = Normal(draft.image(pivot), draft.image(node), pair(pivot, node), measured=(pivot, node))
+    end = _normal_component(draft, node, pivot, length)
+    turn = (draft.image(pivot), draft.image(node))
+    lines = (
+        _turning(draft, (pivot, node), end, Along(pivot, node, 1)),
+        _sliding(draft, (pin, node), _slot_axis(group), turn, (group.link, pivot, node)),
+    )
+    _images(draft, node, lines)
+    _rates(draft, group.link, draft.relative(node, pivot), (pivot, node))
+    if group.foot is not None and _is_used(draft.mechanism, group.foot):
+        _rigid_images(draft, group.foot, (pivot, node))
+
+
+def _is_used(mechanism: Mechanism, joint: str) -> bool:
+    """Whether another group stands on a joint."""
+    bases = [
+        (*getattr(group, "pins", ()), *getattr(group, "base", ()), getattr(group, "pin", ""))
+        for group in mechanism.groups
+    ]
+    guides = [guide.base for group in mechanism.groups for guide in moving_guides(group)]
+    return any(joint in joints for joints in (*bases, *guides))
+
+
+def _draw_slot_point(draft: _Draft, group: SlotPoint) -> None:
+    node = group.node
+    slotted = next(
+        one for one in draft.mechanism.groups if isinstance(one, SlottedLink) and one.node == group.slotted
+    )
+    x, y = Scaled(f"x {node}", "kL"), Scaled(f"y {node}", "kL")
+    draft.sketch.append(Local(node, slotted.pivot, _slot_axis(slotted), x, y))
+    _rigid_images(draft, node, (slotted.pivot, slotted.node))
+
+
+def _rigid_images(draft: _Draft, node: str, base: tuple[str, str]) -> None:
+    """Both images of a link's point by similarity, without relative vectors."""
+    _note_similar_images(draft, node, base)
+    draft.velocity.append(draft.images[draft.image(node)])
+    draft.acceleration.append(draft.images[draft.image(node, primed=True)])
+    _absolute(draft, node)
 
 
 def _note_similar_images(draft: _Draft, node: str, base: tuple[str, str]) -> None:
@@ -204,12 +422,10 @@ def _note_similar_images(draft: _Draft, node: str, base: tuple[str, str]) -> Non
 
 
 def _similar_images(draft: _Draft, node: str, base: tuple[str, str]) -> None:
-    draft.velocity.append(draft.images[draft.image(node)])
-    draft.acceleration.append(draft.images[draft.image(node, primed=True)])
+    _rigid_images(draft, node, base)
     for pin in base:
         if not draft.mechanism.is_ground(pin):
             draft.vector(f"v_{node}{pin}", draft.image(pin), draft.image(node), link=(pin, node))
-    _absolute(draft, node)
 
 
 def _images_on_line(draft: _Draft, node: str, base: tuple[str, str]) -> None:
@@ -239,23 +455,44 @@ def parameters_of(
 
     Arguments: scales in real units per millimetre on paper (m/mm, (m/s)/mm, (m/s^2)/mm).
     """
-    crank = mechanism.crank
-    arm = crank.length_m
-    known: dict[str, FloatArray] = {
-        "kL": k_length,
-        "kv": k_velocity,
-        "ka": k_acceleration,
-        "angle crank": crank.angle_rad,
-        pair(crank.pivot, crank.pin): arm,
-        f"v_{crank.pin}": crank.omega * arm,
-        f"a_{crank.pin}_n": crank.omega**2 * arm,
-        f"a_{crank.pin}_t": crank.epsilon * arm,
-    }
+    known: dict[str, FloatArray] = {"kL": k_length, "kv": k_velocity, "ka": k_acceleration}
+    known.update(_driver_parameters(mechanism.driver))
     for joint, place in mechanism.ground_m.items():
         known[f"x {joint}"], known[f"y {joint}"] = np.asarray(place.real), np.asarray(place.imag)
     for group in mechanism.groups:
         known.update(_group_parameters(group))
     return known
+
+
+def _driver_parameters(driver: Driver) -> dict[str, FloatArray]:
+    pin = driver.pin
+    match driver:
+        case Crank(length_m=arm):
+            return {
+                "angle crank": driver.angle_rad,
+                pair(driver.pivot, pin): arm,
+                f"v_{pin}": driver.omega * arm,
+                f"a_{pin}_n": driver.omega**2 * arm,
+                f"a_{pin}_t": driver.epsilon * arm,
+            }
+        case DrivenSlider():
+            guide = FixedGuide(driver.guide_m, driver.guide_rad)
+            return {
+                f"s {pin}": driver.displacement_m,
+                f"v_{pin}": driver.speed,
+                f"a_{pin}": driver.acceleration,
+                **_guide_parameters(pin, guide),
+            }
+
+
+def _guide_parameters(node: str, guide: Guide) -> dict[str, FloatArray]:
+    if not isinstance(guide, FixedGuide):
+        return {}
+    return {
+        f"x guide {node}": np.asarray(guide.through_m.real),
+        f"y guide {node}": np.asarray(guide.through_m.imag),
+        f"angle guide {node}": guide.angle_rad,
+    }
 
 
 def _group_parameters(group: Group) -> dict[str, FloatArray]:
@@ -267,10 +504,13 @@ def _group_parameters(group: Group) -> dict[str, FloatArray]:
             return known
         case PointOnLine(node=node, ratio=ratio):
             return {f"ratio {node}": ratio}
-        case Slider(node=node):
-            return {
-                pair(group.pin, node): group.length_m,
-                f"x guide {node}": np.asarray(group.guide_m.real),
-                f"y guide {node}": np.asarray(group.guide_m.imag),
-                f"angle guide {node}": group.guide_rad,
-            }
+        case Slider(node=node, guide=guide):
+            return {pair(group.pin, node): group.length_m, **_guide_parameters(node, guide)}
+        case CrossSlider(node=node, guides=(first, second)):
+            return {**_guide_parameters(node, first), **_guide_parameters(node, second)}
+        case Yoke(node=node, guide=guide):
+            return {f"angle slot {node}": group.slot_rad, **_guide_parameters(node, guide)}
+        case SlottedLink(node=node):
+            return {f"offset {node}": group.offset_m}
+        case SlotPoint(node=node, local_m=local):
+            return {f"x {node}": np.asarray(local.real), f"y {node}": np.asarray(local.imag)}

@@ -7,6 +7,8 @@ scale, up to the conditioning of the figure itself.
 import numpy as np
 from numpy.typing import NDArray
 
+from reference import numbers
+
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
 QUARTER_TURN = 1j
@@ -14,12 +16,12 @@ QUARTER_TURN = 1j
 
 def cross(u: ComplexArray, v: ComplexArray) -> FloatArray:
     """The cross product of u and v, positive when v lies to the left of u."""
-    return np.asarray(u.real * v.imag - u.imag * v.real)
+    return np.asarray(numbers.cross(u, v))
 
 
 def dot(u: ComplexArray, v: ComplexArray) -> FloatArray:
     """The scalar product of u and v."""
-    return np.asarray(u.real * v.real + u.imag * v.imag)
+    return np.asarray(numbers.dot(u, v))
 
 
 def unit(u: ComplexArray) -> ComplexArray:
@@ -40,7 +42,7 @@ def meet(p: ComplexArray, u: ComplexArray, q: ComplexArray, v: ComplexArray) -> 
 
 
 def two_arcs(
-    p: ComplexArray, p_radius: FloatArray, q: ComplexArray, q_radius: FloatArray, side: int
+    p: ComplexArray, p_radius: FloatArray, q: ComplexArray, q_radius: FloatArray, side: int | FloatArray
 ) -> ComplexArray:
     """The third corner of a triangle on pq by its other two sides; nan where it does not close.
 
@@ -62,7 +64,7 @@ def two_arcs(
 
 
 def arc_and_line(
-    p: ComplexArray, radius: FloatArray, q: ComplexArray, u: ComplexArray, side: int
+    p: ComplexArray, radius: FloatArray, q: ComplexArray, u: ComplexArray, side: int | FloatArray
 ) -> ComplexArray:
     """Where the arc about p meets the line through q along the unit vector u; nan where it does not.
 

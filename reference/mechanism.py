@@ -1,17 +1,20 @@
-"""A planar mechanism for one variant or for many: ground, a driven crank, Assur groups in order.
+"""A planar mechanism for one variant or for many: ground, a driven link, Assur groups in order.
 
 All numbers are SI and arrays that broadcast over variants and positions, shape (N,). Angles are
 counter-clockwise from +x. Branches are explicit signs, never starting guesses: `side` is +1 to the
 left of the directed line between the group's pins (for a slider: ahead along its guide), -1 to the
-right (behind).
+right (behind); an array where it differs between variants.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from reference.geometry import ComplexArray, FloatArray
 
 Pins = tuple[str, str]
+Side = int | FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +33,45 @@ class Crank:
 
 
 @dataclass(frozen=True, slots=True)
+class DrivenSlider:
+    """The driven link is a slider: its `pin` lies at `displacement_m` along a fixed guide."""
+
+    link: str
+    pin: str
+    guide_m: ComplexArray
+    guide_rad: FloatArray
+    displacement_m: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
+
+
+Driver = Crank | DrivenSlider
+
+
+@dataclass(frozen=True, slots=True)
+class FixedGuide:
+    """A straight guide on the ground, by a point of it (m) and its direction."""
+
+    through_m: ComplexArray
+    angle_rad: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class MovingGuide:
+    """A straight guide on a moving link: the line through two of its joints.
+
+    `coincident` names the point of the link that lies under the slider at this instant.
+    """
+
+    link: str
+    base: Pins
+    coincident: str
+
+
+Guide = FixedGuide | MovingGuide
+
+
+@dataclass(frozen=True, slots=True)
 class Dyad:
     """Assur group RRR: `node` joins two links, hinged at `pins`, of the lengths given."""
 
@@ -37,36 +79,87 @@ class Dyad:
     pins: Pins
     links: tuple[str, str]
     lengths_m: tuple[FloatArray, FloatArray]
-    side: int
+    side: Side
 
 
 @dataclass(frozen=True, slots=True)
 class Slider:
-    """Assur group RRP: `node` slides on a fixed guide, a rod of `length_m` joins it to `pin`."""
+    """Assur group RRP: `node` slides on a guide, a rod of `length_m` joins it to `pin`."""
 
     node: str
     pin: str
     link: str
     length_m: FloatArray
-    guide_m: ComplexArray
-    guide_rad: FloatArray
-    side: int
+    guide: Guide
+    side: Side
+
+
+@dataclass(frozen=True, slots=True)
+class SlottedLink:
+    """Assur group RPR: `link` turns about `pivot`, and a block at `pin` slides along its guide.
+
+    `node` is the point of the link that coincides with the pin at this instant. The guide passes the
+    pivot at `offset_m`, the pin lying that far to the left of the pivot's parallel to the guide; then
+    `foot` is the guide's nearest point to the pivot, a point of the link. `side` is +1 where the pin
+    lies ahead of the pivot along the guide's direction.
+    """
+
+    node: str
+    pin: str
+    pivot: str
+    link: str
+    offset_m: FloatArray
+    foot: str | None
+    side: Side
+
+
+@dataclass(frozen=True, slots=True)
+class CrossSlider:
+    """Assur group PRP: `node` hinges two blocks, each on a guide; at least one guide moves."""
+
+    node: str
+    guides: tuple[Guide, Guide]
+
+
+@dataclass(frozen=True, slots=True)
+class Yoke:
+    """Assur group RPP: a block hinged at `pin` slides in a yoke's slot, the yoke on a fixed guide.
+
+    `node` is the yoke's point where slot and guide cross.
+    """
+
+    node: str
+    pin: str
+    slot_rad: FloatArray
+    guide: FixedGuide
 
 
 @dataclass(frozen=True, slots=True)
 class Plate:
     """A third point of a link that already carries `base`, by its distances from both.
 
-    Where the three points are in line, `line_ratio` says where (as in `PointOnLine`): then the
-    perpendiculars through the images of the base coincide, and the image must come by similarity.
+    Attributes
+    ----------
+    shape : (node - base[0]) / (base[1] - base[0]), constant in a rigid link; real where the three
+        points are in line, nan where no such triangle closes
     """
 
     node: str
     base: Pins
     link: str
     lengths_m: tuple[FloatArray, FloatArray]
-    side: int
-    line_ratio: FloatArray | None = None
+    side: Side
+    shape: ComplexArray
+
+    @property
+    def line_ratio(self) -> FloatArray | None:
+        """Where the three points are in line for every variant: the ratio of `PointOnLine`."""
+        return np.asarray(self.shape.real) if np.all(self.shape.imag == 0.0) else None
+
+    @property
+    def is_ever_flat(self) -> bool:
+        """In line for some variant: its perpendiculars coincide, its image comes by similarity."""
+        return bool(np.any(self.shape.imag == 0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,22 +172,61 @@ class PointOnLine:
     ratio: FloatArray
 
 
-Group = Dyad | Slider | Plate | PointOnLine
+@dataclass(frozen=True, slots=True)
+class SlotPoint:
+    """A point of a slotted link in the link's own axes: origin its pivot, x along its guide.
+
+    `slotted` is the node of the `SlottedLink`; `local_m` is x + i y, y to the guide's left.
+    """
+
+    node: str
+    slotted: str
+    link: str
+    local_m: ComplexArray
+
+
+Group = Dyad | Slider | SlottedLink | CrossSlider | Yoke | Plate | PointOnLine | SlotPoint
 
 
 @dataclass(frozen=True, slots=True)
 class Mechanism:
-    """Ground pivots (complex metres), the crank, and the groups in the order of assembly."""
+    """Ground pivots (complex metres), the driven link, and the groups in the order of assembly."""
 
     ground_m: Mapping[str, ComplexArray]
-    crank: Crank
+    driver: Driver
     groups: tuple[Group, ...]
 
     @property
+    def crank(self) -> Crank:
+        """The driven crank; raises ValueError where a slider drives."""
+        if not isinstance(self.driver, Crank):
+            raise ValueError("this mechanism is driven by a slider, not by a crank")  # noqa: TRY004
+        return self.driver
+
+    @property
     def joints(self) -> tuple[str, ...]:
-        """All named points: ground pivots, the crank's pin, then each group's node."""
-        return (*self.ground_m, self.crank.pin, *(group.node for group in self.groups))
+        """All named points: ground pivots, the driven pin, then what each group adds."""
+        added = (joint for group in self.groups for joint in joints_of(group))
+        return (*self.ground_m, self.driver.pin, *added)
 
     def is_ground(self, joint: str) -> bool:
         """Whether a joint does not move."""
         return joint in self.ground_m
+
+
+def moving_guides(group: Group) -> tuple[MovingGuide, ...]:
+    """The guides of a group that are carried by moving links."""
+    match group:
+        case Slider(guide=guide):
+            guides: tuple[Guide, ...] = (guide,)
+        case CrossSlider(guides=guides):
+            pass
+        case _:
+            return ()
+    return tuple(guide for guide in guides if isinstance(guide, MovingGuide))
+
+
+def joints_of(group: Group) -> tuple[str, ...]:
+    """The joints that a group adds: its node, the points that coincide with it, a guide's foot."""
+    foot = (group.foot,) if isinstance(group, SlottedLink) and group.foot else ()
+    return (*foot, group.node, *(guide.coincident for guide in moving_guides(group)))

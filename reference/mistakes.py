@@ -16,6 +16,7 @@ from reference.construction import Construction, Vector, ancestors
 from reference.steps import (
     Along,
     ArcAndLine,
+    Coriolis,
     Direction,
     Fixed,
     Given,
@@ -121,9 +122,8 @@ def _changed_step(mistake: Mistake, construction: Construction) -> Step:
         ):
             factor = {"normal_missing": 0.0, "arithmetic": mistake.factor, "scale_wrong": mistake.factor}
             return replace(step, factor=step.factor * factor.get(mistake.code, -1.0))
-        case "normal_from_absolute", Given(length=Normal(head=head, length=length)):
-            pole = construction.poles["velocity_plan"]
-            return replace(step, length=Normal(pole, head, length))
+        case "normal_from_absolute", Given(length=Normal() as length):
+            return replace(step, length=replace(length, tail=construction.poles["velocity_plan"]))
         case "parallel_for_perpendicular", TwoLines():
             return _with_line(step, mistake.slot, lambda line: replace(line, along=_quarter(line.along, 1)))
         case "wrong_link", TwoLines():
@@ -177,11 +177,9 @@ def _with_figure_turned(construction: Construction, figure: str, quarters: int) 
         match step:
             case Given():
                 return replace(step, along=_quarter(step.along, quarters))
-            case TwoLines():
-                first, second = (
-                    replace(line, along=_quarter(line.along, quarters)) for line in (step.first, step.second)
-                )
-                return TwoLines(step.node, first, second)
+            case TwoLines(first=Line() as first, second=Line() as second):
+                lines = (replace(line, along=_quarter(line.along, quarters)) for line in (first, second))
+                return TwoLines(step.node, *lines)
         return step
 
     steps = tuple(turned(step) for step in construction.figures[figure])
@@ -201,7 +199,7 @@ def single_mistakes(drawing: Drawing, figure: str) -> Iterator[Mistake]:
         match step:
             case Given():
                 yield from _mistakes_of_given(step, construction)
-            case TwoLines():
+            case TwoLines() if figure != "mechanism":
                 yield from _mistakes_of_lines(step, construction, figure)
             case TwoArcs() | ArcAndLine():
                 yield Mistake("other_assembly", step.node)
@@ -211,15 +209,16 @@ def single_mistakes(drawing: Drawing, figure: str) -> Iterator[Mistake]:
         scale = "kv" if figure == "velocity_plan" else "ka"
         yield from (Mistake("scale_wrong", scale, factor=f) for f in (0.1, 0.5, 2.0, 10.0))
         yield from (Mistake("figure_rotated", figure, quarters=q) for q in (1, 2, 3))
-        yield Mistake("rpm_not_converted", figure, factor=RPM_FACTOR)
+        if "angle crank" in drawing.parameters:
+            yield Mistake("rpm_not_converted", figure, factor=RPM_FACTOR)
 
 
 def _mistakes_of_given(step: Given, construction: Construction) -> Iterator[Mistake]:
     match step.length:
-        case Normal(tail=tail):
+        case Normal() | Coriolis():
             yield Mistake("normal_missing", step.node)
             yield Mistake("normal_reversed", step.node)
-            if tail != construction.poles["velocity_plan"]:
+            if isinstance(step.length, Normal) and step.length.tail != construction.poles["velocity_plan"]:
                 yield Mistake("normal_from_absolute", step.node)
         case _ if not isinstance(step.along, Fixed):
             yield Mistake("sense_reversed", step.node)
@@ -231,7 +230,7 @@ def _mistakes_of_lines(step: TwoLines, construction: Construction, figure: str) 
     ]
     pole = construction.poles[figure]
     for slot, line in enumerate((step.first, step.second)):
-        if not isinstance(line.along, Along):
+        if not isinstance(line, Line) or not isinstance(line.along, Along):
             continue
         own = {line.along.tail, line.along.head}
         yield Mistake("parallel_for_perpendicular", step.node, slot)
@@ -245,7 +244,8 @@ def _wrong_feet(
     step: TwoLines, slot: int, line: Line, construction: Construction, pole: str
 ) -> Iterator[Mistake]:
     """The line drawn through the start of a normal component, or the pole, instead of its end."""
-    other_foot = (step.second if slot == 0 else step.first).through
+    other = step.second if slot == 0 else step.first
+    other_foot = other.through if isinstance(other, Line) else ""
     feet = [pole]
     foot = construction.step(line.through)
     if isinstance(foot, Given):

@@ -1,18 +1,41 @@
-"""Exact motion in closed form, one Assur group after another, on arrays.
+"""Exact motion in closed form, one Assur group after another.
 
 Positions by Heron's formula and the half chord; velocities and accelerations by eliminating one
-unknown of the rigid-body (Euler) equations of the group, v_B = v_A + i omega (B - A). This road
-knows nothing of drawings: the construction of `reference.construction` is held against it.
+unknown of the rigid-body equations of the group (`reference.groups`). This road knows nothing of
+drawings: the construction of `reference.construction` is held against it.
+
+Many variants are solved on arrays, a few on Python's numbers (faster there). A predicted error goes
+with every result; a variant where it exceeds `DOUBTFUL` is solved again in `DIGITS` digits, its
+data taken as exact, and refused where even the data do not determine it.
 """
 
 from dataclasses import dataclass
+from functools import reduce
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from reference import geometry
-from reference.errors import MechanismError
-from reference.geometry import ComplexArray, FloatArray, cross, dot
-from reference.mechanism import Crank, Dyad, Group, Mechanism, Plate, PointOnLine, Slider
+from reference.geometry import ComplexArray, FloatArray
+from reference.mechanism import Crank, Driver, Mechanism
+from reference.numbers import larger
+from reference.picking import one_variant
+from reference.refusal import reason
+from reference.solving import Solution, solve
+
+EPSILON = float(np.finfo(np.float64).eps)
+SAFETY = 8.0
+"""Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""
+DOUBTFUL = 1e-9
+"""A predicted relative error beyond which a variant is solved again in many digits."""
+REFUSED = 1e3
+"""A predicted relative error of double precision beyond which the data, doubles themselves, do not
+determine the motion: neighbouring doubles have quite another one, or none."""
+DIGITS = 50
+FEW = 3
+"""So many variants are faster one by one, on Python's numbers."""
+
+BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +45,12 @@ class Motion:
     Attributes
     ----------
     position, velocity, acceleration : by joint; acceleration empty when not asked for
-    omega, epsilon : by link, counter-clockwise positive
+    omega, epsilon : by link, counter-clockwise positive; epsilon empty when not asked for
     transmission : |sin| of the angle on which each group's accuracy hangs, by its node: 1 is best,
-        0 is singular; the relative error of velocities is about eps / transmission^2
+        0 is singular
+    predicted_error : (N,) of velocities and accelerations, relative to the largest of each plan;
+        infinite where there is no motion
+    recomputed : (N,) whether the variant was solved in many digits
     """
 
     position: dict[str, ComplexArray]
@@ -33,6 +59,8 @@ class Motion:
     omega: dict[str, FloatArray]
     epsilon: dict[str, FloatArray]
     transmission: dict[str, FloatArray]
+    predicted_error: FloatArray
+    recomputed: BoolArray
 
 
 def move(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
@@ -41,164 +69,133 @@ def move(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
     Raises MechanismError naming the group, the first variant (by its index) and by how much the
     group does not assemble, or that its velocities are not determined there.
     """
-    motion = Motion({}, {}, {}, {}, {}, {})
-    for joint, place in mechanism.ground_m.items():
-        _put(motion, joint, place, np.zeros_like(place), np.zeros_like(place))
-    _drive(motion, mechanism.crank)
-    for group in mechanism.groups:
-        _assemble(motion, group)
-        _set_in_motion(motion, group)
-        if accelerations:
-            _accelerate(motion, group)
-    if not accelerations:
-        return Motion(motion.position, motion.velocity, {}, motion.omega, {}, motion.transmission)
+    motion = move_where_possible(mechanism, accelerations=accelerations)
+    if motion.predicted_error.max(initial=0.0) > REFUSED:
+        raise reason(mechanism, motion.predicted_error > REFUSED)
     return motion
 
 
-def _put(motion: Motion, joint: str, r: ComplexArray, v: ComplexArray, a: ComplexArray) -> None:
-    motion.position[joint], motion.velocity[joint], motion.acceleration[joint] = r, v, a
+def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
+    """As `move`, but nan (and an infinite predicted error) for variants without a motion."""
+    count = _count(mechanism.driver)
+    if count <= FEW:
+        motion = _one_by_one(mechanism, count, accelerations)
+    else:
+        with np.errstate(all="ignore"):
+            motion = _on_arrays(mechanism, count, accelerations)
+    predicted = motion.predicted_error
+    if predicted.max(initial=0.0) > DOUBTFUL:
+        for index in np.flatnonzero((predicted > DOUBTFUL) & (predicted <= REFUSED)):
+            _solve_in_digits(motion, mechanism, int(index), accelerations)
+        _erase(motion, ~(predicted <= REFUSED))
+    return motion
 
 
-def _drive(motion: Motion, crank: Crank) -> None:
-    arm = crank.length_m * geometry.direction(crank.angle_rad)
-    velocity = 1j * crank.omega * arm
-    acceleration = (1j * crank.epsilon - crank.omega**2) * arm
-    _put(motion, crank.pin, motion.position[crank.pivot] + arm, velocity, acceleration)
-    motion.omega[crank.link] = crank.omega
-    motion.epsilon[crank.link] = crank.epsilon
+def _count(driver: Driver) -> int:
+    """The number of variants: the widest of the driver's numbers."""
+    if isinstance(driver, Crank):
+        return max(driver.angle_rad.size, driver.omega.size, driver.length_m.size, driver.epsilon.size)
+    return max(driver.displacement_m.size, driver.speed.size, driver.acceleration.size)
 
 
-def _assemble(motion: Motion, group: Group) -> None:
-    """The group's node, from its pins."""
-    at = motion.position
-    match group:
-        case Dyad():
-            p, q = (at[pin] for pin in group.pins)
-            node = geometry.two_arcs(p, group.lengths_m[0], q, group.lengths_m[1], group.side)
-            _refuse_open(group.node, node, _gap_of_triangle(p, q, group.lengths_m))
-            sine = np.abs(cross(node - p, node - q)) / (np.abs(node - p) * np.abs(node - q))
-        case Plate():
-            p, q = (at[pin] for pin in group.base)
-            node = _plate_corner(p, q, group)
-            _refuse_open(group.node, node, _gap_of_triangle(p, q, group.lengths_m))
-            sine = np.ones_like(group.lengths_m[0])
-        case PointOnLine():
-            p, q = (at[pin] for pin in group.base)
-            node, sine = p + (q - p) * group.ratio, np.ones_like(group.ratio)
-        case Slider():
-            pin, along = at[group.pin], geometry.direction(group.guide_rad)
-            node = geometry.arc_and_line(pin, group.length_m, group.guide_m, along, group.side)
-            gap = np.abs(cross(along, pin - group.guide_m)) - group.length_m
-            _refuse_open(group.node, node, gap)
-            sine = np.abs(dot(node - pin, along)) / group.length_m
-    motion.position[group.node] = node
-    motion.transmission[group.node] = np.asarray(sine)
+def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+    solution = solve(mechanism, accelerations=accelerations)
+    shape = (count,)
 
+    def wide(values: Any) -> Any:  # noqa: ANN401 - real or complex, array or number
+        return values if np.shape(values) == shape else np.array(np.broadcast_to(values, shape))
 
-def _plate_corner(p: ComplexArray, q: ComplexArray, group: Plate) -> ComplexArray:
-    """A plate's third point; exactly in line with its base where the lengths say so."""
-    if group.line_ratio is not None:
-        return np.asarray(p + (q - p) * group.line_ratio)
-    return geometry.two_arcs(p, group.lengths_m[0], q, group.lengths_m[1], group.side)
-
-
-def _gap_of_triangle(p: ComplexArray, q: ComplexArray, sides: tuple[FloatArray, FloatArray]) -> FloatArray:
-    distance = np.abs(q - p)
-    too_far = distance - (sides[0] + sides[1])
-    return np.asarray(np.maximum(too_far, np.abs(sides[0] - sides[1]) - distance))
-
-
-def _refuse_open(node: str, place: ComplexArray, gap_m: FloatArray) -> None:
-    broken = np.atleast_1d(~np.isfinite(place))
-    if not broken.any():
-        return
-    first = int(np.argmax(broken))
-    gap = float(np.atleast_1d(np.broadcast_to(gap_m, place.shape))[first])
-    raise MechanismError(
-        "does_not_assemble",
-        f"the group of {node} does not assemble: its links miss each other by {max(gap, 0.0):.6g} m"
-        f" ({int(broken.sum())} of {broken.size} variant(s), the first at index {first});"
-        " check the lengths, the crank angle and the side",
+    joints = solution.joints
+    amplification = wide(reduce(larger, [joint.amplification for joint in joints.values()]))
+    predicted = np.nan_to_num(SAFETY * EPSILON * amplification, nan=np.inf, copy=False)
+    return Motion(
+        {name: wide(joint.position) for name, joint in joints.items()},
+        {name: wide(joint.velocity) for name, joint in joints.items()},
+        {name: wide(joint.acceleration) for name, joint in joints.items()} if accelerations else {},
+        {name: wide(+rate) for name, rate in solution.omega.items()},
+        {name: wide(+rate) for name, rate in solution.epsilon.items()} if accelerations else {},
+        {name: wide(sine) for name, sine in solution.transmission.items()},
+        predicted,
+        np.zeros(shape, dtype=np.bool_),
     )
 
 
-def _set_in_motion(motion: Motion, group: Group) -> None:
-    """The velocity of the group's node and the angular velocities of its links."""
-    at, v, omega = motion.position, motion.velocity, motion.omega
-    node = at[group.node]
-    match group:
-        case Dyad(pins=(p, q), links=(link_p, link_q)):
-            first, second = _two_turns(node - at[p], node - at[q], v[q] - v[p], group.node)
-            omega[link_p] = first
-            omega[link_q] = second
-            velocity = v[p] + 1j * first * (node - at[p])
-        case Slider():
-            along = geometry.direction(group.guide_rad)
-            turn, speed = _turn_and_slide(node - at[group.pin], along, v[group.pin], group.node)
-            omega[group.link] = turn
-            velocity = speed * along
-        case Plate(base=(p, q)) | PointOnLine(base=(p, q)):
-            velocity = geometry.similar(v[p], v[q], at[p], at[q], node)
-            omega[group.link] = _turn_of(at[q] - at[p], v[q] - v[p])
-    v[group.node] = velocity
+def _one_by_one(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+    """The same on Python's numbers, a variant after another; where they divide by zero, on arrays."""
+    try:
+        solutions = [
+            solve(mechanism, one_variant(index), accelerations=accelerations) for index in range(count)
+        ]
+    except (ZeroDivisionError, OverflowError):
+        with np.errstate(all="ignore"):
+            return _on_arrays(mechanism, count, accelerations)
+    first = solutions[0]
+    grown = [reduce(larger, [joint.amplification for joint in one.joints.values()]) for one in solutions]
+    predicted = [SAFETY * EPSILON * one if one == one else np.inf for one in grown]  # noqa: PLR0124 - nan
+
+    states = np.array(
+        [
+            [(joint.position, joint.velocity, joint.acceleration) for joint in one.joints.values()]
+            for one in solutions
+        ]
+    )
+    position, velocity, acceleration = (
+        {name: states[:, row, order] for row, name in enumerate(first.joints)} for order in range(3)
+    )
+
+    def links(what: str) -> dict[str, FloatArray]:
+        rates: dict[str, float] = getattr(first, what)
+        numbers = np.array([list(getattr(one, what).values()) for one in solutions])
+        return {name: numbers[:, row] for row, name in enumerate(rates)}
+
+    return Motion(
+        position,
+        velocity,
+        acceleration if accelerations else {},
+        links("omega"),
+        links("epsilon") if accelerations else {},
+        links("transmission"),
+        np.array(predicted),
+        np.zeros(count, dtype=np.bool_),
+    )
 
 
-def _accelerate(motion: Motion, group: Group) -> None:
-    """The acceleration of the group's node and the angular accelerations of its links."""
-    at, a, omega, epsilon = motion.position, motion.acceleration, motion.omega, motion.epsilon
-    node = at[group.node]
-    match group:
-        case Dyad(pins=(p, q), links=(link_p, link_q)):
-            u, w = node - at[p], node - at[q]
-            known = a[q] - a[p] + omega[link_p] ** 2 * u - omega[link_q] ** 2 * w
-            first, second = _two_turns(u, w, known, group.node)
-            epsilon[link_p] = first
-            epsilon[link_q] = second
-            acceleration = a[p] + (1j * first - omega[link_p] ** 2) * u
-        case Slider():
-            along, u = geometry.direction(group.guide_rad), node - at[group.pin]
-            known = a[group.pin] - omega[group.link] ** 2 * u
-            turn, slide = _turn_and_slide(u, along, known, group.node)
-            epsilon[group.link] = turn
-            acceleration = slide * along
-        case Plate(base=(p, q)) | PointOnLine(base=(p, q)):
-            acceleration = geometry.similar(a[p], a[q], at[p], at[q], node)
-            epsilon[group.link] = _turn_of(at[q] - at[p], a[q] - a[p])
-    a[group.node] = acceleration
+def _solve_in_digits(motion: Motion, mechanism: Mechanism, index: int, accelerations: bool) -> None:
+    """Put one variant, solved in many digits, in its place; as if beyond all bounds where it has none."""
+    from mpmath import mp  # noqa: PLC0415 - seldom needed, and slow to import
+
+    with mp.workdps(DIGITS):
+        try:
+            take = one_variant(index, mp.mpmathify)
+            solution = solve(mechanism, take, accelerations=accelerations)
+            _put(motion, solution, index)
+        except ZeroDivisionError:
+            motion.predicted_error[index] = np.inf
+            return
+    motion.recomputed[index] = True
+    found = (*motion.velocity.values(), *motion.acceleration.values())
+    motion.predicted_error[index] = EPSILON if all(np.isfinite(z[index]) for z in found) else np.inf
 
 
-def _two_turns(
-    u: ComplexArray, w: ComplexArray, known: ComplexArray, node: str
-) -> tuple[FloatArray, FloatArray]:
-    """X and y of i (x u - y w) = known: dotted with w, then with u."""
-    area = cross(u, w)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        x, y = dot(known, w) / area, dot(known, u) / area
-    _refuse_singular(node, x + y)
-    return np.asarray(x), np.asarray(y)
+def _put(motion: Motion, solution: Solution, index: int) -> None:
+    for name, joint in solution.joints.items():
+        motion.position[name][index] = complex(joint.position)
+        motion.velocity[name][index] = complex(joint.velocity)
+        if motion.acceleration:
+            motion.acceleration[name][index] = complex(joint.acceleration)
+    for link, omega in solution.omega.items():
+        motion.omega[link][index] = float(omega)
+    for link, epsilon in solution.epsilon.items():
+        motion.epsilon[link][index] = float(epsilon)
+    for node, sine in solution.transmission.items():
+        motion.transmission[node][index] = float(sine)
 
 
-def _turn_and_slide(
-    u: ComplexArray, along: ComplexArray, known: ComplexArray, node: str
-) -> tuple[FloatArray, FloatArray]:
-    """X and s of known + i x u = s along (along is a unit vector)."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        x = -cross(along, known) / dot(u, along)
-    _refuse_singular(node, x)
-    return np.asarray(x), dot(known + 1j * x * u, along)
-
-
-def _turn_of(arm: ComplexArray, relative: ComplexArray) -> FloatArray:
-    """The angular rate of a rigid arm from the relative velocity (or acceleration) of its ends."""
-    return np.asarray(cross(arm, relative) / dot(arm, arm))
-
-
-def _refuse_singular(node: str, rates: FloatArray) -> None:
-    broken = np.atleast_1d(~np.isfinite(rates))
-    if broken.any():
-        raise MechanismError(
-            "singular",
-            f"the velocities of the group of {node} are not determined: its links (or rod and guide's"
-            f" perpendicular) are in line ({int(broken.sum())} of {broken.size} variant(s), the first at"
-            f" index {int(np.argmax(broken))}); choose another crank angle",
-        )
+def _erase(motion: Motion, broken: BoolArray) -> None:
+    """Nothing is told of a variant without a motion."""
+    if not broken.any():
+        return
+    motion.predicted_error[broken] = np.inf
+    for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
+        for values in rates.values():
+            values[broken] = np.nan

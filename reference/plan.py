@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from reference.assignment import Assignment, Scales, Variant
-from reference.construction import Construction, evaluate
+from reference.construction import Construction, Vector, evaluate
 from reference.derivation import construction_of, image_name, parameters_of
 from reference.geometry import ComplexArray, FloatArray, cross, dot
 from reference.mechanism import Mechanism
 from reference.mistakes import Drawing
 from reference.motion import Motion, move
-from reference.steps import TwoLines, View
+from reference.steps import Given, Normal, TwoLines, View
 
 ZERO_SHARE = 1e-9
 """A vector shorter than this share of its plan's size is a zero vector and has no direction."""
@@ -88,8 +88,9 @@ def exact_plan(
         for name in (vector.name,)
     }
     ordered = {name: vectors[name] for name in construction.vectors}
-    rates = _rates(construction, motion, ordered)
+    rates = {name: _rate(motion, name) for name in construction.rates}
     parameters = parameters_of(mechanism, scales.kL, scales.kv, scales.ka)
+    parameters = {**_measured(construction, motion), **parameters}
     drawing = Drawing(construction, parameters)
     return Plan(tuple(variants), mechanism, motion, scales, drawing, nodes, ordered, rates)
 
@@ -108,41 +109,48 @@ def _nodes(
             if not mechanism.is_ground(joint):
                 nodes[image_name(joint, primed=primed)] = np.asarray(rate[joint] / scale)
         for vector in construction.vectors_of(figure):
-            if vector.is_normal and vector.link:
-                nodes[vector.head] = nodes[vector.tail] + _normal(motion, *vector.link) / scales.ka
+            if vector.part in {"n", "c"}:
+                nodes[vector.head] = nodes[vector.tail] + _component(motion, vector) / scales.ka
         figures[figure] = {step.node: nodes[step.node] for step in construction.figures[figure]}
     return figures
 
 
-def _normal(motion: Motion, pin: str, node: str) -> ComplexArray:
-    """The normal component of node about pin: v^2 / l towards the pin."""
-    arm = motion.position[node] - motion.position[pin]
+def _component(motion: Motion, vector: Vector) -> ComplexArray:
+    """A normal component v^2 / l towards the link's first joint, or a Coriolis one 2 i omega v."""
+    pin, node = vector.link or ("", "")
     relative = motion.velocity[node] - motion.velocity[pin]
+    if vector.turning is not None:
+        return np.asarray(2j * motion.omega[vector.turning] * relative)
+    arm = motion.position[node] - motion.position[pin]
     return np.asarray(-arm * (dot(relative, relative) / dot(arm, arm)))
 
 
-def _rates(
-    construction: Construction, motion: Motion, vectors: Mapping[str, ComplexArray]
-) -> dict[str, FloatArray]:
-    rates = {}
-    for name, rate in construction.rates.items():
-        tail, head = rate.link
-        arm = motion.position[head] - motion.position[tail]
-        rates[name] = np.asarray(cross(arm, vectors[rate.vector]) / dot(arm, arm))
-    return rates
+def _measured(construction: Construction, motion: Motion) -> dict[str, FloatArray]:
+    """The real lengths that the construction measures on the sketch, of slotted links."""
+    steps = (step.length for step in construction.steps if isinstance(step, Given))
+    normals = (length for length in steps if isinstance(length, Normal) and length.measured)
+    links = {length.length: length.measured for length in normals if length.measured}
+    links |= {rate.length: rate.link for rate in construction.rates.values()}
+    return {
+        name: np.abs(motion.position[head] - motion.position[tail]) for name, (tail, head) in links.items()
+    }
+
+
+def _rate(motion: Motion, name: str) -> FloatArray:
+    kind, _, link = name.partition("_")
+    return motion.omega[link] if kind == "omega" else motion.epsilon[link]
 
 
 def conditioning(plan: Plan) -> dict[str, FloatArray]:
     """How well the plan can be computed and drawn.
 
     ``transmission X``: |sin| on which joint X hangs; ``predicted_error``: relative error of the
-    computed velocities, eps / min(transmission)^2; ``crossing X``: the angle in degrees at which the
+    computed velocities and accelerations; ``crossing X``: the angle in degrees at which the
     construction lines of node X meet (90 is best).
     """
     transmission = plan.motion.transmission
     told: dict[str, FloatArray] = {f"transmission {node}": sine for node, sine in transmission.items()}
-    worst = np.min(list(transmission.values()), axis=0) if transmission else np.ones(len(plan.variants))
-    told["predicted_error"] = np.finfo(float).eps / worst**2
+    told["predicted_error"] = plan.motion.predicted_error
     nodes = evaluate(plan.construction, plan.drawing.parameters)
     told.update(crossings_deg(plan.construction, plan.drawing, nodes))
     return told

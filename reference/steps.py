@@ -9,8 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
-from reference import geometry
+from reference import geometry, groups
 from reference.geometry import ComplexArray, FloatArray
+from reference.mechanism import Side
 
 Parameters = Mapping[str, FloatArray]
 """Real lengths (m) by the pair of joints (``"O1A"``), crank data and the scales kL, kv, ka; see
@@ -35,6 +36,10 @@ class View:
     def error(self, node: str, slot: int, kind: str) -> FloatArray:
         """One error of the hand, zero where there is none."""
         return self.errors.get((node, slot, kind), NO_ERROR)
+
+    def real_length(self, tail: str, head: str) -> FloatArray:
+        """The real length (m) between two joints, measured on the sketch."""
+        return np.asarray(np.abs(self.nodes[head] - self.nodes[tail]) * self.parameters["kL"])
 
 
 # Directions ---------------------------------------------------------------------------------------
@@ -115,25 +120,66 @@ class Scaled:
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """A normal component v^2 / l, from a velocity as drawn and a real length, at the scale ka."""
+    """A normal component v^2 / l, from a velocity as drawn and a real length, at the scale ka.
+
+    `measured` are the sketch's joints between which the length is taken where the mechanism's data do
+    not give it: the distance of a slotted link's point from its pivot.
+    """
 
     tail: str
     head: str
     length: str
+    measured: tuple[str, str] | None = None
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The ends of the velocity."""
-        return (self.tail, self.head)
+        """The ends of the velocity, and those of a measured length."""
+        return (self.tail, self.head, *(self.measured or ()))
 
     def at(self, view: View) -> FloatArray:
         """Drawn millimetres."""
         known = view.parameters
         speed = np.abs(view.nodes[self.head] - view.nodes[self.tail]) * known["kv"]
-        return np.asarray(speed**2 / (known[self.length] * known["ka"]))
+        length = known[self.length] if self.measured is None else view.real_length(*self.measured)
+        return np.asarray(speed**2 / (length * known["ka"]))
 
 
-Length = Scaled | Normal
+@dataclass(frozen=True, slots=True)
+class Coriolis:
+    """A Coriolis component 2 omega v, from two velocities as drawn, at the scale ka.
+
+    Attributes
+    ----------
+    slide : the sliding velocity's ends in the velocity plan
+    guide : the guide's direction, along which it slides
+    turn : ends of the velocity that turns the guide's link about one of its joints
+    link : those joints, in the same order, in the sketch
+
+    The length is positive to the left of `guide`: 2 omega v of the components along guide and across
+    the link, with their signs.
+    """
+
+    slide: tuple[str, str]
+    guide: "Direction"
+    turn: tuple[str, str]
+    link: tuple[str, str]
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Both velocities' ends, the guide's and the link's joints."""
+        return (*self.slide, *self.guide.needs, *self.turn, *self.link)
+
+    def at(self, view: View) -> FloatArray:
+        """Drawn millimetres."""
+        known, nodes = view.parameters, view.nodes
+        sliding, turning = (nodes[head] - nodes[tail] for tail, head in (self.slide, self.turn))
+        arm = geometry.unit(nodes[self.link[1]] - nodes[self.link[0]])
+        omega = geometry.cross(arm, turning) * known["kv"] / view.real_length(*self.link)
+        speed = geometry.dot(self.guide.at(view), sliding) * known["kv"]
+        return np.asarray(2.0 * omega * speed / known["ka"])
+
+
+Length = Scaled | Normal | Coriolis
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,9 +189,38 @@ class Line:
     through: str
     along: Direction
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Its foot, and what its direction is read from."""
+        return (self.through, *self.along.needs)
+
     def at(self, view: View, node: str, slot: int) -> tuple[ComplexArray, ComplexArray]:
         """A point of the line and its unit vector, with the hand's error in drawing it."""
         return drawn(view, node, slot, view.nodes[self.through], self.along.at(view))
+
+
+@dataclass(frozen=True, slots=True)
+class FixedLine:
+    """A guide on the ground, by its name: its point and direction are parameters."""
+
+    guide: str
+
+    @property
+    def along(self) -> Fixed:
+        """Its direction."""
+        return Fixed(f"angle {self.guide}")
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """No nodes."""
+        return ()
+
+    def at(self, view: View, node: str, slot: int) -> tuple[ComplexArray, ComplexArray]:
+        """A point of the line and its unit vector, with the hand's error in drawing it."""
+        return drawn(view, node, slot, fixed_point(view, self.guide), self.along.at(view))
+
+
+AnyLine = Line | FixedLine
 
 
 def drawn(
@@ -240,18 +315,36 @@ class Given:
 
 
 @dataclass(frozen=True, slots=True)
+class OnGuide:
+    """The driven slider: a length along a fixed guide from its point (a negative one backwards)."""
+
+    node: str
+    guide: FixedLine
+    length: Length
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """No nodes."""
+        return self.length.needs
+
+    def place(self, view: View) -> ComplexArray:
+        """The slider's place."""
+        foot, along = self.guide.at(view, self.node, 0)
+        return np.asarray(foot + along * (self.length.at(view) + view.error(self.node, 0, "length")))
+
+
+@dataclass(frozen=True, slots=True)
 class TwoLines:
     """Where two lines meet."""
 
     node: str
-    first: Line
-    second: Line
+    first: AnyLine
+    second: AnyLine
 
     @property
     def needs(self) -> tuple[str, ...]:
         """The nodes both lines start from, and those their directions are read from."""
-        lines = (self.first, self.second)
-        return tuple(name for line in lines for name in (line.through, *line.along.needs))
+        return (*self.first.needs, *self.second.needs)
 
     def place(self, view: View) -> ComplexArray:
         """The meeting point."""
@@ -267,7 +360,7 @@ class TwoArcs:
     node: str
     centres: tuple[str, str]
     radii: tuple[Length, Length]
-    side: int
+    side: Side
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -285,25 +378,90 @@ class TwoArcs:
 
 @dataclass(frozen=True, slots=True)
 class ArcAndLine:
-    """Where a compass arc meets a fixed guide, ahead of (side +1) or behind its centre along the guide."""
+    """Where a compass arc meets a guide, ahead of (side +1) or behind its centre along the guide."""
 
     node: str
     centre: str
     radius: Length
-    guide: str
-    side: int
+    guide: AnyLine
+    side: Side
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The arc's centre."""
-        return (self.centre, *self.radius.needs)
+        """The arc's centre, and what the guide is drawn from."""
+        return (self.centre, *self.radius.needs, *self.guide.needs)
 
     def place(self, view: View) -> ComplexArray:
         """The meeting point."""
-        along = Fixed(f"angle {self.guide}").at(view)
-        foot, along = drawn(view, self.node, 1, fixed_point(view, self.guide), along)
+        foot, along = self.guide.at(view, self.node, 1)
         radius = self.radius.at(view) + view.error(self.node, 0, "length")
         return geometry.arc_and_line(view.nodes[self.centre], radius, foot, along, self.side)
+
+
+@dataclass(frozen=True, slots=True)
+class Coincide:
+    """A point that lies where another does at this instant: on the link under a slider."""
+
+    node: str
+    other: str
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The other point."""
+        return (self.other,)
+
+    def place(self, view: View) -> ComplexArray:
+        """The same place."""
+        return view.nodes[self.other]
+
+
+@dataclass(frozen=True, slots=True)
+class Tangent:
+    """Where a line from a point touches a circle.
+
+    From the centre the touching point lies a quarter turn to the left (for a positive radius) of the
+    line's direction; `side` is +1 where that runs from the touching point to `start`, -1 the other way.
+    """
+
+    node: str
+    centre: str
+    radius: Length
+    start: str
+    side: Side
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Centre and start."""
+        return (self.centre, self.start, *self.radius.needs)
+
+    def place(self, view: View) -> ComplexArray:
+        """The touching point."""
+        centre = view.nodes[self.centre]
+        radius = self.radius.at(view) + view.error(self.node, 0, "length")
+        _, along, _ = groups.rpr_place(view.nodes[self.start] - centre, radius, self.side)
+        return np.asarray(centre + 1j * along * radius)
+
+
+@dataclass(frozen=True, slots=True)
+class Local:
+    """A point by its coordinates in a link's own axes, x along a direction, y to its left."""
+
+    node: str
+    origin: str
+    axis: Direction
+    x: Length
+    y: Length
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The origin, and what the axis is read from."""
+        return (self.origin, *self.axis.needs, *self.x.needs, *self.y.needs)
+
+    def place(self, view: View) -> ComplexArray:
+        """Origin + (x + i y) along the axis."""
+        foot, along = drawn(view, self.node, 0, view.nodes[self.origin], self.axis.at(view))
+        x = self.x.at(view) + view.error(self.node, 0, "length")
+        return np.asarray(foot + along * (x + 1j * self.y.at(view)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from grader.simulation.settings import Student
 from grader.simulation.sketch import DASHES, Sketch
 from grader.simulation.strokes import arc
 from reference.construction import Vector, evaluate
-from reference.mechanism import Dyad, Plate, PointOnLine, Slider
+from reference.mechanism import Dyad, FixedGuide, Plate, PointOnLine, Slider
 from reference.steps import Divide, Given, Similar, TwoArcs, TwoLines
 
 TOO_SHORT_MM = 0.8
@@ -56,8 +56,8 @@ def draw_mechanism(sketch: Sketch, task: Task, nodes: Nodes, student: Student) -
             p, q = group.base
             corners = (nodes[p], nodes[q], nodes[group.node])
             symbols.inside_hatching(sketch, corners, sketch.rng.uniform(2.5, 5.0))
-        if isinstance(group, Slider):
-            angle = float(np.mean(group.guide_rad))
+        if isinstance(group, Slider) and isinstance(group.guide, FixedGuide):
+            angle = float(np.mean(group.guide.angle_rad))
             symbols.slider(sketch, nodes[group.node], turn * complex(np.exp(1j * angle)))
     for joint in task.mechanism.joints:
         if task.mechanism.is_ground(joint):

@@ -12,8 +12,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from reference.assembly import build_mechanism, check_mechanism
+from reference.assembly import build_mechanism
 from reference.authored import MechanismFile, validate
+from reference.checking import check_mechanism
 from reference.motion import Motion, move
 
 DOUBLE_PRECISION = 1e-12

@@ -8,7 +8,7 @@ from hypothesis import assume
 from hypothesis import strategies as st
 
 from reference.geometry import cross, dot
-from reference.mechanism import Crank, Dyad, Mechanism, Plate, PointOnLine, Slider
+from reference.mechanism import Crank, Dyad, FixedGuide, Mechanism, Plate, PointOnLine, Slider
 from reference.motion import Motion, move
 
 LEAST_TRANSMISSION = 0.15
@@ -56,8 +56,17 @@ def mechanisms(draw) -> Mechanism:
     )
     groups = (
         Dyad("B", ("A", "O2"), ("3", "2"), (_array(abs(b - a)), _array(abs(b - o2))), _side(b, a, o2)),
-        Plate("C", ("A", "B"), "3", (_array(abs(c - a)), _array(abs(c - b))), _side(c, a, b)),
-        Slider("D", "C", "4", _array(abs(d - c)), _array(d + 0.7 * along), _array(angle), ahead),
+        Plate(
+            "C",
+            ("A", "B"),
+            "3",
+            (_array(abs(c - a)), _array(abs(c - b))),
+            _side(c, a, b),
+            _array((c - a) / (b - a)),
+        ),
+        Slider(
+            "D", "C", "4", _array(abs(d - c)), FixedGuide(_array(d + 0.7 * along), _array(angle)), ahead
+        ),
         PointOnLine("E", ("C", "D"), "4", _array(draw(_number(-1.0, 2.0)))),
         PointOnLine("F", ("O2", "B"), "2", _array(draw(_number(-1.0, 2.0)))),
     )
@@ -70,7 +79,7 @@ def mechanisms(draw) -> Mechanism:
 def moved(mechanism: Mechanism, **crank) -> Motion:
     """The motion with some of the crank's data changed."""
     changed = {name: _array(value) for name, value in crank.items()}
-    return move(replace(mechanism, crank=replace(mechanism.crank, **changed)))
+    return move(replace(mechanism, driver=replace(mechanism.crank, **changed)))
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference.geometry import cross, dot
-from reference.mechanism import Dyad, Mechanism, Plate, PointOnLine, Slider
+from reference.mechanism import Dyad, FixedGuide, Mechanism, Plate, PointOnLine, Slider
 from reference.motion import move
 
 ROUNDING = 1e-9
@@ -67,8 +67,8 @@ def test_points_of_one_link_turn_alike(mechanism):
 def test_a_slider_stays_on_its_guide(mechanism):
     motion = move(mechanism)
     guide = next(group for group in mechanism.groups if isinstance(group, Slider))
-    along = np.exp(1j * guide.guide_rad)
-    assert near(cross(along, motion.position["D"] - guide.guide_m), 0.0, 1.0)
+    along = np.exp(1j * guide.guide.angle_rad)
+    assert near(cross(along, motion.position["D"] - guide.guide.through_m), 0.0, 1.0)
     assert near(cross(along, motion.velocity["D"]), 0.0, speed(motion))
     assert near(cross(along, motion.acceleration["D"]), 0.0, acceleration(motion))
 
@@ -112,11 +112,14 @@ def transformed(mechanism, turn, *, mirror=False, factor=1.0):
             case PointOnLine():
                 return one
             case Slider():
-                guide_rad = sign * one.guide_rad + np.angle(turn)
-                return replace(
-                    one, length_m=one.length_m * factor, guide_m=place(one.guide_m), guide_rad=guide_rad
-                )
-            case Dyad() | Plate():
+                angle_rad = sign * one.guide.angle_rad + np.angle(turn)
+                guide = FixedGuide(place(one.guide.through_m), angle_rad)
+                return replace(one, length_m=one.length_m * factor, guide=guide, side=one.side)
+            case Plate():
+                lengths = tuple(length * factor for length in one.lengths_m)
+                shape = np.conj(one.shape) if mirror else one.shape
+                return replace(one, lengths_m=lengths, side=sign * one.side, shape=shape)
+            case Dyad():
                 lengths = tuple(length * factor for length in one.lengths_m)
                 return replace(one, lengths_m=lengths, side=sign * one.side)
 

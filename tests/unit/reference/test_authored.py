@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference.assembly import check_mechanism
+from reference.checking import check_mechanism
 from reference.assignment import Assignment, _check_formulas, built_in, library, load_assignment
 from reference.authored import AssignmentFile, MechanismFile, load, validate
 from reference.canvas import svg
@@ -95,7 +95,7 @@ def structure(data: dict) -> dict[str, str]:
 def test_an_unknown_joint_is_told_with_those_placed_so_far(mechanism):
     mechanism["group"][0]["pins"] = ["A", "O3"]
     told = structure(mechanism)
-    assert told == {"$.group[0].pins[1]": "O3 is not placed above: known so far are A, O1, O2"}
+    assert told == {"$.group[0].pins[1]": "O3 is not placed above (did you mean O2?): known so far are A, O1, O2"}
 
 
 def test_a_joint_with_two_places_is_over_constrained(mechanism):

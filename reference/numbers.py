@@ -1,0 +1,64 @@
+"""One arithmetic for four kinds of numbers: arrays, Python's own, many digits, and compiled ones.
+
+The kernels of `reference.groups` are written once, with these few functions for what operators do
+not give. A root of a negative number is nan: the figure does not close there.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+Number = Any
+"""float, mpf, or an array of shape (N,) of floats."""
+Complex = Any
+"""complex, mpc, or an array of shape (N,) of complex numbers."""
+
+
+def root(x: Number) -> Number:
+    """The square root; nan below zero."""
+    if isinstance(x, float):
+        return math.sqrt(x) if x >= 0.0 else math.nan
+    if isinstance(x, np.ndarray):
+        return np.sqrt(x)
+    return x.sqrt() if x >= 0 else x * math.nan
+
+
+def sine(x: Number) -> Number:
+    """The sine."""
+    return math.sin(x) if isinstance(x, float) else np.sin(x) if isinstance(x, np.ndarray) else _mp().sin(x)
+
+
+def cosine(x: Number) -> Number:
+    """The cosine."""
+    return math.cos(x) if isinstance(x, float) else np.cos(x) if isinstance(x, np.ndarray) else _mp().cos(x)
+
+
+def nearest(x: Number) -> Number:
+    """The nearest whole number."""
+    if isinstance(x, np.ndarray):
+        return np.rint(x)
+    return float(round(x)) if isinstance(x, float) else _mp().nint(x)
+
+
+def larger(x: Number, y: Number) -> Number:
+    """The larger of two; nan where either is."""
+    if isinstance(x, np.ndarray) or isinstance(y, np.ndarray):
+        return np.maximum(x, y)
+    return x if x > y or x != x else y  # noqa: PLR0124 - only nan differs from itself
+
+
+def _mp() -> Any:  # noqa: ANN401 - mpmath has no types
+    from mpmath import mp  # noqa: PLC0415 - only where many digits are needed
+
+    return mp
+
+
+def cross(u: Complex, v: Complex) -> Number:
+    """The cross product, positive when v lies to the left of u."""
+    return u.real * v.imag - u.imag * v.real
+
+
+def dot(u: Complex, v: Complex) -> Number:
+    """The scalar product."""
+    return u.real * v.real + u.imag * v.imag

@@ -1,0 +1,21 @@
+"""One variant of a mechanism's arrays, as Python's numbers or as numbers of many digits."""
+
+from collections.abc import Callable
+from typing import Any
+
+from reference.solving import Take
+
+
+def one_variant(index: int, number: Callable[[Any], Any] | None = None) -> Take:
+    """Takes the numbers of one variant out of arrays over variants (those of one entry hold for all).
+
+    Arguments: `number` makes another kind of number of a float or complex.
+    """
+
+    def take(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
+        if type(values) is int:
+            return values
+        one = values.item() if values.size == 1 else values.item(index)
+        return one if number is None else number(one)
+
+    return take

@@ -1,0 +1,90 @@
+"""Why a mechanism has no motion: which group, by how much, and what to do."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.errors import MechanismError
+from reference.mechanism import (
+    CrossSlider,
+    Dyad,
+    Group,
+    Mechanism,
+    Plate,
+    Slider,
+    SlottedLink,
+    Yoke,
+)
+from reference.numbers import cross
+from reference.picking import one_variant
+from reference.solving import Solution, rail_of, solve
+
+WHAT_IS_IN_LINE = {
+    Dyad: "its links are in line",
+    Slider: "its rod is perpendicular to the guide",
+    SlottedLink: "the pin is at the link's pivot, or nearest to it",
+    CrossSlider: "its guides are parallel",
+    Yoke: "slot and guide are parallel",
+}
+
+
+def reason(mechanism: Mechanism, broken: NDArray[np.bool_]) -> MechanismError:
+    """The error for the first of the broken variants, from the first group that fails there."""
+    first = int(np.argmax(broken))
+    where = f"({int(broken.sum())} of {broken.size} variant(s), the first at index {first})"
+    take = one_variant(first, _quiet)
+    groups = mechanism.groups
+    with np.errstate(all="ignore"):
+        for count, group in enumerate(groups):
+            before = solve(replace(mechanism, groups=groups[:count]), take)
+            after = solve(replace(mechanism, groups=groups[: count + 1]), take)
+            node = after.joints[group.node]
+            if not np.isfinite(node.position):
+                return _open(group, _gap(group, before), where)
+            if not np.isfinite(node.amplification * np.abs(node.acceleration + node.velocity)):
+                break
+        else:
+            group = min(groups, key=lambda one: float(after.transmission.get(one.node, 1.0)))
+    return _singular(group, where)
+
+
+def _quiet(number: complex) -> np.generic:
+    """NumPy's own scalar: it divides by zero without an error."""
+    one: np.generic = np.asarray(number)[()]  # type: ignore[assignment]
+    return one
+
+
+def _open(group: Group, gap_m: float, where: str) -> MechanismError:
+    return MechanismError(
+        "does_not_assemble",
+        f"the group of {group.node} does not assemble: its links miss each other by {max(gap_m, 0.0):.6g} m"
+        f" {where}; check the lengths, the crank angle and the side",
+    )
+
+
+def _singular(group: Group, where: str) -> MechanismError:
+    why = WHAT_IS_IN_LINE.get(type(group), "its base has no length")
+    return MechanismError(
+        "singular",
+        f"the velocities of the group of {group.node} are not determined: {why} {where};"
+        " choose another crank angle",
+    )
+
+
+def _gap(group: Group, before: Solution) -> float:
+    """By how much a group fails to close, metres; the group's pins are where `before` has them."""
+    at = {name: joint.position for name, joint in before.joints.items()}
+    take = before.take
+    match group:
+        case Dyad(pins=(p, q)) | Plate(base=(p, q)):
+            distance, first, second = abs(at[q] - at[p]), *map(take, group.lengths_m)
+            gap = max(distance - (first + second), abs(first - second) - distance)
+        case Slider(pin=pin):
+            rail = rail_of(before, group.guide)
+            gap = abs(cross(rail.along, at[pin] - rail.joint.position)) - take(group.length_m)
+        case SlottedLink(pin=pin, pivot=pivot):
+            gap = abs(take(group.offset_m)) - abs(at[pin] - at[pivot])
+        case _:
+            gap = 0.0
+    return float(gap)

@@ -1,0 +1,286 @@
+"""A mechanism solved group by group, on numbers of any kind (`reference.numbers`).
+
+The closed forms are those of `reference.groups`; here they meet the mechanism's joints and links.
+Nothing is checked here: what does not assemble is nan, `reference.motion` says so in words.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from reference import groups
+from reference.mechanism import (
+    Crank,
+    CrossSlider,
+    Driver,
+    Dyad,
+    FixedGuide,
+    Group,
+    Guide,
+    Mechanism,
+    Plate,
+    PointOnLine,
+    Slider,
+    SlotPoint,
+    SlottedLink,
+    Yoke,
+)
+from reference.numbers import Complex, Number, cross, dot, larger
+
+Take = Callable[[Any], Any]
+"""The number to calculate with, of one that the mechanism holds: the array, or one variant's."""
+
+
+def as_it_is(value: Any) -> Any:  # noqa: ANN401 - arrays of either kind
+    """All variants at once."""
+    return value
+
+
+@dataclass(slots=True)
+class Joint:
+    """Position (and what rounding took from it, where known), velocity, acceleration, SI.
+
+    `amplification` is by how much a rounding error of the data may have grown up to here.
+    """
+
+    position: Complex
+    velocity: Complex = 0j
+    acceleration: Complex = 0j
+    rest: Complex | None = None
+    amplification: Number = 1.0
+
+
+@dataclass(slots=True)
+class Solution:
+    """Joints and links of a mechanism in motion; each group's |sin| of its transmission angle."""
+
+    joints: dict[str, Joint] = field(default_factory=dict)
+    omega: dict[str, Number] = field(default_factory=dict)
+    epsilon: dict[str, Number] = field(default_factory=dict)
+    transmission: dict[str, Number] = field(default_factory=dict)
+    slots: dict[str, tuple[str, Complex]] = field(default_factory=dict)
+    """By a slotted link's node: its pivot, and the direction of its guide."""
+    take: Take = as_it_is
+
+
+@dataclass(frozen=True, slots=True)
+class Rail:
+    """A guide in motion: a point of it, its direction, and the rates of the link that carries it."""
+
+    joint: Joint
+    along: Complex
+    omega: Number
+    epsilon: Number
+    amplification: Number
+
+    def velocity(self, place: Complex) -> Complex:
+        """Of the link's point at a place."""
+        return self.joint.velocity + 1j * self.omega * (place - self.joint.position)
+
+    def acceleration(self, place: Complex) -> Complex:
+        """Of the link's point at a place."""
+        swing = groups.turned(place - self.joint.position, self.omega, self.epsilon)
+        return self.joint.acceleration + swing
+
+
+def solve(mechanism: Mechanism, take: Take = as_it_is, *, accelerations: bool = True) -> Solution:
+    """Solve a mechanism in the numbers that `take` gives; epsilon stays empty without accelerations."""
+    solution = Solution(take=take)
+    for name, place in mechanism.ground_m.items():
+        solution.joints[name] = Joint(take(place))
+    _drive(solution, mechanism.driver, accelerations)
+    for group in mechanism.groups:
+        _add(solution, group, accelerations)
+    return solution
+
+
+def _drive(solution: Solution, driver: Driver, accelerations: bool) -> None:
+    take = solution.take
+    match driver:
+        case Crank():
+            omega, epsilon = take(driver.omega), take(driver.epsilon)
+            axis, rest = groups.arm(take(driver.length_m), take(driver.angle_rad))
+            arm = axis + rest
+            foot, lost = groups.exact_sum(solution.joints[driver.pivot].position, axis)
+            place, lost_too = groups.exact_sum(foot, rest)
+            pin = Joint(place, 1j * omega * arm, rest=lost + lost_too)
+            if accelerations:
+                pin.acceleration = groups.turned(arm, omega, epsilon)
+                solution.epsilon[driver.link] = epsilon
+            solution.omega[driver.link] = omega
+        case _:
+            along = groups.heading(take(driver.guide_rad))
+            place = take(driver.guide_m) + along * take(driver.displacement_m)
+            pin = Joint(place, along * take(driver.speed))
+            if accelerations:
+                pin.acceleration = along * take(driver.acceleration)
+    solution.joints[driver.pin] = pin
+
+
+def _add(solution: Solution, group: Group, accelerations: bool) -> None:
+    match group:
+        case Dyad():
+            _add_dyad(solution, group, accelerations)
+        case Slider():
+            _add_slider(solution, group, accelerations)
+        case SlottedLink():
+            _add_slotted(solution, group, accelerations)
+        case CrossSlider(node=node, guides=(first, second)):
+            rails = (rail_of(solution, first), rail_of(solution, second))
+            _add_crossing(solution, node, rails, accelerations)
+            for guide, rail in zip(group.guides, rails, strict=True):
+                _add_coincident(solution, guide, rail, node)
+        case Yoke(node=node):
+            pin = solution.joints[group.pin]
+            slot = Rail(pin, groups.heading(solution.take(group.slot_rad)), 0.0, 0.0, pin.amplification)
+            _add_crossing(solution, node, (rail_of(solution, group.guide), slot), accelerations)
+        case SlotPoint():
+            _add_slot_point(solution, group, solution.take(group.local_m))
+        case Plate(base=base, shape=shape) | PointOnLine(base=base, ratio=shape):
+            _add_point(solution, group.node, base, solution.take(shape))
+
+
+def _between(p: Joint, q: Joint) -> Complex:
+    """From p to q, with what rounding took from either."""
+    d = q.position - p.position
+    if q.rest is not None:
+        d = d + q.rest
+    return d if p.rest is None else d - p.rest
+
+
+def _add_dyad(solution: Solution, group: Dyad, accelerations: bool) -> None:
+    p, q = (solution.joints[pin] for pin in group.pins)
+    link_p, link_q = group.links
+    take, d = solution.take, _between(p, q)
+    along, across, sine = groups.rrr_place(d, *map(take, (*group.lengths_m, group.side)))
+    corner = along + 1j * across
+    arm = d * corner
+    inverse = d.conjugate() / dot(d, d)
+    stretch = (q.velocity - p.velocity) * inverse
+    omega = groups.rrr_turns(along, across, stretch)
+    solution.omega[link_p], solution.omega[link_q] = omega
+    node = Joint(p.position + arm, p.velocity + 1j * omega[0] * arm)
+    if accelerations:
+        growth = (q.acceleration - p.acceleration) * inverse
+        epsilon = groups.rrr_accelerations(along, across, stretch, growth, omega)
+        solution.epsilon[link_p], solution.epsilon[link_q] = epsilon
+        node.acceleration = p.acceleration + groups.turned(arm, omega[0], epsilon[0])
+    node.amplification = larger(p.amplification, q.amplification) / (sine * sine)
+    solution.joints[group.node] = node
+    solution.transmission[group.node] = sine
+
+
+def _add_slider(solution: Solution, group: Slider, accelerations: bool) -> None:
+    pin, rail = solution.joints[group.pin], rail_of(solution, group.guide)
+    take, along, foot = solution.take, rail.along, rail.joint.position
+    height = cross(along, pin.position - foot)
+    lost = 0.0 if pin.rest is None else cross(along, pin.rest)
+    reach, height, sine = groups.rrp_place(height, lost, take(group.length_m), take(group.side))
+    place = foot + along * (dot(along, pin.position - foot) + reach)
+    under = rail.velocity(place)
+    omega, speed = groups.rrp_velocity(reach, height, along, pin.velocity - under)
+    solution.omega[group.link] = omega
+    node = Joint(place, under + along * speed)
+    if accelerations:
+        under = rail.acceleration(place)
+        coriolis = 2.0 * rail.omega * speed
+        epsilon, slide = groups.rrp_acceleration(
+            reach, height, along, pin.acceleration - under, omega, coriolis
+        )
+        solution.epsilon[group.link] = epsilon
+        node.acceleration = under + along * (slide + 1j * coriolis)
+    node.amplification = larger(pin.amplification, rail.amplification) / (sine * sine)
+    solution.joints[group.node] = node
+    solution.transmission[group.node] = sine
+    _add_coincident(solution, group.guide, rail, group.node)
+
+
+def _add_slotted(solution: Solution, group: SlottedLink, accelerations: bool) -> None:
+    pin, pivot = solution.joints[group.pin], solution.joints[group.pivot]
+    d, offset = _between(pivot, pin), solution.take(group.offset_m)
+    reach, along, sine = groups.rpr_place(d, offset, solution.take(group.side))
+    relative = pin.velocity - pivot.velocity
+    omega, speed = groups.rpr_velocity(reach, offset, along, relative)
+    solution.omega[group.link] = omega
+    node = Joint(pin.position, pivot.velocity + 1j * omega * d, rest=pin.rest)
+    if accelerations:
+        relative = pin.acceleration - pivot.acceleration
+        epsilon = groups.rpr_acceleration(reach, offset, along, relative, (omega, speed))
+        solution.epsilon[group.link] = epsilon
+        node.acceleration = pivot.acceleration + groups.turned(d, omega, epsilon)
+    nearness = abs(d) / (abs(d) + abs(pin.position) + abs(pivot.position))
+    node.amplification = larger(pin.amplification, pivot.amplification) / (sine * nearness) ** 2
+    solution.joints[group.node] = node
+    solution.transmission[group.node] = sine
+    solution.slots[group.node] = (group.pivot, along)
+    if group.foot is not None:
+        foot = SlotPoint(group.foot, group.node, group.link, np.asarray(0j))
+        _add_slot_point(solution, foot, 1j * offset)
+
+
+def _add_slot_point(solution: Solution, group: SlotPoint, local: Complex) -> None:
+    pivot_name, along = solution.slots[group.slotted]
+    pivot, arm, omega = solution.joints[pivot_name], along * local, solution.omega[group.link]
+    node = Joint(pivot.position + arm, pivot.velocity + 1j * omega * arm)
+    if group.link in solution.epsilon:
+        node.acceleration = pivot.acceleration + groups.turned(arm, omega, solution.epsilon[group.link])
+    node.amplification = solution.joints[group.slotted].amplification
+    solution.joints[group.node] = node
+
+
+def _add_point(solution: Solution, name: str, base: tuple[str, str], shape: Complex) -> None:
+    """A rigid link's point is the same combination of its base at every order."""
+    p, q = (solution.joints[joint] for joint in base)
+    solution.joints[name] = Joint(
+        p.position + shape * _between(p, q),
+        p.velocity + shape * (q.velocity - p.velocity),
+        p.acceleration + shape * (q.acceleration - p.acceleration),
+        amplification=larger(p.amplification, q.amplification) * (1.0 + abs(shape)),
+    )
+
+
+def rail_of(solution: Solution, guide: Guide) -> Rail:
+    """A guide as it moves; raises KeyError where its link is not placed yet."""
+    if isinstance(guide, FixedGuide):
+        through, angle = solution.take(guide.through_m), solution.take(guide.angle_rad)
+        return Rail(Joint(through), groups.heading(angle), 0.0, 0.0, 1.0)
+    g, h = (solution.joints[joint] for joint in guide.base)
+    d = _between(g, h)
+    amplification = larger(g.amplification, h.amplification)
+    epsilon = solution.epsilon.get(guide.link, 0.0)
+    return Rail(g, d / abs(d), solution.omega[guide.link], epsilon, amplification)
+
+
+def _add_coincident(solution: Solution, guide: Guide, rail: Rail, node: str) -> None:
+    """The point of a moving guide's link that lies under a slider."""
+    if isinstance(guide, FixedGuide):
+        return
+    over = solution.joints[node]
+    solution.joints[guide.coincident] = Joint(
+        over.position,
+        rail.velocity(over.position),
+        rail.acceleration(over.position),
+        amplification=over.amplification,
+    )
+
+
+def _add_crossing(solution: Solution, node: str, rails: tuple[Rail, Rail], accelerations: bool) -> None:
+    first, second = rails
+    across = second.joint.position - first.joint.position
+    reach, sine = groups.cross_place(across, first.along, second.along)
+    place = first.joint.position + first.along * reach
+    under = (first.velocity(place), second.velocity(place))
+    slides = groups.cross_slides(under[1] - under[0], first.along, second.along, sine)
+    joint = Joint(place, under[0] + first.along * slides[0])
+    if accelerations:
+        carried = tuple(
+            rail.acceleration(place) + 2j * rail.omega * slide * rail.along
+            for rail, slide in zip(rails, slides, strict=True)
+        )
+        slide, _ = groups.cross_slides(carried[1] - carried[0], first.along, second.along, sine)
+        joint.acceleration = carried[0] + first.along * slide
+    joint.amplification = larger(first.amplification, second.amplification) / (sine * sine)
+    solution.joints[node] = joint
+    solution.transmission[node] = abs(sine)
