@@ -255,7 +255,11 @@ class PlanVector(Document):
 
 
 class PlanDocument(Document):
-    """The exact plan of one variant; plan nodes relative to their pole, y up."""
+    """The exact plan of one variant; plan nodes relative to their pole, y up.
+
+    `centres_m`: instantaneous centres (``I3``, of two links ``I34``) and acceleration poles (``J3``) in
+    the mechanism's coordinates; null where a link does not turn.
+    """
 
     schema_version: Version = 1
     assignment: str
@@ -266,6 +270,7 @@ class PlanDocument(Document):
     vectors: dict[str, PlanVector]
     nodes_mm: dict[str, dict[str, tuple[float, float]]]
     angular: dict[str, float]
+    centres_m: dict[str, tuple[float, float] | None]
     conditioning: dict[str, float | dict[str, float]]
 
 

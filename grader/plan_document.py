@@ -6,7 +6,8 @@ import numpy as np
 
 from grader.documents import PlanDocument, PlanVector, ScalesDocument
 from reference.assignment import Assignment, Variant
-from reference.geometry import FloatArray
+from reference.centres import acceleration_poles, instantaneous_centres
+from reference.geometry import ComplexArray, FloatArray
 from reference.plan import Plan, conditioning
 
 UNITS = {"kv": "m/s", "ka": "m/s^2"}
@@ -59,8 +60,19 @@ def _document(assignment: Assignment, plan: Plan, index: int, told: Mapping[str,
             for figure in plan.construction.poles
         },
         angular={name: pick(values) for name, values in plan.rates.items()},
+        centres_m={name: _known_point(point(place)) for name, place in _centres(plan).items()},
         conditioning=_grouped({name: pick(values) for name, values in told.items()}),
     )
+
+
+def _centres(plan: Plan) -> dict[str, ComplexArray]:
+    found = (plan.mechanism, plan.construction, plan.motion)
+    poles = acceleration_poles(*found) if plan.motion.acceleration else {}
+    return {**instantaneous_centres(*found), **poles}
+
+
+def _known_point(place: tuple[float, float]) -> tuple[float, float] | None:
+    return place if np.isfinite(place).all() else None
 
 
 def _known(value: float) -> float | None:

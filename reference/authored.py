@@ -318,8 +318,18 @@ class GivenTable(Authored):
     unit: str = ""
 
 
+TRADITIONS: dict[str, dict[str, str]] = {
+    "o": {},
+    "p": {"o": "p", "o'": "π", "kL": "μl", "kv": "μv", "ka": "μa"},
+}
+"""What students call poles and scales: o, o', kL, kv, ka; or p, π, μl, μv, μa."""
+
+
 class AssignmentFile(Authored):
-    """An assignment: a mechanism, what varies, the scales, the sheets, the names students see."""
+    """An assignment: a mechanism, what varies, the scales, the sheets, the names students see.
+
+    `tradition` fills `names` with those of a school; names given one by one go before it.
+    """
 
     schema_version: Literal[1]
     id: Identifier
@@ -332,8 +342,17 @@ class AssignmentFile(Authored):
     plate_images: Literal["perpendiculars", "similarity"] = "perpendiculars"
     page: Annotated[list[PageTable], Field(min_length=1)]
     given: list[GivenTable] = []
+    tradition: Literal["o", "p"] = "o"
     names: dict[str, str] = {}
     assumptions: list[str] = []
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_names_of_its_tradition(cls, data: Any) -> Any:  # noqa: ANN401 - not yet validated
+        if not isinstance(data, dict) or not isinstance(data.get("names", {}), dict):
+            return data
+        of_the_school = TRADITIONS.get(str(data.get("tradition", "o")), {})
+        return {**data, "names": {**of_the_school, **data.get("names", {})}}
 
 
 def load(model: type[Model], path: Path) -> Model:
