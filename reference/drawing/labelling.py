@@ -199,14 +199,3 @@ def _overlaps(boxes: FloatArray, taken: FloatArray, clear: float) -> FloatArray:
     high = np.minimum(boxes[:, None, 2:], taken[:, 2:])
     depth = np.min(high - low, axis=2) + clear
     return np.where(depth > 0.0, depth + 1.0, 0.0)
-
-
-def together(nodes: dict[str, complex], touching: float) -> Iterator[tuple[tuple[str, ...], complex]]:
-    """Nodes gathered where they fall on one point."""
-    left = dict(nodes)
-    while left:
-        _, at = next(iter(left.items()))
-        same = tuple(node for node, place in left.items() if abs(place - at) <= touching)
-        yield same, at
-        for node in same:
-            del left[node]

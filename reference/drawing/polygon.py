@@ -6,14 +6,14 @@ import numpy as np
 
 from reference.canvas import CONSTRUCTION, Shape, Stroke
 from reference.drawing import symbols
-from reference.drawing.labelling import Wanted, place_labels, together
-from reference.drawing.sketch import captioned, joined
-from reference.drawing.subject import TOUCHING_MM, Figure, Part, Subject
+from reference.drawing.letters import Style, letters
+from reference.drawing.sketch import captioned
+from reference.drawing.subject import Figure, Part, Subject
 from reference.drawing.symbols import HAIR_MM, point
-from reference.steps import Step, TwoLines, View
+from reference.steps import Line, Step, TwoLines, View
 
 COLOURS = {"velocity_plan": "#1456a0", "acceleration_plan": "#a03014"}
-LETTER_MM, NORMAL_LETTER_MM = 4.2, 3.4
+LETTER_MM, SMALL_LETTER_MM = 4.2, 3.4
 OVERRUN_MM = 5.0
 """A construction line goes on past its foot and past the node that it finds."""
 ABSOLUTE_MM, RELATIVE_MM = 0.5, 0.3
@@ -26,8 +26,9 @@ def polygon(subject: Subject, figure: str) -> Figure:
     drawn = [*_lines(subject, figure, nodes), *_vectors(subject, figure, nodes)]
     pole = subject.plan.construction.poles[figure]
     drawn.append(Part(pole, symbols.marked_point(nodes[pole], colour)))
-    letters = _letters(subject, nodes, drawn, colour)
-    return captioned(subject, figure, (*drawn, *letters), colour)
+    style = Style(LETTER_MM, SMALL_LETTER_MM, colour, symbols.POINT_RADIUS_MM)
+    named = letters(subject, nodes, [part.shape for part in drawn], style)
+    return captioned(subject, figure, (*drawn, *named), colour)
 
 
 def _lines(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator[Part]:
@@ -39,9 +40,10 @@ def _lines(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator
 
 def construction_lines(step: Step, view: View, nodes: dict[str, complex]) -> Iterator[Shape]:
     """The lines that a node is found by, thin, going on a little at both ends."""
-    if not isinstance(step, TwoLines):
-        return
-    for line in (step.first, step.second):
+    lines = (step.first, step.second) if isinstance(step, TwoLines) else ()
+    for line in lines:
+        if not isinstance(line, Line):
+            continue
         foot, node = nodes[line.through], nodes[step.node]
         along = complex(line.along.at(view))
         if not np.isfinite(along):
@@ -60,14 +62,3 @@ def _vectors(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterat
         width = ABSOLUTE_MM if vector.tail == pole else RELATIVE_MM
         for shape in symbols.arrow(nodes[vector.tail], nodes[vector.head], width, colour):
             yield Part(vector.head, shape)
-
-
-def _letters(subject: Subject, nodes: dict[str, complex], drawn: list[Part], colour: str) -> Iterator[Part]:
-    middle = sum(nodes.values()) / len(nodes)
-    wanted = []
-    for same, at in together(nodes, TOUCHING_MM):
-        size = NORMAL_LETTER_MM if all(node.startswith("n_") for node in same) else LETTER_MM
-        wanted.append(Wanted(same[-1], point(at), joined(subject, same), size, colour, 0.6, at - middle))
-    for standing in place_labels(wanted, [part.shape for part in drawn]):
-        for shape in standing.shapes:
-            yield Part(standing.wanted.node, shape)

@@ -54,10 +54,14 @@ class Wording:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A shape of a figure and the node whose step draws it (none for what is there from the start)."""
+    """A shape of a figure, and the node whose step draws it (none for what is there from the start).
+
+    `until` is the node whose step puts another shape in its place: a letter to which one is added.
+    """
 
     node: str
     shape: Shape
+    until: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +73,8 @@ class Figure:
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
-        """All of it."""
-        return tuple(part.shape for part in self.parts)
+        """All of it, as it is in the end."""
+        return tuple(part.shape for part in self.parts if not part.until)
 
     @property
     def bounds(self) -> Bounds:
