@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from reference.assignment import Assignment
 from reference.canvas import INK, Bounds, Label, Shape, Stroke, moved
 from reference.drawing.layout import lay_out
-from reference.drawing.polygon import COLOURS as PLAN_COLOURS
 from reference.drawing.polygon import polygon
 from reference.drawing.sketch import sketch
-from reference.drawing.subject import Figure, Subject, Wording
+from reference.drawing.subject import PLAN_COLOURS, Figure, Subject, Wording
 from reference.drawing.tables import column
 from reference.plan import Plan
 
@@ -31,14 +30,22 @@ class Sheet:
 
 
 def reference_drawing(
-    assignment: Assignment, plan: Plan, index: int = 0, wording: Wording = ENGLISH
+    assignment: Assignment,
+    plan: Plan,
+    index: int = 0,
+    wording: Wording = ENGLISH,
+    *,
+    altitude: bool = False,
 ) -> list[Sheet]:
     """The drawing of one variant of a plan on A3, true to scale.
 
     All on one sheet where it fits, else on the sheets that the assignment asks for, else on as many as
     are needed. A figure that is too large even so at its scales is told in red on the drawing.
+
+    Arguments: `altitude` draws the right triangles of the normal components on the sketch; raises
+    CallError where the scales do not allow that.
     """
-    subject = Subject(assignment, plan, index, wording)
+    subject = Subject(assignment, plan, index, wording, altitude)
     figures = figures_of(subject)
     every = _sheet(subject, list(figures.values()))
     if every.fits:

@@ -179,7 +179,25 @@ class Coriolis:
         return np.asarray(2.0 * omega * speed / known["ka"])
 
 
-Length = Scaled | Normal | Coriolis
+@dataclass(frozen=True, slots=True)
+class Component:
+    """The drawn length of a vector between two nodes along a direction, with its sign."""
+
+    tail: str
+    head: str
+    along: "Direction"
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The vector's ends, and what the direction is read from."""
+        return (self.tail, self.head, *self.along.needs)
+
+    def at(self, view: View) -> FloatArray:
+        """Drawn millimetres."""
+        return geometry.dot(view.nodes[self.head] - view.nodes[self.tail], self.along.at(view))
+
+
+Length = Scaled | Normal | Coriolis | Component
 
 
 @dataclass(frozen=True, slots=True)

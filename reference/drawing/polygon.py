@@ -8,11 +8,10 @@ from reference.canvas import CONSTRUCTION, Shape, Stroke
 from reference.drawing import symbols
 from reference.drawing.letters import Style, letters
 from reference.drawing.sketch import captioned
-from reference.drawing.subject import Figure, Part, Subject
+from reference.drawing.subject import PLAN_COLOURS, Figure, Part, Subject
 from reference.drawing.symbols import HAIR_MM, point
 from reference.steps import Line, Step, TwoLines, View
 
-COLOURS = {"velocity_plan": "#1456a0", "acceleration_plan": "#a03014"}
 LETTER_MM, SMALL_LETTER_MM = 4.2, 3.4
 OVERRUN_MM = 5.0
 """A construction line goes on past its foot and past the node that it finds."""
@@ -22,7 +21,7 @@ ABSOLUTE_MM, RELATIVE_MM = 0.5, 0.3
 
 def polygon(subject: Subject, figure: str) -> Figure:
     """One plan of one variant."""
-    colour, nodes = COLOURS[figure], subject.nodes(figure)
+    colour, nodes = PLAN_COLOURS[figure], subject.nodes(figure)
     drawn = [*_lines(subject, figure, nodes), *_vectors(subject, figure, nodes)]
     pole = subject.plan.construction.poles[figure]
     drawn.append(Part(pole, symbols.marked_point(nodes[pole], colour)))
@@ -55,7 +54,7 @@ def construction_lines(step: Step, view: View, nodes: dict[str, complex]) -> Ite
 
 def _vectors(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator[Part]:
     """Each vector that is longer than nothing; of several along one line the longest undermost."""
-    pole, colour = subject.plan.construction.poles[figure], COLOURS[figure]
+    pole, colour = subject.plan.construction.poles[figure], PLAN_COLOURS[figure]
     for vector in subject.plan.construction.vectors_of(figure):
         if subject.is_zero(vector.name):
             continue

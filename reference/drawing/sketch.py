@@ -11,6 +11,7 @@ from reference.drawing.letters import Style, letters
 from reference.drawing.links import Bar, bars, blocks, hinged_on, unit
 from reference.drawing.subject import Figure, Part, Subject
 from reference.drawing.symbols import LINK_MM, point
+from reference.drawing.triangles import altitudes
 from reference.lettering import pieces_of
 from reference.mechanism import Crank, DrivenSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
 
@@ -34,9 +35,11 @@ CAPTION_GAP_MM, CAPTION_MM = 6.0, 3.5
 def sketch(subject: Subject) -> Figure:
     """The mechanism of one variant."""
     nodes = subject.nodes("mechanism")
-    drawn = [part for layer in _layers(subject, nodes) for part in layer]
+    thin = altitudes(subject, nodes)
+    layers = (_plates(subject, nodes), thin.lines, *_layers(subject, nodes), thin.vectors)
+    drawn = [part for layer in layers for part in layer]
     style = Style(LETTER_MM, SMALL_LETTER_MM, INK, symbols.JOINT_RADIUS_MM)
-    others = [*_link_numbers(subject, nodes), *_rate_letter(subject, nodes)]
+    others = [*_link_numbers(subject, nodes), *_rate_letter(subject, nodes), *thin.letters]
     named = letters(subject, nodes, [part.shape for part in drawn], style, others)
     return captioned(subject, "mechanism", (*drawn, *named), INK)
 
@@ -49,8 +52,7 @@ def captioned(subject: Subject, name: str, parts: tuple[Part, ...], colour: str)
 
 
 def _layers(subject: Subject, nodes: dict[str, complex]) -> Iterator[Iterator[Part]]:
-    """What lies undermost first."""
-    yield _plates(subject, nodes)
+    """Over plates and thin lines: what lies undermost first."""
     yield _guides(subject, nodes)
     yield (
         Part(bar.node, Stroke(point(bar.ends[0]), point(bar.ends[1]), LINK_MM))

@@ -8,6 +8,7 @@ import numpy as np
 
 from reference.canvas import PAPER, Area, Curve, Ring, Shape, Stroke
 from reference.drawing import symbols
+from reference.drawing.sketch import PLATE_FILL
 from reference.drawing.subject import Figure, Subject
 from reference.drawing.symbols import point
 from reference.steps import Along, ArcAndLine, Given, Similar, Step, TwoArcs, TwoLines
@@ -23,9 +24,10 @@ def stage(figure: Figure, earlier: Collection[str], node: str) -> tuple[Shape, .
     """The figure once a node's step is done, after the steps of the earlier nodes."""
     known = {*earlier, node}
     shown = [part for part in figure.parts if part.node in known and part.until not in known]
+    plates = [part.shape for part in shown if _is_light(part.shape)]
     before = [inked(part.shape, BEFORE) for part in shown if part.node != node]
     now = [_wider(inked(part.shape, NOW)) for part in shown if part.node == node]
-    return (*before, *now)
+    return (*plates, *(shape for shape in (*before, *now) if not _is_light(shape)))
 
 
 def grey(figure: Figure) -> tuple[Shape, ...]:
@@ -39,10 +41,14 @@ def inked(shape: Shape, colour: str) -> Shape:
         case Ring():
             return replace(shape, colour=colour, fill=PAPER if shape.fill == PAPER else colour)
         case Area():
-            light = shape.width > 0.0 or shape.fill.startswith("#e")
-            return replace(shape, colour=colour, fill=shape.fill if light else colour)
+            kept = _is_light(shape) or shape.fill == PAPER
+            return replace(shape, colour=colour, fill=shape.fill if kept else colour)
         case _:
             return replace(shape, colour=colour)
+
+
+def _is_light(shape: Shape) -> bool:
+    return isinstance(shape, Area) and shape.fill == PLATE_FILL
 
 
 def _wider(shape: Shape) -> Shape:

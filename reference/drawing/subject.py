@@ -15,6 +15,7 @@ from reference.steps import View
 SCALE_OF = {"mechanism": "kL", "velocity_plan": "kv", "acceleration_plan": "ka"}
 SCALE_UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}
 VECTOR_UNITS = {"kv": "m/s", "ka": "m/s²"}
+PLAN_COLOURS = {"velocity_plan": "#1456a0", "acceleration_plan": "#a03014"}
 TOUCHING_MM = 0.05
 """Nodes nearer than this are one point on paper."""
 
@@ -84,12 +85,13 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """The variant at an index of a plan's arrays."""
+    """The variant at an index of a plan's arrays; `altitude` draws the triangles of normal components."""
 
     assignment: Assignment
     plan: Plan
     index: int = 0
     wording: Wording = field(default_factory=Wording)
+    altitude: bool = False
 
     def one(self, values: FloatArray) -> float:
         """The variant's number, of an array over variants or of a number common to all."""
