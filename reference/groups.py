@@ -27,8 +27,8 @@ def arm(length: Number, angle: Number) -> tuple[Complex, Complex]:
     turns = nearest(angle * QUARTERS)
     rest = ((angle - turns * QUARTER_1) - turns * QUARTER_2) - turns * QUARTER_3
     half_sine, half_cosine = sine(0.5 * rest), cosine(0.5 * rest)
-    quarter = turns % 4.0
-    axis = (abs(quarter - 2.0) - 1.0) + 1j * (abs((quarter + 3.0) % 4.0 - 2.0) - 1.0)
+    quarter = turns - 4.0 * nearest(0.25 * turns)
+    axis = (1.0 - abs(quarter)) + 1j * (quarter * (2.0 - abs(quarter)))
     doubled = 2.0 * length * half_sine
     return length * axis, axis * (1j * (doubled * half_cosine) - doubled * half_sine)
 

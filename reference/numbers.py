@@ -1,4 +1,4 @@
-"""One arithmetic for four kinds of numbers: arrays, Python's own, many digits, and compiled ones.
+"""One arithmetic for four kinds of numbers: arrays, Python's own, many digits, and noted ones.
 
 The kernels of `reference.groups` are written once, with these few functions for what operators do
 not give. A root of a negative number is nan: the figure does not close there.
@@ -15,36 +15,78 @@ Complex = Any
 """complex, mpc, or an array of shape (N,) of complex numbers."""
 
 
+class Noted:
+    """A number that only notes what is done with it (`reference.program`), these functions included."""
+
+    __slots__ = ()
+
+    def root(self) -> Number:
+        """The square root."""
+        raise NotImplementedError
+
+    def sine(self) -> Number:
+        """The sine."""
+        raise NotImplementedError
+
+    def cosine(self) -> Number:
+        """The cosine."""
+        raise NotImplementedError
+
+    def nearest(self) -> Number:
+        """The nearest whole number."""
+        raise NotImplementedError
+
+    def larger(self, other: Number) -> Number:
+        """The larger of two."""
+        raise NotImplementedError
+
+
 def root(x: Number) -> Number:
     """The square root; nan below zero."""
     if isinstance(x, float):
         return math.sqrt(x) if x >= 0.0 else math.nan
     if isinstance(x, np.ndarray):
         return np.sqrt(x)
+    if isinstance(x, Noted):
+        return x.root()
     return x.sqrt() if x >= 0 else x * math.nan
 
 
 def sine(x: Number) -> Number:
     """The sine."""
-    return math.sin(x) if isinstance(x, float) else np.sin(x) if isinstance(x, np.ndarray) else _mp().sin(x)
+    if isinstance(x, float):
+        return math.sin(x)
+    if isinstance(x, np.ndarray):
+        return np.sin(x)
+    return x.sine() if isinstance(x, Noted) else _mp().sin(x)
 
 
 def cosine(x: Number) -> Number:
     """The cosine."""
-    return math.cos(x) if isinstance(x, float) else np.cos(x) if isinstance(x, np.ndarray) else _mp().cos(x)
+    if isinstance(x, float):
+        return math.cos(x)
+    if isinstance(x, np.ndarray):
+        return np.cos(x)
+    return x.cosine() if isinstance(x, Noted) else _mp().cos(x)
 
 
 def nearest(x: Number) -> Number:
     """The nearest whole number."""
+    if isinstance(x, float):
+        return float(round(x))
     if isinstance(x, np.ndarray):
         return np.rint(x)
-    return float(round(x)) if isinstance(x, float) else _mp().nint(x)
+    return x.nearest() if isinstance(x, Noted) else _mp().nint(x)
 
 
 def larger(x: Number, y: Number) -> Number:
     """The larger of two; nan where either is."""
     if isinstance(x, np.ndarray) or isinstance(y, np.ndarray):
         return np.maximum(x, y)
+    if isinstance(x, Noted):
+        return x.larger(y)
+    if isinstance(y, Noted):
+        return y.larger(x)
     return x if x > y or x != x else y  # noqa: PLR0124 - only nan differs from itself
 
 
