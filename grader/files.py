@@ -3,9 +3,10 @@
 import contextlib
 import os
 import secrets
+from collections.abc import Mapping
 from pathlib import Path
 
-from reference.errors import PlanmarkError
+from reference.errors import CallError, PlanmarkError
 
 
 class OutputError(PlanmarkError):
@@ -63,3 +64,39 @@ def _write_new(path: Path, content: bytes) -> None:
 def _forget(temporary: Path) -> None:
     with contextlib.suppress(OSError):
         temporary.unlink()
+
+
+def create_whole(files: Mapping[Path, str]) -> None:
+    """Create several text files, all of them or none, and never over what is there.
+
+    Raises CallError naming a file that is there already, OutputError with the system's reason.
+    """
+    taken = [path for path in files if path.exists()]
+    if taken:
+        raise _taken(taken[0])
+    created: list[Path] = []
+    try:
+        for path, text in files.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            # Exclusive: a file that appears meanwhile is not touched.
+            with path.open("xb") as file:
+                created.append(path)
+                file.write(text.encode("utf-8"))
+                file.flush()
+                os.fsync(file.fileno())
+    except BaseException as error:
+        for path in created:
+            _forget(path)
+        if isinstance(error, FileExistsError):
+            raise _taken(Path(str(error.filename))) from error
+        if isinstance(error, OSError):
+            raise OutputError(
+                "cannot_write",
+                f"{error.filename}: cannot be written ({error.strerror or error}); choose another place",
+            ) from error
+        raise
+
+
+def _taken(path: Path) -> CallError:
+    told = "is there already and is left as it is; choose another name, or remove it first"
+    return CallError("file_exists", f"{path}: {told}")

@@ -62,6 +62,28 @@ def lint(
 
 
 @app.command()
+def new(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="NAME.assignment.toml; mechanism and rubric go beside it.")
+    ],
+    like: Annotated[
+        str | None,
+        typer.Option("--like", help="Start from this assignment: a built-in name or a .toml file."),
+    ] = None,
+    mechanism: Annotated[
+        str | None,
+        typer.Option(
+            "--mechanism", help="Start from a four-bar (default), slider-crank, ...; the rubric is made."
+        ),
+    ] = None,
+) -> None:
+    """Write a commented assignment to start from: three files that lint and plan take as they are."""
+    from grader.cli.authoring import write_new
+
+    write_new(file, like, mechanism)
+
+
+@app.command()
 def schema(name: Annotated[str, typer.Argument(help="report, results, reading, measurements, ...")]) -> None:
     """The JSON Schema of a document or authored file."""
     import json
@@ -214,7 +236,8 @@ def bench(
     quick: Annotated[bool, typer.Option("--quick", help="A few sheets and cases only.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
     solver: Annotated[
-        bool, typer.Option("--solver", help="The solver only: speed, errors, stability beside other programs.")
+        bool,
+        typer.Option("--solver", help="The solver only: speed, errors, stability beside other programs."),
     ] = False,
 ) -> None:
     """Run time against error, on generated sheets with known truth."""

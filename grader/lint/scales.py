@@ -12,7 +12,7 @@ from grader.lint.room import Extents, PageRoom, growth, pages_of
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN
 from reference.assignment import Assignment, Scales
 from reference.geometry import FloatArray
-from reference.plan import Plan
+from reference.plan import ZERO_SHARE, Plan
 
 LENGTH_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 """Of 1 : 10^k. ISO 5455 has 1, 2, 5; GOST 2.302 and SR EN practice add 2.5."""
@@ -76,8 +76,10 @@ def _shortest_link_m(plan: Plan) -> FloatArray:
     """The shortest distance (m) that a direction of the plans is taken from, (N,)."""
     at = plan.motion.position
     links = {vector.link for vector in plan.construction.vectors.values() if vector.link}
-    lengths = [np.abs(at[head] - at[tail]) for tail, head in links if {tail, head} <= at.keys()]
     count = len(plan.variants)
+    known = [np.abs(at[head] - at[tail]) for tail, head in links if {tail, head} <= at.keys()]
+    # A slider lies on the point under it: that is no link.
+    lengths = [length for length in known if np.all(length > ZERO_SHARE * np.max(known))]
     return (
         np.min([np.broadcast_to(length, (count,)) for length in lengths], axis=0)
         if lengths

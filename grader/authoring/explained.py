@@ -1,0 +1,228 @@
+"""What each key of an authored file means, in a line: the comments of a new assignment.
+
+By table (the name of its model) and key. `example` is shown, commented out, where the key is not
+set: a key that nobody sees is a key that nobody uses.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key's meaning, and what may stand there."""
+
+    text: str
+    example: str = ""
+
+
+VERSION = Key("of this file's form")
+FILE_NAME = Key("letters, digits, . _ -; printed on answer sheets")
+NODE = Key("the joint that this group adds: a capital, then letters or digits; not O or N")
+NEW_LINK = Key("the new link's name")
+SAME_LINK = Key("the link that carries the point, and the joints of its base")
+
+TABLES = {
+    "Text": "What people read: English is required, ro and ru are optional.",
+    "MechanismFile": "A mechanism, without its variants. x right, y up; angles in degrees counter-clockwise"
+    " from +x. Wherever a number stands, a formula in quotes may stand, of the values in the assignment"
+    " file.",
+    "CrankTable": "The driven link.",
+    "DrivenSliderTable": "The driven link: a slider on a fixed guide, in place of a crank.",
+    "DyadTable": "RRR: two links that meet in a new joint, hinged at two known ones.",
+    "SliderTable": "RRP: a slider on a straight guide, with a rod to a known joint.",
+    "SlottedLinkTable": "RPR: a link that turns about a pivot; a block hinged at a joint slides along it.",
+    "CrossSliderTable": "PRP: a pin with two blocks, each on its guide, one at least on a moving link.",
+    "YokeTable": "RPP: a yoke on a fixed guide, driven by a block in its slot.",
+    "PlateTable": "plate: a third point of a link, by its distances from two joints of it.",
+    "PointOnLineTable": "point_on_line: a point on the line through two joints of a link.",
+    "PointTable": "point: a point of a link by coordinates, x from base[0] towards base[1], y to the left.",
+    "AssignmentFile": "An assignment: what students are told, what varies, the scales, the sheets.",
+    "VariantTable": "What differs between students.",
+    "ScalesTable": "The proposed scales: SI units per millimetre on paper, as formulas. They may use the"
+    " values above, crank_mm (drawn length of the crank), crank_m (its real length), omega, then kL, then"
+    " kv; where a slider drives, speed.",
+    "PageTable": "A sheet that students hand in.",
+    "GivenTable": "A datum told to the student, as label = value unit.",
+    "RubricFile": "A rubric: what is judged, for how many points, and how far off it may be.",
+    "ToleranceTable": "How far off full marks may be.",
+    "CriterionTable": "One for each thing judged: exactly one of vector, angular and scale.",
+}
+"""What each table is; said above its first one."""
+
+KEYS: dict[str, dict[str, Key]] = {
+    "Text": {"en": Key("English"), "ro": Key("Romanian"), "ru": Key("Russian")},
+    "MechanismFile": {
+        "schema_version": VERSION,
+        "id": Key("the mechanism's name"),
+        "title": Key("what people read"),
+        "length_unit": Key("m, cm or mm: of every length and coordinate in this file"),
+        "ground": Key("Fixed pivots: NAME = [x, y]."),
+        "crank": Key("a driven crank"),
+        "driven_slider": Key("or a driven slider"),
+        "group": Key("One entry for each further joint, in the order of assembly."),
+    },
+    "CrankTable": {
+        "link": Key("its name", '"1"'),
+        "pivot": Key("the ground pivot that it turns about"),
+        "pin": Key("the joint at its end"),
+        "length": Key("from pivot to pin"),
+        "angle_deg": Key("where it stands, counter-clockwise from +x"),
+        "omega": Key("rad/s, negative for clockwise", '"pi*n1_rpm/30"'),
+        "rpm": Key("in place of omega: rev/min, of the motor where there is a gear", '"n1_rpm"'),
+        "gear_ratio": Key("the crank turns at rpm / gear_ratio", "23.5"),
+        "epsilon": Key("angular acceleration, rad/s^2", "2"),
+    },
+    "DrivenSliderTable": {
+        "link": Key("its name", '"1"'),
+        "pin": Key("the joint on the slider"),
+        "guide": Key("its fixed guide: a point of it, and its direction"),
+        "displacement": Key("from the guide's point, along its direction"),
+        "speed": Key("in length_unit per second"),
+        "acceleration": Key("in length_unit per second squared", "0"),
+    },
+    "FixedGuideTable": {"through": Key("a point of the guide"), "angle_deg": Key("its direction")},
+    "GuideTable": {
+        "through": Key("a point of a fixed guide"),
+        "angle_deg": Key("its direction"),
+        "joints": Key("or, of a guide on a moving link: two joints of that link"),
+        "coincident": Key("and the name of the link's point under the slider, such as D5"),
+    },
+    "DyadTable": {
+        "type": Key("two hinged links"),
+        "node": NODE,
+        "pins": Key("two joints that are there already"),
+        "links": Key("names of the two new links, in the order of the pins"),
+        "lengths": Key("of the two links, in the order of the pins"),
+        "side": Key("left or right of the directed line from the first pin to the second"),
+    },
+    "SliderTable": {
+        "type": Key("a slider with a rod"),
+        "node": NODE,
+        "pin": Key("the joint at the rod's other end"),
+        "link": Key("the rod's name"),
+        "length": Key("of the rod"),
+        "guide": Key("a point of the guide and its direction; or joints and coincident, on a moving link"),
+        "side": Key("ahead or behind: where the slider is, seen from the pin along the guide's direction"),
+    },
+    "SlottedLinkTable": {
+        "type": Key("a turning guide"),
+        "node": Key("the link's point under the block's pin, such as B3 under B"),
+        "pin": Key("the joint that carries the block"),
+        "pivot": Key("the joint about which the link turns"),
+        "link": NEW_LINK,
+        "offset": Key("how far the pin is to the left of the parallel to the guide through the pivot", "0"),
+        "foot": Key("with an offset: the name of the guide's nearest point to the pivot", '"E"'),
+        "side": Key("ahead or behind: where the pin is, seen from the pivot along the guide", '"ahead"'),
+    },
+    "CrossSliderTable": {
+        "type": Key("two guides that cross"),
+        "node": NODE,
+        "guides": Key("the two guides, each fixed (through, angle_deg) or moving (joints, coincident)"),
+    },
+    "YokeTable": {
+        "type": Key("a slot on a slider"),
+        "node": Key("the yoke's point where slot and guide cross"),
+        "pin": Key("the joint that carries the block"),
+        "slot_deg": Key("direction of the slot"),
+        "guide": Key("the yoke's fixed guide: a point of it, and its direction"),
+    },
+    "PlateTable": {
+        "type": Key("a third point of a link"),
+        "node": NODE,
+        "base": Key("two joints of the link"),
+        "link": SAME_LINK,
+        "lengths": Key("distances from the two; in line with them, its image comes by similarity"),
+        "side": Key("left or right of the directed base", '"left"'),
+    },
+    "PointOnLineTable": {
+        "type": Key("a point in line with a link"),
+        "node": NODE,
+        "base": Key("two joints of the link"),
+        "link": SAME_LINK,
+        "ratio": Key("0 at the first, 1 at the second, 0.5 in the middle, 2 as far again"),
+    },
+    "PointTable": {
+        "type": Key("a point by coordinates"),
+        "node": NODE,
+        "base": Key("origin, and the joint on the x axis; of a slotted link its pivot and its node"),
+        "link": SAME_LINK,
+        "at": Key("x along the base, y to its left"),
+    },
+    "AssignmentFile": {
+        "schema_version": VERSION,
+        "id": FILE_NAME,
+        "title": Key("Title, as students read it."),
+        "task": Key("The task, as students read it."),
+        "mechanism": Key("NAME.mechanism.toml beside this file, or a built-in one"),
+        "rubric": Key("NAME.rubric.toml beside this file, or a built-in one"),
+        "variant": Key("what differs between students"),
+        "scales": Key("the proposed scales"),
+        "plate_images": Key(
+            "or similarity: how a plate's third point is drawn in the plans", '"perpendiculars"'
+        ),
+        "page": Key("the sheets"),
+        "given": Key("the data told"),
+        "names": Key("What students see instead of a name.", '{ "o" = "p", "kv" = "μv" }'),
+        "assumptions": Key(
+            "what the source leaves open and this file settles", '["B to the right of A -> O2"]'
+        ),
+    },
+    "VariantTable": {
+        "n": Key("the student's number"),
+        "position": Key("positions, where each student draws several", "{ from = 0, to = 7 }"),
+        "values": Key(
+            "Data that follow from them; each may use those above it. Functions: sqrt sin cos tan abs floor"
+            " ceil radians degrees (of radians, but for radians); pi; + - * / % **."
+        ),
+    },
+    "Range": {"first": Key("the first number"), "last": Key("the last number")},
+    "ScalesTable": {
+        "crank_mm": Key("how long the crank is drawn", "50"),
+        "kL": Key("m/mm"),
+        "kv": Key("(m/s)/mm"),
+        "ka": Key("(m/s^2)/mm; with kL ka = kv^2 normal components can be built by the right triangle"),
+        "bare_units": Key("the unit of a scale that students write as a bare number", '{ kv = "(m/s)/mm" }'),
+    },
+    "PageTable": {
+        "kind": Key("all, velocity or acceleration"),
+        "figures": Key("what is drawn on it: mechanism, velocity_plan, acceleration_plan"),
+    },
+    "GivenTable": {
+        "label": Key("as the student reads it"),
+        "value": Key("a number or a formula"),
+        "unit": Key("as the student reads it", '"cm"'),
+    },
+    "RubricFile": {
+        "schema_version": VERSION,
+        "id": Key("the rubric's name"),
+        "title": Key("what people read"),
+        "tolerance": Key("limits"),
+        "missing": Key("the verdict on what was not handed in: review, none or not_judged", '"review"'),
+        "least_confidence": Key("a reading less certain than this goes to a person", "0.9"),
+        "follow_through": Key("full marks for what follows rightly from an earlier mistake", "true"),
+        "least_followed_share": Key("no credit for what follows and is shorter than this share", "0.2"),
+        "criterion": Key("what is judged"),
+    },
+    "ToleranceTable": {
+        "length_mm": Key("a length may be off by so many millimetres,", "1.0"),
+        "length_relative": Key("or by this share of it, whichever is larger", "0.02"),
+        "direction_deg": Key("a direction by so many degrees,", "1.5"),
+        "across_mm": Key("or by so much across the vector's end, whichever is larger", "0.5"),
+        "least_mm": Key("vectors shorter than this are not judged on their direction", "3.0"),
+        "scale_relative": Key("for declared scales and angular quantities", "0.02"),
+        "certain_errors": Key("standard errors of a scan's reading within which a person decides", "1.645"),
+        "partial_factor": Key("up to so many times the limits", "2.0"),
+        "partial_share": Key("there are so many of the points", "0.5"),
+    },
+    "CriterionTable": {
+        "id": Key("its name in the report"),
+        "title": Key("what the student reads"),
+        "points": Key("for full marks"),
+        "vector": Key("a vector, such as v_B, v_BA, a_BA_n", '"v_B"'),
+        "angular": Key("or an angular quantity, such as omega_3", '"omega_3"'),
+        "scale": Key("or a scale: kL, kv, ka", '"kL"'),
+        "optional": Key("true: not judged where it was not handed in", "true"),
+        "direction": Key("false: only the length counts", "true"),
+        "tolerance": Key("limits for this criterion alone", "{ length_mm = 2.0 }"),
+    },
+}

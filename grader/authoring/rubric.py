@@ -1,0 +1,122 @@
+"""A rubric for a mechanism, made from its construction: a criterion for everything that is drawn."""
+
+from collections.abc import Iterator
+
+from grader.rubric import CriterionTable, RubricFile, ToleranceTable
+from reference.authored import Text
+from reference.construction import Construction, Vector
+from reference.derivation import construction_of
+from reference.mechanism import Mechanism, Plate
+
+POINTS = {"v": 2.0, "a": 2.0, "n": 2.0, "t": 1.0, "c": 2.0, "r": 1.0}
+"""Of a velocity, of an acceleration, and of its parts."""
+POINTS_OF_RESULT = 3.0
+"""Of velocity and acceleration of the joint that the mechanism is there for: the last one."""
+POINTS_OF_SCALE, POINTS_OF_RATE, POINTS_OF_WAY = 1.0, 0.5, 0.5
+"""Of a scale, of an angular quantity, and of a vector that is one way of two to draw a plate's image."""
+
+SCALES = {
+    "kL": ("Scale of lengths", "Scara lungimilor", "Масштаб длин"),
+    "kv": ("Scale of velocities", "Scara vitezelor", "Масштаб скоростей"),
+    "ka": ("Scale of accelerations", "Scara accelerațiilor", "Масштаб ускорений"),
+}
+RATES = {
+    "omega": (
+        "Angular velocity of link {}",
+        "Viteza unghiulară a elementului {}",
+        "Угловая скорость звена {}",
+    ),
+    "epsilon": (
+        "Angular acceleration of link {}",
+        "Accelerația unghiulară a elementului {}",
+        "Угловое ускорение звена {}",
+    ),
+}
+VECTORS = {
+    "v": ("Velocity of {}", "Viteza punctului {}", "Скорость точки {}"),
+    "a": ("Acceleration of {}", "Accelerația punctului {}", "Ускорение точки {}"),
+    "n": ("Normal acceleration of {}", "Accelerația normală a lui {}", "Нормальное ускорение {}"),
+    "t": ("Tangential acceleration of {}", "Accelerația tangențială a lui {}", "Касательное ускорение {}"),
+    "c": ("Coriolis acceleration of {}", "Accelerația Coriolis a lui {}", "Кориолисово ускорение {}"),
+    "r": (
+        "Acceleration along the guide of {}",
+        "Accelerația de-a lungul ghidajului a lui {}",
+        "Ускорение вдоль направляющей {}",
+    ),
+}
+RELATIVE = ("{} about {}", "{} față de {}", "{} относительно {}")
+RELATIVE_VELOCITY = ("Velocity of {}", "Viteza lui {}", "Скорость {}")
+
+
+def rubric_for(name: str, title: Text, mechanism: Mechanism, *, by_similarity: bool = False) -> RubricFile:
+    """A rubric that asks for the scales, every vector of both plans, and the angular quantities.
+
+    What students may leave out without harm is optional: declared scales, angular quantities, and
+    the vectors about both joints of a plate's base, whose third image may come by similarity.
+    """
+    construction = construction_of(mechanism, plate_by_similarity=by_similarity)
+    return RubricFile(
+        schema_version=1,
+        id=name,
+        title=title,
+        tolerance=ToleranceTable(
+            length_mm=1.0, length_relative=0.02, direction_deg=1.5, across_mm=0.5, least_mm=3.0
+        ),
+        criterion=list(_criteria(mechanism, construction)),
+    )
+
+
+def _criteria(mechanism: Mechanism, construction: Construction) -> Iterator[CriterionTable]:
+    for scale, words in SCALES.items():
+        yield CriterionTable(id=scale, scale=scale, points=POINTS_OF_SCALE, optional=True, title=_text(words))  # type: ignore[arg-type]
+    for figure, rate in (("velocity_plan", "omega"), ("acceleration_plan", "epsilon")):
+        for vector in construction.vectors_of(figure):
+            yield _of_vector(mechanism, vector)
+        for name in construction.rates:
+            kind, _, link = name.partition("_")
+            if kind == rate:
+                words = RATES[kind]
+                title = Text(en=words[0].format(link), ro=words[1].format(link), ru=words[2].format(link))
+                yield CriterionTable(id=name, angular=name, points=POINTS_OF_RATE, optional=True, title=title)
+
+
+def _of_vector(mechanism: Mechanism, vector: Vector) -> CriterionTable:
+    kind, about, *part = vector.name.split("_")
+    joint, other = joints_of(about, mechanism.joints)
+    plates = {group.node for group in mechanism.groups if isinstance(group, Plate)}
+    if joint in plates and other:
+        return CriterionTable(
+            id=vector.name,
+            vector=vector.name,
+            points=POINTS_OF_WAY,
+            optional=True,
+            title=_title(vector, mechanism),
+        )
+    is_result = not other and not part and joint == mechanism.joints[-1]
+    points = POINTS_OF_RESULT if is_result else POINTS[part[0] if part else kind]
+    return CriterionTable(id=vector.name, vector=vector.name, points=points, title=_title(vector, mechanism))
+
+
+def joints_of(about: str, joints: tuple[str, ...]) -> tuple[str, str]:
+    """The joints in a vector's name: ``BA`` is B about A, ``B3B`` is B3 about B, ``B`` is B alone."""
+    for joint in sorted(joints, key=len, reverse=True):
+        rest = about.removeprefix(joint)
+        if about.startswith(joint) and (not rest or rest in joints):
+            return joint, rest
+    return about, ""
+
+
+def _title(vector: Vector, mechanism: Mechanism) -> Text:
+    kind, about, *part = vector.name.split("_")
+    joint, other = joints_of(about, mechanism.joints)
+    words = VECTORS[part[0] if part else kind]
+    if not other:
+        return Text(en=words[0].format(joint), ro=words[1].format(joint), ru=words[2].format(joint))
+    if kind == "v":
+        words = RELATIVE_VELOCITY
+    whose = [form.format(joint, other) for form in RELATIVE]
+    return Text(en=words[0].format(whose[0]), ro=words[1].format(whose[1]), ru=words[2].format(whose[2]))
+
+
+def _text(words: tuple[str, str, str]) -> Text:
+    return Text(en=words[0], ro=words[1], ru=words[2])
