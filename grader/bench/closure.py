@@ -1,281 +1,315 @@
 """Motion in 50 digits by an independent road: the closure equations, differentiated.
 
-Positions solve the equations of the links' lengths, (N - P).(N - P) = l^2, by Newton's method;
-velocities and accelerations solve the same equations differentiated once and twice. Data are taken
-from the authored file in decimal, so that rounding of the data themselves counts as an error too.
-Nothing of `reference.motion` is used but its position, where Newton starts: it names the branch.
+Positions solve the equations of the links' lengths, (N - P).(N - P) = l^2, and of the guides by
+Newton's method; velocities and accelerations solve the same equations differentiated (`jets`).
+Nothing of the closed forms is used. A group's side is told by the place where Newton's method starts,
+which elementary geometry gives in as many digits.
+
+`exact_motion` takes the data from the authored file in decimal, so that rounding of the data
+themselves counts as an error too; `exact_motion_of` takes the doubles of a mechanism as exact.
 """
 
-import ast
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 from mpmath import mp, mpf
 
+from grader.bench.exact_data import DIGITS, ExactMechanism, LocalPoint, authored_exactly, exactly
+from grader.bench.jets import Equations, Jet, Pair, Point, cross, dot, fixed, follow, moving
 from reference.assignment import Assignment, Variant
-from reference.authored import (
-    DyadTable,
-    MechanismFile,
-    PlateTable,
-    PointOnLineTable,
-    SliderTable,
-)
 from reference.construction import Vector
-from reference.formula import Formula
-from reference.motion import move
+from reference.mechanism import (
+    Crank,
+    CrossSlider,
+    DrivenSlider,
+    Dyad,
+    FixedGuide,
+    Group,
+    Guide,
+    Mechanism,
+    MovingGuide,
+    Plate,
+    PointOnLine,
+    Slider,
+    SlotPoint,
+    SlottedLink,
+    Yoke,
+)
 
-DIGITS = 50
-CONVERGED = mpf(10) ** -45
-SAME_BRANCH = 1e-9
-"""How far, relative to the mechanism, the double-precision start may be from the root."""
-MAX_STEPS = 12
-
-Pair = tuple[Any, Any]
-"""x and y, 50 digits."""
-_UNITS = {"m": 1, "cm": 100, "mm": 1000}
+IN_LINE = mpf(10) ** -9
+"""Relative: a plate's lengths that sum up this nearly are meant to be in line."""
 
 
 @dataclass(slots=True)
 class ExactMotion:
-    """Positions, velocities and accelerations of the joints, SI, 50 digits."""
+    """The joints as moving points, SI, and how fast the links turn that carry a sliding point."""
 
-    position: dict[str, Pair] = field(default_factory=dict)
-    velocity: dict[str, Pair] = field(default_factory=dict)
-    acceleration: dict[str, Pair] = field(default_factory=dict)
+    points: dict[str, Point] = field(default_factory=dict)
+    axes: dict[str, Point] = field(default_factory=dict)
+    """By coincident point: a vector that is fixed in the link which carries it."""
+    slots: dict[str, str] = field(default_factory=dict)
+    """By a slotted link's node: its pivot."""
+
+    @property
+    def position(self) -> dict[str, Pair]:
+        """By joint, metres."""
+        return {joint: point.place for joint, point in self.points.items()}
+
+    @property
+    def velocity(self) -> dict[str, Pair]:
+        """By joint, m/s."""
+        return {joint: point.velocity for joint, point in self.points.items()}
+
+    @property
+    def acceleration(self) -> dict[str, Pair]:
+        """By joint, m/s^2."""
+        return {joint: point.acceleration for joint, point in self.points.items()}
 
     def vector(self, vector: Vector) -> complex:
         """A named vector of the plans, rounded once at the end."""
-        kind, _, part = vector.name.partition("_")
-        rates = self.velocity if kind == "v" else self.acceleration
+        kind, _, joint = vector.name.partition("_")
         if vector.link is None:
-            return _rounded(rates[part])
-        tail, head = vector.link
-        relative = _minus(rates[head], rates[tail])
-        if part.endswith(("_n", "_t")):
-            normal = self._normal(tail, head)
-            relative = normal if part.endswith("_n") else _minus(relative, normal)
-        return _rounded(relative)
+            point = self.points[joint]
+            return rounded(point.velocity if kind == "v" else point.acceleration)
+        with mp.workdps(DIGITS):
+            tail, head = vector.link
+            between = self.points[head] - self.points[tail]
+            if kind == "v":
+                return rounded(between.velocity)
+            return rounded(self._share(between, vector))
+
+    def _share(self, between: Point, vector: Vector) -> Pair:
+        """The acceleration of a point about another, or its part along or across the link or guide."""
+        whole = between.acceleration
+        match vector.part:
+            case "":
+                return whole
+            case "n" | "t":
+                speed2, length2 = _square(between.velocity), _square(between.place)
+                taken = _scaled(between.place, -speed2 / length2)
+            case _:
+                turn = 2 * self._carried(vector)
+                taken = -turn * between.velocity[1], turn * between.velocity[0]
+        rest = whole[0] - taken[0], whole[1] - taken[1]
+        return taken if vector.part in "nc" else rest
+
+    def _carried(self, vector: Vector) -> Any:  # noqa: ANN401 - mpf has no types
+        """The angular velocity of the link that carries the vector's coincident point."""
+        joints = reversed(vector.link or ())
+        return next(turning(self.axes[joint])[0] for joint in joints if joint in self.axes)
 
     def rate(self, vector: Vector) -> float:
         """The angular velocity or acceleration of the link that a vector turns."""
         tail, head = vector.link or ("", "")
-        rates = self.velocity if vector.name.startswith("v") else self.acceleration
-        arm = _minus(self.position[head], self.position[tail])
-        return float(_cross(arm, _minus(rates[head], rates[tail])) / _dot(arm, arm))
-
-    def _normal(self, tail: str, head: str) -> Pair:
-        arm = _minus(self.position[head], self.position[tail])
-        relative = _minus(self.velocity[head], self.velocity[tail])
-        share = -_dot(relative, relative) / _dot(arm, arm)
-        return arm[0] * share, arm[1] * share
-
-
-@dataclass(slots=True)
-class _Row:
-    """One equation of a node: its gradient, its residual, and what its derivatives ask for."""
-
-    gradient: Pair
-    residual: Any
-    velocity: Any
-    acceleration: Any = 0
+        with mp.workdps(DIGITS):
+            omega, epsilon = turning(self.points[head] - self.points[tail])
+        return float(omega if vector.name.startswith("v") else epsilon)
 
 
 def exact_motion(assignment: Assignment, variant: Variant) -> ExactMotion:
-    """The motion of one variant in 50 digits.
+    """The motion of one variant, its data as written in the authored file.
 
-    Raises ArithmeticError where Newton's method does not converge to the branch of the closed form.
+    Raises ArithmeticError where it does not assemble.
     """
-    values = _values(assignment, variant)
-    start = move(assignment.mechanism([variant]), accelerations=False).position
-    places = {joint: (mpf(float(z[0].real)), mpf(float(z[0].imag))) for joint, z in start.items()}
     with mp.workdps(DIGITS):
-        return _solve(assignment.mechanism_file, values, places)
+        return _solve(authored_exactly(assignment, variant))
 
 
-def _values(assignment: Assignment, variant: Variant) -> dict[str, Any]:
-    known: dict[str, Any] = {
-        name: mpf(number)
-        for name, number in (("n", variant.n), ("position", variant.position))
-        if number is not None
-    }
+def exact_motion_of(mechanism: Mechanism, index: int = 0) -> ExactMotion:
+    """The motion of one variant of a mechanism, its doubles taken as exact.
+
+    Raises ArithmeticError where it does not assemble.
+    """
     with mp.workdps(DIGITS):
-        for name, formula in assignment.file.variant.values.items():
-            known[name] = _number(formula.tree, known)
-    return known
+        return _solve(exactly(mechanism, index))
 
 
-def _solve(file: MechanismFile, values: Mapping[str, Any], start: Mapping[str, Pair]) -> ExactMotion:
+def _solve(mechanism: ExactMechanism) -> ExactMotion:
     motion = ExactMotion()
-    unit = _UNITS[file.length_unit]
-
-    def number(formula: Formula) -> Any:  # noqa: ANN401 - mpf has no types
-        return _number(formula.tree, values)
-
-    for joint, (x, y) in file.ground.items():
-        motion.position[joint] = number(x) / unit, number(y) / unit
-        motion.velocity[joint] = motion.acceleration[joint] = (mpf(0), mpf(0))
-    _drive(motion, file, values)
-    for group in file.group:
-        _assemble(motion, group, number, unit, start[group.node])
+    for joint, place in mechanism.ground_m.items():
+        motion.points[joint] = fixed(_pair(place))
+    motion.points[mechanism.driver.pin] = _driven(motion, mechanism.driver)
+    for group in mechanism.groups:
+        _assemble(motion, group)
     return motion
 
 
-def _drive(motion: ExactMotion, file: MechanismFile, values: Mapping[str, Any]) -> None:
-    crank = file.crank
-    length = _number(crank.length.tree, values) / _UNITS[file.length_unit]
-    angle = _number(crank.angle_deg.tree, values) * mp.pi / 180
-    omega = _number(crank.omega.tree, values)
-    epsilon = mpf(0) if crank.epsilon is None else _number(crank.epsilon.tree, values)
-    x, y = length * mp.cos(angle), length * mp.sin(angle)
-    x0, y0 = motion.position[crank.pivot]
-    motion.position[crank.pin] = x0 + x, y0 + y
-    motion.velocity[crank.pin] = -omega * y, omega * x
-    motion.acceleration[crank.pin] = -epsilon * y - omega**2 * x, epsilon * x - omega**2 * y
+def _driven(motion: ExactMotion, driver: Crank | DrivenSlider) -> Point:
+    if isinstance(driver, DrivenSlider):
+        along = mp.cos(driver.guide_rad), mp.sin(driver.guide_rad)
+        path = Jet(driver.displacement_m, driver.speed, driver.acceleration)
+        return fixed(_pair(driver.guide_m)) + Point(Jet(along[0]) * path, Jet(along[1]) * path)
+    length, omega, epsilon = driver.length_m, driver.omega, driver.epsilon
+    x, y = length * mp.cos(driver.angle_rad), length * mp.sin(driver.angle_rad)
+    arm = moving((x, y), (-omega * y, omega * x), (-epsilon * y - omega**2 * x, epsilon * x - omega**2 * y))
+    return motion.points[driver.pivot] + arm
 
 
-def _assemble(motion: ExactMotion, group: Any, number: Any, unit: int, start: Pair) -> None:  # noqa: ANN401
-    """Newton for the node's place, then the differentiated equations for its rates."""
-    node, place = group.node, start
-    motion.velocity[node] = motion.acceleration[node] = (mpf(0), mpf(0))
-    for _ in range(MAX_STEPS):
-        motion.position[node] = place
-        first, second = _rows(motion, group, number, unit)
-        step = _solve_2x2(first, second, -first.residual, -second.residual)
-        place = place[0] + step[0], place[1] + step[1]
-        if mp.hypot(*step) < CONVERGED:
-            break
-    else:
-        raise ArithmeticError(f"Newton's method does not converge at {node}")
-    size = max(mp.hypot(*_minus(place, other)) for other in motion.position.values())
-    if mp.hypot(*_minus(place, start)) > SAME_BRANCH * max(size, mpf(1) / unit):
-        raise ArithmeticError(f"{node} converged to another branch")
-    motion.position[node] = place
-    first, second = _rows(motion, group, number, unit)
-    motion.velocity[node] = _solve_2x2(first, second, first.velocity, second.velocity)
-    first, second = _rows(motion, group, number, unit)
-    motion.acceleration[node] = _solve_2x2(first, second, first.acceleration, second.acceleration)
-
-
-def _rows(motion: ExactMotion, group: Any, number: Any, unit: int) -> tuple[_Row, _Row]:  # noqa: ANN401
+def _assemble(motion: ExactMotion, group: Group | LocalPoint) -> None:
+    at = motion.points
     match group:
-        case DyadTable(pins=pins):
-            lengths = [number(length) / unit for length in group.lengths]
-            return _link(motion, group.node, pins[0], lengths[0]), _link(
-                motion, group.node, pins[1], lengths[1]
-            )
-        case PlateTable(base=base):
-            lengths = [number(length) / unit for length in group.lengths]
-            ratio = _ratio_in_line(motion, base, lengths)
+        case (
+            Dyad(pins=(p, q), lengths_m=lengths, side=side) | Plate(base=(p, q), lengths_m=lengths, side=side)
+        ):
+            ratio = _ratio_in_line(motion, group) if isinstance(group, Plate) else None
             if ratio is not None:
-                return _divided(motion, group.node, base, ratio)
-            return _link(motion, group.node, base[0], lengths[0]), _link(
-                motion, group.node, base[1], lengths[1]
-            )
-        case PointOnLineTable(base=base):
-            return _divided(motion, group.node, base, number(group.ratio))
-        case SliderTable(pin=pin):
-            rod = _link(motion, group.node, pin, number(group.length) / unit)
-            return rod, _guided(motion, group, number, unit)
-    raise AssertionError(f"an unknown group {group!r}")
+                at[group.node] = at[p] + (at[q] - at[p]).times((ratio, mpf(0)))
+                return
+            start = _two_arcs(at[p].place, lengths[0], at[q].place, lengths[1], side)
+            at[group.node] = _follow(motion, _both(_link(at[p], lengths[0]), _link(at[q], lengths[1])), start)
+        case PointOnLine(base=(p, q)):
+            at[group.node] = at[p] + (at[q] - at[p]).times((group.ratio, mpf(0)))
+        case LocalPoint(base=(p, q)):
+            axis = at[q] - at[p]
+            at[group.node] = at[p] + axis.times(_scaled(group.at, 1 / mp.hypot(*axis.place)))
+        case Slider():
+            _slide(motion, group)
+        case CrossSlider(guides=(first, second)):
+            lines = _both(_on(_line(motion, first)), _on(_line(motion, second)))
+            at[group.node] = _follow(motion, lines, _line(motion, first)[0].place)
+        case Yoke():
+            slot = at[group.pin], _unit(group.slot_rad)
+            lines = _both(_on(slot), _on(_line(motion, group.guide)))
+            at[group.node] = _follow(motion, lines, at[group.pin].place)
+            motion.axes[group.node] = slot[1]
+        case SlottedLink():
+            _turn_slot(motion, group)
+        case SlotPoint():
+            axis = motion.axes[group.slotted].times(_pair(group.local_m))
+            at[group.node] = at[motion.slots[group.slotted]] + axis
+    _carry(motion, group)
 
 
-def _link(motion: ExactMotion, node: str, pin: str, length: Any) -> _Row:  # noqa: ANN401
-    """u.u = l^2 with u = N - P; u.(v_N - v_P) = 0; u.(a_N - a_P) = -(v_N - v_P).(v_N - v_P)."""
-    arm = _minus(motion.position[node], motion.position[pin])
-    relative = _minus(motion.velocity[node], motion.velocity[pin])
-    return _Row(
-        arm,
-        (_dot(arm, arm) - length**2) / 2,
-        _dot(arm, motion.velocity[pin]),
-        _dot(arm, motion.acceleration[pin]) - _dot(relative, relative),
-    )
+def _slide(motion: ExactMotion, group: Slider) -> None:
+    pin = motion.points[group.pin]
+    foot, along = _line(motion, group.guide)
+    u = _scaled(along.place, 1 / mp.hypot(*along.place))
+    to_pin = (pin - foot).place
+    height = u[0] * to_pin[1] - u[1] * to_pin[0]
+    half = _root(group.length_m**2 - height**2)
+    reach = u[0] * to_pin[0] + u[1] * to_pin[1] + group.side * half
+    start = foot.place[0] + reach * u[0], foot.place[1] + reach * u[1]
+    both = _both(_link(pin, group.length_m), _on((foot, along)))
+    motion.points[group.node] = _follow(motion, both, start)
 
 
-def _guided(motion: ExactMotion, group: SliderTable, number: Any, unit: int) -> _Row:  # noqa: ANN401
-    angle = number(group.guide.angle_deg) * mp.pi / 180
-    across = -mp.sin(angle), mp.cos(angle)
-    through = number(group.guide.through[0]) / unit, number(group.guide.through[1]) / unit
-    return _Row(across, _dot(across, _minus(motion.position[group.node], through)), mpf(0), mpf(0))
+def _turn_slot(motion: ExactMotion, group: SlottedLink) -> None:
+    """Unknown is the guide's direction: |e|^2 = 1, e x (P - Q) = offset."""
+    pivot, pin = motion.points[group.pivot], motion.points[group.pin]
+    arm = pin - pivot
+    length2 = _square(arm.place)
+    reach = group.side * _root(length2 - group.offset_m**2)
+
+    def equations(e: Point) -> tuple[Jet, Jet]:
+        return dot(e, e) - Jet(mpf(1)), cross(e, arm) - Jet(group.offset_m)
+
+    x, y = arm.place
+    start = (x * reach + y * group.offset_m) / length2, (y * reach - x * group.offset_m) / length2
+    axis = follow(equations, start, mpf(1))
+    motion.points[group.node] = pivot + axis.times((reach, group.offset_m))
+    motion.axes[group.node] = axis
+    if group.foot is not None:
+        motion.points[group.foot] = pivot + axis.times((mpf(0), group.offset_m))
+    motion.slots[group.node] = group.pivot
 
 
-def _divided(motion: ExactMotion, node: str, base: list[str], ratio: Any) -> tuple[_Row, _Row]:  # noqa: ANN401
-    """N = (1 - t) P + t Q, and so for both derivatives."""
-    told = []
-    for rates in (motion.position, motion.velocity, motion.acceleration):
-        (px, py), (qx, qy) = rates[base[0]], rates[base[1]]
-        told.append((px + ratio * (qx - px), py + ratio * (qy - py)))
-    here = motion.position[node]
-    return (
-        _Row((mpf(1), mpf(0)), here[0] - told[0][0], told[1][0], told[2][0]),
-        _Row((mpf(0), mpf(1)), here[1] - told[0][1], told[1][1], told[2][1]),
-    )
+def _carry(motion: ExactMotion, group: Group | LocalPoint) -> None:
+    """The points of moving guides' links that lie under the group's node at this instant."""
+    guides = group.guides if isinstance(group, CrossSlider) else (getattr(group, "guide", None),)
+    for guide in guides:
+        if isinstance(guide, MovingGuide):
+            origin, axis = _line(motion, guide)
+            length2 = _square(axis.place)
+            between = (motion.points[group.node] - origin).place
+            ratio = (between[0] * axis.place[0] + between[1] * axis.place[1]) / length2
+            motion.points[guide.coincident] = origin + axis.times((ratio, mpf(0)))
+            motion.axes[guide.coincident] = axis
 
 
-def _ratio_in_line(motion: ExactMotion, base: list[str], lengths: list[Any]) -> Any:  # noqa: ANN401
+def _line(motion: ExactMotion, guide: Guide) -> tuple[Point, Point]:
+    """A point of a guide and a vector along it, both as they move."""
+    if isinstance(guide, FixedGuide):
+        return fixed(_pair(guide.through_m)), _unit(guide.angle_rad)
+    first, second = (motion.points[joint] for joint in guide.base)
+    return first, second - first
+
+
+def _unit(angle: Any) -> Point:  # noqa: ANN401
+    return fixed((mp.cos(angle), mp.sin(angle)))
+
+
+Equation = Callable[[Point], Jet]
+
+
+def _link(pin: Point, length: Any) -> Equation:  # noqa: ANN401
+    """(N - P).(N - P) = l^2."""
+    return lambda node: dot(node - pin, node - pin) - Jet(length**2)
+
+
+def _on(line: tuple[Point, Point]) -> Equation:
+    """The node on a line: u x (N - G) = 0."""
+    through, along = line
+    return lambda node: cross(along, node - through)
+
+
+def _both(first: Equation, second: Equation) -> Equations:
+    return lambda node: (first(node), second(node))
+
+
+def _follow(motion: ExactMotion, equations: Equations, start: Pair) -> Point:
+    size = max(mp.hypot(*point.place) for point in motion.points.values())
+    return follow(equations, start, size)
+
+
+def _two_arcs(p: Pair, first: Any, q: Pair, second: Any, side: Any) -> Pair:  # noqa: ANN401
+    """A triangle's third corner, plainly, by the law of cosines."""
+    x, y = q[0] - p[0], q[1] - p[1]
+    square = x * x + y * y
+    along = (square + first**2 - second**2) / (2 * square)
+    across = side * _root(first**2 / square - along**2)
+    return p[0] + along * x - across * y, p[1] + along * y + across * x
+
+
+def _ratio_in_line(motion: ExactMotion, plate: Plate) -> Any:  # noqa: ANN401
     """Where a flat plate's point divides its base; None for a plate that is a triangle."""
-    span = mp.hypot(*_minus(motion.position[base[1]], motion.position[base[0]]))
-    first, second = lengths
+    span = mp.hypot(*(motion.points[plate.base[1]] - motion.points[plate.base[0]]).place)
+    first, second = plate.lengths_m
     for gap, ratio in (
         (span - first - second, first / span),
         (first - span - second, first / span),
         (second - span - first, -first / span),
     ):
-        if abs(gap) < CONVERGED ** mpf("0.5") * span:
+        if abs(gap) < IN_LINE * span:
             return ratio
     return None
 
 
-def _solve_2x2(first: _Row, second: _Row, p: Any, q: Any) -> Pair:  # noqa: ANN401
-    (a, b), (c, d) = first.gradient, second.gradient
-    area = a * d - b * c
-    return (p * d - b * q) / area, (a * q - c * p) / area
+def turning(arm: Point) -> Pair:
+    """The angular velocity and acceleration of a rigid link from a vector that is fixed in it."""
+    (x, y), (vx, vy), (ax, ay) = arm.place, arm.velocity, arm.acceleration
+    square = x * x + y * y
+    return (x * vy - y * vx) / square, (x * ay - y * ax) / square
 
 
-def _number(node: ast.expr, values: Mapping[str, Any]) -> Any:  # noqa: ANN401
-    """A formula of an authored file in 50 digits; decimals are taken as they are written."""
-    match node:
-        case ast.Constant(value=value):
-            return mpf(repr(value))
-        case ast.Name(id="pi"):
-            return +mp.pi
-        case ast.Name(id=name):
-            return values[name]
-        case ast.UnaryOp(op=operator, operand=operand):
-            inner = _number(operand, values)
-            return -inner if isinstance(operator, ast.USub) else inner
-        case ast.Call(func=ast.Name(id=function), args=[argument]):
-            functions = {"abs": mp.fabs}
-            return functions.get(function, getattr(mp, function))(_number(argument, values))
-        case ast.BinOp(left=left, op=operator, right=right):
-            x, y = _number(left, values), _number(right, values)
-            match operator:
-                case ast.Add():
-                    return x + y
-                case ast.Sub():
-                    return x - y
-                case ast.Mult():
-                    return x * y
-                case ast.Div():
-                    return x / y
-                case ast.Mod():
-                    return x % y
-                case ast.Pow():
-                    return x**y
-    raise AssertionError(f"an unchecked node {node!r}")
-
-
-def _minus(p: Pair, q: Pair) -> Pair:
-    return p[0] - q[0], p[1] - q[1]
-
-
-def _dot(p: Pair, q: Pair) -> Any:  # noqa: ANN401
-    return p[0] * q[0] + p[1] * q[1]
-
-
-def _cross(p: Pair, q: Pair) -> Any:  # noqa: ANN401
-    return p[0] * q[1] - p[1] * q[0]
-
-
-def _rounded(pair: Pair) -> complex:
+def rounded(pair: Pair) -> complex:
+    """The nearest doubles."""
     return complex(float(pair[0]), float(pair[1]))
+
+
+def _pair(number: Any) -> Pair:  # noqa: ANN401
+    return mp.re(number), mp.im(number)
+
+
+def _scaled(pair: Pair, factor: Any) -> Pair:  # noqa: ANN401
+    return pair[0] * factor, pair[1] * factor
+
+
+def _root(x: Any) -> Any:  # noqa: ANN401
+    if x < 0:
+        raise ArithmeticError("a group does not assemble")
+    return mp.sqrt(x)
+
+
+def _square(pair: Pair) -> Any:  # noqa: ANN401
+    return pair[0] ** 2 + pair[1] ** 2

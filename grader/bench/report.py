@@ -9,8 +9,9 @@ import numpy as np
 
 from grader.bench.reading import STAGES, ReadingRow
 from grader.bench.solver import SolverFigures
+from grader.bench.tables import solver_tables
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +19,7 @@ class Report:
     """All that was measured, and where."""
 
     solver: SolverFigures
-    reading: tuple[ReadingRow, ...]
+    reading: tuple[ReadingRow, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """One JSON object."""
@@ -35,19 +36,18 @@ class Report:
 
     def as_text(self) -> str:
         """Tables that read well in a terminal and in Markdown."""
-        return "\n".join(
-            [
-                *_table("Solver: median time per variant (pump)", *_times(self.solver)),
-                *_table("Solver: largest error, relative to the plan's size", *_errors(self.solver)),
-                *_table(
+        tables = list(solver_tables(self.solver))
+        if self.reading:
+            tables.append(
+                (
                     "Reading: median milliseconds per page, and pages not registered rightly",
                     *_stages(self.reading),
-                ),
-                *_table(
-                    "Reading: error of nodes, and what became of the vectors drawn", *_vectors(self.reading)
-                ),
-            ]
-        )
+                )
+            )
+            tables.append(
+                ("Reading: error of nodes, and what became of the vectors drawn", *_vectors(self.reading))
+            )
+        return "\n".join(line for table in tables for line in _table(*table))
 
 
 def _table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
@@ -56,27 +56,6 @@ def _table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> I
     for row in (heads, ["-" * width for width in widths], *rows):
         yield "| " + " | ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) + " |"
     yield ""
-
-
-def _times(solver: SolverFigures) -> tuple[list[str], list[list[str]]]:
-    rows = [
-        [str(row.variants), f"{row.closed_form_us:.3g}", f"{row.construction_us:.3g}"] for row in solver.times
-    ]
-    return ["variants at once", "closed form, us", "construction, us"], rows
-
-
-def _errors(solver: SolverFigures) -> tuple[list[str], list[list[str]]]:
-    rows = [
-        [
-            row.assignment,
-            str(row.variants),
-            f"{row.velocity:.1e}",
-            f"{row.acceleration:.1e}",
-            f"{row.construction:.1e}",
-        ]
-        for row in solver.errors
-    ]
-    return ["assignment", "variants", "velocities", "accelerations", "construction - closed form"], rows
 
 
 def _stages(reading: Sequence[ReadingRow]) -> tuple[list[str], list[list[str]]]:

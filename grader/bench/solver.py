@@ -1,35 +1,25 @@
-"""The solver's run time per variant, and its error against 50-digit arithmetic."""
+"""All that is measured of the solver: speed, errors, stability near singular positions, branches."""
 
-import statistics
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
-from reference.assembly import build_mechanism
+from grader.bench.branches import BranchRow, count_branches
+from grader.bench.closure import exact_motion
+from grader.bench.singular import KINDS
+from grader.bench.speed import SpeedRow, measure_speed, speed_rows
+from grader.bench.stability import (
+    DISTANCES,
+    DISTANCES_QUICK,
+    StabilityRow,
+    installed_peers,
+    measure_stability,
+)
 from reference.assignment import Assignment, built_in, load_assignment
 from reference.construction import evaluate
-from reference.derivation import construction_of, parameters_of
-from reference.geometry import FloatArray
-from reference.mechanism import Mechanism
-from reference.motion import move
 from reference.plan import exact_plan
-
-BATCHES = (1, 30, 10_000)
-REPEATS = 21
-LEAST_RUN_S = 0.02
-"""A run is repeated inside until it takes so long, so that the clock's own steps do not count."""
-
-
-@dataclass(frozen=True, slots=True)
-class SolverRow:
-    """Median microseconds per variant of one batch size, by each of the two roads."""
-
-    variants: int
-    closed_form_us: float
-    construction_us: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,62 +36,72 @@ class ErrorRow:
 
 @dataclass(frozen=True, slots=True)
 class SolverFigures:
-    """Run time and error side by side."""
+    """Run time, error and stability side by side."""
 
-    times: tuple[SolverRow, ...]
-    errors: tuple[ErrorRow, ...]
+    speed: tuple[SpeedRow, ...] = ()
+    errors: tuple[ErrorRow, ...] = ()
+    stability: tuple[StabilityRow, ...] = ()
+    branches: tuple[BranchRow, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """For the report's JSON."""
-        return {"times": [asdict(row) for row in self.times], "errors": [asdict(row) for row in self.errors]}
+        return asdict(self)
 
 
-def measure_solver(*, quick: bool = False, batches: Sequence[int] = BATCHES) -> SolverFigures:
-    """Run times on the pump (four-bar, plate, rod and slider), errors on every built-in assignment."""
-    repeats = 5 if quick else REPEATS
-    times = tuple(_timed_batch(load_assignment("pump"), count, repeats) for count in batches)
-    return SolverFigures(times, tuple(_errors(load_assignment(name)) for name in built_in()))
+@dataclass(slots=True)
+class SolverBench:
+    """All that is measured of the solver, a row after another, so that progress can be shown."""
+
+    quick: bool = False
+    speed: list[SpeedRow] = field(default_factory=list)
+    errors: list[ErrorRow] = field(default_factory=list)
+    stability: list[StabilityRow] = field(default_factory=list)
+    branches: list[BranchRow] = field(default_factory=list)
+
+    @property
+    def steps(self) -> int:
+        """How many rows there will be."""
+        distances = DISTANCES_QUICK if self.quick else DISTANCES
+        return speed_rows() + len(built_in()) + len(KINDS) * len(distances) + 1 + len(installed_peers())
+
+    def run(self) -> Iterator[str]:
+        """Measure; each item says what was measured."""
+        for speed in measure_speed(quick=self.quick):
+            self.speed.append(speed)
+            yield f"speed of {speed.solver}"
+        for error in measure_errors():
+            self.errors.append(error)
+            yield f"errors of {error.assignment}"
+        for stability in measure_stability(quick=self.quick):
+            self.stability.append(stability)
+            yield f"stability: {stability.kind}"
+        for row in count_branches(quick=self.quick):
+            self.branches.append(row)
+            yield f"branches of {row.solver}"
+
+    @property
+    def figures(self) -> SolverFigures:
+        """What was measured so far."""
+        return SolverFigures(
+            tuple(self.speed), tuple(self.errors), tuple(self.stability), tuple(self.branches)
+        )
 
 
-def _timed_batch(assignment: Assignment, count: int, repeats: int) -> SolverRow:
-    mechanism = _spread(assignment, count)
-    construction = construction_of(mechanism)
-    scale = np.asarray(0.01)
-    parameters = parameters_of(mechanism, scale, scale, scale)
-    closed_form = _median_us(lambda: move(mechanism), repeats)
-    drawn = _median_us(lambda: evaluate(construction, parameters), repeats)
-    return SolverRow(count, closed_form / count, drawn / count)
+def measure_solver(*, quick: bool = False) -> SolverFigures:
+    """All of it."""
+    bench = SolverBench(quick)
+    for _ in bench.run():
+        pass
+    return bench.figures
 
 
-def _spread(assignment: Assignment, count: int) -> Mechanism:
-    """The assignment's mechanism at so many crank angles between those of its first and last variant."""
-    variants = assignment.variants()
-    known = assignment.values(variants)
-
-    def between(values: FloatArray) -> FloatArray:
-        return np.linspace(values[0], values[-1], count)
-
-    values = {name: between(np.broadcast_to(value, (len(variants),))) for name, value in known.items()}
-    return build_mechanism(assignment.mechanism_file, values, count)
-
-
-def _median_us(run: Callable[[], object], repeats: int) -> float:
-    run()
-    start = time.perf_counter()
-    run()
-    loops = max(1, int(LEAST_RUN_S / max(time.perf_counter() - start, 1e-9)))
-    spent = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        for _ in range(loops):
-            run()
-        spent.append((time.perf_counter() - start) / loops)
-    return statistics.median(spent) * 1e6
+def measure_errors() -> Iterator[ErrorRow]:
+    """Every variant of every built-in assignment, its data as written in the file."""
+    for name in built_in():
+        yield _errors(load_assignment(name))
 
 
 def _errors(assignment: Assignment) -> ErrorRow:
-    from grader.bench.closure import exact_motion  # noqa: PLC0415 - mpmath is an extra
-
     variants = assignment.variants()
     plan = exact_plan(assignment, variants)
     truth = [exact_motion(assignment, variant) for variant in variants]

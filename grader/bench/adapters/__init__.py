@@ -1,0 +1,1 @@
+"""One module per peer; each is imported only where the peer is installed."""

@@ -1,0 +1,120 @@
+"""The solver's figures as tables of text: a title, the heads, the rows."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
+
+from grader.bench.branches import BranchRow
+from grader.bench.solver import ErrorRow, SolverFigures
+from grader.bench.speed import PLANS, SpeedRow
+from grader.bench.stability import OURS, Cell, StabilityRow
+
+Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
+NOTHING = "-"
+
+
+def solver_tables(solver: SolverFigures) -> Iterator[Table]:
+    """All tables of the solver."""
+    timed = [row for row in solver.speed if row.solver != PLANS]
+    for accelerations, told in ((True, "positions, velocities, accelerations"), (False, "velocities only")):
+        rows = [row for row in timed if row.accelerations == accelerations]
+        yield _speed(f"Solver: median microseconds per variant (pump; {told}; in brackets over ours)", rows)
+    yield _plans([row for row in solver.speed if row.solver == PLANS])
+    yield _errors(solver.errors)
+    yield _summary(solver.stability)
+    yield _branches(solver.branches)
+    for _, rows_of_kind in groupby(solver.stability, key=lambda row: row.kind):
+        yield _stability(list(rows_of_kind))
+
+
+def _speed(title: str, rows: Sequence[SpeedRow]) -> Table:
+    counts = list(rows[0].us) if rows else []
+    heads = ["solver", *(f"{count} at once" for count in counts), "error of v", "error of a"]
+    lines = []
+    for row in rows:
+        name = f"{row.solver} {row.version}" if row.version else row.solver
+        times = [_time(row, rows[0], count) for count in counts]
+        errors = [_figure(row.velocity_error, ".1e"), _figure(row.acceleration_error, ".1e")]
+        lines.append([name, *times, *errors])
+    return title, heads, lines
+
+
+def _time(row: SpeedRow, ours: SpeedRow, count: int) -> str:
+    if count not in row.us:
+        return row.note or NOTHING
+    ratio = "" if row is ours else f" ({row.us[count] / ours.us[count]:.2g})"
+    return f"{row.us[count]:.3g}{ratio}"
+
+
+def _plans(rows: Sequence[SpeedRow]) -> Table:
+    lines = [[str(count), f"{us * count / 1e3:.2f}"] for row in rows for count, us in row.us.items()]
+    return "Solver: a class with both plans (pump)", ["variants", "ms in all"], lines
+
+
+def _errors(rows: Iterable[ErrorRow]) -> Table:
+    heads = ["assignment", "variants", "velocities", "accelerations", "construction - closed form"]
+    lines = [
+        [
+            row.assignment,
+            str(row.variants),
+            f"{row.velocity:.1e}",
+            f"{row.acceleration:.1e}",
+            f"{row.construction:.1e}",
+        ]
+        for row in rows
+    ]
+    return "Solver: largest error, relative to the plan's size", heads, lines
+
+
+def _summary(rows: Iterable[StabilityRow]) -> Table:
+    """Over all distances: the largest error of ours, and what every solver failed at."""
+    lines, solvers = [], [OURS]
+    for _, group in groupby(rows, key=lambda row: row.kind):
+        told = list(group)
+        cells = {
+            name: [cell for row in told for cell in row.cells if cell.solver == name] for name in _names(told)
+        }
+        solvers = max(solvers, list(cells), key=len)
+        unit = "eps" if told[0].smooth else "eps/delta"
+        lines.append([told[0].title, unit, *(_overall(cells[name]) for name in cells)])
+    padded = [line + [NOTHING] * (2 + len(solvers) - len(line)) for line in lines]
+    return "Stability: largest error over all distances", ["position", "unit", *solvers], padded
+
+
+def _names(rows: Sequence[StabilityRow]) -> list[str]:
+    return [cell.solver for cell in rows[0].cells]
+
+
+def _overall(cells: Sequence[Cell]) -> str:
+    counts = (sum(getattr(cell, what) for cell in cells) for what in ("wrong", "refused", "silent"))
+    return _outcome(f"{max(cell.worst for cell in cells):.2g}", *counts)
+
+
+def _branches(rows: Iterable[BranchRow]) -> Table:
+    heads = ["solver", "random cases", "wrong branch", "refused", "silent nan"]
+    lines = [[row.solver, str(row.cases), str(row.wrong), str(row.refused), str(row.silent)] for row in rows]
+    return "Stability: branches in random four-bars and slider-cranks", heads, lines
+
+
+def _stability(rows: Sequence[StabilityRow]) -> Table:
+    unit = "eps" if rows[0].smooth else "eps/delta"
+    title = f"Stability: {rows[0].title} (error over {unit}, median / largest)"
+    lines = [[f"{row.delta:.0e}", *(_cell(cell) for cell in row.cells)] for row in rows]
+    return title, ["delta", *_names(rows)], lines
+
+
+def _cell(cell: Cell) -> str:
+    """The larger of the errors of velocities and accelerations, and what failed."""
+    pairs = [pair for pair in (cell.velocity, cell.acceleration) if pair is not None]
+    error = NOTHING
+    if pairs:
+        error = f"{max(pair[0] for pair in pairs):.2g} / {max(pair[1] for pair in pairs):.2g}"
+    return _outcome(error, cell.wrong, cell.refused, cell.silent)
+
+
+def _outcome(error: str, wrong: int, refused: int, silent: int) -> str:
+    counts = ((wrong, "wrong"), (refused, "refused"), (silent, "nan"))
+    return "; ".join([error, *(f"{count} {what}" for count, what in counts if count)])
+
+
+def _figure(value: float | None, form: str) -> str:
+    return NOTHING if value is None else format(value, form)

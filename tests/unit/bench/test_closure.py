@@ -1,0 +1,142 @@
+"""The 50-digit road: it keeps its own laws, and the closed forms agree with it for every group."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+from grader.bench.closure import ExactMotion, _solve, exact_motion, exact_motion_of, rounded, turning
+from grader.bench.exact_data import DIGITS, authored_exactly, exactly
+from grader.bench.jets import Jet, dot, fixed, follow
+from grader.bench.singular import KINDS
+from reference.assignment import load_assignment
+from reference.construction import Vector
+from reference.mechanism import Crank, Dyad, FixedGuide, Mechanism, MovingGuide, Slider
+from reference.motion import move
+
+FAR = 0.1
+"""A distance from the singular position at which nothing is lost."""
+SHARE_OF_PLAN = 1e-11
+STEP_S = mpf(10) ** -12
+DIFFERENCE = mpf(10) ** -15
+"""What central differences of second order leave at that step, relative."""
+
+
+def far(kind):
+    return kind.draw(np.random.default_rng(3), FAR).mechanism
+
+
+def one(*numbers):
+    return [np.array([number]) for number in numbers]
+
+
+def inverted_slider():
+    """A rod whose slider runs on the coupler of a four-bar: a guide on a moving link."""
+    crank = Crank("1", "O1", "A", *one(0.3, 0.7, 4.0, -9.0), accelerated=True)
+    dyad = Dyad("B", ("A", "O2"), ("2", "3"), tuple(one(0.9, 0.8)), 1)
+    guide = MovingGuide("2", ("A", "B"), "D2")
+    slider = Slider("D", "O3", "4", np.array([0.6]), guide, 1)
+    places = dict(zip(("O1", "O2", "O3"), one(0j, 1.1 + 0j, 0.4 - 0.1j), strict=True))
+    return Mechanism(places, crank, (dyad, slider))
+
+
+MECHANISMS = {kind.id: far(kind) for kind in KINDS} | {"moving_guide": inverted_slider()}
+
+
+def at_time(mechanism: Mechanism, seconds) -> ExactMotion:
+    data = exactly(mechanism, 0)
+    crank = data.driver
+    angle = crank.angle_rad + crank.omega * seconds + crank.epsilon * seconds**2 / 2
+    return _solve(replace(data, driver=replace(crank, angle_rad=angle)))
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_velocity_and_acceleration_are_differences_of_positions_in_time(name):
+    mechanism = MECHANISMS[name]
+    coincident = {"A3", "B1", "D2"}  # another point of the link lies there at each instant
+    with mp.workdps(DIGITS):
+        before, now, after = (at_time(mechanism, step * STEP_S) for step in (-1, 0, 1))
+        largest = max(mp.hypot(*rates) for rates in now.acceleration.values())
+        for joint in now.position.keys() - coincident:
+            for axis in (0, 1):
+                x0, x1, x2 = (motion.position[joint][axis] for motion in (before, now, after))
+                fastest = max(mp.hypot(*rates) for rates in now.velocity.values())
+                assert abs((x2 - x0) / (2 * STEP_S) - now.velocity[joint][axis]) <= DIFFERENCE * fastest
+                assert (
+                    abs((x2 - 2 * x1 + x0) / STEP_S**2 - now.acceleration[joint][axis])
+                    <= DIFFERENCE * largest
+                )
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_the_closed_form_agrees_with_the_closure_equations(name):
+    mechanism = MECHANISMS[name]
+    motion, truth = move(mechanism), exact_motion_of(mechanism)
+    for found, exact in (
+        (motion.position, truth.position),
+        (motion.velocity, truth.velocity),
+        (motion.acceleration, truth.acceleration),
+    ):
+        assert found.keys() == exact.keys()
+        size = max(abs(rounded(pair)) for pair in exact.values())
+        assert (
+            max(abs(found[joint][0] - rounded(pair)) for joint, pair in exact.items()) <= SHARE_OF_PLAN * size
+        )
+
+
+def test_a_point_on_a_moving_guide_slides_along_it_and_coriolis_is_across():
+    motion = exact_motion_of(inverted_slider())
+    about = {part: motion.vector(Vector(f"a_DD2_{part}", "", "", "ka", ("D2", "D"), part)) for part in "cr"}
+    guide = complex(*map(float, (motion.points["B"] - motion.points["A"]).place))
+    whole = rounded(motion.acceleration["D"]) - rounded(motion.acceleration["D2"])
+    assert about["c"] + about["r"] == pytest.approx(whole, rel=1e-12)
+    assert (about["r"] / guide).imag == pytest.approx(0.0, abs=1e-12 * abs(about["r"] / guide))
+    assert (about["c"] / guide).real == pytest.approx(0.0, abs=1e-12 * abs(about["c"] / guide))
+
+
+def test_decimals_of_the_file_are_read_as_written_not_as_doubles():
+    press = load_assignment("press")
+    with mp.workdps(DIGITS):
+        data = authored_exactly(press, press.variant(None, 1))
+        assert data.driver.length_m == mpf(3) / 10
+        assert data.driver.omega == mp.pi * 1350 / (30 * mpf("23.5"))
+
+
+def test_the_two_ways_of_taking_data_differ_by_the_roundings_of_the_data_only():
+    shaper = load_assignment("shaper")
+    written, doubles = (
+        exact_motion(shaper, shaper.variant(7)),
+        exact_motion_of(shaper.mechanism([shaper.variant(7)])),
+    )
+    largest = max(abs(rounded(pair)) for pair in written.acceleration.values())
+    apart = {
+        abs(rounded(pair) - rounded(doubles.acceleration[joint]))
+        for joint, pair in written.acceleration.items()
+    }
+    assert max(apart) <= 1e-14 * largest
+
+
+def test_what_does_not_assemble_is_an_arithmetic_error():
+    crank = Crank("1", "O1", "A", *one(0.3, 0.7, 4.0, 0.0), accelerated=True)
+    guide = FixedGuide(np.array([2.0j]), np.array([0.0]))
+    far_off = Mechanism({"O1": np.array([0j])}, crank, (Slider("B", "A", "2", np.array([0.5]), guide, 1),))
+    with pytest.raises(ArithmeticError, match="does not assemble"):
+        exact_motion_of(far_off)
+
+
+def test_newtons_method_that_finds_no_root_says_so():
+    def never(point):
+        return dot(point, point) + Jet(mpf(1)), point.x
+
+    with pytest.raises(ArithmeticError, match="converge"):
+        follow(never, (mpf("0.3"), mpf("0.2")), mpf(1))
+
+
+def test_a_vector_fixed_in_a_link_tells_how_it_turns():
+    motion = exact_motion_of(inverted_slider())
+    crank = inverted_slider().crank
+    omega, epsilon = turning(motion.points["A"] - motion.points["O1"])
+    assert float(omega) == pytest.approx(crank.omega[0])
+    assert float(epsilon) == pytest.approx(crank.epsilon[0])
+    assert turning(fixed((mpf(1), mpf(2)))) == (0, 0)

@@ -1,0 +1,178 @@
+"""The stability table: outcomes are told apart, distances are as asked, peers are asked fairly."""
+
+import math
+
+import numpy as np
+import pytest
+
+from grader.bench import branches, stability
+from grader.bench.arrays import one_of, stacked
+from grader.bench.peers import PEERS, Answer, NoAnswerError, error_of, plain, sketch
+from grader.bench.singular import KINDS
+from grader.bench.speed import spread
+from grader.bench.stability import EPSILON, _count, _Outcomes, measure_stability, truth_of
+from reference.assignment import load_assignment
+from reference.motion import move
+
+PEER_ERROR = 1e-6
+"""The coarsest peer stops its iteration there."""
+PLAIN = [kind for kind in KINDS if kind.plain]
+
+
+def case_of(kind, delta=0.1, seed=5):
+    return kind.draw(np.random.default_rng(seed), delta)
+
+
+def right(truth):
+    return Answer(truth.position, truth.velocity, truth.acceleration)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.id)
+@pytest.mark.parametrize("delta", [1e-1, 1e-8, 1e-14])
+def test_a_case_lies_at_about_the_distance_asked_for(kind, delta):
+    assert case_of(kind, delta).delta == pytest.approx(delta, rel=0.1)
+
+
+def test_the_right_answer_has_no_error_and_its_unit_is_the_one_given():
+    truth = truth_of(case_of(KINDS[0]).mechanism)
+    off = {joint: rate * (1.0 + 1e-10) for joint, rate in truth.velocity.items()}
+    outcomes = _Outcomes()
+    _count(outcomes, right(truth), truth, EPSILON)
+    _count(outcomes, Answer(truth.position, off, truth.acceleration), truth, 1e-10)
+    assert outcomes.velocity == [0.0, pytest.approx(1.0, rel=1e-5)]
+    assert outcomes.wrong == outcomes.refused == outcomes.silent == 0
+
+
+@pytest.mark.parametrize(
+    "kind", [kind for kind in KINDS if kind.id[:3] in ("rrr", "rrp", "rpr")], ids=lambda k: k.id
+)
+def test_the_mirrored_assembly_is_a_wrong_branch(kind):
+    truth = truth_of(case_of(kind).mechanism)
+    outcomes = _Outcomes()
+    _count(outcomes, Answer(truth.mirrored, truth.velocity, truth.acceleration), truth, EPSILON)
+    assert (outcomes.wrong, outcomes.velocity) == (1, [])
+
+
+def test_nan_is_silent_and_a_refusal_is_told():
+    truth = truth_of(case_of(KINDS[0]).mechanism)
+    nothing = {joint: complex(math.nan) for joint in truth.velocity}
+    outcomes = _Outcomes()
+    _count(outcomes, Answer(truth.position, nothing, nothing), truth, EPSILON)
+    _count(outcomes, None, truth, EPSILON)
+    assert (outcomes.silent, outcomes.refused, outcomes.velocity) == (1, 1, [])
+    assert math.isnan(error_of(nothing, truth.velocity))
+
+
+def test_ours_is_never_on_a_wrong_branch_nor_silent_and_its_usual_error_is_below_the_conditioning():
+    for row in measure_stability(quick=True, kinds=PLAIN[:3]):
+        for cell in row.cells[:2]:
+            assert cell.wrong == cell.silent == cell.refused == 0
+            assert max(cell.velocity[0], cell.acceleration[0]) <= 1.0
+
+
+@pytest.mark.parametrize("peer", PEERS, ids=lambda peer: peer.name)
+def test_an_installed_peer_solves_the_pump_as_the_closed_form_does(peer):
+    pytest.importorskip(peer.module)
+    mechanism = spread(load_assignment("pump"), 3)
+    motion = move(mechanism)
+    starts = sketch(mechanism, motion.position)
+    solver = peer.build(mechanism)
+    for index in range(3):
+        start = {joint: complex(places[index]) for joint, places in starts.items()}
+        answer = solver.solve(index, start)()
+        for found, ours in (
+            (answer.position, motion.position),
+            (answer.velocity, motion.velocity),
+            (answer.acceleration, motion.acceleration),
+        ):
+            assert error_of(found, {joint: complex(at[index]) for joint, at in ours.items()}) <= PEER_ERROR
+
+
+def test_the_compiled_cycle_of_pylinkage_gives_every_variant():
+    pytest.importorskip("numba")
+    pytest.importorskip("pylinkage")
+    from grader.bench.adapters.pylinkage_adapter import PylinkageCycle  # noqa: PLC0415
+
+    mechanism = spread(load_assignment("pump"), 4)
+    motion = move(mechanism)
+    drawn = sketch(mechanism, motion.position)
+    answers = PylinkageCycle(plain(mechanism)).answers({joint: complex(at[0]) for joint, at in drawn.items()})
+    for index, answer in enumerate(answers):
+        ours = {joint: complex(at[index]) for joint, at in motion.acceleration.items()}
+        assert error_of(answer.acceleration, ours) <= PEER_ERROR
+
+
+def test_a_mechanism_that_no_peer_knows_is_no_answer():
+    slotted = next(kind for kind in KINDS if not kind.plain)
+    with pytest.raises(NoAnswerError, match="no adapter for SlottedLink"):
+        plain(case_of(slotted).mechanism)
+
+
+def test_a_sketch_shows_the_side_plainly():
+    case = case_of(PLAIN[0], 1e-12)
+    truth = truth_of(case.mechanism)
+    start = sketch(case.mechanism, {joint: np.array([z]) for joint, z in truth.position.items()})
+    assert abs(start["B"][0] - truth.position["B"]) < abs(start["B"][0] - truth.mirrored["B"])
+    assert abs(truth.position["B"] - truth.mirrored["B"]) < 1e-4 * abs(start["B"][0] - truth.position["B"])
+
+
+def test_variants_put_together_can_be_taken_out_again():
+    cases = [case_of(PLAIN[0], seed=seed).mechanism for seed in (1, 2, 3)]
+    together = stacked(cases)
+    assert together.crank.length_m.shape == (3,)
+    again = one_of(together, 1, np.atleast_1d)
+    assert again.ground_m == cases[1].ground_m
+    assert again.groups[0].lengths_m == cases[1].groups[0].lengths_m
+    assert float(again.groups[0].side[0]) == cases[1].groups[0].side
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_branches_are_told_by_the_side_of_the_node(index):
+    mechanism = branches._both_kinds(40)[index]
+    at = move(mechanism).position
+    np.testing.assert_allclose(branches._side_share(mechanism, at), 1.0, rtol=1e-3)
+    group = mechanism.groups[0]
+    pins = group.pins if index == 0 else (group.pin,)
+    p = at[pins[0]]
+    along = (at[pins[1]] - p) if index == 0 else 1j * np.exp(1j * group.guide.angle_rad)
+    mirrored = p + along * np.conj((at["B"] - p) / along)
+    np.testing.assert_allclose(branches._side_share(mechanism, at | {"B": mirrored}), -1.0, rtol=1e-3)
+
+
+def test_ours_puts_no_random_case_on_the_wrong_branch():
+    row = branches.count_ours(quick=True)
+    assert row.cases == branches.CASES_QUICK
+    assert row.wrong == row.silent == row.refused == 0
+
+
+def test_solvers_that_fail_are_counted_for_how_they_fail(monkeypatch):
+    class Odd:
+        def __init__(self, start):
+            self.start = start
+
+        def solve(self, index, start):
+            if index:
+                raise AssertionError
+            self.start.append(start)
+            if len(self.start) % 3 == 0:
+                raise NoAnswerError("not today")
+            place = dict(start) if len(self.start) % 3 == 1 else dict.fromkeys(start, complex(math.nan))
+            return lambda: Answer(place, place, place)
+
+    seen = []
+
+    class Package:
+        name = "odd"
+
+        def build(self, mechanism):
+            del mechanism
+            return Odd(seen)
+
+    monkeypatch.setattr(branches, "PEER_CASES_QUICK", 12)
+    row = branches.count_peer(Package(), quick=True)
+    assert (row.cases, row.refused, row.silent) == (12, 4, 4)
+
+
+def test_the_peers_measured_are_those_installed(monkeypatch):
+    monkeypatch.setattr(stability, "PEERS", tuple(peer for peer in PEERS if peer.module == "scipy"))
+    assert [peer.name for peer in stability.installed_peers()] == ["scipy fsolve"]
