@@ -387,7 +387,8 @@ def _draw_slotted_link(draft: _Draft, group: SlottedLink) -> None:
 def _is_used(mechanism: Mechanism, joint: str) -> bool:
     """Whether another group stands on a joint."""
     bases = [
-        (*getattr(group, "pins", ()), *getattr(group, "base", ()), getattr(group, "pin", ""))
+        (*getattr(group, "pins", ()), *getattr(group, "base", ()))
+        + (getattr(group, "pin", ""), getattr(group, "pivot", ""))
         for group in mechanism.groups
     ]
     guides = [guide.base for group in mechanism.groups for guide in moving_guides(group)]

@@ -4,13 +4,16 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from reference.assignment import Scales
 from reference.construction import evaluate
-from reference.derivation import construction_of, image_name, parameters_of
+from reference.derivation import construction_of, parameters_of
 from reference.mechanism import Mechanism
 from reference.motion import move
+from reference.plan import _nodes
+from reference.steps import View
 
 ROUNDING = 1e-9
-"""Relative to the figure's size; lines may meet at 10 degrees, and errors add up over a dozen steps."""
+"""Relative to the figure's size; lines may meet at 14 degrees, and errors add up over a dozen steps."""
 a_mechanism = st.from_type(Mechanism)
 a_scale = st.floats(1e-4, 10.0)
 
@@ -20,23 +23,22 @@ def drawn(mechanism, *scales, **how):
     return construction, evaluate(construction, parameters_of(mechanism, *map(np.asarray, scales)))
 
 
+def size_of(nodes):
+    return max(float(np.max(np.abs(place))) for place in nodes)
+
+
 @given(a_mechanism, a_scale, a_scale, a_scale, st.booleans())
-def test_the_plan_as_drawn_is_the_motion_as_computed(
+def test_every_node_as_drawn_lies_where_the_closed_form_has_it(
     mechanism, k_length, k_velocity, k_acceleration, similar
 ):
-    _, nodes = drawn(mechanism, k_length, k_velocity, k_acceleration, plate_by_similarity=similar)
-    motion = move(mechanism)
-    moving = [joint for joint in mechanism.joints if not mechanism.is_ground(joint)]
-    for rates, scale, primed in (
-        (motion.velocity, k_velocity, False),
-        (motion.acceleration, k_acceleration, True),
-    ):
-        size = max(float(np.abs(rates[joint] / scale)[0]) for joint in moving)
-        for joint in moving:
-            place = nodes[image_name(joint, primed=primed)]
-            assert np.abs(place - rates[joint] / scale)[0] <= ROUNDING * size
-    for joint in mechanism.joints:
-        assert np.abs(nodes[joint] - motion.position[joint] / k_length)[0] <= ROUNDING * 4.0 / k_length
+    scales = Scales(*map(np.asarray, (k_length, k_velocity, k_acceleration)))
+    construction, nodes = drawn(mechanism, k_length, k_velocity, k_acceleration, plate_by_similarity=similar)
+    exact = _nodes(construction, mechanism, move(mechanism), scales)
+    assert set(nodes) == {node for figure in exact.values() for node in figure}
+    for figure in exact.values():
+        size = size_of(figure.values())
+        for node, place in figure.items():
+            assert np.max(np.abs(nodes[node] - place)) <= ROUNDING * size, node
 
 
 @given(a_mechanism, st.floats(0.2, 5.0))
@@ -45,23 +47,54 @@ def test_a_plan_at_another_scale_is_the_same_plan_enlarged(mechanism, factor):
     _, other = drawn(mechanism, 0.01, 0.1 / factor, 1.0 / factor)
     for figure in ("velocity_plan", "acceleration_plan"):
         names = [step.node for step in construction.figures[figure]]
-        size = max(float(np.max(np.abs(other[name]))) for name in names)
+        size = size_of(other[name] for name in names)
         for name in names:
             assert np.max(np.abs(nodes[name] * factor - other[name])) <= ROUNDING * size
+
+
+PARTS = {"n": "t", "c": "r"}
+"""Each first part of a relative acceleration, and the second that starts where it ends."""
 
 
 @given(a_mechanism)
 def test_the_parts_of_every_relative_acceleration_are_square_to_each_other_and_add_up(mechanism):
     construction, nodes = drawn(mechanism, 0.01, 0.1, 1.0)
-    size = max(float(np.max(np.abs(z))) for z in nodes.values())
-    seen = 0
-    for name, normal in construction.vectors.items():
-        if not name.endswith("_n"):
+    vectors = construction.vectors
+    size = size_of(nodes.values())
+
+    def along(vector):
+        return nodes[vector.head] - nodes[vector.tail]
+
+    for name, first in vectors.items():
+        if first.part not in PARTS:
             continue
-        tangential = construction.vectors[name.removesuffix("_n") + "_t"]
-        assert tangential.tail == normal.head
-        one = nodes[normal.head] - nodes[normal.tail]
-        other = nodes[tangential.head] - nodes[tangential.tail]
-        assert abs((np.conj(one) * other).real[0]) <= ROUNDING * size**2
-        seen += 1
-    assert seen >= 6
+        about = name.rpartition("_")[0]
+        second = vectors[f"{about}_{PARTS[first.part]}"]
+        assert second.tail == first.head
+        assert abs((np.conj(along(first)) * along(second)).real[0]) <= ROUNDING * size**2
+        velocity = vectors[about.replace("a", "v", 1)]
+        assert abs((np.conj(along(velocity)) * along(first)).real[0]) <= ROUNDING * size**2
+        if velocity.link is not None:
+            # The relative acceleration of two joints is that of their images.
+            images = {joint: vectors.get(f"a_{joint}") for joint in velocity.link}
+            ends = [nodes[one.head] if one else 0.0 for one in images.values()]
+            assert abs((along(first) + along(second) - (ends[1] - ends[0]))[0]) <= ROUNDING * size
+
+
+@given(a_mechanism)
+def test_centres_of_velocity_and_acceleration_are_at_rest_in_their_links_motion(mechanism):
+    scales = (0.01, 0.1, 1.0)
+    construction, nodes = drawn(mechanism, *scales)
+    parameters = parameters_of(mechanism, *map(np.asarray, scales))
+    motion = move(mechanism)
+    for name, centre in construction.centres.items():
+        link, (joint, _) = name[1:], centre.base
+        omega, epsilon = motion.omega[link], motion.epsilon[link]
+        turn = 1j * omega if name[0] == "I" else 1j * epsilon - omega**2
+        rate = (motion.velocity if name[0] == "I" else motion.acceleration)[joint]
+        with np.errstate(all="ignore"):
+            arm = centre.place(View(nodes, parameters)) * scales[0] - motion.position[joint]
+        size = max(np.abs(rate)[0], *(np.abs(one)[0] for one in motion.velocity.values()))
+        if np.abs(turn)[0] * 1e3 > size:
+            # A link that hardly turns has its centre beyond the horizon.
+            assert np.abs(rate + turn * arm)[0] <= ROUNDING * 1e3 * size, name
