@@ -22,6 +22,16 @@ def plan(
         Path | None,
         typer.Option("--pdf", help="Draw the plan into this PDF file; with --all the tables too."),
     ] = None,
+    steps: Annotated[
+        Path | None,
+        typer.Option(
+            "--steps", help="Write the construction step by step, in words and pictures: .html or .pdf."
+        ),
+    ] = None,
+    altitude: Annotated[
+        bool,
+        typer.Option("--altitude", help="Draw normal components by right triangles on the mechanism too."),
+    ] = False,
     every: Annotated[
         bool, typer.Option("--all", help="All variants, for the instructor's own records.")
     ] = False,
@@ -38,12 +48,13 @@ def plan(
     if every or csv is not None:
         from grader.cli.classes import refuse_single, show_class
 
-        refuse_single(every=every, options={"--n": n, "--position": position, "--svg": svg})
+        refuse_single(every=every, options={"--n": n, "--position": position, "--svg": svg, "--steps": steps})
         show_class(assignment, crank_mm, as_json=as_json, csv=csv, pdf=pdf, drawings=drawings, lang=lang)
         return
-    from grader.cli.plans import show_plan
+    from grader.cli.plans import Drawings, show_plan
 
-    show_plan(assignment, n, position, crank_mm, as_json=as_json, svg=svg, pdf=pdf)
+    drawn = Drawings(svg, pdf, steps, lang, altitude=altitude)
+    show_plan(assignment, n, position, crank_mm, as_json=as_json, drawings=drawn)
 
 
 @app.command()
@@ -236,8 +247,7 @@ def bench(
     quick: Annotated[bool, typer.Option("--quick", help="A few sheets and cases only.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
     solver: Annotated[
-        bool,
-        typer.Option("--solver", help="The solver only: speed, errors, stability beside other programs."),
+        bool, typer.Option("--solver", help="The solver only: speed, errors, stability beside its peers.")
     ] = False,
 ) -> None:
     """Run time against error, on generated sheets with known truth."""

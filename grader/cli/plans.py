@@ -1,5 +1,6 @@
 """``planmark plan``."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +9,42 @@ from rich.console import Console
 from rich.table import Table
 
 from grader.files import write_whole
+from grader.i18n import tongue
 from grader.plan_document import plan_document
 from reference.assignment import Assignment, load_assignment
 from reference.canvas import svg as as_svg
 from reference.draw import reference_drawing
+from reference.drawing.subject import Subject
 from reference.errors import CallError
 from reference.plan import Plan, exact_plan
+
+STEP_FILES = (".html", ".pdf")
+
+
+@dataclass(frozen=True, slots=True)
+class Drawings:
+    """The files that a plan is drawn into, and how."""
+
+    svg: Path | None = None
+    pdf: Path | None = None
+    steps: Path | None = None
+    lang: str = "en"
+    altitude: bool = False
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Those that are asked for."""
+        return tuple(file for file in (self.svg, self.pdf, self.steps) if file is not None)
+
+    def check(self) -> None:
+        """Refuse what cannot be drawn before anything is computed."""
+        tongue(self.lang)
+        if self.steps is not None and self.steps.suffix.lower() not in STEP_FILES:
+            raise CallError(
+                "steps_file", f"--steps {self.steps}: the name must end in {' or '.join(STEP_FILES)}"
+            )
+        if self.altitude and self.svg is None and self.pdf is None:
+            raise CallError("altitude", "--altitude is drawn on the sketch: name a file by --svg or --pdf")
 
 
 def show_plan(
@@ -23,22 +54,21 @@ def show_plan(
     crank_mm: float | None,
     *,
     as_json: bool,
-    svg: Path | None,
-    pdf: Path | None,
+    drawings: Drawings,
 ) -> None:
     """Print the exact plan of a variant, and draw it where files are named."""
     check_crank(crank_mm)
+    drawings.check()
     assignment = load_assignment(name)
     variants = [assignment.variant(n, position)]
     plan = exact_plan(assignment, variants, assignment.scales(variants, crank_mm=crank_mm))
-    _draw(assignment, plan, svg, pdf)
+    _draw(assignment, plan, drawings)
     if as_json:
         typer.echo(plan_document(assignment, plan).model_dump_json(indent=2))
         return
     _print_table(assignment, plan)
-    for file in (svg, pdf):
-        if file is not None:
-            typer.echo(f"Drawn in {file}")
+    for file in drawings.files:
+        typer.echo(f"Drawn in {file}")
 
 
 def check_crank(crank_mm: float | None) -> None:
@@ -49,16 +79,28 @@ def check_crank(crank_mm: float | None) -> None:
         )
 
 
-def _draw(assignment: Assignment, plan: Plan, svg: Path | None, pdf: Path | None) -> None:
-    if svg is None and pdf is None:
+def _draw(assignment: Assignment, plan: Plan, drawings: Drawings) -> None:
+    """Draw everything before the first file is written: what fails leaves none behind."""
+    if not drawings.files:
         return
-    sheets = [sheet.shapes for sheet in reference_drawing(assignment, plan)]
-    if svg is not None:
-        write_whole(svg, as_svg(sheets))
-    if pdf is not None:
-        from grader.plan_pdf import pdf as as_pdf
+    from grader.plan_pdf import pdf as as_pdf
+    from grader.plan_steps import html_page, pdf_pages, wording_of
 
-        write_whole(pdf, as_pdf(sheets, f"{assignment.file.title.en}, {plan.variants[0]}"))
+    speaker = tongue(drawings.lang)
+    subject = Subject(assignment, plan, 0, wording_of(speaker))
+    written: dict[Path, str | bytes] = {}
+    if drawings.svg is not None or drawings.pdf is not None:
+        drawn = reference_drawing(assignment, plan, wording=subject.wording, altitude=drawings.altitude)
+        sheets = [sheet.shapes for sheet in drawn]
+        if drawings.svg is not None:
+            written[drawings.svg] = as_svg(sheets)
+        if drawings.pdf is not None:
+            written[drawings.pdf] = as_pdf(sheets, subject.title)
+    if drawings.steps is not None:
+        printed = drawings.steps.suffix.lower() == ".pdf"
+        written[drawings.steps] = pdf_pages(subject, speaker) if printed else html_page(subject, speaker)
+    for file, content in written.items():
+        write_whole(file, content)
 
 
 def _print_table(assignment: Assignment, plan: Plan) -> None:

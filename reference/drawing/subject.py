@@ -93,6 +93,13 @@ class Subject:
     wording: Wording = field(default_factory=Wording)
     altitude: bool = False
 
+    @property
+    def title(self) -> str:
+        """The assignment's title and the variant, in the wording's language."""
+        title = self.assignment.file.title.in_language(self.wording.lang)
+        told = self.wording.told(self.plan.variants[self.index])
+        return f"{title}, {told}" if told else title
+
     def one(self, values: FloatArray) -> float:
         """The variant's number, of an array over variants or of a number common to all."""
         return float(values[self.index] if np.ndim(values) else values)

@@ -1,0 +1,203 @@
+"""The steps as a page for the screen and as a document for the printer."""
+
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from reportlab.lib.enums import TA_LEFT
+from reportlab.lib.pagesizes import A4
+from reportlab.lib.styles import ParagraphStyle
+from reportlab.lib.units import mm
+from reportlab.platypus import (
+    CondPageBreak,
+    Flowable,
+    KeepTogether,
+    Paragraph,
+    SimpleDocTemplate,
+    Spacer,
+    Table,
+)
+
+from grader.answer_sheet.words import REGULAR, embed_fonts
+from grader.i18n import Tongue
+from grader.plan_pdf import put_shapes
+from grader.plan_steps.explanation import LENGTHS_MM, Explanation, Section, explain
+from reference.canvas import Bounds, Shape, picture_svg
+from reference.draw import figures_of
+from reference.drawing import stages
+from reference.drawing.subject import Figure, Subject
+
+MARGIN_MM = 2.5
+COLUMN_MM, GAP_MM, TALLEST_MM = 88.0, 6.0, 105.0
+MODEL_SHARE = 0.45
+"""The mechanism beside a plan's step is drawn at this part of its size on the printed page."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Shapes and the box they are seen in, sheet millimetres."""
+
+    shapes: tuple[Shape, ...]
+    box: Bounds
+
+    @property
+    def svg(self) -> Markup:
+        """As an element of a page."""
+        return Markup(picture_svg(self.shapes, self.box))  # noqa: S704 - written by the canvas
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height."""
+        return self.box[2] - self.box[0], self.box[3] - self.box[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Illustrated:
+    """A step's words, its figure so far, and what it takes from the mechanism."""
+
+    told: Explanation
+    picture: Picture
+    model: Picture | None
+
+
+@dataclass(frozen=True, slots=True)
+class Chapter:
+    """A section with its pictures."""
+
+    section: Section
+    steps: tuple[Illustrated, ...]
+
+
+def chapters(subject: Subject, tongue: Tongue) -> list[Chapter]:
+    """Every figure's steps with their pictures."""
+    figures = figures_of(subject)
+    return [
+        Chapter(section, tuple(_illustrated(subject, figures, section)))
+        for section in explain(subject, tongue)
+    ]
+
+
+def _illustrated(subject: Subject, figures: dict[str, Figure], section: Section) -> Iterator[Illustrated]:
+    figure, mechanism = figures[section.figure], figures["mechanism"]
+    nodes = subject.nodes(section.figure)
+    box, model_box = _box(figure), _box(mechanism)
+    base = stages.grey(mechanism)
+    earlier: list[str] = []
+    for told in section.steps:
+        shapes = (*stages.stage(figure, earlier, told.step.node), *stages.compasses(told.step, nodes))
+        marked = tuple(stages.models(subject, told.step)) if section.figure != "mechanism" else ()
+        model = Picture((*base, *marked), model_box) if marked else None
+        yield Illustrated(told, Picture(shapes, box), model)
+        earlier.append(told.step.node)
+
+
+def _box(figure: Figure) -> Bounds:
+    """The box of a figure without its caption, with a margin."""
+    left, top, right, bottom = Figure(figure.name, tuple(part for part in figure.parts if part.node)).bounds
+    return (left - MARGIN_MM, top - MARGIN_MM, right + MARGIN_MM, bottom + MARGIN_MM)
+
+
+@cache
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("grader.plan_steps"), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+
+
+def html_page(subject: Subject, tongue: Tongue) -> str:
+    """The steps as one self-contained page."""
+    return (
+        _environment()
+        .get_template("steps.html")
+        .render(
+            lang=tongue.lang,
+            title=subject.title,
+            note=tongue.gettext(LENGTHS_MM),
+            chapters=chapters(subject, tongue),
+        )
+    )
+
+
+class _Drawn(Flowable):  # type: ignore[misc]  # reportlab has no types
+    """A picture on the printed page, true to size unless it is larger than its place."""
+
+    def __init__(self, picture: Picture, share: float = 1.0) -> None:
+        super().__init__()
+        width, height = picture.size
+        self.picture = picture
+        self.unit = mm * min(share, COLUMN_MM / width, TALLEST_MM / height)
+        self.width, self.height = width * self.unit, height * self.unit
+
+    def wrap(self, _width: float, _height: float) -> tuple[float, float]:
+        return self.width, self.height
+
+    def draw(self) -> None:
+        left, top = self.picture.box[:2]
+        put_shapes(
+            self.canv, self.picture.shapes, (-left * self.unit, self.height + top * self.unit), self.unit
+        )
+
+
+def pdf_pages(subject: Subject, tongue: Tongue) -> bytes:
+    """The steps as an A4 document."""
+    embed_fonts()
+    buffer = io.BytesIO()
+    title = subject.title
+    document = SimpleDocTemplate(
+        buffer, pagesize=A4, title=title, invariant=1,
+        leftMargin=12 * mm, rightMargin=12 * mm, topMargin=14 * mm, bottomMargin=14 * mm,
+    )  # fmt: skip
+    story: list[Flowable] = [Paragraph(_printed(Markup.escape(title)), _style(14))]
+    story += [Spacer(1, 2 * mm), Paragraph(_printed(Markup.escape(tongue.gettext(LENGTHS_MM))), _style(8.5))]
+    for chapter in chapters(subject, tongue):
+        story += _printed_chapter(chapter)
+    document.build(story)
+    return buffer.getvalue()
+
+
+def _printed_chapter(chapter: Chapter) -> Iterator[Flowable]:
+    yield CondPageBreak(70 * mm)
+    yield Spacer(1, 6 * mm)
+    yield Paragraph(_printed(Markup.escape(chapter.section.title)), _style(12))
+    yield Paragraph(_printed(chapter.section.introduction), _style(9))
+    for step in chapter.steps:
+        yield Spacer(1, 4 * mm)
+        yield KeepTogether([_printed_step(step)])
+
+
+def _printed_step(step: Illustrated) -> Table:
+    head = Markup("{}. {}").format(step.told.number, step.told.sentence)
+    words: list[Flowable] = [Paragraph(_printed(line), _style(8.5, indent=4)) for line in step.told.before]
+    words += [Paragraph(_printed(head), _style(9.5))]
+    words += [Paragraph(_printed(line), _style(8.5, indent=4)) for line in step.told.after]
+    if step.model is not None:
+        words += [Spacer(1, 2 * mm), _Drawn(step.model, MODEL_SHARE)]
+    widths = ((COLUMN_MM + GAP_MM) * mm, COLUMN_MM * mm)
+    style = [("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)]
+    return Table([[words, _Drawn(step.picture)]], colWidths=widths, style=style)
+
+
+def _style(size: float, indent: float = 0.0) -> ParagraphStyle:
+    return ParagraphStyle(
+        f"s{size}i{indent}", fontName=REGULAR, fontSize=size, leading=1.4 * size, alignment=TA_LEFT,
+        leftIndent=indent * mm,
+    )  # fmt: skip
+
+
+def _printed(text: Markup) -> str:
+    """Markup as reportlab reads it; the embedded font has no slanted letters."""
+    marks: Sequence[tuple[str, str]] = (
+        ("<i>", ""),
+        ("</i>", ""),
+        ("<sub>", '<sub rise="2" size="70%">'),
+        ("<sup>", '<super rise="3" size="70%">'),
+        ("</sup>", "</super>"),
+    )
+    written = str(text)
+    for mark, printed in marks:
+        written = written.replace(mark, printed)
+    return written
