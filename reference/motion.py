@@ -5,8 +5,7 @@ unknown of the rigid-body equations of the group (`reference.groups`). This road
 drawings: the construction of `reference.construction` is held against it.
 
 Many variants are solved on arrays, a few on Python's numbers (faster there). A predicted error goes
-with every result; a variant where it exceeds `DOUBTFUL` is solved again in `DIGITS` digits, its
-data taken as exact, and refused where even the data do not determine it.
+with every result; variants where digits are lost are solved again (`reference.precision`).
 """
 
 from dataclasses import dataclass
@@ -20,18 +19,12 @@ from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import Crank, Driver, Mechanism
 from reference.numbers import larger
 from reference.picking import one_variant
+from reference.precision import EPSILON, LOSSY, REFUSED, refine
 from reference.refusal import reason
 from reference.solving import Solution, solve
 
-EPSILON = float(np.finfo(np.float64).eps)
-SAFETY = 8.0
+SAFETY = 32.0
 """Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""
-DOUBTFUL = 1e-9
-"""A predicted relative error beyond which a variant is solved again in many digits."""
-REFUSED = 1e3
-"""A predicted relative error of double precision beyond which the data, doubles themselves, do not
-determine the motion: neighbouring doubles have quite another one, or none."""
-DIGITS = 50
 FEW = 3
 """So many variants are faster one by one, on Python's numbers."""
 
@@ -50,7 +43,7 @@ class Motion:
         0 is singular
     predicted_error : (N,) of velocities and accelerations, relative to the largest of each plan;
         infinite where there is no motion
-    recomputed : (N,) whether the variant was solved in many digits
+    recomputed : (N,) whether the variant was solved again with more digits
     """
 
     position: dict[str, ComplexArray]
@@ -71,7 +64,7 @@ def move(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
     """
     motion = move_where_possible(mechanism, accelerations=accelerations)
     if motion.predicted_error.max(initial=0.0) > REFUSED:
-        raise reason(mechanism, motion.predicted_error > REFUSED)
+        raise reason(mechanism, np.isinf(motion.predicted_error))
     return motion
 
 
@@ -83,12 +76,40 @@ def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> 
     else:
         with np.errstate(all="ignore"):
             motion = _on_arrays(mechanism, count, accelerations)
-    predicted = motion.predicted_error
-    if predicted.max(initial=0.0) > DOUBTFUL:
-        for index in np.flatnonzero((predicted > DOUBTFUL) & (predicted <= REFUSED)):
-            _solve_in_digits(motion, mechanism, int(index), accelerations)
-        _erase(motion, ~(predicted <= REFUSED))
+    if motion.predicted_error.max(initial=0.0) > LOSSY:
+        with np.errstate(all="ignore"):
+            _refine(motion, mechanism, accelerations)
     return motion
+
+
+def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
+    """More digits for what has lost some; nothing is told of a variant without a motion."""
+
+    def put(solution: Solution, rows: NDArray[np.intp]) -> None:
+        for name, joint in solution.joints.items():
+            motion.position[name][rows] = _rounded(joint.position)
+            motion.velocity[name][rows] = _rounded(joint.velocity)
+            if accelerations:
+                motion.acceleration[name][rows] = _rounded(joint.acceleration)
+        for given, found in (
+            (motion.omega, solution.omega),
+            (motion.epsilon, solution.epsilon),
+            (motion.transmission, solution.transmission),
+        ):
+            for name in given:
+                given[name][rows] = np.real(_rounded(found[name]))
+
+    predicted = motion.predicted_error
+    motion.recomputed[:] = refine(mechanism, predicted, put, accelerations=accelerations)
+    broken = np.isinf(predicted)
+    if broken.any():
+        for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
+            for values in rates.values():
+                values[broken] = np.nan
+
+
+def _rounded(number: Any) -> Any:  # noqa: ANN401 - of extended floats or of many digits
+    return number if isinstance(number, np.ndarray) else complex(number)
 
 
 def _count(driver: Driver) -> int:
@@ -158,44 +179,3 @@ def _one_by_one(mechanism: Mechanism, count: int, accelerations: bool) -> Motion
         np.array(predicted),
         np.zeros(count, dtype=np.bool_),
     )
-
-
-def _solve_in_digits(motion: Motion, mechanism: Mechanism, index: int, accelerations: bool) -> None:
-    """Put one variant, solved in many digits, in its place; as if beyond all bounds where it has none."""
-    from mpmath import mp  # noqa: PLC0415 - seldom needed, and slow to import
-
-    with mp.workdps(DIGITS):
-        try:
-            take = one_variant(index, mp.mpmathify)
-            solution = solve(mechanism, take, accelerations=accelerations)
-            _put(motion, solution, index)
-        except ZeroDivisionError:
-            motion.predicted_error[index] = np.inf
-            return
-    motion.recomputed[index] = True
-    found = (*motion.velocity.values(), *motion.acceleration.values())
-    motion.predicted_error[index] = EPSILON if all(np.isfinite(z[index]) for z in found) else np.inf
-
-
-def _put(motion: Motion, solution: Solution, index: int) -> None:
-    for name, joint in solution.joints.items():
-        motion.position[name][index] = complex(joint.position)
-        motion.velocity[name][index] = complex(joint.velocity)
-        if motion.acceleration:
-            motion.acceleration[name][index] = complex(joint.acceleration)
-    for link, omega in solution.omega.items():
-        motion.omega[link][index] = float(omega)
-    for link, epsilon in solution.epsilon.items():
-        motion.epsilon[link][index] = float(epsilon)
-    for node, sine in solution.transmission.items():
-        motion.transmission[node][index] = float(sine)
-
-
-def _erase(motion: Motion, broken: BoolArray) -> None:
-    """Nothing is told of a variant without a motion."""
-    if not broken.any():
-        return
-    motion.predicted_error[broken] = np.inf
-    for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
-        for values in rates.values():
-            values[broken] = np.nan

@@ -1,7 +1,10 @@
-"""One variant of a mechanism's arrays, as Python's numbers or as numbers of many digits."""
+"""Some variants of a mechanism's arrays, in other kinds of numbers."""
 
 from collections.abc import Callable
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from reference.solving import Take
 
@@ -17,5 +20,17 @@ def one_variant(index: int, number: Callable[[Any], Any] | None = None) -> Take:
             return values
         one = values.item() if values.size == 1 else values.item(index)
         return one if number is None else number(one)
+
+    return take
+
+
+def some_variants(rows: NDArray[np.intp]) -> Take:
+    """Takes some variants out of arrays over variants, in the widest floats there are."""
+
+    def take(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
+        if type(values) is int:
+            return values
+        chosen = values if values.size == 1 else values[rows]
+        return chosen.astype(np.clongdouble if np.iscomplexobj(chosen) else np.longdouble)
 
     return take
