@@ -20,6 +20,8 @@ from reference.numbers import cross
 from reference.picking import one_variant
 from reference.solving import Solution, rail_of, solve
 
+ROUNDING = 1e-14
+"""Relative to the mechanism's reach."""
 WHAT_IS_IN_LINE = {
     Dyad: "its links are in line",
     Slider: "its rod is perpendicular to the guide",
@@ -41,7 +43,9 @@ def reason(mechanism: Mechanism, broken: NDArray[np.bool_]) -> MechanismError:
             after = solve(replace(mechanism, groups=groups[: count + 1]), take)
             node = after.joints[group.node]
             if not np.isfinite(node.position):
-                return _open(group, _gap(group, before), where)
+                gap, reach = _gap(group, before), max(abs(one.position) for one in before.joints.values())
+                # A gap of rounding alone: the group is flat, and its data say so as well as they can.
+                return _open(group, gap, where) if gap > ROUNDING * reach else _singular(group, where)
             if not np.isfinite(node.amplification * np.abs(node.acceleration + node.velocity)):
                 break
         else:
