@@ -1,7 +1,7 @@
 """The benchmark as one JSON document and as tables of text."""
 
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from grader.bench.reading import STAGES, ReadingRow
 from grader.bench.solver import SolverFigures
-from grader.bench.tables import solver_tables
+from grader.bench.tables import Table, solver_tables
 
 SCHEMA_VERSION = 2
 
@@ -36,18 +36,20 @@ class Report:
 
     def as_text(self) -> str:
         """Tables that read well in a terminal and in Markdown."""
-        tables = list(solver_tables(self.solver))
-        if self.reading:
-            tables.append(
-                (
-                    "Reading: median milliseconds per page, and pages not registered rightly",
-                    *_stages(self.reading),
-                )
-            )
-            tables.append(
-                ("Reading: error of nodes, and what became of the vectors drawn", *_vectors(self.reading))
-            )
-        return "\n".join(line for table in tables for line in _table(*table))
+        return as_text([*solver_tables(self.solver), *reading_tables(self.reading)])
+
+
+def as_text(tables: Iterable[Table]) -> str:
+    """Tables one after another."""
+    return "\n".join(line for table in tables for line in _table(*table))
+
+
+def reading_tables(reading: Sequence[ReadingRow]) -> Iterator[Table]:
+    """Both tables of the reading, where it was measured."""
+    if reading:
+        told = "Reading: median milliseconds per page, and pages not registered rightly"
+        yield told, *_stages(reading)
+        yield "Reading: error of nodes, and what became of the vectors drawn", *_vectors(reading)
 
 
 def _table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:

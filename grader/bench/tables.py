@@ -86,7 +86,8 @@ def _names(rows: Sequence[StabilityRow]) -> list[str]:
 
 def _overall(cells: Sequence[Cell]) -> str:
     counts = (sum(getattr(cell, what) for cell in cells) for what in ("wrong", "refused", "silent"))
-    return _outcome(f"{max(cell.worst for cell in cells):.2g}", *counts)
+    answered = any(cell.velocity for cell in cells)
+    return _outcome(_units(max(cell.worst for cell in cells)) if answered else NOTHING, *counts)
 
 
 def _branches(rows: Iterable[BranchRow]) -> Table:
@@ -107,8 +108,13 @@ def _cell(cell: Cell) -> str:
     pairs = [pair for pair in (cell.velocity, cell.acceleration) if pair is not None]
     error = NOTHING
     if pairs:
-        error = f"{max(pair[0] for pair in pairs):.2g} / {max(pair[1] for pair in pairs):.2g}"
+        error = f"{_units(max(pair[0] for pair in pairs))} / {_units(max(pair[1] for pair in pairs))}"
     return _outcome(error, cell.wrong, cell.refused, cell.silent)
+
+
+def _units(error: float) -> str:
+    """An error in its unit; a thousandth of a rounding is none."""
+    return "0" if error < 1e-3 else f"{error:.2g}"
 
 
 def _outcome(error: str, wrong: int, refused: int, silent: int) -> str:
