@@ -115,7 +115,7 @@ def _ends(values: FloatArray) -> tuple[float, float]:
 
 
 def _span(values: FloatArray) -> str:
-    low, high = (f"{end:.4g}" for end in _ends(values))
+    low, high = (f"{end:.0f}" if end >= 1e4 else f"{end:.4g}" for end in _ends(values))
     return low if low == high else f"{low} .. {high}"
 
 

@@ -12,6 +12,8 @@ from reference.errors import MechanismError
 from reference.plan import exact_plan
 
 _GAP = re.compile(r"\bby ([0-9.]+(?:e[-+]?[0-9]+)?) m\b")
+_ABOUT_ARRAYS = re.compile(r" \(1 of 1 variant\(s\), the first at index 0\)")
+"""What a message says of how many variants of how many: here it is always one."""
 _GROUP = re.compile(r"the group of (\w+)")
 
 
@@ -34,8 +36,7 @@ def broken_variants(assignment: Assignment, variants: Sequence[Variant]) -> list
         exact_plan(assignment, list(variants))
     except MechanismError as error:
         if len(variants) == 1:
-            # What the message says in brackets is about arrays: which index, how many of how many.
-            return [Broken(variants[0], error.code, re.sub(r" \(1 of 1 [^)]*\)", "", error.message))]
+            return [Broken(variants[0], error.code, _ABOUT_ARRAYS.sub("", error.message))]
         middle = len(variants) // 2
         return [
             *broken_variants(assignment, variants[:middle]),

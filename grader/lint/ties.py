@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from grader.lint.findings import BoolArray, LintFinding, chosen, named
 from grader.lint.lengths import Asked
@@ -14,6 +16,8 @@ from reference.plan import Plan
 SAME_MM = 0.5
 """Drawings whose nodes all lie within this of each other cannot be told apart: a hand's tolerance."""
 NAMED_GROUPS = 3
+MOST_PAIRS = 100_000
+"""No more are looked for: where all variants are alike, there are as many as their number squared."""
 
 Pairs = tuple[np.ndarray, np.ndarray]
 
@@ -101,7 +105,8 @@ def _pairs(
     best = int(np.argmax(apart))
     key, limit = coordinates[best], reach[best]
     order = np.argsort(key, kind="stable")
-    found: list[tuple[np.ndarray, np.ndarray]] = []
+    found: list[Pairs] = []
+    total = 0
     for step in range(1, len(order)):
         near = np.flatnonzero(key[order[step:]] - key[order[:-step]] <= limit)
         if not len(near):
@@ -109,6 +114,9 @@ def _pairs(
         i, j = order[near], order[near + step]
         accepted = judge(i, j)
         found.append((np.minimum(i, j)[accepted], np.maximum(i, j)[accepted]))
+        total += int(accepted.sum())
+        if total >= MOST_PAIRS:
+            break
     first = np.concatenate([pair[0] for pair in found]) if found else np.empty(0, dtype=np.intp)
     second = np.concatenate([pair[1] for pair in found]) if found else np.empty(0, dtype=np.intp)
     return first, second
@@ -116,21 +124,13 @@ def _pairs(
 
 def groups_of(pairs: Pairs, count: int) -> list[list[int]]:
     """Variants that hang together by pairs, each group in rising order."""
-    root = list(range(count))
-
-    def find(one: int) -> int:
-        while root[one] != one:
-            root[one] = root[root[one]]
-            one = root[one]
-        return one
-
-    for i, j in zip(pairs[0].tolist(), pairs[1].tolist(), strict=True):
-        first, second = sorted((find(i), find(j)))
-        root[second] = first
-    groups: dict[int, list[int]] = {}
-    for one in range(count):
-        groups.setdefault(find(one), []).append(one)
-    return [group for group in groups.values() if len(group) > 1]
+    graph = coo_array((np.ones(len(pairs[0]), dtype=np.int8), pairs), shape=(count, count))
+    _, group = connected_components(graph, directed=False)
+    tied = np.unique(np.concatenate(pairs))
+    found: dict[int, list[int]] = {}
+    for one in tied.tolist():
+        found.setdefault(int(group[one]), []).append(one)
+    return list(found.values())
 
 
 def tie_findings(plan: Plan, ties: Ties) -> Iterator[LintFinding]:
@@ -144,18 +144,15 @@ def tie_findings(plan: Plan, ties: Ties) -> Iterator[LintFinding]:
         more = f" and {len(groups) - NAMED_GROUPS} more groups" if len(groups) > NAMED_GROUPS else ""
         message = f"the same drawing within {SAME_MM:g} mm: {told}{more}"
         yield LintFinding("warning", "ties", "assignment", "$.variant", message, chosen(variants, meant))
-    known = {*_as_set(ties.same)}
-    further = sorted(_as_set(ties.passing) - known)
-    if further:
-        i, j = further[0]
+    count = len(variants)
+    further = np.setdiff1d(ties.passing[0] * count + ties.passing[1], ties.same[0] * count + ties.same[1])
+    if len(further):
+        i, j = divmod(int(further[0]), count)
+        least = "at least " if len(ties.passing[0]) >= MOST_PAIRS else ""
         message = (
-            f"{len(further)} pair(s) of variants differ by less than the rubric's tolerance: a copied drawing"
-            f" would get full marks, such as that of {variants[i]} for {variants[j]}"
+            f"{least}{len(further)} pair(s) of variants differ by less than the rubric's tolerance: a copied"
+            f" drawing would get full marks, such as that of {variants[i]} for {variants[j]}"
         )
-        meant = np.zeros(len(variants), dtype=np.bool_)
-        meant[np.unique(np.array(further))] = True
+        meant = np.zeros(count, dtype=np.bool_)
+        meant[np.concatenate(divmod(further, count))] = True
         yield LintFinding("hint", "near_ties", "assignment", "$.variant", message, chosen(variants, meant))
-
-
-def _as_set(pairs: Pairs) -> set[tuple[int, int]]:
-    return set(zip(pairs[0].tolist(), pairs[1].tolist(), strict=True))
