@@ -386,13 +386,10 @@ def _draw_slotted_link(draft: _Draft, group: SlottedLink) -> None:
 
 def _is_used(mechanism: Mechanism, joint: str) -> bool:
     """Whether another group stands on a joint."""
-    bases = [
-        (*getattr(group, "pins", ()), *getattr(group, "base", ()))
-        + (getattr(group, "pin", ""), getattr(group, "pivot", ""))
-        for group in mechanism.groups
-    ]
+    several = [getattr(group, key, ()) for group in mechanism.groups for key in ("pins", "base")]
+    single = [getattr(group, key, "") for group in mechanism.groups for key in ("pin", "pivot")]
     guides = [guide.base for group in mechanism.groups for guide in moving_guides(group)]
-    return any(joint in joints for joints in (*bases, *guides))
+    return any(joint in joints for joints in (*several, single, *guides))
 
 
 def _draw_slot_point(draft: _Draft, group: SlotPoint) -> None:
