@@ -1,7 +1,6 @@
 """The reference drawing as a PDF, true to size, from the same shapes as its SVG."""
 
 import io
-import math
 from collections.abc import Iterable, Sequence
 
 from reportlab.lib.colors import HexColor
@@ -10,11 +9,8 @@ from reportlab.pdfgen.canvas import Canvas
 from reportlab.pdfgen.pathobject import PDFPathObject
 
 from grader.answer_sheet.words import REGULAR, embed_fonts
-from reference.canvas import A3_MM, Area, Curve, Label, Point, Ring, Shape, Stroke
+from reference.canvas import A3_MM, SLANT, Area, Curve, Label, Point, Ring, Shape, Stroke
 from reference.lettering import set_pieces
-
-SLANT = math.tan(math.radians(12.0))
-"""Of italic letters: the embedded font has none of its own."""
 
 
 def pdf(sheets: Sequence[Sequence[Shape]], title: str, page_mm: tuple[float, float] = A3_MM) -> bytes:

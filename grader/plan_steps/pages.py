@@ -32,8 +32,8 @@ from reference.drawing.subject import Figure, Subject
 
 MARGIN_MM = 2.5
 COLUMN_MM, GAP_MM, TALLEST_MM = 88.0, 6.0, 105.0
-MODEL_SHARE = 0.45
-"""The mechanism beside a plan's step is drawn at this part of its size on the printed page."""
+MODEL_SHARE, MODEL_TALLEST_MM = 0.45, 45.0
+"""The mechanism beside a plan's step is drawn at this part of its size on the printed page, at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,11 +125,11 @@ def html_page(subject: Subject, tongue: Tongue) -> str:
 class _Drawn(Flowable):  # type: ignore[misc]  # reportlab has no types
     """A picture on the printed page, true to size unless it is larger than its place."""
 
-    def __init__(self, picture: Picture, share: float = 1.0) -> None:
+    def __init__(self, picture: Picture, share: float = 1.0, tallest_mm: float = TALLEST_MM) -> None:
         super().__init__()
         width, height = picture.size
         self.picture = picture
-        self.unit = mm * min(share, COLUMN_MM / width, TALLEST_MM / height)
+        self.unit = mm * min(share, COLUMN_MM / width, tallest_mm / height)
         self.width, self.height = width * self.unit, height * self.unit
 
     def wrap(self, _width: float, _height: float) -> tuple[float, float]:
@@ -175,7 +175,7 @@ def _printed_step(step: Illustrated) -> Table:
     words += [Paragraph(_printed(head), _style(9.5))]
     words += [Paragraph(_printed(line), _style(8.5, indent=4)) for line in step.told.after]
     if step.model is not None:
-        words += [Spacer(1, 2 * mm), _Drawn(step.model, MODEL_SHARE)]
+        words += [Spacer(1, 2 * mm), _Drawn(step.model, MODEL_SHARE, MODEL_TALLEST_MM)]
     widths = ((COLUMN_MM + GAP_MM) * mm, COLUMN_MM * mm)
     style = [("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)]
     return Table([[words, _Drawn(step.picture)]], colWidths=widths, style=style)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.canvas import CONSTRUCTION, Area, Curve, Label, Point, Ring, Shape, Stroke
+from reference.canvas import CONSTRUCTION, SLANT, Area, Curve, Label, Point, Ring, Shape, Stroke
 from reference.drawing.symbols import HAIR_MM
 from reference.geometry import FloatArray
 from reference.lettering import Text, rise_and_fall, width_of
@@ -112,7 +112,8 @@ class _Places:
 
 
 def _places(one: Wanted, segments: FloatArray, points: FloatArray) -> _Places:
-    wide, (rise, fall) = width_of(one.text, one.size), rise_and_fall(one.text, one.size)
+    rise, fall = rise_and_fall(one.text, one.size)
+    wide = width_of(one.text, one.size) + (SLANT * rise if one.italic else 0.0)
     half = np.array([wide, rise + fall]) / 2.0
     gap, turn = (
         grid.ravel()

@@ -17,7 +17,7 @@ LINE_HEIGHT = 1.45
 ROW_MM, LEAST_ROW_MM = 4.6, 3.0
 LETTER_SHARE = 0.68
 """Of a row's height."""
-COLUMNS_MM = (0.0, 19.0, 39.0, 54.0, 78.0, 96.0)
+COLUMNS_MM = (0.0, 17.0, 35.0, 50.0, 74.0, 96.0)
 RULE_COLOUR = "#9aa3ad"
 
 
