@@ -1,13 +1,14 @@
 """All that is measured of the solver: speed, errors, stability near singular positions, branches."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grader.bench.branches import BranchRow, count_branches
-from grader.bench.closure import exact_motion
+from grader.bench.closure import ExactMotion, exact_motion
 from grader.bench.singular import KINDS
 from grader.bench.speed import SpeedRow, measure_speed, speed_rows
 from grader.bench.stability import (
@@ -19,19 +20,26 @@ from grader.bench.stability import (
 )
 from reference.assignment import Assignment, built_in, load_assignment
 from reference.construction import evaluate
-from reference.plan import exact_plan
+from reference.plan import Plan, exact_plan
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorRow:
-    """Largest error of one assignment's vectors, relative to the longest of the same plan and variant."""
+    """Largest errors of one assignment over its variants.
+
+    Attributes
+    ----------
+    velocity, acceleration : of the vectors, relative to the longest of the same plan
+    rates : of angular velocities and accelerations, relative to the largest of the same kind
+    construction : of the construction's nodes against the closed form's, relative to the plan's size
+    """
 
     assignment: str
     variants: int
     velocity: float
     acceleration: float
+    rates: float
     construction: float
-    """Of the construction's nodes against the closed form's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,12 +117,30 @@ def _errors(assignment: Assignment) -> ErrorRow:
     for figure in plan.construction.poles:
         vectors = plan.construction.vectors_of(figure)
         exact = np.array([[motion.vector(vector) for motion in truth] for vector in vectors])
-        ours = np.array([plan.vectors_si[vector.name] for vector in vectors])
-        worst[figure] = float(np.max(np.abs(ours - exact) / np.max(np.abs(exact), axis=0)))
+        worst[figure] = _largest([plan.vectors_si[vector.name] for vector in vectors], exact)
     drawn = evaluate(plan.construction, plan.drawing.parameters)
     apart = max(
         float(np.max(np.abs(drawn[node] - place) / plan.size_mm(figure)))
         for figure, nodes in plan.nodes_mm.items()
         for node, place in nodes.items()
     )
-    return ErrorRow(assignment.id, len(variants), worst["velocity_plan"], worst["acceleration_plan"], apart)
+    return ErrorRow(
+        assignment.id,
+        len(variants),
+        worst["velocity_plan"],
+        worst["acceleration_plan"],
+        max(_error_of_rates(plan, truth, kind) for kind in ("omega", "epsilon")),
+        apart,
+    )
+
+
+def _error_of_rates(plan: Plan, truth: list[ExactMotion], kind: str) -> float:
+    rates = [rate for rate in plan.construction.rates if rate.startswith(kind)]
+    vectors = [plan.construction.vectors[plan.construction.rates[rate].vector] for rate in rates]
+    exact = np.array([[motion.rate(vector) for motion in truth] for vector in vectors])
+    return _largest([plan.rates[rate] for rate in rates], exact)
+
+
+def _largest(ours: Sequence[NDArray[Any]], exact: NDArray[Any]) -> float:
+    """The largest error; rows are quantities, columns variants."""
+    return float(np.max(np.abs(np.array(ours) - exact) / np.max(np.abs(exact), axis=0)))

@@ -51,14 +51,12 @@ def _plans(rows: Sequence[SpeedRow]) -> Table:
 
 
 def _errors(rows: Iterable[ErrorRow]) -> Table:
-    heads = ["assignment", "variants", "velocities", "accelerations", "construction - closed form"]
+    heads = ["assignment", "variants", "velocities", "accelerations", "rates", "construction - closed form"]
     lines = [
         [
             row.assignment,
             str(row.variants),
-            f"{row.velocity:.1e}",
-            f"{row.acceleration:.1e}",
-            f"{row.construction:.1e}",
+            *(f"{error:.1e}" for error in (row.velocity, row.acceleration, row.rates, row.construction)),
         ]
         for row in rows
     ]

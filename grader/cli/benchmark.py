@@ -1,19 +1,14 @@
 """``planmark bench``."""
 
-import importlib.util
 import json
 
 import typer
 from rich.console import Console
 from rich.progress import Progress
 
-from reference.errors import CallError
-
 
 def show_benchmark(*, quick: bool, as_json: bool, solver_only: bool) -> None:
     """Measure the solver and, unless it alone is asked for, the reading; print the figures."""
-    if importlib.util.find_spec("mpmath") is None:
-        raise CallError("mpmath_missing", "the benchmark needs mpmath: pip install 'planmark[bench]'")
     from grader.bench.reading import RESOLUTIONS_DPI, measure_reading
     from grader.bench.report import Report
     from grader.bench.solver import SolverBench

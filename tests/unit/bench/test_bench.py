@@ -14,6 +14,7 @@ from grader.bench.singular import KINDS
 from grader.bench.solver import SolverBench, measure_errors
 from grader.bench.speed import NOT_INSTALLED, SpeedRow, measure_speed, speed_rows
 from grader.bench.stability import DISTANCES_QUICK, measure_stability
+from grader.cli.benchmark import show_benchmark
 from grader.records import ReadVector
 
 SURE, UNSURE = 0.95, 0.5
@@ -22,6 +23,13 @@ SHARE_OF_PLAN = 1e-12
 """Error allowed, relative to the plan's size."""
 DRAWN = {"length_mm": 50.0, "direction_deg": 90.0, "line_mm": [[10.0, 100.0], [10.0, 52.0]]}
 ABSENT = Package("no such solver", "no-such-solver", "no_such_solver", "Solver")
+
+READING = ReadingRow(
+    dpi=300.0, sheets=2, turned=0, off_scale=1, vectors=40,
+    times_ms={"decode": 20.0, "sheet": 100.0, "ink": 700.0, "reading": 300.0},
+    node_median_mm=0.1, node_p95_mm=0.4, node_worst_mm=None,
+    read=0.75, doubtful=0.2, unread=0.05, misreads=0,
+)  # fmt: skip
 
 
 def found(length_mm=50.0, direction_deg=90.0, confidence=SURE):
@@ -56,6 +64,7 @@ def test_every_built_in_assignment_is_held_against_fifty_digits():
     for row in rows.values():
         assert 0.0 < row.velocity <= SHARE_OF_PLAN
         assert 0.0 < row.acceleration <= SHARE_OF_PLAN
+        assert 0.0 < row.rates <= SHARE_OF_PLAN
         assert row.construction <= SHARE_OF_PLAN
 
 
@@ -110,16 +119,10 @@ def test_the_bench_of_the_solver_measures_as_many_rows_as_it_says(monkeypatch):
 
 
 def test_the_report_shows_time_and_error_and_is_json_too():
-    row = ReadingRow(
-        dpi=300.0, sheets=2, turned=0, off_scale=1, vectors=40,
-        times_ms={"decode": 20.0, "sheet": 100.0, "ink": 700.0, "reading": 300.0},
-        node_median_mm=0.1, node_p95_mm=0.4, node_worst_mm=None,
-        read=0.75, doubtful=0.2, unread=0.05, misreads=0,
-    )  # fmt: skip
     ours = SpeedRow("closed form", None, accelerations=True, us={30: 5.0}, velocity_error=1e-16)
     theirs = SpeedRow("peer", "1.0", accelerations=True, us={30: 60.0}, velocity_error=1e-16)
     figures = solver.SolverFigures(speed=(ours, theirs), branches=(BranchRow("peer", 100, 3, 2, 1),))
-    report = Report(figures, (row,))
+    report = Report(figures, (READING,))
     text = report.as_text()
     assert "1120" in text
     assert "75 %" in text
@@ -130,3 +133,27 @@ def test_the_report_shows_time_and_error_and_is_json_too():
 @pytest.mark.parametrize("peer", PEERS, ids=lambda peer: peer.name)
 def test_a_peers_version_is_known_where_it_is_installed(peer):
     assert (peer.version is not None) == (importlib.util.find_spec(peer.module) is not None)
+
+
+@pytest.mark.parametrize("solver_only", [True, False])
+def test_the_command_prints_the_solvers_figures_and_the_readings_unless_told_otherwise(
+    solver_only, monkeypatch, capsys
+):
+    branch = BranchRow("closed form", 100, 0, 0, 0)
+
+    class Bench:
+        steps = 1
+        figures = solver.SolverFigures(branches=(branch,))
+
+        def __init__(self, quick):
+            assert quick
+
+        def run(self):
+            yield "branches"
+
+    monkeypatch.setattr("grader.bench.solver.SolverBench", Bench)
+    monkeypatch.setattr("grader.bench.reading.measure_reading", lambda *, quick: iter([READING] * quick))
+    show_benchmark(quick=True, as_json=True, solver_only=solver_only)
+    told = json.loads(capsys.readouterr().out)
+    assert told["solver"]["branches"][0]["cases"] == 100
+    assert len(told["reading"]) == (0 if solver_only else 1)
