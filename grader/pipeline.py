@@ -30,6 +30,7 @@ from grader.sheet import rectify, straighten
 from reference.assignment import Assignment, Scales, Variant
 from reference.construction import Vector
 from reference.errors import InputFileError, MechanismError
+from reference.mechanism import Crank
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,10 +174,16 @@ def _declared_scales(assignment: Assignment, variant: Variant, declared: Mapping
             case Declared(per_mm=value):
                 known[name] = value
             case ByRule() as rule:
-                omega = abs(float(assignment.mechanism([variant]).crank.omega[0]))
-                if set(rule.powers) <= {"omega", *known}:
-                    known[name] = rule.per_mm({"omega": omega, **known})
+                values = {**_crank_speed(assignment, variant), **known}
+                if rule.powers.keys() <= values.keys():
+                    known[name] = rule.per_mm(values)
     return assignment.scales([variant], **known)
+
+
+def _crank_speed(assignment: Assignment, variant: Variant) -> dict[str, float]:
+    """Omega of the crank; nothing where a slider drives."""
+    driver = assignment.mechanism([variant]).driver
+    return {"omega": abs(float(driver.omega[0]))} if isinstance(driver, Crank) else {}
 
 
 def documents_of(

@@ -384,7 +384,9 @@ def validate(model: type[Model], data: dict[str, Any], file: str) -> Model:
 def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Finding]:
     """Pydantic's faults as paths and plain sentences."""
     for fault in error.errors():
-        path = "$" + "".join(_path_part(part) for part in fault["loc"])
+        *above, last = fault["loc"] or ("",)
+        is_field = fault["type"] in {"extra_forbidden", "missing"}
+        path = "$" + "".join(map(_path_part, above)) + (f".{last}" if is_field else _path_part(last))
         message = fault["msg"].removeprefix("Value error, ")
         if fault["type"] == "extra_forbidden":
             message = "is not known here; check its spelling" + _near(str(fault["loc"][-1]), model)
@@ -407,7 +409,7 @@ _WHY_NEEDED = {
 def _path_part(part: str | int) -> str:
     if isinstance(part, int):
         return f"[{part}]"
-    return "" if part in _UNION_TAGS else f".{part}"
+    return "" if part in _UNION_TAGS or part.startswith("function-") else f".{part}"
 
 
 def _near(name: str, model: type[BaseModel]) -> str:

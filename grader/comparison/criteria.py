@@ -31,12 +31,18 @@ def compare(task: Task, submission: Submission) -> Comparison:
     evidence = gather(task, submission)
     settled = settle(task, evidence, submission.declared)
     marking = _Marking(task, evidence, settled, open_ledger(task, evidence, settled))
-    order = [*settled, *task.construction.vectors, *task.construction.rates]
+    order = [*settled, *_in_order(task)]
     criteria = sorted(task.rubric.criterion, key=lambda criterion: order.index(criterion.name))
     found = {criterion.id: marking.outcome(criterion) for criterion in criteria}
     outcomes = tuple(found[criterion.id] for criterion in task.rubric.criterion)
     scales = {name: scale.used for name, scale in settled.items()}
     return Comparison(outcomes, scales, marking.ledger.followed, evidence)
+
+
+def _in_order(task: Task) -> list[str]:
+    """Vectors and angular quantities as they are found: accelerations hang on angular velocities."""
+    names = [*task.construction.vectors, *task.construction.rates]
+    return sorted(names, key=lambda name: ("v", "omega", "a", "epsilon").index(name.partition("_")[0]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,14 +178,16 @@ class _Marking:
             return self.absent(criterion, Quantity(value=right, unit=unit))
         value, tolerance = self.evidence.values[name], task.tolerance(criterion)
         rate = task.construction.rates[name]
-        per_mm = self.used[task.scale_of(rate.vector)] / task.lengths_m[name]
+        scale = self.used[task.scale_of(rate.vector)]
+        per_mm = scale / task.lengths_m[name]
 
         def against(expected: float) -> Mark:
             allowed = length_tolerance(tolerance, abs(expected) / per_mm) * per_mm
             return mark_value(value, expected, allowed, tolerance, unit)
 
         mark, followed = against(right), False
-        own = from_rate(task, self.evidence, rate, per_mm) if task.rubric.follow_through else None
+        self.ledger.remember(name, mark)
+        own = from_rate(task, self.evidence, rate, scale) if task.rubric.follow_through else None
         if mark.level != "full" and own is not None:
             head = task.construction.vectors[rate.vector].head
             candidate = self.ledger.allowed(frozenset({head}), against(own))

@@ -64,7 +64,7 @@ class Evidence:
     measured : vectors measured by hand
     nodes : the student's own nodes, complex mm; plans about their pole, the mechanism about its
         assignment's origin
-    crank_mm : drawn length of the crank and its standard error, or None
+    yardstick_mm : drawn length of the task's yardstick (the crank) and its standard error, or None
     unread : why something asked for was not read, by name
     has_sheets : whether any sheet was handed in
     """
@@ -72,7 +72,7 @@ class Evidence:
     drawn: Mapping[str, DrawnVector]
     measured: Mapping[str, DrawnVector]
     nodes: Mapping[str, complex]
-    crank_mm: tuple[float, float] | None
+    yardstick_mm: tuple[float, float] | None
     unread: Mapping[str, str]
     has_sheets: bool
     values: Mapping[str, float]
@@ -86,7 +86,7 @@ def gather(task: Task, submission: Submission) -> Evidence:
     """All readings of a submission in the assignment's frame."""
     drawn: dict[str, DrawnVector] = {}
     nodes: dict[str, complex] = {}
-    cranks: list[tuple[float, float]] = []
+    lengths: list[tuple[float, float]] = []
     turns: dict[str, float] = {}
     for reading in submission.readings:
         sketch = reading.figures.get(MECHANISM)
@@ -101,14 +101,14 @@ def gather(task: Task, submission: Submission) -> Evidence:
             for name, place in _plan_nodes(task, figure, read, turn).items():
                 nodes.setdefault(name, place)
         if sketch:
-            cranks.extend(_crank(task, sketch))
+            lengths.extend(_yardstick(task, sketch))
             for name, place in _mechanism_nodes(task, sketch, turn).items():
                 nodes.setdefault(name, place)
     measured = _measured(submission.measured)
     own = nodes if submission.readings else _nodes_from(task, measured)
-    crank = min(cranks, key=lambda one: one[1], default=None)
+    length = min(lengths, key=lambda one: one[1], default=None)
     unread = {gap.name: gap.reason for reading in submission.readings for gap in reading.unread}
-    return Evidence(drawn, measured, own, crank, unread, bool(submission.readings), submission.values)
+    return Evidence(drawn, measured, own, length, unread, bool(submission.readings), submission.values)
 
 
 # The turn of a sketch -----------------------------------------------------------------------------
@@ -177,16 +177,14 @@ def _plan_nodes(task: Task, figure: str, read: Figure, turn: float) -> dict[str,
 
 
 def _mechanism_nodes(task: Task, sketch: Figure, turn: float) -> dict[str, complex]:
-    """The sketch about the assignment's origin, for which its crank's pivot must be known."""
-    sure = _sure(task, sketch)
-    if task.pivot not in sure or task.pin not in sure:
+    """The sketch about the assignment's origin, for which its scale and one of its pivots must be known."""
+    sure, drawn = _sure(task, sketch), _yardstick(task, sketch)
+    pivot = next((name for name in task.ground if name in sure), None)
+    if task.yardstick is None or not drawn or pivot is None:
         return {}
-    pivot, pin = sure[task.pivot].at, sure[task.pin].at
-    if abs(pin - pivot) == 0.0:
-        return {}
-    origin = task.ground[task.pivot] * abs(pin - pivot) / task.crank_m
+    origin = task.ground[pivot] * drawn[0][0] / task.yardstick.length_m
     back = cmath.rect(1.0, -turn)
-    return {name: (node.at - pivot) * back + origin for name, node in sure.items()}
+    return {name: (node.at - sure[pivot].at) * back + origin for name, node in sure.items()}
 
 
 def _sure(task: Task, read: Figure) -> dict[str, ReadNode]:
@@ -194,13 +192,13 @@ def _sure(task: Task, read: Figure) -> dict[str, ReadNode]:
     return {name: node for name, node in read.nodes.items() if node.confidence >= least}
 
 
-def _crank(task: Task, sketch: Figure) -> list[tuple[float, float]]:
-    sure = _sure(task, sketch)
-    if task.pivot not in sure or task.pin not in sure:
+def _yardstick(task: Task, sketch: Figure) -> list[tuple[float, float]]:
+    sure, link = _sure(task, sketch), task.yardstick
+    if link is None or link.tail not in sure or link.head not in sure:
         return []
-    pivot, pin = sure[task.pivot], sure[task.pin]
-    length = abs(pin.at - pivot.at)
-    return [(length, math.hypot(pivot.se_mm, pin.se_mm))] if length > 0.0 else []
+    tail, head = sure[link.tail], sure[link.head]
+    length = abs(head.at - tail.at)
+    return [(length, math.hypot(tail.se_mm, head.se_mm))] if length > 0.0 else []
 
 
 def _measured(reading: Reading | None) -> dict[str, DrawnVector]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from grader.comparison import verdicts
 from grader.comparison.evidence import Evidence
-from grader.comparison.following import Expectation, expectations
+from grader.comparison.following import Expectation, expectations, with_own_lengths
 from grader.comparison.limits import Mark
 from grader.comparison.marking import length_tolerance
 from grader.comparison.scales import Scale, followed_scales, used_scales
@@ -24,9 +24,7 @@ def open_ledger(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) ->
 
 def _deviating(task: Task, evidence: Evidence, used: Mapping[str, float]) -> frozenset[str]:
     """The student's own nodes that are further from their right places than a length may be off."""
-    crank = evidence.crank_mm
-    scales = dict(used) if crank is None else {**used, "kL": task.crank_m / crank[0]}
-    exact = task.nodes(scales)
+    exact = task.nodes(with_own_lengths(task, evidence, used))
     tolerance = task.rubric.tolerance
     return frozenset(
         name

@@ -1,8 +1,9 @@
 """Declared scales held against the assignment's rule, the drawn crank, v_A and a_A.
 
-A scale is right when it turns what was drawn into what is real: the crank for kL, v_A for kv, a_A
-for ka. Another scale than the assignment proposes is no mistake. Where the drawn vectors follow
-another scale than the declared one, the scale is wrong and the drawing is not.
+A scale is right when it turns what was drawn into what is real: the crank for kL (where a slider
+drives, the first link of given length), v_A for kv, a_A for ka. Another scale than the assignment
+proposes is no mistake. Where the drawn vectors follow another scale than the declared one, the scale is
+wrong and the drawing is not.
 """
 
 from collections.abc import Mapping
@@ -13,7 +14,7 @@ from grader.comparison.limits import Limit, Mark, mark
 from grader.comparison.marking import length_tolerance
 from grader.comparison.task import SCALE_NAMES, Task, unit_of
 from grader.outcomes import Reason, UsedScale
-from grader.quantities import ByRule, Refused, parse_scale
+from grader.quantities import EXAMPLES, ByRule, ParsedScale, Refused, parse_scale
 from grader.rubric import ToleranceTable
 
 
@@ -57,11 +58,7 @@ def _settle_one(
     task: Task, evidence: Evidence, name: str, text: str | None, before: Mapping[str, Scale]
 ) -> Scale:
     rule = _by_rule(task, evidence, name, before)
-    parsed = None
-    if text is not None and text.strip():
-        units = task.assignment.file.scales.bare_units
-        bare = next((unit for scale, unit in units.items() if scale == name), None)
-        parsed = parse_scale(name, text, bare_unit=bare)
+    parsed = _parsed(task, name, text)
     if parsed is None:
         used = UsedScale(None, None, rule, assumed=True)
         return Scale(used, _contradiction(task, evidence, name, rule), None, (_assumed(name, rule),))
@@ -71,11 +68,21 @@ def _settle_one(
         open_mark = Mark("none", "none", "full", (reason,))
         return Scale(used, _contradiction(task, evidence, name, rule), open_mark)
     if isinstance(parsed, ByRule):
-        known = {"omega": task.omega, **followed_scales(before)}
-        value = parsed.per_mm(known)
+        value = parsed.per_mm({"omega": task.omega or 0.0, **followed_scales(before)})
     else:
         value = parsed.per_mm
     return _hold_declared(task, evidence, name, UsedScale(text, value, value, assumed=False), rule)
+
+
+def _parsed(task: Task, name: str, text: str | None) -> ParsedScale | None:
+    if text is None or not text.strip():
+        return None
+    units = task.assignment.file.scales.bare_units
+    bare = next((unit for scale, unit in units.items() if scale == name), None)
+    parsed = parse_scale(name, text, bare_unit=bare)
+    if isinstance(parsed, ByRule) and "omega" in parsed.powers and task.omega is None:
+        return Refused(f"a slider drives this mechanism, there is no crank's omega; write {EXAMPLES[name]}")
+    return parsed
 
 
 def _assumed(name: str, rule: float) -> Reason:
@@ -83,10 +90,12 @@ def _assumed(name: str, rule: float) -> Reason:
 
 
 def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Scale]) -> float:
-    """The assignment's rule; a length scale from the drawn crank where that was read."""
+    """The assignment's rule; a length scale from the drawn yardstick where that was read."""
     known = followed_scales(before)
-    if name == "kL" and evidence.crank_mm is not None:
-        return task.crank_m / evidence.crank_mm[0]
+    if name == "kL":
+        witness = _witness(task, evidence, name)
+        if witness is not None:
+            return witness[0] / witness[1]
     found = task.assignment.scales([task.variant], **known)
     return float(getattr(found, name)[0])
 
@@ -97,10 +106,12 @@ def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Sca
 def _witness(task: Task, evidence: Evidence, name: str) -> tuple[float, float, float] | None:
     """What is known of a scale: real value, drawn millimetres, standard error."""
     if name == "kL":
-        return None if evidence.crank_mm is None else (task.crank_m, *evidence.crank_mm)
+        if task.yardstick is None or evidence.yardstick_mm is None:
+            return None
+        return (task.yardstick.length_m, *evidence.yardstick_mm)
     vector = f"{name[1]}_{task.pin}"
     drawn = evidence.vector(vector)
-    if vector not in task.real or drawn is None or drawn.length_mm <= 0.0:
+    if drawn is None or drawn.length_mm <= 0.0 or not task.real.get(vector):
         return None
     return abs(task.real[vector]), drawn.length_mm, drawn.se_mm
 

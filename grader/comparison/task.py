@@ -8,6 +8,7 @@ import numpy as np
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference.assignment import Assignment, Variant
 from reference.construction import Construction, evaluate
+from reference.mechanism import Crank, Dyad, Mechanism, Slider
 from reference.plan import exact_plan
 from reference.steps import Nodes, Parameters
 
@@ -30,6 +31,15 @@ def unit_of(name: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
+class Yardstick:
+    """A link of given length, whose drawing tells the scale of lengths, from joint `tail` to `head`."""
+
+    tail: str
+    head: str
+    length_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Task:
     """One student's task with its right answer.
 
@@ -39,6 +49,9 @@ class Task:
     real : exact vectors, complex SI, by name
     rates : exact angular quantities, rad/s and rad/s^2
     lengths_m : by angular quantity, the real length of its link
+    pin : of the driven link
+    yardstick : the crank; where a slider drives, the first link of given length; None without any
+    omega : of the crank, None where a slider drives
     """
 
     assignment: Assignment
@@ -49,10 +62,9 @@ class Task:
     real: Mapping[str, complex]
     rates: Mapping[str, float]
     lengths_m: Mapping[str, float]
-    pivot: str
     pin: str
-    crank_m: float
-    omega: float
+    yardstick: Yardstick | None
+    omega: float | None
     ground: Mapping[str, complex]
 
     def tolerance(self, criterion: CriterionTable) -> ToleranceTable:
@@ -80,7 +92,7 @@ def task_of(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Tas
     Raises MechanismError where the variant does not assemble.
     """
     plan = exact_plan(assignment, [variant], accelerations=rubric.needs_accelerations)
-    construction, crank = plan.construction, plan.mechanism.crank
+    construction, driver = plan.construction, plan.mechanism.driver
     parameters = {name: np.asarray(np.ravel(value)[0]) for name, value in plan.drawing.parameters.items()}
     return Task(
         assignment=assignment,
@@ -91,9 +103,21 @@ def task_of(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Tas
         real={name: complex(vector[0]) for name, vector in plan.vectors_si.items()},
         rates={name: float(rate[0]) for name, rate in plan.rates.items()},
         lengths_m={name: float(parameters[rate.length]) for name, rate in construction.rates.items()},
-        pivot=crank.pivot,
-        pin=crank.pin,
-        crank_m=float(crank.length_m[0]),
-        omega=float(crank.omega[0]),
+        pin=driver.pin,
+        yardstick=_yardstick(plan.mechanism),
+        omega=float(driver.omega[0]) if isinstance(driver, Crank) else None,
         ground={name: complex(np.ravel(place)[0]) for name, place in plan.mechanism.ground_m.items()},
     )
+
+
+def _yardstick(mechanism: Mechanism) -> Yardstick | None:
+    driver = mechanism.driver
+    if isinstance(driver, Crank):
+        return Yardstick(driver.pivot, driver.pin, float(driver.length_m[0]))
+    for group in mechanism.groups:
+        match group:
+            case Dyad(node=node, pins=(pin, _), lengths_m=(length, _)):
+                return Yardstick(pin, node, float(np.ravel(length)[0]))
+            case Slider(node=node, pin=pin, length_m=length):
+                return Yardstick(pin, node, float(np.ravel(length)[0]))
+    return None

@@ -62,7 +62,7 @@ def test_the_plan_is_drawn_into_a_file(planmark, tmp_path):
 @pytest.mark.parametrize(
     ("call", "status", "words"),
     [
-        ("plan pmup", 2, "built in are engine, press"),
+        ("plan pmup", 2, "built in are engine, piston, press"),
         ("plan pump", 2, "needs --n (n from 1 to 30)"),
         ("plan pump --n 31", 2, "has n from 1 to 30"),
         ("plan press --position 8", 2, "has position from 0 to 7"),
