@@ -162,6 +162,7 @@ KEYS: dict[str, dict[str, Key]] = {
         ),
         "page": Key("the sheets"),
         "given": Key("the data told"),
+        "tradition": Key("o: poles o and o', scales kL, kv, ka; p: poles p and π, scales μl, μv, μa", '"o"'),
         "names": Key("What students see instead of a name.", '{ "o" = "p", "kv" = "μv" }'),
         "assumptions": Key(
             "what the source leaves open and this file settles", '["B to the right of A -> O2"]'

@@ -51,7 +51,7 @@ class _Writer:
             is_set = value is not None and (field in model.model_fields_set or info.is_required())
             if is_set and _is_table(value) and not flat:
                 tables.append((name, value))
-            elif is_set and value != []:
+            elif is_set and value not in ([], {}):
                 yield from self._line(kind, field, f"{_bare(name)} = {_spread(value)}")
             else:
                 yield from self._offer(kind, field, name)

@@ -67,11 +67,13 @@ def show_class(
 
 def _print_pages(assignment: Assignment, plan: Plan, pdf: Path, *, drawings: bool, lang: str) -> None:
     from grader.plan_pdf import pdf as as_pdf
+    from grader.plan_steps import wording_of
 
-    pages = table_pages(assignment, plan, tongue(lang))
+    words = tongue(lang)
+    pages = table_pages(assignment, plan, words)
     if drawings:
         with _told(len(plan.variants) >= LONG) as tell:
-            pages = class_pages(pages, assignment, plan, tell=tell)
+            pages = class_pages(pages, assignment, plan, wording_of(words), tell)
     write_whole(pdf, as_pdf(numbered(pages), f"{assignment.file.title.in_language(lang)} ({assignment.id})"))
 
 
