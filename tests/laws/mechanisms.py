@@ -366,12 +366,12 @@ def rates_of(mechanism: Mechanism) -> tuple[float, float]:
     return float(driver.speed[0]), float(driver.acceleration[0])
 
 
-def transformed(mechanism: Mechanism, turn: complex, *, mirror: bool = False, factor: float = 1.0):
-    """The mechanism turned by a unit number, mirrored in the x axis before, and enlarged; the map itself."""
+def transformed(mechanism: Mechanism, turn: complex, *, mirror=False, factor=1.0, shift=0j):
+    """The mechanism mirrored in the x axis, turned by a unit number, enlarged, shifted; the map itself."""
     sign, angle = -1 if mirror else 1, float(np.angle(turn))
 
     def place(z):
-        return (np.conj(z) if mirror else z) * turn * factor
+        return (np.conj(z) if mirror else z) * turn * factor + shift
 
     def guide_of(guide):
         if isinstance(guide, MovingGuide):

@@ -164,15 +164,24 @@ def test_backwards_in_time_velocities_turn_round_and_accelerations_stay(mechanis
         assert near(forth.acceleration[joint], back.acceleration[joint], acceleration(forth))
 
 
-@given(a_mechanism, st.floats(-3.1, 3.1), st.booleans(), st.sampled_from([1e-6, 0.01, 1.0, 39.37, 1e5]))
-def test_turned_mirrored_and_enlarged_mechanisms_move_alike(mechanism, angle, mirror, factor):
-    image, place = transformed(mechanism, np.exp(1j * angle), mirror=mirror, factor=factor)
+SIZES = [1e-6, 0.01, 1.0, 39.37, 1e5]
+PLACES = [0j, 30 - 40j]
+
+
+@given(a_mechanism, st.floats(-3.1, 3.1), st.booleans(), st.sampled_from(SIZES), st.sampled_from(PLACES))
+def test_shifted_turned_mirrored_and_enlarged_mechanisms_move_alike(mechanism, angle, mirror, factor, shift):
+    turn = np.exp(1j * angle)
+    image, place = transformed(mechanism, turn, mirror=mirror, factor=factor, shift=shift * factor)
     motion, other = move(mechanism), move(image)
+
+    def rate(z):
+        return place(z) - shift * factor
+
     for joint in motion.position:
         assert near(place(motion.position[joint]), other.position[joint], 4.0 * factor)
-        assert near(place(motion.velocity[joint]), other.velocity[joint], speed(motion) * factor)
+        assert near(rate(motion.velocity[joint]), other.velocity[joint], speed(motion) * factor)
         assert near(
-            place(motion.acceleration[joint]), other.acceleration[joint], acceleration(motion) * factor
+            rate(motion.acceleration[joint]), other.acceleration[joint], acceleration(motion) * factor
         )
     sign = -1 if mirror else 1
     for rates, images in ((motion.omega, other.omega), (motion.epsilon, other.epsilon)):
