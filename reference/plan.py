@@ -115,6 +115,17 @@ def _nodes(
     return figures
 
 
+def vectors_of(construction: Construction, mechanism: Mechanism, motion: Motion) -> dict[str, ComplexArray]:
+    """Every vector of the plans from the closed form, complex, m/s and m/s^2, shape (N,)."""
+    one = np.ones(1)
+    nodes = _nodes(construction, mechanism, motion, Scales(one, one, one))
+    return {
+        vector.name: nodes[figure][vector.head] - nodes[figure][vector.tail]
+        for figure in construction.poles
+        for vector in construction.vectors_of(figure)
+    }
+
+
 def _component(motion: Motion, vector: Vector) -> ComplexArray:
     """A normal component v^2 / l towards the link's first joint, or a Coriolis one 2 i omega v."""
     pin, node = vector.link or ("", "")
