@@ -6,17 +6,17 @@ import numpy as np
 
 from reference.canvas import INK, Area, Label, Stroke
 from reference.drawing import symbols
-from reference.drawing.labelling import Wanted, lengths_inside, segments_of
+from reference.drawing.drive import drive_arrow, drive_letter
+from reference.drawing.labelling import Wanted
 from reference.drawing.letters import Style, letters
 from reference.drawing.links import Bar, bars, blocks, hinged_on, unit
 from reference.drawing.subject import Figure, Part, Subject
 from reference.drawing.symbols import LINK_MM, point
 from reference.drawing.triangles import altitudes
-from reference.lettering import pieces_of
-from reference.mechanism import Crank, DrivenSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
+from reference.mechanism import DrivenSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
 
 LETTER_MM, SMALL_LETTER_MM = 4.2, 3.2
-LINK_NUMBER_MM, RATE_MM = 3.0, 3.4
+LINK_NUMBER_MM = 3.0
 PLATE_FILL = "#eef1f4"
 GUIDE_REACH_MM, NEAR_GUIDE_MM = 13.0, 7.0
 AXIS_REACH_MM = 18.0
@@ -24,7 +24,6 @@ NUMBER_SHARES = (0.5, 0.36, 0.64, 0.25, 0.75)
 """Where along its longest stretch a link's number may stand, the best first."""
 STEEP_ROD = 0.25
 """Sine of a rod's angle to the guide beyond which the ground lies on the guide's other side."""
-TURN_RADIUS_MM, TURN_SWEEP = 9.0, 0.9
 SUPPORTS = (-1j, 1j, -1.0 + 0j, 1.0 + 0j)
 """Where the ground of a pivot may lie, the best first."""
 SUPPORT_CLEAR_COSINE = 0.62
@@ -39,7 +38,7 @@ def sketch(subject: Subject) -> Figure:
     layers = (_plates(subject, nodes), thin.lines, *_layers(subject, nodes), thin.vectors)
     drawn = [part for layer in layers for part in layer]
     style = Style(LETTER_MM, SMALL_LETTER_MM, INK, symbols.JOINT_RADIUS_MM)
-    others = [*_link_numbers(subject, nodes), *_rate_letter(subject, nodes), *thin.letters]
+    others = [*_link_numbers(subject, nodes), *drive_letter(subject, nodes), *thin.letters]
     named = letters(subject, nodes, [part.shape for part in drawn], style, others)
     return captioned(subject, "mechanism", (*drawn, *named), INK)
 
@@ -53,6 +52,7 @@ def captioned(subject: Subject, name: str, parts: tuple[Part, ...], colour: str)
 
 def _layers(subject: Subject, nodes: dict[str, complex]) -> Iterator[Iterator[Part]]:
     """Over plates and thin lines: what lies undermost first."""
+    driver = subject.plan.mechanism.driver.pin
     yield _guides(subject, nodes)
     yield (
         Part(bar.node, Stroke(point(bar.ends[0]), point(bar.ends[1]), LINK_MM))
@@ -61,7 +61,7 @@ def _layers(subject: Subject, nodes: dict[str, complex]) -> Iterator[Iterator[Pa
     yield (Part(block.node, symbols.block(block.at, block.along)) for block in blocks(subject, nodes))
     yield _grounds(subject, nodes)
     yield _joints(subject, nodes)
-    yield _drive(subject, nodes)
+    yield (Part(driver, shape) for shape in drive_arrow(subject, nodes))
 
 
 def _plates(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
@@ -157,57 +157,6 @@ def _welds(
     yield Part(group.node, symbols.weld(nodes[middle], along, -1 if left > 0.0 else 1))
 
 
-def _drive(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
-    """The sense in which the crank turns, or the driven slider moves."""
-    driver = subject.plan.mechanism.driver
-    if isinstance(driver, DrivenSlider):
-        ends = _thrust(subject, nodes)
-        shapes = symbols.arrow(*ends, symbols.THIN_MM, INK) if ends else ()
-    else:
-        place = _turn_place(subject, driver, nodes)
-        shapes = symbols.turning(nodes[driver.pivot], *place) if place else ()
-    for shape in shapes:
-        yield Part(driver.pin, shape)
-
-
-def _thrust(subject: Subject, nodes: dict[str, complex]) -> tuple[complex, complex] | None:
-    """The arrow beside the driven slider, in the sense of its velocity."""
-    driver = subject.plan.mechanism.driver
-    block = next(block for block in blocks(subject, nodes) if block.node == driver.pin)
-    speed = subject.one(np.asarray(driver.speed)) if isinstance(driver, DrivenSlider) else 0.0
-    if speed == 0.0:
-        return None
-    along = block.along * float(np.sign(speed))
-    above = 1j * block.along * (1 if block.along.real >= 0.0 else -1)
-    start = block.at + above * (symbols.BLOCK_MM[1] + 3.0) - along * symbols.BLOCK_MM[0]
-    return start, start + 2.5 * along * symbols.BLOCK_MM[0]
-
-
-def _turn_place(
-    subject: Subject, crank: Crank, nodes: dict[str, complex]
-) -> tuple[float, float, float] | None:
-    """Radius, start and sweep of the crank's turning arrow, where it meets the fewest links."""
-    rate = subject.one(np.asarray(crank.omega))
-    arm = nodes[crank.pin] - nodes[crank.pivot]
-    if rate == 0.0 or abs(arm) == 0.0:
-        return None
-    sign = float(np.sign(rate))
-    links = segments_of(Stroke(point(bar.ends[0]), point(bar.ends[1])) for bar in bars(subject, nodes))
-
-    def meets(place: tuple[float, float, float]) -> int:
-        bow = symbols.arc(nodes[crank.pivot], *place, LINK_MM).points
-        boxes = np.array([(x - 0.8, y - 0.8, x + 0.8, y + 0.8) for x, y in bow])
-        return int(np.any(lengths_inside(boxes, links) > 0.0, axis=0).sum())
-
-    largest = min(TURN_RADIUS_MM, 0.45 * abs(arm))
-    tried = [
-        (radius, float(np.angle(arm)) + sign * turn, sign * TURN_SWEEP)
-        for radius in (largest, 0.7 * largest)
-        for turn in (0.25, -0.25 - TURN_SWEEP, 1.5, -1.5 - TURN_SWEEP, 2.5)
-    ]
-    return min(tried, key=meets)
-
-
 def _link_numbers(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted]:
     """A number at the longest stretch of each link, in a plate's middle, at a driven slider."""
     driver = subject.plan.mechanism.driver
@@ -236,18 +185,3 @@ def _beside(parts: Sequence[Bar], nodes: dict[str, complex]) -> complex:
     start, end = max((bar.ends for bar in parts), key=lambda ends: abs(ends[1] - ends[0]))
     places = (start + share * (end - start) for share in NUMBER_SHARES)
     return max(places, key=lambda at: min(10.0, *(abs(at - place) for place in nodes.values())))
-
-
-def _rate_letter(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted]:
-    driver = subject.plan.mechanism.driver
-    if isinstance(driver, DrivenSlider):
-        ends = _thrust(subject, nodes)
-        if ends:
-            yield Wanted(driver.pin, point(ends[1]), subject.letter(f"v_{driver.pin}"), RATE_MM, INK, 0.6)
-        return
-    place = _turn_place(subject, driver, nodes)
-    if place is not None:
-        radius, start, sweep = place
-        turn = complex(np.exp(1j * (start + 0.5 * sweep)))
-        at = nodes[driver.pivot] + radius * turn
-        yield Wanted(driver.pin, point(at), pieces_of(f"omega_{driver.link}"), RATE_MM, INK, 0.6, turn)

@@ -40,8 +40,9 @@ class Wording:
     units: Mapping[str, str] = field(default_factory=dict)
 
     def unit(self, unit: str) -> str:
-        """A unit in the language's letters."""
-        return self.units.get(unit, unit)
+        """A unit in the language's letters, `m/s^2` with a superscript."""
+        written = unit.replace("^2", "²")
+        return self.units.get(written, written)
 
     def number(self, text: str) -> str:
         """A number, written with a point, as the language writes it."""

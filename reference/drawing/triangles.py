@@ -11,7 +11,7 @@ from reference.drawing import symbols
 from reference.drawing.labelling import Wanted
 from reference.drawing.subject import PLAN_COLOURS, Part, Subject
 from reference.drawing.symbols import HAIR_MM, MEDIUM_MM, point
-from reference.lettering import Piece
+from reference.lettering import Piece, pieces_of
 
 LETTER_MM = 2.8
 RIGHT_ANGLE_MM = 1.8
@@ -80,13 +80,12 @@ def _right_angle(at: complex, p: complex, q: complex) -> Curve:
 def _letters(triangle: Triangle, nodes: dict[str, complex], *, several: bool) -> Iterator[Wanted]:
     """Letters at the triangle's nodes, with the component's index where the joint has several."""
     about = (Piece(triangle.vector.name.split("_")[1], -1),) if several else ()
-    letter = triangle.joint.lower()
+    letter = pieces_of(triangle.joint.lower())
     for node, mark, figure in (
-        (triangle.end, "''", "velocity_plan"),
-        (triangle.beyond, "'''", ""),
-        (triangle.turned, "IV", "acceleration_plan"),
+        (triangle.end, Piece("''"), "velocity_plan"),
+        (triangle.beyond, Piece("'''"), ""),
+        (triangle.turned, Piece("IV", 1), "acceleration_plan"),
     ):
-        raised = mark == "IV"
-        text = (Piece(letter), *about, Piece(mark, 1)) if raised else (Piece(letter + mark), *about)
+        text = (*letter, mark, *about) if mark.height == 0 else (*letter, *about, mark)
         colour = PLAN_COLOURS.get(figure, CONSTRUCTION)
         yield Wanted(triangle.vector.head, point(nodes[node]), text, LETTER_MM, colour, 0.5)
