@@ -316,6 +316,7 @@ class LintVariant(VariantDocument):
     shortest_mm: LintLeast | None
     under_8_mm: int
     room: LintLeast | None
+    predicted_error: float | None
 
 
 class LintScales(Document):

@@ -12,7 +12,7 @@ from grader.authoring.toml import commented
 from grader.files import create_whole
 from grader.rubric import RubricFile, load_rubric
 from reference.assignment import SUFFIXES, Assignment, load_assignment
-from reference.authored import AssignmentFile, MechanismFile, validate
+from reference.authored import TRADITIONS, AssignmentFile, MechanismFile, validate
 from reference.errors import CallError
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
@@ -94,16 +94,19 @@ def _generated(source: Assignment, name: str) -> RubricFile:
 
 def _texts(source: Assignment, rubric: RubricFile, name: str, file: str, what: str) -> dict[str, str]:
     """The files' texts, read again: what is written can be loaded."""
-    set_keys = {"id": name}
+    # The tradition gives its names by itself.
+    school = TRADITIONS.get(source.file.tradition, {})
+    names = {key: shown for key, shown in source.file.names.items() if school.get(key) != shown}
+    changed = {"id": name, "mechanism": name, "rubric": name, "names": names}
     heads = {kind: head.format(what=what, file=file, name=name) for kind, head in HEADS.items()}
     texts = {
         "assignment": commented(
-            source.file.model_copy(update={**set_keys, "mechanism": name, "rubric": name}),
+            source.file.model_copy(update=changed),
             heads["assignment"],
         ),
-        "mechanism": commented(source.mechanism_file.model_copy(update=set_keys), heads["mechanism"])
+        "mechanism": commented(source.mechanism_file.model_copy(update={"id": name}), heads["mechanism"])
         + _other_groups(source.mechanism_file),
-        "rubric": commented(rubric.model_copy(update=set_keys), heads["rubric"]),
+        "rubric": commented(rubric.model_copy(update={"id": name}), heads["rubric"]),
     }
     for kind, model in (("assignment", AssignmentFile), ("mechanism", MechanismFile), ("rubric", RubricFile)):
         validate(model, tomllib.loads(texts[kind]), f"{name}{SUFFIXES[kind]}")

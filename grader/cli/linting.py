@@ -133,6 +133,8 @@ def _tell_end(found: Lint, svg: Path | None) -> None:
         typer.echo(f"hardest to draw: {variant}: {found.worst.why}")
         if svg is not None:
             typer.echo(f"drawn in {svg}")
+    elif svg is not None:
+        typer.echo("nothing drawn: no variant can be solved")
     counts = {
         severity: sum(finding.severity == severity for finding in found.findings)
         for severity in ("fault", "warning", "hint")

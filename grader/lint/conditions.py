@@ -17,12 +17,12 @@ LEAST_CROSSING_DEG = 20.0
 """Construction lines that meet at less are hard to intersect by hand: an error across one of them
 moves the node by three times as much."""
 LARGEST_ERROR = 1e-9
-"""Relative error of the computed velocities above which more digits are needed to trust them."""
+"""Relative error of a computed plan that is told: far below a pencil's, far above a rounding's."""
 
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """Arrays of shape (N,) by joint or node; `error` is the predicted relative error of velocities."""
+    """Arrays of shape (N,) by joint or node; `error` is the predicted relative error of the plan."""
 
     transmission: Mapping[str, FloatArray]
     crossing_deg: Mapping[str, FloatArray]
@@ -66,9 +66,15 @@ def condition_findings(assignment: Assignment, plan: Plan, conditions: Condition
                 f"the construction lines of {' and '.join(nodes)} meet at only {least:.1f} degrees{moved}",
                 chosen(plan.variants, flat),
             )  # fmt: skip
+    again = np.broadcast_to(plan.motion.recomputed, (len(plan.variants),))
+    if np.any(again):
+        told = "so near a singular position that the plan was computed with more digits than usual"
+        yield LintFinding(
+            "hint", "recomputed", *mechanism_place(assignment), told, chosen(plan.variants, again)
+        )
     lost = conditions.error > LARGEST_ERROR
     if np.any(lost):
-        told = f"the computed velocities may be off by a share of {np.max(conditions.error):.1g}"
+        told = f"the computed plan may be off by {np.max(conditions.error):.1g} of its size"
         yield LintFinding(
             "warning", "predicted_error", *mechanism_place(assignment), told, chosen(plan.variants, lost)
         )

@@ -8,6 +8,7 @@ from grader.lint.findings import LintFinding
 from grader.lint.places import mechanism_place
 from grader.rubric import RubricFile, check_rubric
 from reference.assignment import Assignment
+from reference.authored import TRADITIONS
 from reference.construction import Construction, ancestors
 from reference.derivation import image_name
 from reference.formula import Formula
@@ -105,6 +106,7 @@ def _not_told(assignment: Assignment) -> Iterator[LintFinding]:
 def _unknown_names(assignment: Assignment, construction: Construction) -> Iterator[LintFinding]:
     known = {step.node for step in construction.steps} | construction.vectors.keys()
     known |= construction.rates.keys() | set(SCALES)
+    known |= TRADITIONS.get(assignment.file.tradition, {}).keys()
     for name in assignment.file.names:
         if name not in known:
             told = "is neither a node nor a vector nor a scale of this assignment"

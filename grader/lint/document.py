@@ -57,6 +57,7 @@ def _row(row: Row) -> LintVariant:
         shortest_mm=_least(row.shortest_mm),
         under_8_mm=row.short,
         room=_least(row.room),
+        predicted_error=row.error,
     )
 
 

@@ -45,6 +45,7 @@ class Row:
     shortest_mm : the shortest asked vector as drawn at the proposed scales, zero vectors apart
     short : how many asked vectors are under 8 mm
     room : how many times as large the tightest figure could be drawn in its zone
+    error : predicted relative error of the computed plan
     """
 
     variant: Variant
@@ -54,6 +55,7 @@ class Row:
     shortest_mm: Least | None = None
     short: int = 0
     room: Least | None = None
+    error: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,10 +164,10 @@ def _rows(plan: Plan, conditions: Conditions, asked: Asked, rooms: Mapping[int, 
     transmission, crossing = _least(conditions.transmission, count), _least(conditions.crossing_deg, count)
     shortest, room = _least(lengths, count), _least(zones, count)
     short = asked.short(WELL_READ_MM).sum(axis=0) if asked.names else np.zeros(count, dtype=int)
-    return [
-        Row(variant, None, transmission[i], crossing[i], shortest[i], int(short[i]), room[i])
-        for i, variant in enumerate(plan.variants)
-    ]
+    figures = zip(
+        transmission, crossing, shortest, short.tolist(), room, conditions.error.tolist(), strict=True
+    )
+    return [Row(variant, None, *told) for variant, told in zip(plan.variants, figures, strict=True)]
 
 
 def _least(figures: Mapping[str, FloatArray], count: int) -> list[Least | None]:
