@@ -87,11 +87,13 @@ def _observed(outcome: Outcome, name: str, comparison: Comparison) -> Observed |
 
 
 def _with_mistake(outcome: Outcome, mistakes: Sequence[Mistake]) -> Outcome:
-    """The outcome with the code of the mistake that explains its loss."""
+    """The outcome with the mistake that explains its loss."""
     if outcome.verdict not in {"none", "partial"}:
         return outcome
-    found = next((one.code for one in mistakes if outcome.criterion in one.explains), None)
-    return replace(outcome, mistake=found) if found and outcome.mistake is None else outcome
+    found = next((one for one in mistakes if outcome.criterion in one.explains), None)
+    if found is None or outcome.mistake is not None:
+        return outcome
+    return replace(outcome, mistake=found.code, cause=found)
 
 
 def report_of(  # noqa: PLR0913 - what a report holds beside the judgement

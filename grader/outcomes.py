@@ -88,6 +88,7 @@ class Outcome:
     confidence : that the verdict is right
     reasons : most important first; empty only for a declared scale that nothing can be held against
     mistake : code of the mistake that explains a loss, or None
+    cause : that mistake, where diagnosis found it
     """
 
     criterion: str
@@ -100,6 +101,7 @@ class Outcome:
     reasons: tuple[Reason, ...]
     possible: tuple[Verdict, Verdict]
     mistake: str | None = None
+    cause: "Mistake | None" = None
 
 
 @dataclass(frozen=True, slots=True)

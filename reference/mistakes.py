@@ -128,7 +128,7 @@ def _changed_step(mistake: Mistake, construction: Construction) -> Step:
             return _with_line(step, mistake.slot, lambda line: replace(line, along=_quarter(line.along, 1)))
         case "wrong_link", TwoLines():
             tail, head = mistake.other
-            return _with_line(step, mistake.slot, lambda line: replace(line, along=Along(tail, head, 1)))
+            return _with_line(step, mistake.slot, lambda line: _by_link(line, tail, head))
         case "wrong_intersection", TwoLines():
             (through,) = mistake.other
             return _with_line(step, mistake.slot, lambda line: replace(line, through=through))
@@ -143,6 +143,12 @@ def _with_line(step: TwoLines, slot: int, change) -> TwoLines:  # type: ignore[n
     lines = [step.first, step.second]
     lines[slot] = change(lines[slot])
     return TwoLines(step.node, *lines)
+
+
+def _by_link(line: Line, tail: str, head: str) -> Line:
+    """The line by another link: across it, or along it where it ran along a guide."""
+    turned = isinstance(line.along, Along) and line.along.quarters % 2 == 0
+    return replace(line, along=Along(tail, head, 0 if turned else 1))
 
 
 def _quarter(along: Direction, quarters: int) -> Direction:

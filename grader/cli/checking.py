@@ -6,13 +6,13 @@ from rich.console import Console
 from rich.table import Table
 
 from grader.cli.grading import check_language
-from grader.feedback import reason_sentence
+from grader.feedback import mistake_feedback, reason_sentence
 from grader.i18n import Tongue, tongue
-from grader.judging import Submission, task_of
+from grader.judging import Submission, judge, task_of
 from grader.measurements import Measurements, names_of, read_measurements
-from grader.outcomes import Quantity
+from grader.outcomes import Mistake, Quantity
 from grader.rubric import rubric_of
-from grader.selfcheck import LEVELS, Checked, Level, is_all_right, self_check
+from grader.selfcheck import LEVELS, Checked, Level, is_all_right, likely_mistakes, told
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError
 
@@ -34,8 +34,10 @@ def check_measured(name: str, n: int | None, position: int | None, file: Path, l
         variant = _variant(assignment, entered, n, position)
         _tell_head(console, entered, variant)
         submission = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
-        checked = self_check(task_of(assignment, rubric, variant), submission, wanted)
+        judgement = judge(task_of(assignment, rubric, variant), submission)
+        checked = told(judgement, wanted)
         _tell(console, checked, wanted, words, assignment)
+        _tell_mistakes(console, likely_mistakes(judgement, wanted), lang, assignment)
         all_right = all_right and is_all_right(checked) and bool(checked) and not entered.problems
     return not all_right
 
@@ -78,6 +80,14 @@ def _tell(
             numbers = f"{_number(one.measured)} / {_number(one.expected)}"
         table.add_row(f"[{style}]{mark}[/{style}]", names.get(one.name, one.name), numbers, sentence)
     console.print(table, highlight=False)
+
+
+def _tell_mistakes(
+    console: Console, mistakes: tuple[Mistake, ...], lang: str, assignment: Assignment
+) -> None:
+    for mistake in mistakes:
+        sentences = mistake_feedback(mistake, lang, "full", assignment.file.names)
+        console.print(f"  {mistake.code}: {sentences}", highlight=False, markup=False)
 
 
 def _number(quantity: Quantity) -> str:

@@ -26,7 +26,7 @@ from reference.assignment import Assignment, Variant
 from reference.construction import ancestors, evaluate
 from reference.derivation import parameters_of
 from reference.mistakes import Drawing
-from reference.steps import Nodes
+from reference.steps import Along, Coriolis, Given, Line, Nodes, Step, TwoLines
 
 LEAST_CONFIDENCE = 0.6
 """An explanation less certain than this is not told."""
@@ -242,7 +242,18 @@ def _told(case: Case, operator: operators.Mistake, explains: list[str], confiden
             detail["degrees"] = 90.0 * quarters
         case operators.Mistake(other=other) if other:
             detail["other"] = "".join(other)
+    if code in LINE_MISTAKES and _is_along_guide(case.drawing.construction.step(operator.at), operator.slot):
+        detail["line"] = "guide"
     return Mistake(code, operator.at, tuple(explains), confidence, detail)
+
+
+LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link"})
+
+
+def _is_along_guide(step: Step, slot: int) -> bool:
+    """Whether a step's line runs along a link instead of across it."""
+    line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None
+    return isinstance(line, Line) and isinstance(line.along, Along) and line.along.quarters % 2 == 0
 
 
 def _code_of_scale(name: str, factor: float) -> str:
@@ -254,6 +265,8 @@ def _code_of_scale(name: str, factor: float) -> str:
 # What could have gone wrong -----------------------------------------------------------------------
 
 OF_THE_WHOLE = frozenset({"figure_rotated", "other_assembly"})
+COMPONENTS = frozenset({"n", "c"})
+"""Parts that end in nodes of their own, no joints' images."""
 
 
 class _Candidates(Protocol):
@@ -284,13 +297,18 @@ def _of_steps(stage: _Stage) -> Iterator[operators.Mistake]:
         for operator in operators.single_mistakes(stage.drawing, figure):
             if operator.code not in OF_THE_WHOLE | {"scale_wrong", "rpm_not_converted"}:
                 yield operator
+    for step in stage.drawing.construction.steps:
+        if isinstance(step, Given) and isinstance(step.length, Coriolis):
+            yield operators.Mistake("arithmetic", step.node, factor=0.5)
 
 
 def _swaps(drawing: Drawing) -> Iterator[operators.Mistake]:
     """Two images of a plan with each other's letters."""
     construction = drawing.construction
     for figure, pole in construction.poles.items():
-        images = sorted(v.head for v in construction.vectors_of(figure) if v.tail == pole and not v.is_normal)
+        images = sorted(
+            v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in COMPONENTS
+        )
         for index, first in enumerate(images):
             for second in images[index + 1 :]:
                 yield operators.Mistake("labels_swapped", first, other=(first, second))

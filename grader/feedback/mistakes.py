@@ -1,11 +1,17 @@
 """The mistakes that planmark names: a title, what was done, what to redo.
 
-`%(at)s` is the node, vector, scale or figure where it was made.
+`%(at)s` is the node, vector, scale or figure where it was made. Some are told in other words where a
+link carries a guide: of a Coriolis component, and of the line along the guide.
 """
 
 from dataclasses import dataclass
 
 from grader.i18n import N_
+
+ALONG_GUIDE = "guide"
+"""The detail `line` of a mistake in a line that runs along a moving guide."""
+CORIOLIS_END = "k_"
+"""How the nodes begin in which Coriolis components end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,3 +112,47 @@ MISTAKES: dict[str, Words] = {
         N_("Compute it once more; the drawing before it can stay."),
     ),
 }  # fmt: skip
+
+_CORIOLIS: dict[str, Words] = {
+    "normal_missing": Words(
+        N_("Coriolis component left out"),
+        N_("At %(at)s, the Coriolis component was left out."),
+        N_("Where a block slides along a turning guide, lay off 2·ω·v first, then draw the line along"
+           " the guide through its end."),
+    ),
+    "normal_reversed": Words(
+        N_("Coriolis component reversed"),
+        N_("At %(at)s, the Coriolis component was laid off the wrong way round."),
+        N_("Turn the sliding velocity of the point of the guide about the block by 90° in the sense in"
+           " which the guide turns: that is its direction."),
+    ),
+    "arithmetic": Words(
+        N_("Coriolis component without its factor 2"),
+        N_("At %(at)s, the Coriolis component is half of what it should be."),
+        N_("It is 2·ω·v, not ω·v: lay it off twice as long, and redo what starts from its end."),
+    ),
+}  # fmt: skip
+_ALONG_GUIDE: dict[str, Words] = {
+    "parallel_for_perpendicular": Words(
+        N_("perpendicular instead of along the guide"),
+        N_("At %(at)s, a line was drawn perpendicular to the guide instead of along it."),
+        N_("A block can only slide along its guide: draw the line along the guide, then redo what starts"
+           " from its end."),
+    ),
+    "wrong_link": Words(
+        N_("line drawn by the wrong link"),
+        N_("At %(at)s, a line was taken along another link than the one that carries the guide."),
+        N_("The block slides along its own guide: redraw the line by it."),
+    ),
+}  # fmt: skip
+
+
+def words_of(code: str, at: str = "", line: str = "") -> Words:
+    """The words for a mistake of this code made there, in a `line` along a guide or across a link.
+
+    Raises KeyError for a code that is not known.
+    """
+    usual = MISTAKES[code]
+    if at.startswith(CORIOLIS_END):
+        return _CORIOLIS.get(code, usual)
+    return _ALONG_GUIDE.get(code, usual) if line == ALONG_GUIDE else usual

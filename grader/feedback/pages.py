@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from grader.documents import (
     CriterionDocument,
+    MistakeDocument,
     QuantityDocument,
     ReportDocument,
     ResultsDocument,
@@ -18,7 +19,7 @@ from grader.documents import (
     ToleranceDocument,
 )
 from grader.feedback import statistics, words
-from grader.feedback.mistakes import MISTAKES
+from grader.feedback.mistakes import MISTAKES, Words, words_of
 from grader.feedback.overlay import View, views
 from grader.feedback.problems import problem_sentence, unmatched_sentence
 from grader.feedback.sentences import PLACES, Level, mistake_sentences, place
@@ -236,14 +237,20 @@ def _mistakes(
     titles = {criterion.id: criterion.title for criterion in report.criteria}
     return [
         {
-            "title": speaker.gettext(MISTAKES[mistake.code].title),
-            "text": mistake_sentences(mistake.code, mistake.at, speaker, names),
+            "title": speaker.gettext(words.title),
+            "text": mistake_sentences(words, mistake.at, speaker, names),
             "detail": mistake.detail if level == "full" else "",
             "at": place(mistake.at, speaker, names),
             "explains": [titles.get(one, one) for one in mistake.explains],
         }
         for mistake in report.mistakes
+        for words in (_words_of(mistake),)
     ]
+
+
+def _words_of(mistake: MistakeDocument) -> Words:
+    known = dict(part.split(" = ", 1) for part in mistake.detail.split(", ") if " = " in part)
+    return words_of(mistake.code, mistake.at, known.get("line", ""))
 
 
 _SCALE_UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}

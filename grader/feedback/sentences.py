@@ -8,7 +8,7 @@ Names of vectors stand in sentences as `v_BA`, `a_BA_n`; pages set them with ind
 from collections.abc import Callable, Mapping
 from typing import Literal
 
-from grader.feedback.mistakes import MISTAKES
+from grader.feedback.mistakes import MISTAKES, Words, words_of
 from grader.feedback.reasons import told_reason
 from grader.i18n import N_, Tongue, tongue
 from grader.outcomes import Mistake, Outcome, Param, Reason
@@ -105,7 +105,9 @@ def criterion_feedback(
     told = (reason_sentence(reason, speaker, level, names) for reason in _worth_telling(outcome))
     parts = list(dict.fromkeys(told))[:MOST_REASONS]
     if outcome.mistake and outcome.verdict in {"none", "partial"} and outcome.mistake in MISTAKES:
-        title = speaker.gettext(MISTAKES[outcome.mistake].title)
+        cause = outcome.cause
+        words = words_of(cause.code, cause.at, line_of(cause)) if cause else MISTAKES[outcome.mistake]
+        title = speaker.gettext(words.title)
         parts.append(speaker.gettext("Likely cause: %(cause)s.") % {"cause": title})
     return " ".join(part for part in parts if part)
 
@@ -136,14 +138,19 @@ def mistake_feedback(
     """What was done, most likely, and what to redo; empty at level `symbol` and for an unknown code."""
     if level == "symbol" or mistake.code not in MISTAKES:
         return ""
-    return mistake_sentences(mistake.code, mistake.at, tongue(lang), names)
+    words = words_of(mistake.code, mistake.at, line_of(mistake))
+    return mistake_sentences(words, mistake.at, tongue(lang), names)
 
 
-def mistake_sentences(code: str, at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
+def mistake_sentences(words: Words, at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
     """What a mistake was and what to redo."""
-    known = MISTAKES[code]
     where = {"at": place(at, speaker, names)}
-    return f"{speaker.gettext(known.what) % where} {speaker.gettext(known.redo) % where}"
+    return f"{speaker.gettext(words.what) % where} {speaker.gettext(words.redo) % where}"
+
+
+def line_of(mistake: Mistake) -> str:
+    """Which kind of line it was made in, as `words_of` takes it; empty where the code says enough."""
+    return str(mistake.detail.get("line", ""))
 
 
 PLACES = {

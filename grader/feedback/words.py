@@ -28,7 +28,7 @@ STATE_MARKS = {"graded": "✓", "needs_review": "?", "unreadable": "✗", "missi
 
 _GREEK = {"omega": "ω", "epsilon": "ε"}
 _NAME = re.compile(
-    r"\b(?:(?P<vector>[van])_(?P<points>[A-Z][A-Za-z0-9]{0,7})(?:_(?P<part>[nt])\b)?"
+    r"\b(?:(?P<vector>[vank])_(?P<points>[A-Z][A-Za-z0-9]{0,7})(?:_(?P<part>[ntcr])\b)?"
     r"|(?P<rate>omega|epsilon)_(?P<link>\w{1,4})|(?P<letter>[kμ])(?P<scale>[Llva])\b)"
 )
 
