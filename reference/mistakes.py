@@ -16,16 +16,20 @@ from reference.construction import Construction, Vector, ancestors
 from reference.steps import (
     Along,
     ArcAndLine,
+    Coincide,
     Coriolis,
     Direction,
     Fixed,
     Given,
     Line,
+    Local,
     Normal,
     Parameters,
+    Similar,
     Step,
     TwoArcs,
     TwoLines,
+    View,
 )
 
 Code = Literal[
@@ -188,8 +192,20 @@ def _with_figure_turned(construction: Construction, figure: str, quarters: int) 
                 return TwoLines(step.node, *lines)
         return step
 
-    steps = tuple(turned(step) for step in construction.figures[figure])
-    return replace(construction, figures={**construction.figures, figure: steps})
+    figures = {
+        name: tuple(
+            turned(step) if name == figure else _seen_turned(step, figure, quarters) for step in steps
+        )
+        for name, steps in construction.figures.items()
+    }
+    return replace(construction, figures=figures)
+
+
+def _seen_turned(step: Step, figure: str, quarters: int) -> Step:
+    """A Coriolis component is computed from lengths and senses: a turned velocity plan gives the same."""
+    if figure == "velocity_plan" and isinstance(step, Given) and isinstance(step.length, Coriolis):
+        return replace(step, length=replace(step.length, quarters=step.length.quarters + quarters))
+    return step
 
 
 # What could have gone wrong -----------------------------------------------------------------------
@@ -209,7 +225,7 @@ def single_mistakes(drawing: Drawing, figure: str) -> Iterator[Mistake]:
                 yield from _mistakes_of_lines(step, construction, figure)
             case TwoArcs() | ArcAndLine():
                 yield Mistake("other_assembly", step.node)
-        if step.node in construction.images and figure != "mechanism":
+        if step.node in construction.images and figure != "mechanism" and not _is_in_line(step, drawing):
             yield Mistake("image_mirrored", step.node)
     if figure != "mechanism":
         scale = "kv" if figure == "velocity_plan" else "ka"
@@ -219,6 +235,14 @@ def single_mistakes(drawing: Drawing, figure: str) -> Iterator[Mistake]:
             yield Mistake("rpm_not_converted", figure, factor=RPM_FACTOR)
 
 
+def _is_in_line(step: Step, drawing: Drawing) -> bool:
+    """Whether a point of a slotted link lies on its guide's line: its image's mirror image is itself."""
+    if not isinstance(step, Similar):
+        return False
+    joint = drawing.construction.step(step.model[2])
+    return isinstance(joint, Local) and not np.any(joint.y.at(View({}, drawing.parameters)))
+
+
 def _mistakes_of_given(step: Given, construction: Construction) -> Iterator[Mistake]:
     match step.length:
         case Normal() | Coriolis():
@@ -226,7 +250,7 @@ def _mistakes_of_given(step: Given, construction: Construction) -> Iterator[Mist
             yield Mistake("normal_reversed", step.node)
             if isinstance(step.length, Normal) and step.length.tail != construction.poles["velocity_plan"]:
                 yield Mistake("normal_from_absolute", step.node)
-        case _ if not isinstance(step.along, Fixed):
+        case _ if not isinstance(step.along, Fixed) or step.start in construction.poles.values():
             yield Mistake("sense_reversed", step.node)
 
 
@@ -235,13 +259,16 @@ def _mistakes_of_lines(step: TwoLines, construction: Construction, figure: str) 
         tuple(vector.link) for vector in construction.vectors.values() if vector.link and vector.scale == "kv"
     ]
     pole = construction.poles[figure]
+    joints = construction.figures["mechanism"]
+    under = {joint.node: joint.other for joint in joints if isinstance(joint, Coincide)}
     for slot, line in enumerate((step.first, step.second)):
         if not isinstance(line, Line) or not isinstance(line.along, Along):
             continue
-        own = {line.along.tail, line.along.head}
+        own = {under.get(joint, joint) for joint in line.along.needs}
         yield Mistake("parallel_for_perpendicular", step.node, slot)
         for link in dict.fromkeys(links):
-            if set(link) != own:
+            places = {under.get(joint, joint) for joint in link}
+            if len(places) > 1 and places != own:
                 yield Mistake("wrong_link", step.node, slot, other=link)
         yield from _wrong_feet(step, slot, line, construction, pole)
 

@@ -154,6 +154,7 @@ class Coriolis:
     guide : the guide's direction, along which it slides
     turn : ends of the velocity that turns the guide's link about one of its joints
     link : those joints, in the same order, in the sketch
+    quarters : how the velocity plan is turned as a whole, by quarters counter-clockwise
 
     The length is positive to the left of `guide`: 2 omega v of the components along guide and across
     the link, with their signs.
@@ -163,6 +164,7 @@ class Coriolis:
     guide: "Direction"
     turn: tuple[str, str]
     link: tuple[str, str]
+    quarters: int = 0
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -172,7 +174,8 @@ class Coriolis:
     def at(self, view: View) -> FloatArray:
         """Drawn millimetres."""
         known, nodes = view.parameters, view.nodes
-        sliding, turning = (nodes[head] - nodes[tail] for tail, head in (self.slide, self.turn))
+        back = 1j**-self.quarters
+        sliding, turning = ((nodes[head] - nodes[tail]) * back for tail, head in (self.slide, self.turn))
         arm = geometry.unit(nodes[self.link[1]] - nodes[self.link[0]])
         omega = geometry.cross(arm, turning) * known["kv"] / view.real_length(*self.link)
         speed = geometry.dot(self.guide.at(view), sliding) * known["kv"]
