@@ -1,6 +1,7 @@
 """``planmark lint``."""
 
 from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from rich.table import Table
 
 from grader.files import write_whole
 from grader.lint import Least, Lint, Proposal, Row, lint, lint_document, named
+from grader.lint.lengths import WELL_READ_MM
 from grader.lint.scales import ratio_text
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
@@ -36,18 +38,22 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
     console.print(f"[bold]{assignment.file.title.en}[/bold]", highlight=False)
     console.print(_variants_table(found.rows))
     if found.scales and found.plan is not None:
+        console.print()
         console.print(_scales_table(found.scales))
+    console.print()
     _tell_findings(console, found)
     _tell_end(found, svg)
     return found.needs_a_person
 
 
 def _variants_table(rows: Sequence[Row]) -> Table:
-    table = Table("variant", "assembles", box=None, header_style="bold")
+    table = Table(box=None, header_style="bold")
+    table.add_column("variant", no_wrap=True)
+    table.add_column("assembles")
     for heading in (
-        "transmission\nsine",
+        "transmis-\nsion sine",
         "crossing\ndegrees",
-        "shortest asked\nmm",
+        "shortest\nasked mm",
         "under\n8 mm",
         "fits\ntimes",
     ):
@@ -62,52 +68,74 @@ def _variants_table(rows: Sequence[Row]) -> Table:
             _worst_of([row.crossing_deg for row in group], "{:.1f}"),
             _worst_of([row.shortest_mm for row in group], "{:.2f}"),
             str(sum(row.short for row in group)),
-            _worst_of([row.room for row in group], "{:.2f}", named_below=1.0),
+            _room_of([row.room for row in group]),
         )
     return table
 
 
-def _ranges(rows: Sequence[Row]) -> list[Sequence[Row]]:
-    """A row each, or of many variants about thirty stretches."""
+def _ranges(rows: Sequence[Row]) -> list[list[Row]]:
+    """A row each; of many variants about thirty stretches, all positions of a number in one."""
     if len(rows) <= SHOWN_ROWS:
         return [[row] for row in rows]
-    long = -(-len(rows) // 30)
-    return [rows[start : start + long] for start in range(0, len(rows), long)]
+    has_both = rows[0].variant.n is not None and rows[0].variant.position is not None
+    units = (
+        [list(unit) for _, unit in groupby(rows, key=lambda row: row.variant.n)]
+        if has_both
+        else [[row] for row in rows]
+    )
+    long = -(-len(units) // 30)
+    return [
+        [row for unit in units[start : start + long] for row in unit] for start in range(0, len(units), long)
+    ]
 
 
 def _named_range(group: Sequence[Row]) -> str:
     return str(group[0].variant) if len(group) == 1 else named([row.variant for row in group])
 
 
-def _worst_of(figures: Sequence[Least | None], form: str, named_below: float = np.inf) -> str:
+def _worst_of(figures: Sequence[Least | None], form: str) -> str:
     known = [figure for figure in figures if figure is not None]
     if not known:
         return "-"
     least = min(known, key=lambda figure: figure.value)
-    return form.format(least.value) + (f" {least.at}" if least.value < named_below else "")
+    return f"{form.format(least.value)} {least.at}"
+
+
+def _room_of(figures: Sequence[Least | None]) -> str:
+    """How the tightest figure fits; on which page, where it does not."""
+    known = [figure for figure in figures if figure is not None]
+    if not known:
+        return "-"
+    least = min(known, key=lambda figure: figure.value)
+    where = least.at.partition(" on ")[2]
+    return f"{least.value:.2f} {where}" if least.value < 1.0 else f"{least.value:.2f}"
 
 
 def _scales_table(scales: Sequence[Proposal]) -> Table:
-    told = {"proposed": "as proposed", "round": "round, one for all", "round_each": "round, each its own"}
+    """Quantities in rows: three columns stay readable in a narrow terminal."""
+    told = {"proposed": "as proposed", "round": "round", "round_each": "round, each its own"}
     table = Table("scales", box=None, header_style="bold")
-    for heading in (
-        "kL", "kv\n(m/s)/mm", "ka\n(m/s^2)/mm", "fits\ntimes",
-        "shortest asked\nmm", "under\n8 mm", "shortest\nlink mm",
-    ):  # fmt: skip
-        table.add_column(heading, justify="right")
     for one in scales:
-        lengths = sorted({ratio_text(float(kL)) for kL in _ends(one.scales.kL)}, key=len)
-        table.add_row(
-            told[one.name],
-            " .. ".join(lengths),
-            _span(one.scales.kv),
-            _span(one.scales.ka),
-            f"{one.room:.2f}",
-            "-" if one.shortest_mm is None else f"{one.shortest_mm:.2f} {one.shortest}",
-            f"{one.under_8_mm} of {one.asked}",
-            f"{one.link_mm:.1f}",
-        )
+        table.add_column(told[one.name], justify="right", no_wrap=True)
+    rows: dict[str, list[str]] = {
+        "kL": ["..".join(_ratios(one.scales.kL)) for one in scales],
+        "kv, (m/s)/mm": [_span(one.scales.kv) for one in scales],
+        "ka, (m/s^2)/mm": [_span(one.scales.ka) for one in scales],
+        "fits, times": [f"{one.room:.2f}" for one in scales],
+        "shortest asked, mm": [
+            "-" if one.shortest_mm is None else f"{one.shortest_mm:.2f} {one.shortest}" for one in scales
+        ],
+        f"asked under {WELL_READ_MM:g} mm": [f"{one.under_8_mm} of {one.asked}" for one in scales],
+        "shortest link, mm": [f"{one.link_mm:.1f}" for one in scales],
+    }
+    for name, cells in rows.items():
+        table.add_row(name, *cells)
     return table
+
+
+def _ratios(values: FloatArray) -> list[str]:
+    """The finest and the coarsest scale of lengths, once where they are one."""
+    return list(dict.fromkeys(ratio_text(end) for end in _ends(values)))
 
 
 def _ends(values: FloatArray) -> tuple[float, float]:
@@ -116,7 +144,7 @@ def _ends(values: FloatArray) -> tuple[float, float]:
 
 def _span(values: FloatArray) -> str:
     low, high = (f"{end:.0f}" if end >= 1e4 else f"{end:.4g}" for end in _ends(values))
-    return low if low == high else f"{low} .. {high}"
+    return low if low == high else f"{low}..{high}"
 
 
 def _tell_findings(console: Console, found: Lint) -> None:
@@ -142,4 +170,5 @@ def _tell_end(found: Lint, svg: Path | None) -> None:
     told = ", ".join(
         f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items() if count
     )
-    typer.echo(f"{found.assignment.id}: {len(found.rows)} variants, {told or 'no findings'}")
+    many = "1 variant" if len(found.rows) == 1 else f"{len(found.rows)} variants"
+    typer.echo(f"{found.assignment.id}: {many}, {told or 'no findings'}")

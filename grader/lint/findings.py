@@ -24,7 +24,8 @@ NAMED = 6
 class LintFinding:
     """One finding: how grave, a stable code, where (a path such as ``$.criterion[3]``), what, for whom.
 
-    `variants` is empty where the finding concerns the files as such.
+    `variants` is empty where the finding concerns the files as such; `names_them` where the message
+    tells them in its own way.
     """
 
     severity: Severity
@@ -33,9 +34,10 @@ class LintFinding:
     path: str
     message: str
     variants: tuple[Variant, ...] = ()
+    names_them: bool = False
 
     def __str__(self) -> str:
-        told = f" ({named(self.variants)})" if self.variants else ""
+        told = f" ({named(self.variants)})" if self.variants and not self.names_them else ""
         return f"{self.file} {self.path}: {self.message}{told}"
 
 
@@ -45,20 +47,21 @@ def chosen(variants: Sequence[Variant], which: BoolArray) -> tuple[Variant, ...]
 
 
 def named(variants: Iterable[Variant]) -> str:
-    """Variants as people say them: ``n = 3..7, 12``; with positions ``n = 3, position = 0, 4; n = 4``."""
-    told = []
+    """Variants as people say them: ``n = 3..7, 12``; with positions ``n = 3, 4, position = 0``."""
+    alike: dict[tuple[int, ...], list[int]] = {}
     for n, group in groupby(variants, key=lambda variant: variant.n):
-        members = list(group)
-        positions = [variant.position for variant in members if variant.position is not None]
-        told.append((n, tuple(positions)))
-    if all(not positions for _, positions in told):
-        numbers = [n for n, _ in told if n is not None]
-        return f"n = {_ranges(numbers)}" if numbers else "the only variant"
+        positions = tuple(variant.position for variant in group if variant.position is not None)
+        alike.setdefault(positions, []).extend([] if n is None else [n])
     parts = [
-        ("" if n is None else f"n = {n}, ") + f"position = {_ranges(positions)}" for n, positions in told
+        ", ".join(
+            f"{name} = {_ranges(numbers)}"
+            for name, numbers in (("n", known), ("position", positions))
+            if numbers
+        )
+        for positions, known in alike.items()
     ]
     more = len(parts) - NAMED
-    return "; ".join(parts[:NAMED]) + (f" and {more} more numbers" if more > 0 else "")
+    return "; ".join(parts[:NAMED]) + (" and more" if more > 0 else "") or "the only variant"
 
 
 def _ranges(numbers: Sequence[int]) -> str:

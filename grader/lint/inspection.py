@@ -133,7 +133,7 @@ def _inspected(
         *length_findings(rubric, plan, asked),
         *room_findings(assignment, plan, rooms),
         *tie_findings(plan, ties_of(rubric, plan, asked)),
-        *scale_findings(plan, scales),
+        *scale_findings(assignment, plan, scales),
     ]
     rows = {row.variant: row for row in _rows(plan, conditions, asked, rooms)}
     rows |= {one.variant: _row_of(one) for one in broken}

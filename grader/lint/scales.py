@@ -172,16 +172,18 @@ def _judged(name: str, scales: Scales, plan: Plan, asked: Asked, room: float) ->
     )
 
 
-def scale_findings(plan: Plan, told: Sequence[Proposal]) -> Iterator[LintFinding]:
+def scale_findings(assignment: Assignment, plan: Plan, told: Sequence[Proposal]) -> Iterator[LintFinding]:
     """Round scales where the proposed ones are none, and whether normals can be built by the triangle."""
-    for name in SCALE_OF.values():
+    drawn = {figure for _, figures in pages_of(assignment, plan) for figure in figures}
+    names = [name for figure, name in SCALE_OF.items() if figure in drawn]
+    for name in names:
         values = np.asarray(getattr(plan.scales, name))
         if not np.allclose(round_up(values, steps_of(name)), values, rtol=1e-6):
             own, round_, each = told
             message = (
                 "the proposed scales are not round; these are, and fit every variant:"
-                f" {written(round_.scales)}; then {round_.under_8_mm} of {round_.asked} asked vectors are"
-                f" under {WELL_READ_MM:g} mm instead of {own.under_8_mm};"
+                f" {written(round_.scales, names)}; then {round_.under_8_mm} of {round_.asked} asked"
+                f" vectors are under {WELL_READ_MM:g} mm instead of {own.under_8_mm};"
                 f" with round scales of each variant's own {each.under_8_mm}"
             )
             yield LintFinding("hint", "round_scales", "assignment", "$.scales", message)
@@ -195,13 +197,18 @@ def scale_findings(plan: Plan, told: Sequence[Proposal]) -> Iterator[LintFinding
             yield LintFinding("hint", "no_altitude_method", "assignment", "$.scales", message)
 
 
-def written(scales: Scales, index: int = 0) -> str:
-    """The scales of one variant as people write them."""
-    kL, kv, ka = (float(np.ravel(getattr(scales, name))[index]) for name in ("kL", "kv", "ka"))  # noqa: N806
-    return f"kL = {ratio_text(kL)} ({kL:g} m/mm), kv = {kv:g} (m/s)/mm, ka = {ka:g} (m/s^2)/mm"
+def written(scales: Scales, names: Sequence[str]) -> str:
+    """Scales that are the same for all variants, as people write them."""
+    units = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
+    told = []
+    for name in names:
+        value = float(np.ravel(getattr(scales, name))[0])
+        text = f"{value:g} {units[name]}"
+        told.append(f"kL = {ratio_text(value)} ({text})" if name == "kL" else f"{name} = {text}")
+    return ", ".join(told)
 
 
 def ratio_text(scale_m_per_mm: float) -> str:
     """A scale of lengths as a ratio: 1:5, 1:2.5, 10:1."""
     ratio = 1000.0 * scale_m_per_mm
-    return f"1:{ratio:.6g}" if ratio >= 1.0 - _SLACK else f"{1.0 / ratio:.6g}:1"
+    return f"1:{ratio:.4g}" if ratio >= 1.0 - _SLACK else f"{1.0 / ratio:.4g}:1"

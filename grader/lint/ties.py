@@ -143,7 +143,9 @@ def tie_findings(plan: Plan, ties: Ties) -> Iterator[LintFinding]:
         told = "; ".join(named([variants[one] for one in group]) for group in groups[:NAMED_GROUPS])
         more = f" and {len(groups) - NAMED_GROUPS} more groups" if len(groups) > NAMED_GROUPS else ""
         message = f"the same drawing within {SAME_MM:g} mm: {told}{more}"
-        yield LintFinding("warning", "ties", "assignment", "$.variant", message, chosen(variants, meant))
+        yield LintFinding(
+            "warning", "ties", "assignment", "$.variant", message, chosen(variants, meant), names_them=True
+        )
     count = len(variants)
     further = np.setdiff1d(ties.passing[0] * count + ties.passing[1], ties.same[0] * count + ties.same[1])
     if len(further):

@@ -220,6 +220,7 @@ def test_every_code_of_a_finding_is_documented():
         ([Variant(1), Variant(2), Variant(3), Variant(7)], "n = 1..3, 7"),
         ([Variant(None, 0), Variant(None, 4)], "position = 0, 4"),
         ([Variant(3, 0), Variant(3, 1), Variant(4, 2)], "n = 3, position = 0, 1; n = 4, position = 2"),
+        ([Variant(n, p) for n in (1, 2, 3) for p in (0, 4)], "n = 1..3, position = 0, 4"),
         ([Variant(n) for n in range(1, 40, 2)], "n = 1, 3, 5, 7, 9, 11 and 14 more"),
         ([Variant()], "the only variant"),
     ],
