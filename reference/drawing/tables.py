@@ -136,7 +136,8 @@ def _table(rows: Sequence[Row], at: tuple[float, float], height: float) -> Itera
         base = y + 0.72 * height
         yield Stroke((left, y), (left + COLUMN_MM, y), 0.13 if k > 1 else 0.3, RULE_COLOUR if k > 1 else INK)
         yield Label((left + 1.5, base), row.name, size)
-        yield Label((left + COLUMNS_MM[1] + 1.5, base), row.segment, size)
+        if row.segment:
+            yield Label((left + COLUMNS_MM[1] + 1.5, base), row.segment, size)
         for edge, text in zip(COLUMNS_MM[3:], (row.drawn, row.value, row.direction), strict=True):
             if text:
                 yield Label((left + edge - 1.5, base), text, size, "end")

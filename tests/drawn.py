@@ -1,0 +1,128 @@
+"""What drawings and steps are tried on: built-in assignments, and a mechanism of each other kind."""
+
+from functools import cache
+
+from reference.assignment import load_assignment
+from reference.plan import exact_plan
+
+_HEAD = """
+schema_version = 1
+id = "{name}"
+rubric = "{name}"
+title = {{ en = "{name}" }}
+task = {{ en = "Draw it" }}
+[scales]
+crank_mm = 40
+kL = 0.0025
+kv = 0.025
+ka = 0.25
+[[page]]
+kind = "all"
+figures = ["mechanism", "velocity_plan", "acceleration_plan"]
+[mechanism]
+schema_version = 1
+id = "{name}"
+title = {{ en = "{name}" }}
+length_unit = "mm"
+"""
+_FOUR_BAR = """
+ground = { O1 = [0, 0], O2 = [250, 0] }
+crank = { pivot = "O1", pin = "A", length = 100, angle_deg = 60, omega = 10 }
+[[mechanism.group]]
+type = "RRR"
+node = "B"
+pins = ["A", "O2"]
+lengths = [260, 200]
+links = ["2", "3"]
+side = "left"
+"""
+MECHANISMS = {
+    "slotted link with an offset, crank slowing down clockwise": """
+ground = { O1 = [0, 0], O2 = [300, 20] }
+crank = { pivot = "O1", pin = "A", length = 100, angle_deg = 75, omega = -10, epsilon = 20 }
+[[mechanism.group]]
+type = "RPR"
+node = "A3"
+pin = "A"
+pivot = "O2"
+link = "3"
+offset = 50
+foot = "F"
+[[mechanism.group]]
+type = "point"
+node = "C"
+base = ["O2", "A3"]
+link = "3"
+at = [40, 60]
+""",
+    "yoke": """
+ground = { O1 = [0, 0] }
+crank = { pivot = "O1", pin = "A", length = 100, angle_deg = 40, omega = 10 }
+[[mechanism.group]]
+type = "RPP"
+node = "B"
+pin = "A"
+slot_deg = 90
+guide = { through = [0, 0], angle_deg = 0 }
+""",
+    "two crossed guides": _FOUR_BAR + """
+[[mechanism.group]]
+type = "PRP"
+node = "D"
+guides = [ { joints = ["A", "B"], coincident = "D2" }, { through = [160, 0], angle_deg = 90 } ]
+""",
+    "slider on a moving link": _FOUR_BAR + """
+[[mechanism.group]]
+type = "RRP"
+node = "D"
+pin = "A"
+link = "4"
+length = 250
+guide = { joints = ["O2", "B"], coincident = "D3" }
+side = "behind"
+""",
+    "driven slider": """
+ground = { O2 = [0, 0] }
+[mechanism.driven_slider]
+pin = "A"
+guide = { through = [0, -50], angle_deg = 0 }
+displacement = -300
+speed = 900
+acceleration = 2000
+[[mechanism.group]]
+type = "RRR"
+node = "B"
+pins = ["A", "O2"]
+lengths = [280, 120]
+links = ["2", "3"]
+side = "left"
+[[mechanism.group]]
+type = "plate"
+node = "C"
+base = ["A", "B"]
+link = "2"
+lengths = [140, 200]
+side = "left"
+""",
+}  # fmt: skip
+BUILT_IN = {
+    "pump 1": ("pump", 1, None), "pump 7": ("pump", 7, None), "pump 30": ("pump", 30, None),
+    "pump-collinear 7": ("pump-collinear", 7, None), "press 0": ("press", None, 0),
+    "press 1": ("press", None, 1), "press 4": ("press", None, 4), "engine 5": ("engine", 5, None),
+    "shaper 5": ("shaper", 5, None), "piston 5": ("piston", 5, None),
+}  # fmt: skip
+CASES = (*BUILT_IN, *MECHANISMS)
+
+
+@cache
+def planned(case, folder):
+    """The assignment and the plan of one case; files of our own are written into the folder."""
+    if case in BUILT_IN:
+        name, n, position = BUILT_IN[case]
+        assignment = load_assignment(name)
+        return assignment, exact_plan(assignment, [assignment.variant(n, position)])
+    name = f"m{list(MECHANISMS).index(case)}"
+    file = folder / f"{name}.assignment.toml"
+    file.write_text(_HEAD.format(name=name) + MECHANISMS[case], encoding="utf-8")
+    assignment = load_assignment(str(file))
+    return assignment, exact_plan(assignment, assignment.variants())

@@ -1,0 +1,59 @@
+"""``planmark plan`` as it draws: files, languages, the steps, the altitude construction, wrong calls."""
+
+import xml.etree.ElementTree as ET
+
+import pypdfium2
+import pytest
+
+A3_POINTS = (420.0 / 25.4 * 72.0, 297.0 / 25.4 * 72.0)
+A4_POINTS = (210.0 / 25.4 * 72.0, 297.0 / 25.4 * 72.0)
+POINT = 0.01
+
+
+@pytest.mark.parametrize("call", ["pump --n 7", "press --position 0"])
+def test_the_drawing_is_a_document_of_a3_pages(planmark, tmp_path, call):
+    ran = planmark("plan", *call.split(), "--pdf", "plan.pdf")
+    assert ran.returncode == 0, ran.stderr
+    for page in pypdfium2.PdfDocument(tmp_path / "plan.pdf"):
+        assert page.get_size() == pytest.approx(A3_POINTS, abs=POINT)
+
+
+def test_drawing_steps_and_table_speak_the_language_asked_for(planmark, tmp_path):
+    ran = planmark("plan", "pump", "--n", 7, "--lang", "ro", "--svg", "plan.svg", "--steps", "steps.html")
+    assert ran.returncode == 0, ran.stderr
+    drawing = "".join(ET.parse(tmp_path / "plan.svg").getroot().itertext())
+    assert "Planul vitezelor" in drawing
+    assert "0,19373" in drawing
+    steps = (tmp_path / "steps.html").read_text(encoding="utf-8")
+    assert "Marcați polul" in steps
+    assert "planmark:" not in ran.stderr
+    assert ran.stdout.count("Drawn in") == 2
+
+
+def test_steps_are_printed_on_a4(planmark, tmp_path):
+    assert planmark("plan", "press", "--position", 1, "--steps", "steps.pdf").returncode == 0
+    document = pypdfium2.PdfDocument(tmp_path / "steps.pdf")
+    assert document[0].get_size() == pytest.approx(A4_POINTS, abs=POINT)
+
+
+def test_the_altitude_construction_is_drawn_where_the_scales_allow_it(planmark, tmp_path):
+    assert planmark("plan", "pump", "--n", 7, "--altitude", "--svg", "plan.svg").returncode == 0
+    letters = ["".join(text.itertext()) for text in ET.parse(tmp_path / "plan.svg").getroot().iter()]
+    assert {"d''", "d'''", "dIV", "b''BA", "bBIV"} <= set(letters)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        ("plan press --position 1 --altitude --svg plan.svg", "kL ka / kv^2 = 0.555556"),
+        ("plan pump --n 7 --altitude", "name a file by --svg or --pdf"),
+        ("plan pump --n 7 --steps steps.docx", "must end in .html or .pdf"),
+        ("plan pump --n 7 --steps steps.html --lang de", "choose one of en, ro, ru"),
+        ("plan pump --all --steps steps.html", "--all is every variant"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_and_nothing_is_written(planmark, tmp_path, call, words):
+    ran = planmark(*call.split())
+    assert ran.returncode == 2
+    assert words in " ".join(ran.stderr.replace("│", " ").split())
+    assert not list(tmp_path.iterdir())

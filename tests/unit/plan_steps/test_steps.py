@@ -1,0 +1,237 @@
+"""The construction step by step: every node, its numbers, in three languages; pages and pictures."""
+
+import io
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pypdfium2
+import pytest
+
+from grader.i18n import LANGUAGES, tongue
+from grader.plan_steps import explain, html_page, pdf_pages, wording_of
+from grader.plan_steps.pages import chapters
+from reference.assignment import load_assignment
+from reference.canvas import Label
+from reference.drawing.stages import BEFORE, NOW
+from reference.drawing.subject import Subject
+from reference.lettering import as_pieces, pieces_of
+from reference.plan import exact_plan
+from reference.steps import Given, Pole
+from tests.drawn import CASES, planned
+
+A4_POINTS = (595.28, 841.89)
+POINT = 0.01
+ROUNDED = 0.0051
+"""Half the last digit of a length told with two decimals."""
+
+
+def subject_of(case, lang, folder):
+    assignment, plan = planned(case, folder)
+    return Subject(assignment, plan, 0, wording_of(tongue(lang)))
+
+
+def plain(markup):
+    return re.sub(r"<[^>]*>", "", str(markup)).replace("&#39;", "'").replace("&gt;", ">")
+
+
+def letters(subject, node):
+    return "".join(piece.text for piece in subject.letter(node))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("steps")
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+@pytest.mark.parametrize("case", CASES)
+def test_every_step_has_its_sentence_with_its_node(case, lang, folder):
+    subject = subject_of(case, lang, folder)
+    told = [step for section in explain(subject, tongue(lang)) for step in section.steps]
+    assert [step.step for step in told] == list(subject.plan.construction.steps)
+    assert [step.number for step in told] == list(range(1, len(told) + 1))
+    for step in told:
+        sentence = plain(step.sentence)
+        assert letters(subject, step.step.node) in sentence
+        assert sentence.endswith(".")
+        assert "%(" not in sentence
+        assert "nan" not in plain(step.text)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_vector_and_every_rate_is_told_with_its_value(case, folder):
+    subject = subject_of(case, "en", folder)
+    plan = subject.plan
+    text = "\n".join(plain(s.text) for section in explain(subject, tongue("en")) for s in section.steps)
+    for name, values in plan.vectors_si.items():
+        symbol = letters(subject, name)
+        lines = [line for line in text.split("\n") if line.startswith((f"{symbol} =", f"{symbol} is zero"))]
+        lines += [line for line in text.split("\n") if line.startswith(f"{symbol} / ")]
+        assert lines, name
+        if not subject.is_zero(name) and " = " in lines[0]:
+            value = float(re.findall(r"= ([\d.]+)\s\S+$", lines[0])[0])
+            told = abs(values[0]) if lines[0].startswith(f"{symbol} =") else abs(plan.drawn_mm(name)[0])
+            assert value == pytest.approx(told, rel=1e-4, abs=ROUNDED)
+    for name, values in plan.rates.items():
+        line = next(line for line in text.split("\n") if line.startswith(f"{letters(subject, name)} ="))
+        value = float(re.findall(r"= ([\d.]+)\srad", line)[0])
+        assert value == pytest.approx(abs(values[0]), rel=1e-4, abs=1e-9)
+        if not subject.is_zero(plan.construction.rates[name].vector):
+            assert ("counter-clockwise" in line) == (values[0] > 0.0)
+            assert "clockwise" in line
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_is_laid_off_is_told_with_its_drawn_length(case, folder):
+    subject = subject_of(case, "en", folder)
+    nodes = subject.view.nodes
+    for section in explain(subject, tongue("en")):
+        for step in section.steps:
+            found = re.search(r"lay off .* = ([\d.]+)\smm", plain(step.sentence))
+            if isinstance(step.step, Given) and found:
+                drawn = abs(complex(nodes[step.step.node]) - complex(nodes[step.step.start]))
+                assert abs(float(found[1]) - drawn) <= ROUNDED
+
+
+def test_a_normal_component_is_told_with_its_formula_and_the_scale(folder):
+    subject = subject_of("pump 7", "en", folder)
+    steps = {s.step.node: s for section in explain(subject, tongue("en")) for s in section.steps}
+    first, second = (plain(line) for line in steps["n_BA"].before)
+    assert first == "aBAn = vBA² / AB = 4.5245² / 0.4 = 51.178\N{NO-BREAK SPACE}m/s²"
+    assert second == "aBAn / ka = 51.178 / 7.5064 = 6.82\N{NO-BREAK SPACE}mm"
+    assert plain(steps["n_BA"].sentence).endswith("parallel to BA, from B towards A; it ends in nBA.")
+
+
+def test_a_coriolis_component_is_told_with_its_formula(folder):
+    subject = subject_of("shaper 5", "en", folder)
+    steps = {s.step.node: s for section in explain(subject, tongue("en")) for s in section.steps}
+    assert plain(steps["k_A3A"].before[0]).startswith("aA3Ac = 2 · ω3 · vA3A = 2 · ")
+    assert "turned by 90° in the sense of ω3" in plain(steps["k_A3A"].sentence)
+
+
+@pytest.mark.parametrize("case", ["pump 7", "shaper 5", "driven slider", "two crossed guides"])
+def test_directions_told_for_vectors_are_those_of_the_plan(case, folder):
+    subject = subject_of(case, "en", folder)
+    nodes = subject.view.nodes
+    for step in (s for section in explain(subject, tongue("en")) for s in section.steps):
+        if not isinstance(step.step, Given):
+            continue
+        drawn = complex(nodes[step.step.node]) - complex(nodes[step.step.start])
+        sentence = plain(step.sentence)
+        told = re.search(r"from (\w+) towards (\w+);", sentence)
+        turned = re.search(r"quarter turn (\S+) from the direction (\w+)→(\w+)", sentence)
+        angle = re.search(r"direction ([\d.]+)°", sentence)
+        if told:
+            link = complex(nodes[told[2]]) - complex(nodes[told[1]])
+            assert (np.conj(link) * drawn).real > 0.999 * abs(link) * abs(drawn)
+        elif turned:
+            link = complex(nodes[turned[3]]) - complex(nodes[turned[2]])
+            sense = 1.0 if turned[1] == "counter-clockwise" else -1.0
+            assert sense * (np.conj(link) * drawn).imag > 0.999 * abs(link) * abs(drawn)
+        elif angle:
+            assert np.degrees(np.angle(drawn)) % 360.0 == pytest.approx(float(angle[1]), abs=ROUNDED)
+
+
+@pytest.mark.parametrize(
+    ("lang", "words"),
+    [
+        ("en", ["Mark the pole o", "perpendicular to", "the guide of D", "11.624 / 0.19373 = 60.00"]),
+        ("ro", ["Marcați polul o", "perpendiculară pe", "ghidajul lui D", "11,624 / 0,19373 = 60,00"]),
+        ("ru", ["Отметьте полюс o", "перпендикулярно", "направляющей точки D", "60,00\N{NO-BREAK SPACE}мм"]),
+    ],
+)  # fmt: skip
+def test_the_terms_and_the_decimal_mark_are_those_of_the_language(lang, words, folder):
+    subject = subject_of("pump 7", lang, folder)
+    sections = explain(subject, tongue(lang))
+    text = "\n".join(plain(step.text) for section in sections for step in section.steps)
+    assert [word for word in words if word not in text] == []
+    title = {"en": "Velocity plan", "ro": "Planul vitezelor", "ru": "План скоростей"}[lang]
+    assert sections[1].title == title
+
+
+def test_names_are_those_of_the_assignment_everywhere(folder):
+    subject = subject_of("press 1", "ru", folder)
+    page = html_page(subject, tongue("ru"))
+    assert "<i>π</i>" in page
+    assert "<i>μ</i><sub>v</sub>" in page
+    assert "<i>o</i>" not in page
+    assert "<i>k</i>" not in page
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_each_picture_shows_the_new_step_and_greys_the_earlier_ones(case, folder):
+    subject = subject_of(case, "en", folder)
+    for chapter in chapters(subject, tongue("en")):
+        seen = set()
+        for step in chapter.steps:
+            now = [shape for shape in step.picture.shapes if getattr(shape, "colour", "") == NOW]
+            named = {"".join(piece.text for piece in as_pieces(s.text)) for s in now if isinstance(s, Label)}
+            letter = letters(subject, step.told.step.node)
+            assert any(letter in label.split(", ") for label in named)
+            before = {
+                part
+                for s in step.picture.shapes
+                if isinstance(s, Label) and s.colour == BEFORE
+                for part in "".join(piece.text for piece in as_pieces(s.text)).split(", ")
+            }
+            shown = before | {part for label in named for part in label.split(", ")}
+            assert seen <= shown
+            seen.add(letter)
+
+
+def test_what_a_direction_is_taken_from_is_shown_on_the_mechanism(folder):
+    subject = subject_of("pump 7", "en", folder)
+    for chapter in chapters(subject, tongue("en"))[1:]:
+        for step in chapter.steps:
+            assert (step.model is None) == isinstance(step.told.step, Pole)
+
+
+def test_the_page_is_whole_by_itself_and_its_pictures_are_well_formed(folder):
+    subject = subject_of("pump 7", "ro", folder)
+    page = html_page(subject, tongue("ro"))
+    assert page.startswith('<!doctype html>\n<html lang="ro">')
+    assert not re.findall(r'(?:src|href)="', page)
+    pictures = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
+    assert len(pictures) > len(subject.plan.construction.steps)
+    for picture in pictures:
+        ET.fromstring(picture)
+
+
+def test_pictures_on_the_page_are_true_to_size(folder):
+    subject = subject_of("pump 7", "en", folder)
+    picture = ET.fromstring(chapters(subject, tongue("en"))[1].steps[1].picture.svg)
+    assert picture.get("width") == f"{float(picture.get('viewBox').split()[2]):g}mm"
+    line = next(one for one in picture.iter("{http://www.w3.org/2000/svg}line") if one.get("stroke") == NOW)
+    tip = next(one for one in picture.iter("{http://www.w3.org/2000/svg}polygon") if one.get("fill") == NOW)
+    start = complex(float(line.get("x1")), float(line.get("y1")))
+    end = complex(*map(float, tip.get("points").split()[0].split(",")))
+    assert abs(end - start) == pytest.approx(60.0, abs=ROUNDED)
+
+
+@pytest.mark.parametrize("case", ["press 1", "slotted link with an offset, crank slowing down clockwise"])
+def test_the_printed_steps_are_a4_and_hold_every_number(case, folder):
+    subject = subject_of(case, "ru", folder)
+    document = pypdfium2.PdfDocument(io.BytesIO(pdf_pages(subject, tongue("ru"))))
+    assert len(document) > 1
+    text = ""
+    for page in document:
+        assert page.get_size() == pytest.approx(A4_POINTS, abs=POINT)
+        text += page.get_textpage().get_text_range()
+    for number in range(1, len(subject.plan.construction.steps) + 1):
+        assert f"{number}. " in text
+
+
+def test_a_similar_image_of_a_link_that_does_not_turn_is_told_as_one_point():
+    pump = load_assignment("pump-collinear")
+    plan = exact_plan(pump, [pump.variant(7)])
+    still = plan.nodes_mm["velocity_plan"]
+    nodes = {**plan.nodes_mm, "velocity_plan": {**still, "b": still["a"], "c": still["a"]}}
+    object.__setattr__(plan, "nodes_mm", nodes)
+    steps = explain(Subject(pump, plan), tongue("en"))[1].steps
+    image = next(step for step in steps if step.step.node == "c")
+    assert plain(image.sentence).startswith("a and b coincide, and so does c")
+
+
+def test_digits_in_the_middle_of_a_joints_name_are_set_below():
+    assert [(piece.text, piece.height) for piece in pieces_of("a3'")] == [("a", 0), ("3", -1), ("'", 0)]
