@@ -14,9 +14,10 @@ from grader.cli.grading import check_language, progress
 from grader.cli.plans import check_crank
 from grader.files import write_whole
 from grader.i18n import tongue
+from grader.lint import broken_findings, broken_variants
 from grader.plan_document import plan_documents
-from reference.assignment import Assignment, load_assignment
-from reference.errors import CallError
+from reference.assignment import Assignment, Variant, load_assignment
+from reference.errors import CallError, MechanismError
 from reference.plan import Plan, exact_plan
 
 LONG = 20
@@ -43,13 +44,17 @@ def show_class(
     pdf: Path | None,
     drawings: bool,
     lang: str,
-) -> None:
-    """Write the plans of all variants as JSON, as a table, or on pages; without any, a short table."""
+) -> bool:
+    """Write the plans of all variants as JSON, as a table, or on pages; without any, a short table.
+
+    Variants that cannot be solved are told and left out; whether there are any.
+    """
     check_crank(crank_mm)
     check_language(lang)
     assignment = load_assignment(name)
-    variants = assignment.variants()
+    variants = _sound(assignment)
     plan = exact_plan(assignment, variants, assignment.scales(variants, crank_mm=crank_mm))
+    is_open = len(variants) < len(assignment.variants())
     if csv is not None:
         write_whole(csv, class_csv(plan, decimal_comma=lang in DECIMAL_COMMA))
     if pdf is not None:
@@ -57,12 +62,25 @@ def show_class(
     if as_json:
         documents = [one.model_dump(mode="json") for one in plan_documents(assignment, plan)]
         typer.echo(json.dumps(documents, indent=2, ensure_ascii=False))
-        return
+        return is_open
     if csv is None and pdf is None:
         _show_table(assignment, plan)
     for file in (csv, pdf):
         if file is not None:
             typer.echo(f"{len(variants)} variants written to {file}")
+    return is_open
+
+
+def _sound(assignment: Assignment) -> list[Variant]:
+    """The variants that can be solved; the others are told."""
+    variants = assignment.variants()
+    broken = broken_variants(assignment, variants)
+    without = {one.variant for one in broken}
+    if len(without) == len(variants):
+        raise MechanismError(broken[0].code, f"no variant can be solved; {variants[0]}: {broken[0].message}")
+    for finding in broken_findings(assignment, broken):
+        typer.secho(f"left out: {finding}", err=True, fg="red")
+    return [variant for variant in variants if variant not in without]
 
 
 def _print_pages(assignment: Assignment, plan: Plan, pdf: Path, *, drawings: bool, lang: str) -> None:

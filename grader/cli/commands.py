@@ -49,8 +49,10 @@ def plan(
         from grader.cli.classes import refuse_single, show_class
 
         refuse_single(every=every, options={"--n": n, "--position": position, "--svg": svg, "--steps": steps})
-        show_class(assignment, crank_mm, as_json=as_json, csv=csv, pdf=pdf, drawings=drawings, lang=lang)
-        return
+        is_open = show_class(
+            assignment, crank_mm, as_json=as_json, csv=csv, pdf=pdf, drawings=drawings, lang=lang
+        )
+        raise typer.Exit(1 if is_open else 0)
     from grader.cli.plans import Drawings, show_plan
 
     drawn = Drawings(svg, pdf, steps, lang, altitude=altitude)

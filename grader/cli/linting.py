@@ -15,12 +15,15 @@ from grader.lint.lengths import WELL_READ_MM
 from grader.lint.scales import ratio_text
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
+from reference.canvas import Label
 from reference.canvas import svg as as_svg
-from reference.draw import reference_drawing
+from reference.draw import FRAME, reference_drawing
 from reference.geometry import FloatArray
 
 SHOWN_ROWS = 40
 """More variants than that are told in ranges."""
+REASON_MM, REASON_COLOUR = 4.0, "#a03014"
+"""Of the line under the drawing's frame that says why this variant."""
 COLOURS = {"fault": "bold red", "warning": "yellow", "hint": "cyan"}
 
 
@@ -29,7 +32,10 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
     assignment = load_assignment(name)
     found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
     if svg is not None and found.plan is not None and found.worst is not None:
-        sheets = [sheet.shapes for sheet in reference_drawing(assignment, found.plan, found.worst.index)]
+        told = f"{found.plan.variants[found.worst.index]}: {found.worst.why}"
+        reason = Label((FRAME[0], FRAME[3] + 1.5 * REASON_MM), told, REASON_MM, colour=REASON_COLOUR)
+        drawing = reference_drawing(assignment, found.plan, found.worst.index)
+        sheets = [(*sheet.shapes, reason) for sheet in drawing]
         write_whole(svg, as_svg(sheets))
     if as_json:
         typer.echo(lint_document(found).model_dump_json(indent=2))

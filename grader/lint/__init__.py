@@ -1,5 +1,6 @@
 """An assignment and its rubric held against every variant, before students get it."""
 
+from grader.lint.broken import broken_findings, broken_variants
 from grader.lint.document import lint_document
 from grader.lint.findings import LintFinding, Severity, named
 from grader.lint.inspection import Least, Lint, Row, Worst, lint
@@ -13,6 +14,8 @@ __all__ = [
     "Row",
     "Severity",
     "Worst",
+    "broken_findings",
+    "broken_variants",
     "lint",
     "lint_document",
     "named",
