@@ -97,6 +97,35 @@ def new(
 
 
 @app.command()
+def cycle(
+    assignment: AssignmentArgument,
+    n: NumberOption = None,
+    position: PositionOption = None,
+    of: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--of",
+            help="What to tell: v_B, a_B, v_BA, a_BA_n (with _x or _y a component), omega_3, epsilon_3, D"
+            " (the path of point D); several with commas. All speeds and accelerations if absent.",
+        ),
+    ] = None,
+    samples: Annotated[int, typer.Option("--samples", help="Positions over the cycle.")] = 361,
+    csv: Annotated[Path | None, typer.Option("--csv", help="Write every position to this CSV file.")] = None,
+    svg: Annotated[Path | None, typer.Option("--svg", help="Draw the diagram into this SVG file.")] = None,
+    pdf: Annotated[Path | None, typer.Option("--pdf", help="Draw the diagram into this PDF file.")] = None,
+    lang: LanguageOption = "en",
+) -> None:
+    """Velocities and accelerations over the cycle: a table of extremes, a CSV file, or a diagram.
+
+    Over 0 to 360 degrees of the crank, or the range in which it can turn, followed without branch
+    jumps. In every position the driven link has the variant's own speed and acceleration.
+    """
+    from grader.cli.cycling import show_cycle
+
+    show_cycle(assignment, n, position, of=of or [], samples=samples, csv=csv, svg=svg, pdf=pdf, lang=lang)
+
+
+@app.command()
 def schema(name: Annotated[str, typer.Argument(help="report, results, reading, measurements, ...")]) -> None:
     """The JSON Schema of a document or authored file."""
     import json

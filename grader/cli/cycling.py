@@ -1,0 +1,170 @@
+"""``planmark cycle``."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from grader.cli.grading import check_language
+from grader.cycle import Asked, Extreme, Subject, cycle_csv, extremes, strokes_of
+from grader.files import write_whole
+from grader.i18n import tongue
+from reference.assignment import Assignment, Variant, load_assignment
+from reference.canvas import svg as as_svg
+from reference.cycle import cycle
+
+DECIMAL_COMMA = frozenset({"ro", "ru"})
+CONSTANT = 1e-9
+"""Relative: what changes by less over a cycle is constant but for rounding."""
+
+
+def show_cycle(
+    name: str,
+    n: int | None,
+    position: int | None,
+    *,
+    of: list[str],
+    samples: int,
+    csv: Path | None,
+    svg: Path | None,
+    pdf: Path | None,
+    lang: str,
+) -> None:
+    """Write a variant's cycle as a table or a diagram; without files, print its extremes and strokes."""
+    check_language(lang)
+    assignment = load_assignment(name)
+    variant = assignment.variant(n, position)
+    subject = Subject(cycle(assignment.mechanism([variant]), samples))
+    asked = subject.asked([one.strip() for text in of for one in text.split(",") if one.strip()])
+    if csv is not None:
+        write_whole(csv, cycle_csv(subject, asked, decimal_comma=lang in DECIMAL_COMMA))
+    _draw(assignment, variant, subject, asked, (svg, pdf), lang)
+    if csv is None and svg is None and pdf is None:
+        _print(assignment, variant, subject, asked)
+    for file in (csv, svg, pdf):
+        if file is not None:
+            typer.echo(f"{'Written to' if file == csv else 'Drawn in'} {file}")
+
+
+def _draw(
+    assignment: Assignment,
+    variant: Variant,
+    subject: Subject,
+    asked: Asked,
+    files: tuple[Path | None, Path | None],
+    lang: str,
+) -> None:
+    svg, pdf = files
+    if svg is None and pdf is None:
+        return
+    from grader.cycle.plot import Setting, cycle_diagram
+
+    diagram = cycle_diagram(subject, asked, Setting(assignment, variant, tongue(lang)))
+    if svg is not None:
+        write_whole(svg, as_svg([diagram.shapes], diagram.page_mm))
+    if pdf is not None:
+        from grader.plan_pdf import pdf as as_pdf
+
+        title = f"{assignment.file.title.in_language(lang)}, {variant}"
+        write_whole(pdf, as_pdf([diagram.shapes], title, diagram.page_mm))
+
+
+def _print(assignment: Assignment, variant: Variant, subject: Subject, asked: Asked) -> None:
+    """The range, strokes, and the extremes of what is asked for."""
+    console = Console()
+    console.print(f"[bold]{assignment.file.title.en}[/bold], {variant}", highlight=False)
+    for line in (*_range(subject), *_strokes(subject)):
+        console.print(line, highlight=False)
+    table = Table("", box=None, header_style="bold")
+    coordinate = "crank angle" if subject.cycle.is_turned else "displacement"
+    for heading in ("unit", "least", f"at {coordinate}", "largest", f"at {coordinate}", "here"):
+        table.add_column(heading, justify="left" if heading == "unit" else "right")
+    for quantity in asked.quantities:
+        least, largest = extremes(subject, quantity)
+        here = float(subject.values_at(quantity, np.array([subject.cycle.start]))[0])
+        unit = quantity.unit.replace("²", "^2")
+        finite = math.isfinite(largest.value - least.value)
+        if finite and largest.value - least.value <= CONSTANT * abs(largest.value):
+            table.add_row(quantity.name, unit, "constant", "", "", "", f"{here:.6g}")
+            continue
+        size = max((abs(one.value) for one in (least, largest) if math.isfinite(one.value)), default=0.0)
+        cells = (*_told(subject, least, size), *_told(subject, largest, size), f"{here + 0.0:.6g}")
+        table.add_row(quantity.name, unit, *cells)
+    for point in asked.points:
+        _path_rows(subject, point, table)
+    console.print(table)
+    console.print("every position: --csv FILE; as a diagram: --svg FILE, --pdf FILE", style="dim")
+
+
+def _path_rows(subject: Subject, point: str, table: Table) -> None:
+    """How far a point's path reaches each way, by its samples."""
+    place = np.broadcast_to(subject.cycle.motion.position[point], subject.cycle.driven.shape)
+    here = complex(subject.motion_at(np.array([subject.cycle.start])).position[point][0])
+    for axis, values, own in (("x", place.real, here.real), ("y", place.imag, here.imag)):
+        ends = [int(np.nanargmin(values)), int(np.nanargmax(values))]
+        cells = [
+            cell
+            for end in ends
+            for cell in (f"{values[end] + 0.0:.6g}", _at(subject, float(subject.cycle.driven[end])))
+        ]
+        table.add_row(f"{axis}_{point}", "m", *cells, f"{own + 0.0:.6g}")
+
+
+def _told(subject: Subject, extreme: Extreme, size: float) -> tuple[str, str]:
+    value = extreme.value if abs(extreme.value) > CONSTANT * size else 0.0
+    if math.isinf(value):
+        text = "∞" if value > 0.0 else "-∞"
+    else:
+        text = "-" if math.isnan(value) else f"{value + 0.0:.6g}"
+    return text, " and ".join(_at(subject, at) for at in extreme.at)
+
+
+def _at(subject: Subject, driven: float) -> str:
+    if subject.cycle.is_turned:
+        return f"{math.degrees(driven) + 0.0:.2f} deg"
+    return f"{1e3 * driven + 0.0:.3f} mm"
+
+
+def _range(subject: Subject) -> Iterator[str]:
+    """How far the driven link goes, what stops it, and what it passes."""
+    found = subject.cycle
+    what = "crank" if found.is_turned else "driven slider"
+    here = f"this variant: {_at(subject, found.start)}"
+    if found.turns:
+        yield f"the crank turns fully; {here}"
+    else:
+        ends = [_at(subject, float(end)) for end in (found.driven[0], found.driven[-1])]
+        yield f"the {what} moves from {ends[0]} to {ends[1]}; {here}"
+        for stop in found.following.stops:
+            if stop is None:
+                yield "  nothing stops it on one side"
+            else:
+                yield f"  {_at(subject, stop.at)}: {stop.node}, {stop.why}"
+    if found.turns > 1:
+        yield "after a turn it is in its other assembly: the cycle is two turns"
+    for low, high in found.elsewhere:
+        yield f"it assembles from {_at(subject, low)} to {_at(subject, high)} as well, out of reach from here"
+    for event in found.following.events:
+        if found.driven[0] <= event.at <= found.driven[-1]:
+            told = "both branches meet, the motion goes on smoothly"
+            yield f"flat position of {event.node} at {_at(subject, event.at)}: {told}"
+
+
+def _strokes(subject: Subject) -> Iterator[str]:
+    """What goes to and fro."""
+    for stroke in strokes_of(subject):
+        whose = f"link {stroke.name}" if stroke.is_angle else stroke.name
+        places = " and ".join(_at(subject, at) for at in stroke.dead_points)
+        text = f"{whose}: dead point{'s' if len(stroke.dead_points) > 1 else ''} at {places}"
+        if stroke.travel is not None and stroke.time_ratio is not None:
+            far = (
+                f"{math.degrees(stroke.travel):.3f} deg"
+                if stroke.is_angle
+                else f"{1e3 * stroke.travel:.3f} mm"
+            )
+            text += f", travel {far}, time ratio of the strokes {stroke.time_ratio:.4f}"
+        yield text

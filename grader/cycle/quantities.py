@@ -1,0 +1,139 @@
+"""What may be asked of a cycle by name: vectors of the plans, rates of links, paths of points.
+
+``v_B`` is a speed, ``v_B_x`` and ``v_B_y`` its components; likewise ``a_B``, ``v_BA``, ``a_BA_n``;
+``omega_3``, ``epsilon_3`` counter-clockwise positive; ``D`` the path of point D.
+"""
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from reference.construction import Construction
+from reference.cycle import Cycle
+from reference.derivation import construction_of
+from reference.errors import CallError
+from reference.geometry import ComplexArray, FloatArray
+from reference.mechanism import Mechanism
+from reference.motion import Motion, move_where_possible
+from reference.plan import vectors_of
+
+Kind = Literal["velocity", "acceleration", "omega", "epsilon"]
+UNITS: dict[Kind, str] = {"velocity": "m/s", "acceleration": "m/s²", "omega": "rad/s", "epsilon": "rad/s²"}
+AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
+MANY = 24
+"""Of so many known names an error tells no more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number that changes over the cycle: a vector's length or component, or a link's rate."""
+
+    name: str
+    kind: Kind
+    of: str
+    """The vector's or the rate's own name."""
+    axis: Literal["", "x", "y"] = ""
+
+    @property
+    def unit(self) -> str:
+        """SI."""
+        return UNITS[self.kind]
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What is to be told: quantities, and points whose paths are."""
+
+    quantities: tuple[Quantity, ...]
+    points: tuple[str, ...] = ()
+
+
+class Subject:
+    """A mechanism on its cycle, and all that may be asked of it."""
+
+    def __init__(self, cycle: Cycle) -> None:
+        self.cycle = cycle
+        self.structure = cycle.following.mechanism
+        self.construction: Construction = construction_of(self.structure)
+        moving = [joint for joint in self.structure.joints if not self.structure.is_ground(joint)]
+        self.points = tuple(moving)
+        self._known = self._quantities()
+
+    def _quantities(self) -> dict[str, Quantity]:
+        kinds: dict[str, Kind] = {"kv": "velocity", "ka": "acceleration"}
+        vectors: dict[str, Kind] = {
+            name: kinds[vector.scale] for name, vector in self.construction.vectors.items()
+        }
+        vectors |= {f"{letter}_{joint}": kind for letter, kind in _LETTERS.items() for joint in self.points}
+        known = {}
+        for name, kind in vectors.items():
+            known[name] = Quantity(name, kind, name)
+            for axis in AXES:
+                known[f"{name}_{axis}"] = Quantity(f"{name}_{axis}", kind, name, axis)
+        for link in self.cycle.motion.omega:
+            known[f"omega_{link}"] = Quantity(f"omega_{link}", "omega", f"omega_{link}")
+            known[f"epsilon_{link}"] = Quantity(f"epsilon_{link}", "epsilon", f"epsilon_{link}")
+        return known
+
+    def asked(self, names: list[str]) -> Asked:
+        """The quantities and points of some names; speeds and accelerations of all points for none.
+
+        Raises CallError with the near names for one that is unknown.
+        """
+        if not names:
+            every = [f"{letter}_{joint}" for letter in _LETTERS for joint in self.points]
+            return Asked(tuple(self._known[name] for name in every))
+        for name in names:
+            if name not in self._known and name not in self.points:
+                raise CallError("unknown_quantity", self._unknown(name))
+        chosen = dict.fromkeys(names)
+        return Asked(
+            tuple(self._known[name] for name in chosen if name in self._known),
+            tuple(name for name in chosen if name in self.points),
+        )
+
+    def _unknown(self, name: str) -> str:
+        plain = [known for known in self._known if not known.endswith(("_x", "_y"))]
+        everything = [*self.points, *plain]
+        by_case = {known.lower(): known for known in [*self.points, *self._known]}
+        same = by_case.get(name.lower())
+        near = [same] if same else difflib.get_close_matches(name, everything, n=2, cutoff=0.5)
+        meant = f" (did you mean {' or '.join(near)}?)" if near else ""
+        told = ", ".join(everything[:MANY]) + (", ..." if len(everything) > MANY else "")
+        return f"nothing on this cycle is called '{name}'{meant}: known are {told}; _x or _y for a component"
+
+    def values(self, quantity: Quantity, motion: Motion | None = None) -> FloatArray:
+        """A quantity over the cycle, or in another motion of the mechanism, SI, (N,)."""
+        motion = motion or self.cycle.motion
+        if quantity.kind in {"omega", "epsilon"}:
+            rates: Mapping[str, FloatArray] = motion.omega if quantity.kind == "omega" else motion.epsilon
+            return rates[quantity.of.partition("_")[2]]
+        vector = self._vector(quantity.of, motion)
+        match quantity.axis:
+            case "x":
+                return np.asarray(vector.real)
+            case "y":
+                return np.asarray(vector.imag)
+        return np.abs(vector)
+
+    def _vector(self, name: str, motion: Motion) -> ComplexArray:
+        joint = name[2:]
+        if joint in self.points:
+            return (motion.velocity if name[0] == "v" else motion.acceleration)[joint]
+        with np.errstate(all="ignore"):
+            return vectors_of(self.construction, self.structure, motion)[name]
+
+    def values_at(self, quantity: Quantity, driven: FloatArray) -> FloatArray:
+        """A quantity at other driven coordinates, nan in singular ones."""
+        return self.values(quantity, self.motion_at(driven))
+
+    def motion_at(self, driven: FloatArray) -> Motion:
+        """The motion at other driven coordinates, nan in singular ones."""
+        mechanism: Mechanism = self.cycle.following.at(driven)
+        return move_where_possible(mechanism)
+
+
+_LETTERS: dict[str, Kind] = {"v": "velocity", "a": "acceleration"}
