@@ -118,7 +118,16 @@ def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int
     if isinstance(driver, Crank):
         bodies.carry(driver.link, driver.pivot, driver.pin, driver.length_m)
     ground = {joint: numbers.point(point) for joint, point in file.ground.items()}
-    return Mechanism(ground, driver, tuple(_group(table, numbers, bodies) for table in file.group))
+    groups_ = (_located(index, table, numbers, bodies) for index, table in enumerate(file.group))
+    return Mechanism(ground, driver, tuple(groups_))
+
+
+def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _Bodies) -> Group:
+    """One group; a fault of its numbers is told with its place in the file."""
+    try:
+        return _group(table, numbers, bodies)
+    except FormulaError as error:
+        raise FormulaError(f"group[{index}]: {error}") from error
 
 
 def _driver(table: CrankTable | DrivenSliderTable | None, numbers: _Numbers) -> Driver:

@@ -93,7 +93,7 @@ class CrankTable(Authored):
     @model_validator(mode="after")
     def _has_one_speed(self) -> Self:
         if (self.omega is None) == (self.rpm is None):
-            raise ValueError("needs its speed: either omega (rad/s) or rpm (rev/min)")
+            raise ValueError("needs one speed: either omega (rad/s) or rpm (rev/min)")
         if self.gear_ratio is not None and self.rpm is None:
             raise ValueError("gear_ratio goes with rpm: the crank then turns at rpm / gear_ratio")
         return self
@@ -387,18 +387,18 @@ def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Find
         *above, last = fault["loc"] or ("",)
         is_field = fault["type"] in {"extra_forbidden", "missing"}
         path = "$" + "".join(map(_path_part, above)) + (f".{last}" if is_field else _path_part(last))
-        message = fault["msg"].removeprefix("Value error, ")
+        message = fault["msg"].removeprefix("Value error, ").replace(" after validation", "")
         if fault["type"] == "extra_forbidden":
-            message = "is not known here; check its spelling" + _near(str(fault["loc"][-1]), model)
+            message = _not_known(str(fault["loc"][-1]), model)
         elif fault["type"] == "missing":
             message = "is missing" + _WHY_NEEDED.get(str(fault["loc"][-1]), "")
+        elif fault["type"].startswith("union_tag"):
+            message = f"needs a type, one of {', '.join(_GROUP_TYPES)}"
         yield Finding(path, message)
 
 
-_UNION_TAGS = {
-    *("RRR", "RRP", "RPR", "PRP", "RPP", "plate", "point_on_line", "point"),
-    *("str", "MechanismFile"),
-}
+_GROUP_TYPES = ("RRR", "RRP", "RPR", "PRP", "RPP", "plate", "point_on_line", "point")
+_UNION_TAGS = {*_GROUP_TYPES, "str", "MechanismFile"}
 
 
 _WHY_NEEDED = {
@@ -409,15 +409,17 @@ _WHY_NEEDED = {
 def _path_part(part: str | int) -> str:
     if isinstance(part, int):
         return f"[{part}]"
-    return "" if part in _UNION_TAGS or part.startswith("function-") else f".{part}"
+    return "" if not part or part in _UNION_TAGS or part.startswith("function-") else f".{part}"
 
 
-def _near(name: str, model: type[BaseModel]) -> str:
+def _not_known(name: str, model: type[BaseModel]) -> str:
     import difflib  # noqa: PLC0415 - only on the way to an error message
 
     fields = {field for kind in _models_in(model, set()) for field in kind.model_fields}
+    if name in fields:
+        return "does not belong here: another kind of table has it; leave it out"
     near = difflib.get_close_matches(name, sorted(fields), n=1)
-    return f" (did you mean {near[0]}?)" if near else ""
+    return "is not known here; check its spelling" + (f" (did you mean {near[0]}?)" if near else "")
 
 
 def _models_in(model: type[BaseModel], seen: set[type[BaseModel]]) -> set[type[BaseModel]]:

@@ -31,10 +31,27 @@ class _Bodies:
         self.links: dict[str, set[str]] = {}
         self.slots: dict[str, set[str]] = {}
         """By slotted link: its pivot and its node, the base of its points."""
+        self.moments: dict[str, str] = {}
+        """Points that lie under a slider at this instant only, and their links."""
+
+    def one_with(self, joints: set[str]) -> str | None:
+        """The body that carries all these joints, in words; the ground is one."""
+        link = next((link for link, held in self.links.items() if joints <= held), None)
+        return "the ground" if joints <= self.ground else link and f"link {link}"
 
     def of(self, joints: list[str]) -> str | None:
         """The moving link that carries all these joints."""
         return next((link for link, held in self.links.items() if set(joints) <= held), None)
+
+    def told_of(self, joints: list[str]) -> str:
+        """Which links carry each joint."""
+        told = []
+        for joint in joints:
+            links = [link for link, held in self.links.items() if joint in held]
+            on = f"link {', '.join(links)}" if links else "no link"
+            momentary = f"link {self.moments.get(joint)} for this instant only"
+            told.append(f"{joint} is on {momentary if joint in self.moments else on}")
+        return f" ({'; '.join(told)})"
 
 
 def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
@@ -62,11 +79,34 @@ def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
                 yield Finding(f"{where}.{key}", _unknown(joint, placed, "placed above"))
         for key, joint in _added(group):
             if joint in placed:
-                yield Finding(f"{where}.{key}", f"{joint} has a place already: over-constrained")
+                told = f"{joint} has a place already: over-constrained; a group places a new joint"
+                yield Finding(f"{where}.{key}", told)
             placed.add(joint)
             later.remove(joint)
+        yield from _check_hinges(group, bodies, where)
         yield from _check_links(group, bodies, where)
     yield from _check_names(placed)
+
+
+def _check_hinges(group: AnyGroupTable, bodies: _Bodies, where: str) -> Iterator[Finding]:
+    """A group is hinged to points that stay on their links, and to two bodies that move differently."""
+    hinges = {joint for key, joint in _needed(group) if key.startswith(("pin", "pivot"))}
+    for joint in sorted(hinges & bodies.moments.keys()):
+        link = bodies.moments[joint]
+        told = f'hinge it to a fixed point of the link, a group of type = "point" on link {link}'
+        yield Finding(where, f"{joint} is a point of link {link} for this instant only: {told}")
+    moving = [set(guide.joints) for _, guide in _guides(group) if guide.joints]
+    match group:
+        case CrossSliderTable():
+            hinges = set().union(*moving) if len(moving) == len(group.guides) else set()
+        case SliderTable() | YokeTable():
+            hinges |= moving[0] if moving else set()
+    # A single hinge beside a fixed guide moves unless it is itself on the ground.
+    alone = len(hinges) == 1 and not hinges <= bodies.ground
+    body = bodies.one_with(hinges) if hinges and not alone else None
+    if body is not None:
+        told = f"what it is hinged to and slides on is all on {body}: nothing moves between"
+        yield Finding(where, f'{told}; a further point of a link is a group of type = "plate" or "point"')
 
 
 def _check_names(joints: set[str]) -> Iterator[Finding]:
@@ -125,7 +165,9 @@ def _check_links(group: AnyGroupTable, bodies: _Bodies, where: str) -> Iterator[
     for key, guide in _guides(group):
         if guide.joints and (guide.joints[0] == guide.joints[1] or bodies.of(guide.joints) is None):
             told = f"{guide.joints[0]} and {guide.joints[1]} must be two joints of one moving link"
-            yield Finding(f"{where}.{key}.joints", told)
+            yield Finding(f"{where}.{key}.joints", told + bodies.told_of(guide.joints))
+        elif guide.joints and guide.coincident:
+            bodies.moments[guide.coincident] = bodies.of(guide.joints) or ""
     match group:
         case DyadTable():
             if group.pins[0] == group.pins[1]:
@@ -140,6 +182,7 @@ def _check_links(group: AnyGroupTable, bodies: _Bodies, where: str) -> Iterator[
             carried = {group.pivot, *([group.foot] if group.foot else [])}
             yield from _add_link(group.link, carried, bodies, f"{where}.link")
             bodies.slots[group.link] = {group.pivot, group.node}
+            bodies.moments[group.node] = group.link
         case CrossSliderTable(guides=(first, second)):
             if not first.joints and not second.joints:
                 told = "two fixed guides cross in a fixed point: one of them must be on a moving link"
@@ -156,8 +199,11 @@ def _check_base(
     if group.base[0] == group.base[1] or not (on_slot or set(group.base) <= held):
         told = ", ".join(sorted(held)) or "no joints yet"
         advice = ""
-        if group.link in bodies.slots and not isinstance(group, PointTable):
-            advice = '; points of a slotted link are given by type = "point", from its pivot along its guide'
+        if group.link in bodies.slots:
+            pivot_and_node = ", ".join(
+                sorted(bodies.slots[group.link], key=lambda one: one in bodies.moments)
+            )
+            advice = f'; points of a slotted link are given by type = "point" from {pivot_and_node}'
         yield Finding(where, f"must be two joints of link {group.link} ({told}){advice}")
     elif on_slot and group.base[0] not in held:
         yield Finding(where, "the pivot comes first, then the slotted link's node")

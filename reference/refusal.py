@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from reference.errors import MechanismError
 from reference.mechanism import (
+    Crank,
     CrossSlider,
     Dyad,
     Group,
@@ -25,7 +26,7 @@ ROUNDING = 1e-14
 WHAT_IS_IN_LINE = {
     Dyad: "its links are in line",
     Slider: "its rod is perpendicular to the guide",
-    SlottedLink: "the pin is at the link's pivot, or nearest to it",
+    SlottedLink: "the pin is at the link's pivot, or as near to it as the offset lets it",
     CrossSlider: "its guides are parallel",
     Yoke: "slot and guide are parallel",
 }
@@ -42,15 +43,22 @@ def reason(mechanism: Mechanism, broken: NDArray[np.bool_]) -> MechanismError:
             before = solve(replace(mechanism, groups=groups[:count]), take)
             after = solve(replace(mechanism, groups=groups[: count + 1]), take)
             node = after.joints[group.node]
-            if not np.isfinite(node.position):
+            if not np.isfinite(node.position) or np.isnan(after.transmission.get(group.node, 1.0)):
                 gap, reach = _gap(group, before), max(abs(one.position) for one in before.joints.values())
                 # A gap of rounding alone: the group is flat, and its data say so as well as they can.
-                return _open(group, gap, where) if gap > ROUNDING * reach else _singular(group, where)
+                if gap > ROUNDING * reach:
+                    return _open(group, gap, where, _driven(mechanism))
+                return _singular(group, where, _driven(mechanism))
             if not np.isfinite(node.amplification * np.abs(node.acceleration + node.velocity)):
                 break
         else:
             group = min(groups, key=lambda one: float(after.transmission.get(one.node, 1.0)))
-    return _singular(group, where)
+    return _singular(group, where, _driven(mechanism))
+
+
+def _driven(mechanism: Mechanism) -> str:
+    """What places the driven link."""
+    return "crank angle" if isinstance(mechanism.driver, Crank) else "displacement of the driven slider"
 
 
 def _quiet(number: complex) -> np.generic:
@@ -59,20 +67,20 @@ def _quiet(number: complex) -> np.generic:
     return one
 
 
-def _open(group: Group, gap_m: float, where: str) -> MechanismError:
+def _open(group: Group, gap_m: float, where: str, driven: str) -> MechanismError:
     return MechanismError(
         "does_not_assemble",
-        f"the group of {group.node} does not assemble: its links miss each other by {max(gap_m, 0.0):.6g} m"
-        f" {where}; check the lengths, the crank angle and the side",
+        f"the group of {group.node} does not assemble: its links miss each other by {gap_m:.6g} m {where};"
+        f" check the lengths, the {driven}, and the sides of the groups before it",
     )
 
 
-def _singular(group: Group, where: str) -> MechanismError:
+def _singular(group: Group, where: str, driven: str) -> MechanismError:
+    advice = "give slot and guide two directions" if isinstance(group, Yoke) else f"choose another {driven}"
     why = WHAT_IS_IN_LINE.get(type(group), "its base has no length")
     return MechanismError(
         "singular",
-        f"the velocities of the group of {group.node} are not determined: {why} {where};"
-        " choose another crank angle",
+        f"the velocities of the group of {group.node} are not determined: {why} {where}; {advice}",
     )
 
 
