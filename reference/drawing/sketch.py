@@ -22,8 +22,8 @@ GUIDE_REACH_MM, NEAR_GUIDE_MM = 13.0, 7.0
 AXIS_REACH_MM = 18.0
 NUMBER_SHARES = (0.5, 0.36, 0.64, 0.25, 0.75)
 """Where along its longest stretch a link's number may stand, the best first."""
-STEEP_ROD = 0.25
-"""Sine of a rod's angle to the guide beyond which the ground lies on the guide's other side."""
+SHORTEST_GUIDE_MM, ROD_CLEAR_MM = 7.0, 1.0
+"""A guide ends where the rod comes nearer to it than this; a shorter one lies on the block's other side."""
 SUPPORTS = (-1j, 1j, -1.0 + 0j, 1.0 + 0j)
 """Where the ground of a pivot may lie, the best first."""
 SUPPORT_CLEAR_COSINE = 0.62
@@ -78,12 +78,22 @@ def _guides(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
             continue
         at, along = block.at, block.along
         below = 1 if along.real < 0.0 else -1
-        rod = np.conj(along) * block.rod
-        side = -below if rod.imag * below > STEEP_ROD * abs(rod) else below
-        behind, ahead = (_reach(at, sign * along, nodes) for sign in (-1, 1))
+        rod = complex(np.conj(along) * block.rod)
+        side = below if _before_rod(rod, below) >= SHORTEST_GUIDE_MM else -below
+        behind, ahead = (
+            min(_reach(at, sign * along, nodes), _before_rod(rod, side) if rod.real * sign > 0.0 else np.inf)
+            for sign in (-1, 1)
+        )
         for shape in symbols.guide(at, along, side, (behind, ahead)):
             yield Part(block.node, shape)
         yield Part(block.node, symbols.axis(at - along * AXIS_REACH_MM, at + along * AXIS_REACH_MM))
+
+
+def _before_rod(rod: complex, side: int) -> float:
+    """How far the ground on one side may reach before the rod (in the guide's axes) crosses it."""
+    if rod.imag * side <= 0.0:
+        return float("inf")
+    return (symbols.BLOCK_MM[1] - ROD_CLEAR_MM) * abs(rod.real / rod.imag)
 
 
 def _reach(at: complex, along: complex, nodes: dict[str, complex]) -> float:
