@@ -227,3 +227,41 @@ def test_every_code_of_a_finding_is_documented():
 )
 def test_variants_are_named_shortly(variants, told):
     assert named(variants) == told
+
+
+def within(tmp_path: Path, start: str, old: str, new: str, criterion: str) -> Path:
+    """A start, whose mechanism stands within its assignment, with one text replaced and a rubric."""
+    text = (library() / "starts" / f"{start}.assignment.toml").read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / f"{start}.assignment.toml").write_text(text.replace(old, new), encoding="utf-8")
+    rubric = f'schema_version = 1\nid = "{start}"\ntitle = {{ en = "R" }}\n[[criterion]]\n{criterion}\n'
+    (tmp_path / f"{start}.rubric.toml").write_text(
+        rubric + 'id = "x"\ntitle = { en = "X" }\npoints = 1\n', "utf-8"
+    )
+    return tmp_path / f"{start}.assignment.toml"
+
+
+def test_a_mechanism_within_its_assignment_has_its_paths_there(tmp_path):
+    path = within(tmp_path, "four-bar", "lengths = [40, 30]", "lengths = [10, 30]", 'vector = "v_B"')
+    (fault,) = findings_of(path, "does_not_assemble")
+    assert (fault.file, fault.path) == ("assignment", "$.mechanism.group[0]")
+
+
+def test_a_rubric_of_scales_alone_is_told_to_ask_for_no_vector(tmp_path):
+    path = within(tmp_path, "scotch-yoke", "slot_deg = 75", "slot_deg = 80", 'scale = "kL"')
+    assert findings_of(path, "no_vector_asked")
+    found = linted(path)
+    assert all(row.shortest_mm is None for row in found.rows)
+    assert not found.needs_a_person
+
+
+def test_a_plan_that_needed_more_digits_is_told(tmp_path):
+    # Rod as long as the crank, both square to the guide but for a ten millionth of a degree.
+    flat = 'angle_deg = "phi_deg + 0.0000001"'
+    path = within(tmp_path, "slider-crank", 'angle_deg = "phi_deg"', flat, 'vector = "v_B"')
+    text = path.read_text(encoding="utf-8").replace('"15 + n"', '"90"').replace("length = 30", "length = 10")
+    path.write_text(text, encoding="utf-8")
+    (told,) = findings_of(path, "recomputed")
+    assert told.severity == "hint"
+    assert len(told.variants) == 30
+    assert findings_of(path, "transmission")
