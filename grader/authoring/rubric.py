@@ -11,7 +11,7 @@ from reference.mechanism import Mechanism, Plate
 POINTS = {"v": 2.0, "a": 2.0, "n": 2.0, "t": 1.0, "c": 2.0, "r": 1.0}
 """Of a velocity, of an acceleration, and of its parts."""
 POINTS_OF_RESULT = 3.0
-"""Of velocity and acceleration of the joint that the mechanism is there for: the last one."""
+"""Of velocity and acceleration of the joint that the mechanism is there for: the last group's."""
 POINTS_OF_SCALE, POINTS_OF_RATE, POINTS_OF_WAY = 1.0, 0.5, 0.5
 """Of a scale, of an angular quantity, and of a vector that is one way of two to draw a plate's image."""
 
@@ -92,7 +92,8 @@ def _of_vector(mechanism: Mechanism, vector: Vector) -> CriterionTable:
             optional=True,
             title=_title(vector, mechanism),
         )
-    is_result = not other and not part and joint == mechanism.joints[-1]
+    result = mechanism.groups[-1].node if mechanism.groups else mechanism.joints[-1]
+    is_result = not other and not part and joint == result
     points = POINTS_OF_RESULT if is_result else POINTS[part[0] if part else kind]
     return CriterionTable(id=vector.name, vector=vector.name, points=points, title=_title(vector, mechanism))
 

@@ -170,6 +170,14 @@ def test_the_plates_two_ways_are_optional_in_a_rubric_made_from_the_construction
     assert points["v_D"] == points["a_D"] > points["v_B"] > points["a_B_t"] > points["omega_3"]
 
 
+def test_the_last_groups_joint_gives_the_most_points(tmp_path):
+    for start, result in (("shaper", "D"), ("tangent", "B"), ("slider-crank", "B")):
+        rubric = rubric_of(load_assignment(new_assignment(tmp_path / start, mechanism=start).assignment))
+        points = {criterion.name: criterion.points for criterion in rubric.criterion}
+        most = {name for name, worth in points.items() if worth == max(points.values())}
+        assert most == {f"v_{result}", f"a_{result}"}
+
+
 @pytest.mark.parametrize(
     ("about", "joints"),
     [("BA", ("B", "A")), ("B", ("B", "")), ("B3B", ("B3", "B")), ("A3", ("A3", "")), ("D5D", ("D5", "D"))],
