@@ -14,7 +14,7 @@ from grader.records import FloatArray
 from reference.assignment import Assignment, Variant
 from reference.construction import Construction, evaluate
 from reference.derivation import construction_of, parameters_of
-from reference.steps import ArcAndLine, Divide, Given, Scaled, TwoArcs
+from reference.outline import bars
 
 _ANCHOR_OFF_RAD = np.radians(2.5)
 _SCALES = (0.4, 1.6)
@@ -79,22 +79,11 @@ def _outlines(assignment: Assignment, variants: list[Variant]) -> list[_Outline]
 
 def _pairs(construction: Construction) -> list[list[tuple[str, str]]]:
     """The lines of each figure by their ends."""
-    links: list[tuple[str, str]] = []
-    for step in construction.figures["mechanism"]:
-        match step:
-            case Given(node=node, start=start, length=Scaled()):
-                links.append((start, node))
-            case TwoArcs(node=node, centres=centres):
-                links.extend((centre, node) for centre in centres)
-            case ArcAndLine(node=node, centre=centre):
-                links.append((centre, node))
-            case Divide(node=node, base=base):
-                links.append((base[0], node))
     plans = [
         [(vector.tail, vector.head) for vector in construction.vectors_of(plan)]
         for plan in construction.poles
     ]
-    return [links, *plans]
+    return [list(bars(construction)), *plans]
 
 
 def _most_matched(outline: _Outline, variant: int, strokes: FloatArray) -> float:

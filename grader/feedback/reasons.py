@@ -20,6 +20,7 @@ REASONS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"no acceleration plan was found on the sheets", N_("no acceleration plan was found on the sheets")),
         (r"not drawn: (?P<node>\S+) found by similarity", N_("not drawn: %(node)s found by similarity")),
         (r"not drawn: .*normal component.* left out", N_("not drawn: normal component left out")),
+        (r"not drawn: .*Coriolis component.* left out", N_("not drawn: Coriolis component left out")),
     )
 )
 

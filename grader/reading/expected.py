@@ -6,7 +6,7 @@ follow-through needs no rule of its own.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,21 @@ from grader.records import FloatArray
 from reference.construction import Construction, evaluate
 from reference.geometry import ComplexArray
 from reference.mistakes import Drawing
-from reference.steps import ArcAndLine, Divide, Given, Normal, Similar, Step, TwoArcs, TwoLines
+from reference.outline import bars, coincident
+from reference.steps import (
+    ArcAndLine,
+    Coincide,
+    Divide,
+    Given,
+    Local,
+    OnGuide,
+    Scaled,
+    Similar,
+    Step,
+    Tangent,
+    TwoArcs,
+    TwoLines,
+)
 
 STEP_OF_DERIVATIVE = 1e-5
 
@@ -51,12 +65,14 @@ class Expected:
     at : (n,) complex mm; a plan about its own pole until it is placed
     cov : (2n, 2n) covariance, x and y of each node in turn
     edges : what should be drawn between them
+    tied : pairs of nodes that lie in one place
     """
 
     names: tuple[str, ...]
     at: ComplexArray
     cov: FloatArray
     edges: tuple[Edge, ...]
+    tied: tuple[tuple[int, int], ...] = ()
 
     def placed(self, at: complex, size: float, turn_rad: float, slack: "Slack") -> "Expected":
         """The same figure somewhere on the sheet, with the freedom left to it."""
@@ -72,7 +88,7 @@ class Expected:
                 _pairs(slack.relative * arm),
             ]
         )
-        return Expected(self.names, moved, rotate @ self.cov @ rotate.T + free @ free.T, self.edges)
+        return replace(self, at=moved, cov=rotate @ self.cov @ rotate.T + free @ free.T)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +121,9 @@ def expect(
     moves = moves * np.array([sigma for _, sigma in sources])
     slopes = np.concatenate([_pairs(column)[:, None] for column in moves.T], axis=1) if sources else None
     cov = np.zeros((2 * len(names), 2 * len(names))) if slopes is None else slopes @ slopes.T
-    return Expected(names, at, cov, tuple(edges))
+    under = coincident(construction)
+    tied = tuple((names.index(one), names.index(under[one])) for one in names if one in under)
+    return Expected(names, at, cov, tuple(edges), tied)
 
 
 def _pairs(values: ComplexArray) -> FloatArray:
@@ -119,13 +137,15 @@ def _sources(
     """Every error of the hand in these steps, with its standard error."""
     for step in steps:
         node = step.node
+        if isinstance(step, Coincide):
+            continue
         mark = hand.length_mm if isinstance(step, Similar) else hand.mark_mm
         yield (node, 0, "x"), mark
         yield (node, 0, "y"), mark
         match step:
             case Given():
                 size = abs(complex(np.ravel(nominal[node])[0]) - complex(np.ravel(nominal[step.start])[0]))
-                share = 2.0 * hand.relative if isinstance(step.length, Normal) else hand.relative
+                share = hand.relative if isinstance(step.length, Scaled) else 2.0 * hand.relative
                 yield (node, 0, "length"), hand.length_mm + share * size
                 yield (node, 0, "angle"), hand.angle_rad
                 yield (node, 0, "shift"), hand.shift_mm
@@ -140,8 +160,12 @@ def _sources(
                 yield (node, 0, "length"), hand.length_mm
                 yield (node, 1, "angle"), hand.angle_rad
                 yield (node, 1, "shift"), hand.shift_mm
-            case Divide():
+            case Divide() | Tangent():
                 yield (node, 0, "length"), hand.length_mm
+            case Local() | OnGuide():
+                yield (node, 0, "length"), hand.length_mm
+                yield (node, 0, "angle"), hand.angle_rad
+                yield (node, 0, "shift"), hand.shift_mm
 
 
 # What is drawn between the nodes ------------------------------------------------------------------
@@ -151,18 +175,7 @@ def links_of(construction: Construction) -> tuple[Edge, ...]:
     """The links of a mechanism sketch: every bar that its steps lay between two joints."""
     steps = construction.figures["mechanism"]
     place = {step.node: index for index, step in enumerate(steps)}
-    found: list[tuple[str, str]] = []
-    for step in steps:
-        match step:
-            case Given(start=start):
-                found.append((start, step.node))
-            case TwoArcs(centres=centres):
-                found.extend((centre, step.node) for centre in centres)
-            case ArcAndLine(centre=centre):
-                found.append((centre, step.node))
-            case Divide(base=base):
-                found.append((base[0], step.node))
-    return tuple(Edge(f"{tail}{head}", place[tail], place[head]) for tail, head in found)
+    return tuple(Edge(f"{tail}{head}", place[tail], place[head]) for tail, head in bars(construction))
 
 
 def vectors_of(construction: Construction, figure: str, absent: Iterable[str] = ()) -> tuple[Edge, ...]:

@@ -25,6 +25,8 @@ HIDDEN_MM = 0.5
 END_REACH_MM = 5.0
 CENTRE_MM = 0.2
 """How far a circle drawn around a node is off it."""
+TIED_MM = 0.02
+"""Nodes that lie in one place are one place."""
 BUNDLE_COSINE = 0.87
 """Of 30 degrees: strokes at less lie on one another for 1 mm and more from their node."""
 SPREAD = 0.88
@@ -215,6 +217,12 @@ def _line_rows(found: Explanation, lines: Lines, at: ComplexArray, centres: Mapp
             tilt = lines.se_angle[row] * arm
             sigma.append(float(np.sqrt(loose**2 + lines.se_offset[row] ** 2 + tilt**2)))
             own.append(not found.shared[index])
+    for first, second in found.expected.tied:
+        for axis in (1.0 + 0j, 1j):
+            design.append(_row(len(at), first, axis) - _row(len(at), second, axis))
+            goal.append(0.0)
+            sigma.append(TIED_MM)
+            own.append(False)
     for node, centre in centres.items():
         for axis, value in ((1.0 + 0j, centre.real), (1j, centre.imag)):
             design.append(_row(len(at), node, axis))

@@ -14,7 +14,11 @@ REGULAR = ("as constructed", "plates by similarity")
 COST_OF_SIMILARITY = 0.7
 COST_OF_MISTAKE = 8.0
 """Nats: a third of plans have a mistake, one of some forty; and strokes of one hand err alike."""
-LEFT_OUT = "not drawn: the normal component is left out"
+LEFT_OUT = {
+    "n": "not drawn: the normal component is left out",
+    "k": "not drawn: the Coriolis component is left out",
+}
+"""By the first letter of the node in which the component ends."""
 OF_THE_WHOLE = {"figure_rotated", "scale_wrong", "rpm_not_converted", "vector_missing"}
 
 
@@ -53,7 +57,7 @@ def mistaken(base: Hypothesis, figure: str) -> Iterator[tuple[Hypothesis, Mistak
             continue
         gone = dict(base.absent)
         if mistake.code == "normal_missing":
-            gone[mistake.at] = LEFT_OUT
+            gone[mistake.at] = LEFT_OUT[mistake.at[0]]
         try:
             changed = commit(mistake, base.drawing)
         except ValueError:
@@ -87,7 +91,7 @@ def tied(hypothesis: Hypothesis) -> Construction:
     vectors = dict(construction.vectors)
     for node, reason in hypothesis.absent.items():
         step = construction.step(node)
-        if reason != LEFT_OUT or not isinstance(step, Given):
+        if reason not in LEFT_OUT.values() or not isinstance(step, Given):
             continue
         for name, vector in vectors.items():
             if vector.tail == node:

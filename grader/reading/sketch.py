@@ -16,7 +16,7 @@ from grader.records import FloatArray
 from reference.assignment import Assignment, Scales, Variant
 from reference.derivation import construction_of, parameters_of
 from reference.mistakes import Drawing, commit, single_mistakes
-from reference.steps import ArcAndLine, FixedLine
+from reference.steps import ArcAndLine, FixedLine, OnGuide, Step, TwoLines
 
 LEAST_LINK_MM = 6.0
 HARDLY = 0.4
@@ -153,10 +153,11 @@ def _guide_turn(drawing: Drawing, found: Explanation, fit: Fit, lines: Lines, tu
     """The mean turn of strokes along the guides near their joints; upright where none is seen."""
     turns, weights = [0.0 if abs(turn) < UPRIGHT_RAD else turn], [GUIDE_DOUBT_MM]
     for node, step in zip(found.expected.names, drawing.construction.figures["mechanism"], strict=True):
-        if not isinstance(step, ArcAndLine) or not isinstance(step.guide, FixedLine):
+        guide = _fixed_guide(step)
+        if guide is None:
             continue
         joint = complex(fit.at[found.expected.names.index(node)])
-        angle = float(np.ravel(drawing.parameters[f"angle {step.guide.guide}"])[0]) + turns[0]
+        angle = float(np.ravel(drawing.parameters[f"angle {guide.guide}"])[0]) + turns[0]
         off = (lines.along * np.exp(-1j * angle)) ** 2
         tilt = np.angle(off) / 2.0
         from_joint = (joint - lines.start) * np.conj(lines.along)
@@ -166,6 +167,16 @@ def _guide_turn(drawing: Drawing, found: Explanation, fit: Fit, lines: Lines, tu
             turns.append(turns[0] + float(tilt[row]))
             weights.append(float(lines.length[row]))
     return float(np.average(turns, weights=weights))
+
+
+def _fixed_guide(step: Step) -> FixedLine | None:
+    """The guide on the ground along which a joint slides."""
+    match step:
+        case ArcAndLine(guide=FixedLine() as guide) | OnGuide(guide=guide):
+            return guide
+        case TwoLines(first=FixedLine() as guide) | TwoLines(second=FixedLine() as guide):
+            return guide
+    return None
 
 
 def _centres(fit: Fit, circles: FloatArray) -> dict[int, complex]:

@@ -1,40 +1,21 @@
 """The mechanism's sketch and the two plans as a student draws them."""
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Mapping
 
 import numpy as np
 
 from grader.simulation import symbols
 from grader.simulation.hand import MECHANISM, DrawnFigure, Nodes, Task
+from grader.simulation.links import blocks_of, coincident, fixed_guides, lines_of, links_of
 from grader.simulation.settings import Student
 from grader.simulation.sketch import DASHES, Sketch
 from grader.simulation.strokes import arc
 from reference.construction import Vector, evaluate
-from reference.mechanism import Dyad, FixedGuide, Plate, PointOnLine, Slider
+from reference.mechanism import Crank, Dyad, Plate
 from reference.steps import Divide, Given, Similar, TwoArcs, TwoLines
 
 TOO_SHORT_MM = 0.8
-
-
-def links_of(task: Task) -> Iterator[tuple[str, str, str]]:
-    """Strokes of the sketch: name, tail and head joint."""
-    mechanism = task.mechanism
-    crank = mechanism.crank
-    yield f"{crank.pivot}{crank.pin}", crank.pivot, crank.pin
-    for group in mechanism.groups:
-        match group:
-            case Dyad(node=node, pins=pins):
-                for pin in pins:
-                    yield f"{pin}{node}", pin, node
-            case Plate(node=node, base=base):
-                for pin in base:
-                    yield f"{pin}{node}", pin, node
-            case PointOnLine(node=node, base=(p, q)):
-                if not 0.0 < float(np.mean(group.ratio)) < 1.0:
-                    near = q if float(np.mean(group.ratio)) > 1.0 else p
-                    yield f"{near}{node}", near, node
-            case Slider(node=node, pin=pin):
-                yield f"{pin}{node}", pin, node
 
 
 def at_origin(figure: DrawnFigure, origin: complex) -> dict[str, complex]:
@@ -56,10 +37,9 @@ def draw_mechanism(sketch: Sketch, task: Task, nodes: Nodes, student: Student) -
             p, q = group.base
             corners = (nodes[p], nodes[q], nodes[group.node])
             symbols.inside_hatching(sketch, corners, sketch.rng.uniform(2.5, 5.0))
-        if isinstance(group, Slider) and isinstance(group.guide, FixedGuide):
-            angle = float(np.mean(group.guide.angle_rad))
-            symbols.slider(sketch, nodes[group.node], turn * complex(np.exp(1j * angle)))
-    for joint in task.mechanism.joints:
+    _sliders(sketch, task, nodes, turn)
+    named = [joint for joint in task.mechanism.joints if joint not in coincident(task)]
+    for joint in named:
         if task.mechanism.is_ground(joint):
             symbols.support(sketch, nodes[joint], turn)
         else:
@@ -69,9 +49,21 @@ def draw_mechanism(sketch: Sketch, task: Task, nodes: Nodes, student: Student) -
         _vectors_at_pin(sketch, task, nodes)
     if student.altitude:
         _altitude(sketch, task, nodes)
-    for joint in task.mechanism.joints:
+    for joint in named:
         text = joint[0] + (f"_{{{joint[1:]}}}" if joint[1:] else "")
         sketch.letter(nodes[joint], text, sketch.page.letter_mm, names=joint, distance_mm=2.0)
+
+
+def _sliders(sketch: Sketch, task: Task, nodes: Nodes, turn: complex) -> None:
+    """Blocks: on guides on the ground with their guides, on moving links without."""
+    for node, step in ((step.node, step) for step in task.wrong.construction.figures[MECHANISM]):
+        for guide in fixed_guides(step):
+            angle = float(task.wrong.parameters[f"angle {guide.guide}"])
+            symbols.slider(sketch, nodes[node], turn * complex(np.exp(1j * angle)))
+    for group in task.mechanism.groups:
+        for at, tail, head in blocks_of(task, group):
+            along = nodes[head] - nodes[tail]
+            symbols.block(sketch, nodes[at], along / max(abs(along), 1e-9))
 
 
 def _link(sketch: Sketch, name: str, tail: complex, head: complex) -> None:
@@ -99,7 +91,9 @@ def _compass_arcs(sketch: Sketch, task: Task, nodes: Nodes) -> None:
 
 
 def _crank_extras(sketch: Sketch, task: Task, nodes: Nodes) -> None:
-    crank = task.mechanism.crank
+    crank = task.mechanism.driver
+    if not isinstance(crank, Crank):
+        return
     pivot, pin = nodes[crank.pivot], nodes[crank.pin]
     sense = float(np.mean(crank.omega))
     radius = abs(pin - pivot)
@@ -112,7 +106,9 @@ def _crank_extras(sketch: Sketch, task: Task, nodes: Nodes) -> None:
 
 def _vectors_at_pin(sketch: Sketch, task: Task, nodes: Nodes) -> None:
     """v_A and a_A drawn at the crank's pin as well."""
-    known, crank = task.wrong.parameters, task.mechanism.crank
+    known, crank = task.wrong.parameters, task.mechanism.driver
+    if not isinstance(crank, Crank):
+        return
     arm = nodes[crank.pin] - nodes[crank.pivot]
     along = arm / abs(arm)
     speed = float(known[f"v_{crank.pin}"] / known["kv"])
@@ -188,7 +184,7 @@ def _is_result(task: Task, vector: Vector) -> bool:
     """Whether a vector only joins two nodes that are there without it (pole and c, pole and b')."""
     step = task.wrong.construction.step(vector.head)
     if isinstance(step, TwoLines):
-        return vector.tail not in {step.first.through, step.second.through}
+        return vector.tail not in {line.through for line in lines_of(step)}
     return vector.link is None and not isinstance(step, Given)
 
 
@@ -217,7 +213,7 @@ def _construction_lines(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -
     for step in task.wrong.construction.figures[figure]:
         if not isinstance(step, TwoLines):
             continue
-        for line in (step.first, step.second):
+        for line in lines_of(step):
             reach = nodes[step.node] - nodes[line.through]
             if abs(reach) < 0.3 or not sketch.chance(sketch.style.construction_lines):
                 continue
@@ -248,14 +244,15 @@ def _letters(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
     circles = sketch.chance(sketch.style.node_circles)
     for node, at in nodes.items():
         letter = task.letter_of(node)
-        if node.startswith("n_"):
+        if node.startswith(("n_", "k_")):
             if sketch.chance(sketch.page.end_labels):
-                text, height = f"n_{{{letter[2:]}}}", 0.7 * sketch.page.letter_mm
+                text, height = f"{letter[0]}_{{{letter[2:]}}}", 0.7 * sketch.page.letter_mm
                 sketch.letter(at, text, height, names=node, distance_mm=0.8)
             continue
         if circles:
             symbols.circle(sketch, at, sketch.rng.uniform(0.7, 1.1), sketch.pen("thin"))
-        text = pole_text(task, figure) if node == task.wrong.construction.poles[figure] else letter
+        is_pole = node == task.wrong.construction.poles[figure]
+        text = pole_text(task, figure) if is_pole else re.sub(r"(\d+)", r"_{\1}", letter)
         sketch.letter(at, text, sketch.page.letter_mm, names=node, distance_mm=1.2)
 
 

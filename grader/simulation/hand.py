@@ -17,7 +17,18 @@ from reference.derivation import construction_of, parameters_of
 from reference.geometry import FloatArray
 from reference.mechanism import Mechanism
 from reference.mistakes import RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
-from reference.steps import ArcAndLine, Divide, Given, Step, TwoArcs, TwoLines
+from reference.steps import (
+    ArcAndLine,
+    Coincide,
+    Divide,
+    Given,
+    Local,
+    OnGuide,
+    Step,
+    Tangent,
+    TwoArcs,
+    TwoLines,
+)
 
 MECHANISM, VELOCITY, ACCELERATION = "mechanism", "velocity_plan", "acceleration_plan"
 PLANS = (VELOCITY, ACCELERATION)
@@ -116,6 +127,8 @@ def _with_own_scales(drawing: Drawing, factor: float) -> Drawing:
 
 def _right_drawing(assignment: Assignment, variant: Variant, student: Student) -> Drawing:
     scales = assignment.scales([variant], crank_mm=student.crank_mm)
+    if student.shrunk != 1.0:
+        scales = assignment.scales([variant], kL=scales.kL / student.shrunk)
     scales = Scales(scales.kL, scales.kv * student.kv_ratio, scales.ka * student.ka_ratio)
     by_similarity = student.similarity
     if by_similarity is None:
@@ -139,17 +152,19 @@ def choose_mistake(code: str, assignment: Assignment, variant: Variant, right: D
     if code == "other_variant":
         return _other_variant(assignment, variant, rng)
     if code == "vector_missing":
-        names = [name for name, vector in right.construction.vectors.items() if not vector.is_normal]
+        vectors = right.construction.vectors.items()
+        names = [name for name, vector in vectors if vector.part not in {"n", "c"}]
         return Mistake(code, str(rng.choice(names)))
     if code == "labels_swapped":
         plan = str(rng.choice(PLANS))
-        nodes = [n for n in (s.node for s in right.construction.figures[plan]) if not n.startswith("n_")]
+        steps = right.construction.figures[plan]
+        nodes = [step.node for step in steps if not step.node.startswith(("n_", "k_"))]
         swapped = rng.choice(nodes[1:], 2, replace=False)
         return Mistake(code, plan, other=(str(swapped[0]), str(swapped[1])))
-    if code == "rpm_not_converted":
+    if code == "rpm_not_converted" and "angle crank" in right.parameters:
         return Mistake(code, VELOCITY, factor=RPM_FACTOR)
     if code == "arithmetic":
-        ends = [v.head for v in right.construction.vectors.values() if v.is_normal]
+        ends = [v.head for v in right.construction.vectors.values() if v.part in {"n", "c"}]
         return Mistake(code, str(rng.choice(ends)), factor=float(rng.choice([0.5, 2.0, 0.1, 1.4])))
     choices = [m for plan in PLANS for m in single_mistakes(right, plan) if m.code == code]
     choices += [m for m in single_mistakes(right, MECHANISM) if m.code == code]
@@ -214,8 +229,12 @@ def _acts(step: Step) -> list[tuple[int, str]]:
             return [(0, "length"), (1, "length"), *mark]
         case ArcAndLine():
             return [(0, "length"), (1, "angle"), (1, "shift"), *mark]
-        case Divide():
+        case Divide() | Tangent():
             return [(0, "length"), *mark]
+        case Local() | OnGuide():
+            return [(0, "angle"), (0, "shift"), (0, "length"), *mark]
+        case Coincide():
+            return []
         case _:
             return mark
 

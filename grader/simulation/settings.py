@@ -37,6 +37,7 @@ class Student:
     Attributes
     ----------
     crank_mm : drawn length of the crank; None as the assignment proposes
+    shrunk : of a sketch without a crank, its size as a multiple of the proposed one
     kv_ratio, ka_ratio : scales used, as a multiple of the assignment's rule
     similarity : third points of plates by similar triangles; None as the assignment says
     turn_deg : how far the sketch of the mechanism is turned
@@ -49,6 +50,7 @@ class Student:
     """
 
     crank_mm: float | None = None
+    shrunk: float = 1.0
     kv_ratio: float = 1.0
     ka_ratio: float = 1.0
     similarity: bool | None = None

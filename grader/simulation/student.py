@@ -17,6 +17,7 @@ from grader.simulation.storing import encoded
 from grader.simulation.strokes import Rng
 from grader.simulation.view import view_of
 from reference.assignment import Assignment, Variant
+from reference.mechanism import Crank
 
 _SHRINK = (1.0, 0.9, 0.8, 0.66, 0.5, 0.4)
 """Lengths of the crank tried, as shares of the one wished for."""
@@ -80,9 +81,11 @@ def _with_crank(assignment: Assignment, variant: Variant, settings: Settings, sh
     """The settings with a share of the crank's wished length: people choose a scale that fits the paper."""
     if share == 1.0:
         return settings
+    driver = assignment.mechanism([variant]).driver
+    if not isinstance(driver, Crank):
+        return replace(settings, student=replace(settings.student, shrunk=share))
     proposed = float(assignment.scales([variant]).kL[0])
-    crank = float(assignment.mechanism([variant]).crank.length_m.reshape(-1)[0])
-    wished = settings.student.crank_mm or crank / proposed
+    wished = settings.student.crank_mm or float(driver.length_m.reshape(-1)[0]) / proposed
     return replace(settings, student=replace(settings.student, crank_mm=float(round(wished * share))))
 
 

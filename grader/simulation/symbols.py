@@ -78,10 +78,7 @@ def support(sketch: Sketch, at: complex, turn: complex) -> None:
 def slider(sketch: Sketch, at: complex, along: complex) -> None:
     """A sliding block on a guide: a rectangle, the guide's centre line, ground below or on both sides."""
     pen, thin = sketch.pen("line"), sketch.pen("thin")
-    wide, high = sketch.rng.uniform(4.5, 7.5), sketch.rng.uniform(2.4, 3.8)
-    corners = [at + along * complex(sx * wide, sy * high) for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    for p, q in zip(corners, corners[1:] + corners[:1], strict=True):
-        sketch.line(pen, p, q)
+    high = block(sketch, at, along)
     reach = sketch.rng.uniform(14.0, 26.0)
     sides = (-1, 1) if sketch.chance(0.3) else (-1,)
     for side in sides:
@@ -90,6 +87,16 @@ def slider(sketch: Sketch, at: complex, along: complex) -> None:
         hatching(sketch, *((p, q) if side < 0 else (q, p)), depth_mm=2.2)
     if sketch.chance(0.6):
         sketch.line(thin, at - along * reach * 1.2, at + along * reach * 1.3, CHAIN)
+
+
+def block(sketch: Sketch, at: complex, along: complex) -> float:
+    """A sliding block; half its height."""
+    pen = sketch.pen("line")
+    wide, high = sketch.rng.uniform(4.5, 7.5), sketch.rng.uniform(2.4, 3.8)
+    corners = [at + along * complex(sx * wide, sy * high) for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    for p, q in zip(corners, corners[1:] + corners[:1], strict=True):
+        sketch.line(pen, p, q)
+    return float(high)
 
 
 def turning_arrow(sketch: Sketch, centre: complex, start_rad: float, radius_mm: float, sense: float) -> None:

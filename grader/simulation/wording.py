@@ -7,6 +7,7 @@ import numpy as np
 from grader.simulation.hand import ACCELERATION, MECHANISM, VELOCITY, Task
 from grader.simulation.settings import PageStyle
 from grader.simulation.strokes import Rng
+from reference.mechanism import Crank
 
 CAPTIONS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "ro": {
@@ -95,15 +96,17 @@ def plain(text: str) -> str:
 
 def calculations(task: Task, page: PageStyle, nodes: Mapping[str, complex]) -> list[str]:
     """A few lines of working, with this student's own numbers."""
-    known, crank = task.wrong.parameters, task.mechanism.crank
-    arm = float(np.mean(crank.length_m))
-    speed = abs(float(known[f"v_{crank.pin}"]))
-    pull = abs(float(known[f"a_{crank.pin}_n"]))
-    lines = [
-        f"ω_1 = π n/30 = {number(speed / arm, page)} s^{{-1}}",
-        f"v_{crank.pin} = ω_1·l = {number(speed, page)} m/s",
-        f"a_{crank.pin} = ω_1^2·l = {number(pull, page)} m/s^2",
-    ]
+    known, crank = task.wrong.parameters, task.mechanism.driver
+    lines = []
+    if isinstance(crank, Crank):
+        arm = float(np.mean(crank.length_m))
+        speed = abs(float(known[f"v_{crank.pin}"]))
+        pull = abs(float(known[f"a_{crank.pin}_n"]))
+        lines = [
+            f"ω_1 = π n/30 = {number(speed / arm, page)} s^{{-1}}",
+            f"v_{crank.pin} = ω_1·l = {number(speed, page)} m/s",
+            f"a_{crank.pin} = ω_1^2·l = {number(pull, page)} m/s^2",
+        ]
     for vector in task.wrong.construction.vectors_of(VELOCITY):
         if vector.head in nodes and vector.tail in nodes:
             length = abs(nodes[vector.head] - nodes[vector.tail])
