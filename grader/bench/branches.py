@@ -1,21 +1,25 @@
-"""Wrong branches counted in many random four-bars and slider-cranks, near singular positions and far.
+"""Wrong branches counted in many random mechanisms, near singular positions and far.
+
+Four-bars and slider-cranks for all; slotted links, which no peer knows, for ours as well.
 
 A tenth of the cases lies nearer than 0.1 to a singular position, down to 1e-14. On which side a solver
 puts the group's node is told by the node's distance from the line of symmetry of both assemblies.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from grader.bench.arrays import one_of
 from grader.bench.peers import PEERS, NoAnswerError, Package, Places, sketch
+from grader.bench.speed import has_numba
 from reference.geometry import ComplexArray, FloatArray, cross, direction, dot
-from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, Slider
-from reference.motion import move_where_possible
+from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, Slider, SlotPoint, SlottedLink
+from reference.motion import Motion, move_where_possible
 
 CASES, CASES_QUICK = 100_000, 2_000
 PEER_CASES, PEER_CASES_QUICK = 2_000, 100
@@ -37,17 +41,26 @@ class BranchRow:
 def count_branches(*, quick: bool = False) -> Iterator[BranchRow]:
     """Ours in many cases, then each installed peer in fewer: it takes a thousand times as long."""
     yield count_ours(quick=quick)
+    if has_numba():
+        from reference.compiled import by_machine  # noqa: PLC0415 - numba is an extra
+
+        yield count_ours(quick=quick, name="compiled", solve=partial(move_where_possible, solver=by_machine))
     for peer in PEERS:
         if peer.version is not None:
             yield count_peer(peer, quick=quick)
 
 
-def count_ours(*, quick: bool = False) -> BranchRow:
-    """By the closed form, on arrays."""
+def count_ours(
+    *,
+    quick: bool = False,
+    name: str = "closed form",
+    solve: Callable[[Mechanism], Motion] = move_where_possible,
+) -> BranchRow:
+    """By the closed form, on arrays or compiled."""
     count = CASES_QUICK if quick else CASES
     wrong = refused = silent = 0
-    for mechanism in _both_kinds(count):
-        motion = move_where_possible(mechanism)
+    for mechanism in _all_kinds(count):
+        motion = solve(mechanism)
         told = np.isfinite(motion.predicted_error)
         numbers = (*motion.position.values(), *motion.velocity.values(), *motion.acceleration.values())
         finite = np.isfinite(sum(numbers))
@@ -55,7 +68,7 @@ def count_ours(*, quick: bool = False) -> BranchRow:
         refused += int(np.sum(~told))
         silent += int(np.sum(told & ~finite))
         wrong += int(np.sum(told & finite & (share < 0.0)))
-    return BranchRow("closed form", count, wrong, refused, silent)
+    return BranchRow(name, count, wrong, refused, silent)
 
 
 def count_peer(peer: Package, *, quick: bool = False) -> BranchRow:
@@ -101,10 +114,23 @@ def _side_share(mechanism: Mechanism, at: Mapping[str, ComplexArray]) -> FloatAr
         height = cross(along, pin - group.guide.through_m)
         meant = np.sqrt(np.maximum((group.length_m - height) * (group.length_m + height), 0.0))
         found = dot(at[group.node] - pin, along)
+    elif isinstance(group, SlottedLink):
+        arm = at[group.pin] - at[group.pivot]
+        points = [one for one in mechanism.groups if isinstance(one, SlotPoint)]
+        along = (at[points[0].node] - at[group.pivot]) / points[0].local_m
+        meant = np.sqrt(np.maximum(np.abs(arm) - group.offset_m, 0.0) * (np.abs(arm) + group.offset_m))
+        found = dot(along, arm)
     else:
         raise TypeError(f"a dyad or a slider on a fixed guide is expected, not {group!r}")
     with np.errstate(all="ignore"):
         return np.asarray(group.side * found / meant)
+
+
+def _all_kinds(count: int) -> tuple[Mechanism, Mechanism, Mechanism]:
+    """A third each of four-bars, slider-cranks and slotted links."""
+    rng = np.random.default_rng(SEED)
+    third = count // 3
+    return _four_bars(rng, third), _slider_cranks(rng, third), _slotted_links(rng, count - 2 * third)
 
 
 def _both_kinds(count: int) -> tuple[Mechanism, Mechanism]:
@@ -130,9 +156,9 @@ def _shares(rng: np.random.Generator, count: int) -> FloatArray:
     return np.where(near, 10.0 ** rng.uniform(-14.0, -1.0, count), rng.uniform(0.0, 1.0, count))
 
 
-def _mechanism(crank: Crank, ground: Mapping[str, ComplexArray], group: Group) -> Mechanism:
+def _mechanism(crank: Crank, ground: Mapping[str, ComplexArray], *groups: Group) -> Mechanism:
     origin = np.zeros(crank.length_m.size, dtype=np.complex128)
-    return Mechanism({"O1": origin, **ground}, crank, (group,))
+    return Mechanism({"O1": origin, **ground}, crank, groups)
 
 
 def _four_bars(rng: np.random.Generator, count: int) -> Mechanism:
@@ -155,3 +181,14 @@ def _slider_cranks(rng: np.random.Generator, count: int) -> Mechanism:
     through = pin - 1j * along * height + along * rng.uniform(-1.0, 1.0, count)
     slider = Slider("B", "A", "2", length, FixedGuide(through, angle), _sides(rng, count))
     return _mechanism(crank, {}, slider)
+
+
+def _slotted_links(rng: np.random.Generator, count: int) -> Mechanism:
+    """With offset, the pin ahead of the pivot or behind; a further point shows which way the link lies."""
+    crank, pin = _crank(rng, count)
+    offset = rng.uniform(0.2, 1.0, count)
+    distance = offset * (1.0 + 2.0 * _shares(rng, count))
+    pivot = pin - distance * direction(rng.uniform(-np.pi, np.pi, count))
+    link = SlottedLink("A3", "A", "O2", "3", offset, "F", _sides(rng, count))
+    point = SlotPoint("S", "A3", "3", np.asarray(rng.uniform(0.5, 1.0, count) + 0.2j, np.complex128))
+    return _mechanism(crank, {"O2": pivot}, link, point)

@@ -19,6 +19,7 @@ import numpy as np
 
 from reference.geometry import ComplexArray
 from reference.mechanism import Dyad, FixedGuide, Mechanism, Plate, Slider
+from reference.motion import Motion
 
 OPENED = 0.05
 """How far a sketch opens a group: this share of its link's length."""
@@ -32,11 +33,25 @@ class NoAnswerError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a solver gives for one variant, by joint, SI; nan where it gives no number."""
+    """What a solver gives for one variant, by joint, SI; nan where it gives no number.
+
+    `predicted_error` where it tells one, relative to the largest of each plan.
+    """
 
     position: Places
     velocity: Places
     acceleration: Places
+    predicted_error: float | None = None
+
+
+def answer_of(motion: Motion, index: int) -> Answer:
+    """The closed form's, of one variant."""
+
+    def read(rates: Mapping[str, ComplexArray]) -> Places:
+        return {joint: complex(values[index]) for joint, values in rates.items()}
+
+    predicted = float(motion.predicted_error[index])
+    return Answer(read(motion.position), read(motion.velocity), read(motion.acceleration), predicted)
 
 
 def error_of(found: Places, truth: Places) -> float:

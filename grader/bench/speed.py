@@ -1,21 +1,32 @@
 """Run time per variant, side by side with other programs, with the error of each beside it.
 
 All solve the same mechanism, the pump (four-bar, plate, rod and slider), at so many crank angles between
-those of its first and its last variant. Building a mechanism is no part of the time, for none. The
-clock is the thread's own processor time: other work on the machine does not count.
+those of its first and its last variant. Building a mechanism is no part of the time, for none.
 """
 
 import importlib.util
-import statistics
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
+from importlib.metadata import version
 
 import numpy as np
 
-from grader.bench.closure import exact_motion_of, rounded
-from grader.bench.peers import PEERS, PYLINKAGE, Answer, Package, Peer, error_of, plain, sketch
+from grader.bench.closure import ExactMotion, exact_motion_of, rounded
+from grader.bench.jets import Pair
+from grader.bench.peers import (
+    PEERS,
+    PYLINKAGE,
+    Answer,
+    Package,
+    Peer,
+    Places,
+    answer_of,
+    error_of,
+    plain,
+    sketch,
+)
+from grader.bench.timing import medians_us
 from reference.assembly import build_mechanism
 from reference.assignment import Assignment, load_assignment
 from reference.construction import evaluate
@@ -27,11 +38,7 @@ from reference.plan import exact_plan
 
 BATCHES = (1, 30, 10_000)
 CLASS = 30
-REPEATS, REPEATS_QUICK = 21, 5
-LEAST_RUN_S = 0.02
-"""A run is repeated inside until it takes so long, so that the clock's own steps do not count."""
-SLOW_S = 0.2
-"""A run that takes longer is repeated a few times only."""
+ROUNDS, ROUNDS_QUICK = 21, 5
 PEER_VARIANTS = 300
 """A peer without a road for many variants takes as long for each: so many are timed for a larger batch."""
 ASSIGNMENT = "pump"
@@ -59,118 +66,126 @@ class SpeedRow:
     note: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """What is to be timed for one row: by batch size, a run and how many variants it solves."""
+
+    solver: str
+    version: str | None
+    accelerations: bool
+    runs: Mapping[int, tuple[Callable[[], object], int]] = field(default_factory=dict)
+    answers: Sequence[Answer] = ()
+    note: str = ""
+
+
 def measure_speed(*, quick: bool = False, batches: Sequence[int] = BATCHES) -> Iterator[SpeedRow]:
-    """Ours by each road, then the peers, then the same for velocities alone, then a class's plans."""
-    bench = _Bench(load_assignment(ASSIGNMENT), batches, REPEATS_QUICK if quick else REPEATS)
-    for accelerations in (True, False):
-        yield bench.closed_form(accelerations=accelerations)
-        yield bench.construction(accelerations=accelerations)
-        for peer in PEERS:
-            if accelerations or peer.velocities_alone:
-                yield bench.peer(peer, accelerations=accelerations)
-    yield bench.cycle()
-    yield bench.plans()
+    """Ours by each road, then the peers; the same for velocities alone; then a class's plans."""
+    bench = _Bench(load_assignment(ASSIGNMENT), batches)
+    entries = list(bench.entries())
+    runs = {(row, count): run for row, one in enumerate(entries) for count, (run, _) in one.runs.items()}
+    medians = medians_us(runs, ROUNDS_QUICK if quick else ROUNDS)
+    for row, entry in enumerate(entries):
+        us = {count: medians[row, count] / solved for count, (_, solved) in entry.runs.items()}
+        yield bench.row(entry, us)
 
 
 def speed_rows() -> int:
     """How many rows `measure_speed` gives."""
-    return 6 + sum(1 + peer.velocities_alone for peer in PEERS)
+    return 8 + sum(1 + peer.velocities_alone for peer in PEERS)
+
+
+def has_numba() -> bool:
+    """Whether compiled roads can be measured here."""
+    return all(importlib.util.find_spec(name) for name in ("numba", "reference.compiled"))
 
 
 class _Bench:
     """The mechanisms of each batch size, and the truth of a class."""
 
-    def __init__(self, assignment: Assignment, batches: Sequence[int], repeats: int) -> None:
-        self.assignment, self.repeats = assignment, repeats
+    def __init__(self, assignment: Assignment, batches: Sequence[int]) -> None:
+        self.assignment = assignment
         self.mechanisms = {count: spread(assignment, count) for count in batches}
         self.reference = spread(assignment, CLASS)
-        exact = [exact_motion_of(self.reference, index) for index in range(CLASS)]
-        self.truth = [
-            Answer(
-                *(
-                    {joint: rounded(pair) for joint, pair in rates.items()}
-                    for rates in (one.position, one.velocity, one.acceleration)
-                )
-            )
-            for one in exact
-        ]
+        self.truth = [_rounded(exact_motion_of(self.reference, index)) for index in range(CLASS)]
 
-    def closed_form(self, *, accelerations: bool) -> SpeedRow:
-        """On arrays, as it is used everywhere."""
-        us = {
-            count: self._median_us(partial(move, one, accelerations=accelerations)) / count
+    def entries(self) -> Iterator[_Entry]:
+        """All rows in their order."""
+        for accelerations in (True, False):
+            yield self._by(move, "closed form", None, accelerations=accelerations)
+            yield self._compiled(accelerations=accelerations)
+            yield self._construction(accelerations=accelerations)
+            for peer in PEERS:
+                if accelerations or peer.velocities_alone:
+                    yield self._peer(peer, accelerations=accelerations)
+        yield self._cycle()
+        variants = self.assignment.variants()[:CLASS]
+        run = partial(exact_plan, self.assignment, variants)
+        yield _Entry(PLANS, None, accelerations=True, runs={len(variants): (run, len(variants))})
+
+    def _by(
+        self, solve: Callable[..., Motion], name: str, release: str | None, *, accelerations: bool
+    ) -> _Entry:
+        runs = {
+            count: (partial(solve, one, accelerations=accelerations), count)
             for count, one in self.mechanisms.items()
         }
-        answers = _answers(move(self.reference))
-        return self._row("closed form", None, us, answers, accelerations)
+        return _Entry(name, release, accelerations, runs, _answers(solve(self.reference)))
 
-    def construction(self, *, accelerations: bool) -> SpeedRow:
+    def _compiled(self, *, accelerations: bool) -> _Entry:
+        name = "closed form, compiled (numba)"
+        if not has_numba():
+            return _Entry(name, None, accelerations, note=NOT_INSTALLED)
+        from reference.compiled import move_compiled  # noqa: PLC0415 - numba is an extra
+
+        return self._by(move_compiled, name, version("numba"), accelerations=accelerations)
+
+    def _construction(self, *, accelerations: bool) -> _Entry:
         """The steps of mechanism and plans, evaluated."""
-        us, scale = {}, np.asarray(0.01)
+        runs, scale = {}, np.asarray(0.01)
         for count, one in self.mechanisms.items():
             steps = construction_of(one, accelerations=accelerations)
-            given = parameters_of(one, scale, scale, scale)
-            us[count] = self._median_us(partial(evaluate, steps, given)) / count
-        return SpeedRow("construction", None, accelerations, us)
+            runs[count] = partial(evaluate, steps, parameters_of(one, scale, scale, scale)), count
+        return _Entry("construction", None, accelerations, runs)
 
-    def peer(self, peer: Package, *, accelerations: bool) -> SpeedRow:
+    def _peer(self, peer: Package, *, accelerations: bool) -> _Entry:
         """One variant after another."""
         if peer.version is None:
-            return SpeedRow(peer.name, None, accelerations, {}, note=NOT_INSTALLED)
+            return _Entry(peer.name, None, accelerations, note=NOT_INSTALLED)
         solver, starts = peer.build(self.reference), _starts(self.reference)
         answers = [solver.solve(index, start)() for index, start in enumerate(starts)]
-        us = {}
+        runs = {}
         for count in self.mechanisms:
             timed = spread(self.assignment, min(count, PEER_VARIANTS))
-            run = _one_after_another(peer.build(timed), _starts(timed), accelerations=accelerations)
-            us[count] = self._median_us(run) / min(count, PEER_VARIANTS)
-        return self._row(peer.name, peer.version, us, answers, accelerations)
+            starts = _starts(timed)
+            run = _one_after_another(peer.build(timed), starts, accelerations=accelerations)
+            runs[count] = run, len(starts)
+        return _Entry(peer.name, peer.version, accelerations, runs, answers)
 
-    def cycle(self) -> SpeedRow:
+    def _cycle(self) -> _Entry:
         """The compiled road of pylinkage, where numba is installed too."""
-        package = PYLINKAGE
-        name = f"{package.name}, a cycle (numba)"
-        if package.version is None or importlib.util.find_spec("numba") is None:
-            return SpeedRow(name, package.version, accelerations=True, us={}, note=NOT_INSTALLED)
+        name, release = f"{PYLINKAGE.name}, a cycle (numba)", PYLINKAGE.version
+        if release is None or not has_numba():
+            return _Entry(name, release, accelerations=True, note=NOT_INSTALLED)
         from grader.bench.adapters.pylinkage_adapter import PylinkageCycle  # noqa: PLC0415 - an extra
 
         answers = PylinkageCycle(plain(self.reference)).answers(_starts(self.reference)[0])
-        us = {}
-        for count, mechanism in self.mechanisms.items():
-            solver, start = PylinkageCycle(plain(mechanism)), _starts(mechanism)[0]
-            us[count] = self._median_us(partial(solver.run, start)) / count
-        return self._row(name, package.version, us, answers, accelerations=True)
+        runs = {
+            count: (partial(PylinkageCycle(plain(one)).run, _starts(one)[0]), count)
+            for count, one in self.mechanisms.items()
+        }
+        return _Entry(name, release, accelerations=True, runs=runs, answers=answers)
 
-    def plans(self) -> SpeedRow:
-        """A class with both plans: all nodes, vectors and rates, from the variants on."""
-        variants = self.assignment.variants()[:CLASS]
-        us = self._median_us(partial(exact_plan, self.assignment, variants)) / len(variants)
-        return SpeedRow(PLANS, None, accelerations=True, us={len(variants): us})
-
-    def _row(
-        self, name: str, version: str | None, us: dict[int, float], answers: list[Answer], accelerations: bool
-    ) -> SpeedRow:
-        velocity, acceleration = (
-            max(
-                error_of(getattr(answer, rates), getattr(truth, rates))
-                for answer, truth in zip(answers, self.truth, strict=True)
-            )
-            for rates in ("velocity", "acceleration")
+    def row(self, entry: _Entry, us: Mapping[int, float]) -> SpeedRow:
+        """What was measured of an entry."""
+        velocity = acceleration = None
+        if entry.answers:
+            pairs = list(zip(entry.answers, self.truth, strict=True))
+            velocity = max(error_of(found.velocity, exact.velocity) for found, exact in pairs)
+            if entry.accelerations:
+                acceleration = max(error_of(found.acceleration, exact.acceleration) for found, exact in pairs)
+        return SpeedRow(
+            entry.solver, entry.version, entry.accelerations, us, velocity, acceleration, entry.note
         )
-        return SpeedRow(name, version, accelerations, us, velocity, acceleration if accelerations else None)
-
-    def _median_us(self, run: Callable[[], object]) -> float:
-        run()
-        start = time.thread_time()
-        run()
-        once = max(time.thread_time() - start, 1e-9)
-        loops, spent = max(1, int(LEAST_RUN_S / once)), []
-        for _ in range(self.repeats if once < SLOW_S else min(self.repeats, REPEATS_QUICK)):
-            start = time.thread_time()
-            for _ in range(loops):
-                run()
-            spent.append((time.thread_time() - start) / loops)
-        return statistics.median(spent) * 1e6
 
 
 def spread(assignment: Assignment, count: int) -> Mechanism:
@@ -185,15 +200,21 @@ def spread(assignment: Assignment, count: int) -> Mechanism:
     return build_mechanism(assignment.mechanism_file, values, count)
 
 
-def _starts(mechanism: Mechanism) -> list[dict[str, complex]]:
+def _rounded(motion: ExactMotion) -> Answer:
+    def read(rates: Mapping[str, Pair]) -> Places:
+        return {joint: rounded(pair) for joint, pair in rates.items()}
+
+    return Answer(read(motion.position), read(motion.velocity), read(motion.acceleration))
+
+
+def _starts(mechanism: Mechanism) -> list[Places]:
     """By variant, where the joints are in a sketch."""
     drawn = sketch(mechanism, move(mechanism, accelerations=False).position)
-    return [{joint: complex(at[index]) for joint, at in drawn.items()} for index in range(drawn["A"].size)]
+    count = drawn[mechanism.driver.pin].size
+    return [{joint: complex(at[index]) for joint, at in drawn.items()} for index in range(count)]
 
 
-def _one_after_another(
-    solver: Peer, starts: Sequence[Mapping[str, complex]], *, accelerations: bool
-) -> Callable[[], None]:
+def _one_after_another(solver: Peer, starts: Sequence[Places], *, accelerations: bool) -> Callable[[], None]:
     def run() -> None:
         for index, start in enumerate(starts):
             solver.solve(index, start, accelerations=accelerations)
@@ -202,13 +223,4 @@ def _one_after_another(
 
 
 def _answers(motion: Motion) -> list[Answer]:
-    count = motion.predicted_error.size
-    return [
-        Answer(
-            *(
-                {joint: complex(values[index]) for joint, values in getattr(motion, rates).items()}
-                for rates in ("position", "velocity", "acceleration")
-            )
-        )
-        for index in range(count)
-    ]
+    return [answer_of(motion, index) for index in range(motion.predicted_error.size)]

@@ -18,8 +18,9 @@ import numpy as np
 from grader.bench.arrays import stacked
 from grader.bench.closure import exact_motion_of, rounded
 from grader.bench.jets import Pair
-from grader.bench.peers import PEERS, Answer, NoAnswerError, Package, error_of, sketch
+from grader.bench.peers import PEERS, Answer, NoAnswerError, Package, answer_of, error_of, sketch
 from grader.bench.singular import KINDS, Case, Kind
+from grader.bench.speed import has_numba
 from reference.errors import MechanismError
 from reference.mechanism import Dyad, Group, Mechanism, Slider, SlottedLink
 from reference.motion import Motion, move, move_where_possible
@@ -28,7 +29,7 @@ EPSILON = float(np.finfo(np.float64).eps)
 DISTANCES = tuple(10.0**-k for k in range(1, 15))
 DISTANCES_QUICK = (1e-1, 1e-4, 1e-8, 1e-12, 1e-14)
 CASES, CASES_QUICK = 30, 5
-OURS, OURS_ON_ARRAYS = "closed form", "on arrays"
+OURS, OURS_ON_ARRAYS, OURS_COMPILED = "closed form", "on arrays", "compiled"
 SEED = 20
 
 
@@ -51,6 +52,7 @@ class _Outcomes:
     wrong: int = 0
     refused: int = 0
     silent: int = 0
+    beyond: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,7 @@ class Cell:
     velocity, acceleration : median and largest error of the answers on the right branch, in units
         of eps/delta (eps for a smooth kind); None where there is no such answer
     wrong, refused, silent : answers on the mirrored branch; no answer, and said so; nan
+    beyond : answers whose error is larger than the solver predicts, and than one rounding
     """
 
     solver: str
@@ -71,6 +74,7 @@ class Cell:
     wrong: int
     refused: int
     silent: int
+    beyond: int
 
     @property
     def worst(self) -> float:
@@ -112,7 +116,14 @@ def measure_stability(*, quick: bool = False, kinds: Sequence[Kind] = KINDS) -> 
 def _row(kind: Kind, delta: float, cases: Sequence[Case]) -> StabilityRow:
     truths = [truth_of(case.mechanism) for case in cases]
     mechanisms = [case.mechanism for case in cases]
-    answers = {OURS: [_by_numbers(one) for one in mechanisms], OURS_ON_ARRAYS: _on_arrays(mechanisms)}
+    answers = {
+        OURS: [_by_numbers(one) for one in mechanisms],
+        OURS_ON_ARRAYS: _all_at_once(move_where_possible(stacked(mechanisms))),
+    }
+    if has_numba():
+        from reference.compiled import by_machine  # noqa: PLC0415 - numba is an extra
+
+        answers[OURS_COMPILED] = _all_at_once(move_where_possible(stacked(mechanisms), solver=by_machine))
     if kind.plain:
         for peer in installed_peers():
             answers[peer.name] = [_by(peer, *pair) for pair in zip(mechanisms, truths, strict=True)]
@@ -151,23 +162,15 @@ def _rounded(pairs: Mapping[str, Pair]) -> dict[str, complex]:
 def _by_numbers(mechanism: Mechanism) -> Answer | None:
     """One variant by itself; None where it is refused."""
     try:
-        return _answer(move(mechanism), 0)
+        return answer_of(move(mechanism), 0)
     except MechanismError:
         return None
 
 
-def _on_arrays(mechanisms: Sequence[Mechanism]) -> list[Answer | None]:
-    """All cases at once."""
-    motion = move_where_possible(stacked(mechanisms))
+def _all_at_once(motion: Motion) -> list[Answer | None]:
+    """Every case's; None where it is refused."""
     told = np.isfinite(motion.predicted_error)
-    return [_answer(motion, index) if told[index] else None for index in range(len(mechanisms))]
-
-
-def _answer(motion: Motion, index: int) -> Answer:
-    def read(rates: Mapping[str, Any]) -> dict[str, complex]:
-        return {joint: complex(values[index]) for joint, values in rates.items()}
-
-    return Answer(read(motion.position), read(motion.velocity), read(motion.acceleration))
+    return [answer_of(motion, index) if told[index] else None for index in range(told.size)]
 
 
 def _by(peer: Package, mechanism: Mechanism, truth: Truth) -> Answer | None:
@@ -191,6 +194,8 @@ def _count(outcomes: _Outcomes, answer: Answer | None, truth: Truth, unit: float
     elif not all(math.isfinite(error) for error in errors):
         outcomes.silent += 1
     else:
+        predicted = answer.predicted_error
+        outcomes.beyond += predicted is not None and max(errors) > max(predicted, EPSILON)
         outcomes.velocity.append(errors[0] / unit)
         outcomes.acceleration.append(errors[1] / unit)
 
@@ -218,4 +223,5 @@ def _cell(solver: str, outcomes: _Outcomes, cases: int) -> Cell:
         wrong=outcomes.wrong,
         refused=outcomes.refused,
         silent=outcomes.silent,
+        beyond=outcomes.beyond,
     )

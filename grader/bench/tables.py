@@ -10,6 +10,8 @@ from grader.bench.stability import OURS, Cell, StabilityRow
 
 Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
 NOTHING = "-"
+OUTCOMES = {"wrong": "wrong", "refused": "refused", "silent": "nan", "beyond": "beyond"}
+"""What is counted of each cell, and the word for it in the tables."""
 
 
 def solver_tables(solver: SolverFigures) -> Iterator[Table]:
@@ -83,7 +85,7 @@ def _names(rows: Sequence[StabilityRow]) -> list[str]:
 
 
 def _overall(cells: Sequence[Cell]) -> str:
-    counts = (sum(getattr(cell, what) for cell in cells) for what in ("wrong", "refused", "silent"))
+    counts = (sum(getattr(cell, what) for cell in cells) for what in OUTCOMES)
     answered = any(cell.velocity for cell in cells)
     return _outcome(_units(max(cell.worst for cell in cells)) if answered else NOTHING, *counts)
 
@@ -91,7 +93,7 @@ def _overall(cells: Sequence[Cell]) -> str:
 def _branches(rows: Iterable[BranchRow]) -> Table:
     heads = ["solver", "random cases", "wrong branch", "refused", "silent nan"]
     lines = [[row.solver, str(row.cases), str(row.wrong), str(row.refused), str(row.silent)] for row in rows]
-    return "Stability: branches in random four-bars and slider-cranks", heads, lines
+    return "Stability: branches in random mechanisms", heads, lines
 
 
 def _stability(rows: Sequence[StabilityRow]) -> Table:
@@ -107,7 +109,7 @@ def _cell(cell: Cell) -> str:
     error = NOTHING
     if pairs:
         error = f"{_units(max(pair[0] for pair in pairs))} / {_units(max(pair[1] for pair in pairs))}"
-    return _outcome(error, cell.wrong, cell.refused, cell.silent)
+    return _outcome(error, *(getattr(cell, what) for what in OUTCOMES))
 
 
 def _units(error: float) -> str:
@@ -115,9 +117,9 @@ def _units(error: float) -> str:
     return "0" if error < 1e-3 else f"{error:.2g}"
 
 
-def _outcome(error: str, wrong: int, refused: int, silent: int) -> str:
-    counts = ((wrong, "wrong"), (refused, "refused"), (silent, "nan"))
-    return "; ".join([error, *(f"{count} {what}" for count, what in counts if count)])
+def _outcome(error: str, *counts: int) -> str:
+    told = zip(counts, OUTCOMES.values(), strict=True)
+    return "; ".join([error, *(f"{count} {what}" for count, what in told if count)])
 
 
 def _figure(value: float | None, form: str) -> str:

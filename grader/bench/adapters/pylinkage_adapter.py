@@ -101,9 +101,13 @@ class PylinkageCycle:
 
     def answers(self, start: Places) -> list[Answer]:
         """By variant."""
-        told = [rates[..., 0] + 1j * rates[..., 1] for rates in self.run(start)]
+        place, velocity, acceleration = (rates[..., 0] + 1j * rates[..., 1] for rates in self.run(start))
         names = tuple(self.single.parts)
+
+        def read(rates: Any) -> Places:  # noqa: ANN401 - an array
+            return dict(zip(names, rates.tolist(), strict=False))
+
         return [
-            Answer(*(dict(zip(names, rates[row].tolist(), strict=False)) for rates in told))
+            Answer(read(place[row]), read(velocity[row]), read(acceleration[row]))
             for row in range(self.count)
         ]

@@ -82,7 +82,7 @@ def test_the_speed_of_ours_stands_beside_the_peers_with_the_errors_of_each():
     rows = list(measure_speed(quick=True, batches=(1, 30)))
     assert len(rows) == speed_rows()
     timed = [row for row in rows if row.accelerations and set(row.us) == {1, 30}]
-    assert {row.solver for row in timed} == {"closed form", "construction", "scipy fsolve"}
+    assert {row.solver for row in timed} >= {"closed form", "construction", "scipy fsolve"}
     assert all(0.0 < us < 1e6 for row in timed for us in row.us.values())
     errors = {row.solver: row.acceleration_error for row in timed}
     assert errors["closed form"] <= SHARE_OF_PLAN

@@ -1,6 +1,9 @@
 """The 50-digit road: it keeps its own laws, and the closed forms agree with it for every group."""
 
+import tomllib
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,17 +13,103 @@ from grader.bench.closure import ExactMotion, _solve, exact_motion, exact_motion
 from grader.bench.exact_data import DIGITS, authored_exactly, exactly
 from grader.bench.jets import Jet, dot, fixed, follow
 from grader.bench.singular import KINDS
-from reference.assignment import load_assignment
-from reference.construction import Vector
-from reference.mechanism import Crank, Dyad, FixedGuide, Mechanism, MovingGuide, Slider
+from reference.assembly import build_mechanism
+from reference.assignment import Variant, load_assignment
+from reference.authored import MechanismFile, validate
+from reference.construction import Vector, evaluate
+from reference.derivation import construction_of, parameters_of
+from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, MovingGuide, Slider
 from reference.motion import move
+from reference.plan import _measured
 
 FAR = 0.1
 """A distance from the singular position at which nothing is lost."""
 SHARE_OF_PLAN = 1e-11
+DATA_ROUNDING = 1e-13
+"""What the roundings of the data move, relative to the largest, away from singular positions."""
 STEP_S = mpf(10) ** -12
 DIFFERENCE = mpf(10) ** -15
 """What central differences of second order leave at that step, relative."""
+
+
+ALL_GROUPS = """
+schema_version = 1
+id = "all"
+length_unit = "cm"
+[title]
+en = "All groups"
+[ground]
+O1 = [0, 0]
+O2 = [110.1, 0.7]
+O3 = [40.3, -10.9]
+[crank]
+link = "1"
+pivot = "O1"
+pin = "A"
+length = 30.3
+angle_deg = 40.1
+rpm = 1350
+gear_ratio = 23.5
+epsilon = -2.7
+[[group]]
+type = "RRR"
+node = "B"
+pins = ["A", "O2"]
+lengths = [90.7, 80.9]
+links = ["2", "3"]
+side = "left"
+[[group]]
+type = "plate"
+node = "C"
+base = ["A", "B"]
+link = "2"
+lengths = [35.7, 70.1]
+side = "right"
+[[group]]
+type = "point"
+node = "P"
+base = ["A", "B"]
+link = "2"
+at = [20.3, -7.7]
+[[group]]
+type = "point_on_line"
+node = "Q"
+base = ["A", "B"]
+link = "2"
+ratio = 0.3
+[[group]]
+type = "RRP"
+node = "D"
+pin = "O3"
+link = "4"
+length = 60.7
+guide = { joints = ["A", "B"], coincident = "D2" }
+side = "ahead"
+[[group]]
+type = "RPR"
+node = "C5"
+pin = "C"
+pivot = "O3"
+link = "5"
+offset = 1.1
+foot = "F"
+[[group]]
+type = "point"
+node = "S"
+base = ["O3", "C5"]
+link = "5"
+at = [33.3, 4.1]
+[[group]]
+type = "PRP"
+node = "X"
+guides = [{ joints = ["O1", "A"], coincident = "X1" }, { through = [70.1, 0], angle_deg = 80.3 }]
+[[group]]
+type = "RPP"
+node = "Y"
+pin = "P"
+slot_deg = 80.7
+guide = { through = [3.3, -20.1], angle_deg = 5.3 }
+"""
 
 
 def far(kind):
@@ -115,6 +204,41 @@ def test_the_two_ways_of_taking_data_differ_by_the_roundings_of_the_data_only():
         for joint, pair in written.acceleration.items()
     }
     assert max(apart) <= 1e-14 * largest
+
+
+def test_every_group_of_an_authored_file_is_read_in_decimal():
+    file = validate(MechanismFile, tomllib.loads(ALL_GROUPS), "all.toml")
+    mechanism = build_mechanism(file, {}, 1)
+    assert {type(group) for group in mechanism.groups} == set(get_args(Group))
+    assignment = SimpleNamespace(
+        mechanism_file=file,
+        mechanism=lambda _: mechanism,
+        file=SimpleNamespace(variant=SimpleNamespace(values={})),
+    )
+    written, doubles = exact_motion(assignment, Variant(None, None)), exact_motion_of(mechanism)
+    for exact, rounded_data in (
+        (written.position, doubles.position),
+        (written.velocity, doubles.velocity),
+        (written.acceleration, doubles.acceleration),
+    ):
+        assert exact.keys() == rounded_data.keys()
+        largest = max(abs(rounded(pair)) for pair in exact.values())
+        apart = [abs(rounded(pair) - rounded(rounded_data[joint])) for joint, pair in exact.items()]
+        assert 0.0 < max(apart) <= DATA_ROUNDING * largest
+
+
+def test_every_vector_of_a_construction_of_all_groups_agrees_with_fifty_digits():
+    mechanism = build_mechanism(validate(MechanismFile, tomllib.loads(ALL_GROUPS), "all.toml"), {}, 1)
+    construction, scale = construction_of(mechanism), np.array([0.01])
+    measured = _measured(construction, move(mechanism))
+    nodes = evaluate(construction, {**measured, **parameters_of(mechanism, scale, scale, scale)})
+    truth = exact_motion_of(mechanism)
+    for figure in construction.poles:
+        vectors = construction.vectors_of(figure)
+        exact = np.array([truth.vector(vector) for vector in vectors])
+        drawn = np.array([(nodes[vector.head] - nodes[vector.tail])[0] * scale[0] for vector in vectors])
+        assert np.max(np.abs(drawn - exact)) <= SHARE_OF_PLAN * np.max(np.abs(exact))
+    assert {vector.part for vector in construction.vectors.values()} == {"", "n", "t", "c", "r"}
 
 
 def test_what_does_not_assemble_is_an_arithmetic_error():

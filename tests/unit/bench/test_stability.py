@@ -1,6 +1,7 @@
 """The stability table: outcomes are told apart, distances are as asked, peers are asked fairly."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,6 +52,15 @@ def test_the_mirrored_assembly_is_a_wrong_branch(kind):
     outcomes = _Outcomes()
     _count(outcomes, Answer(truth.mirrored, truth.velocity, truth.acceleration), truth, EPSILON)
     assert (outcomes.wrong, outcomes.velocity) == (1, [])
+
+
+def test_an_error_larger_than_the_one_predicted_is_counted():
+    truth = truth_of(case_of(KINDS[0]).mechanism)
+    off = {joint: rate * (1.0 + 1e-10) for joint, rate in truth.velocity.items()}
+    outcomes = _Outcomes()
+    for predicted in (1e-9, 1e-11, None):
+        _count(outcomes, Answer(truth.position, off, truth.acceleration, predicted), truth, EPSILON)
+    assert (outcomes.beyond, len(outcomes.velocity)) == (1, 3)
 
 
 def test_nan_is_silent_and_a_refusal_is_told():
@@ -126,17 +136,14 @@ def test_variants_put_together_can_be_taken_out_again():
     assert float(again.groups[0].side[0]) == cases[1].groups[0].side
 
 
-@pytest.mark.parametrize("index", [0, 1])
+@pytest.mark.parametrize("index", [0, 1, 2])
 def test_branches_are_told_by_the_side_of_the_node(index):
-    mechanism = branches._both_kinds(40)[index]
-    at = move(mechanism).position
-    np.testing.assert_allclose(branches._side_share(mechanism, at), 1.0, rtol=1e-3)
-    group = mechanism.groups[0]
-    pins = group.pins if index == 0 else (group.pin,)
-    p = at[pins[0]]
-    along = (at[pins[1]] - p) if index == 0 else 1j * np.exp(1j * group.guide.angle_rad)
-    mirrored = p + along * np.conj((at["B"] - p) / along)
-    np.testing.assert_allclose(branches._side_share(mechanism, at | {"B": mirrored}), -1.0, rtol=1e-3)
+    mechanism = branches._all_kinds(60)[index]
+    flipped = replace(mechanism.groups[0], side=-mechanism.groups[0].side)
+    other = replace(mechanism, groups=(flipped, *mechanism.groups[1:]))
+    for assembled, share in ((mechanism, 1.0), (other, -1.0)):
+        told = branches._side_share(mechanism, move(assembled).position)
+        np.testing.assert_allclose(told, share, rtol=1e-3)
 
 
 def test_ours_puts_no_random_case_on_the_wrong_branch():
