@@ -5,14 +5,16 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from grader.lint.findings import LintFinding
 from grader.lint.places import group_place
 from reference.assignment import Assignment, Variant
-from reference.errors import MechanismError
-from reference.plan import exact_plan
+from reference.motion import move_where_possible
+from reference.refusal import reason
 
 _GAP = re.compile(r"\bby ([0-9.]+(?:e[-+]?[0-9]+)?) m\b")
-_ABOUT_ARRAYS = re.compile(r" \(1 of 1 variant\(s\), the first at index 0\)")
+_ABOUT_ARRAYS = re.compile(r" \(1 of \d+ variant\(s\), the first at index \d+\)")
 """What a message says of how many variants of how many: here it is always one."""
 _GROUP = re.compile(r"the group of (\w+)")
 
@@ -26,23 +28,15 @@ class Broken:
     message: str
 
 
-def broken_variants(assignment: Assignment, variants: Sequence[Variant]) -> list[Broken]:
-    """The variants that do not assemble or are singular.
-
-    All at once on arrays; where that fails, by halves: b broken ones of N cost about b log N
-    evaluations.
-    """
-    try:
-        exact_plan(assignment, list(variants))
-    except MechanismError as error:
-        if len(variants) == 1:
-            return [Broken(variants[0], error.code, _ABOUT_ARRAYS.sub("", error.message))]
-        middle = len(variants) // 2
-        return [
-            *broken_variants(assignment, variants[:middle]),
-            *broken_variants(assignment, variants[middle:]),
-        ]
-    return []
+def broken_variants(assignment: Assignment, variants: list[Variant]) -> list[Broken]:
+    """The variants that do not assemble or are singular: all at once, the reason of each by itself."""
+    mechanism = assignment.mechanism(variants)
+    lost = ~np.isfinite(move_where_possible(mechanism).predicted_error)
+    found = []
+    for index in np.flatnonzero(lost):
+        error = reason(mechanism, np.arange(len(variants)) == index)
+        found.append(Broken(variants[index], error.code, _ABOUT_ARRAYS.sub("", error.message)))
+    return found
 
 
 def broken_findings(assignment: Assignment, broken: Sequence[Broken]) -> Iterator[LintFinding]:

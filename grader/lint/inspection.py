@@ -95,8 +95,8 @@ class Lint:
 def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     """Hold an assignment and its rubric against every variant.
 
-    Everything is evaluated once, on arrays over the variants; those that cannot be solved are found
-    by halves and left out of the rest.
+    Everything is evaluated on arrays over the variants; those that cannot be solved are left out of the
+    rest, and only they are looked at one by one.
     """
     variants = assignment.variants()
     accelerations = rubric.needs_accelerations or any(

@@ -265,3 +265,14 @@ def test_a_plan_that_needed_more_digits_is_told(tmp_path):
     assert told.severity == "hint"
     assert len(told.variants) == 30
     assert findings_of(path, "transmission")
+
+
+def test_a_singular_variant_among_sound_ones_is_left_out_and_told(tmp_path):
+    path = within(tmp_path, "slider-crank", "length = 30", "length = 10", 'vector = "v_B"')
+    path.write_text(path.read_text(encoding="utf-8").replace('"15 + n"', '"80 + n"'), encoding="utf-8")
+    found = linted(path)
+    (fault,) = [one for one in found.findings if one.severity == "fault"]
+    assert fault.code == "singular"
+    assert "group of B" in fault.message
+    assert [variant.n for variant in fault.variants] == [10]
+    assert len(found.plan.variants) == 29
