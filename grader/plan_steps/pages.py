@@ -25,12 +25,13 @@ from grader.answer_sheet.words import REGULAR, embed_fonts
 from grader.i18n import Tongue
 from grader.plan_pdf import put_shapes
 from grader.plan_steps.explanation import LENGTHS_MM, Explanation, Section, explain
-from reference.canvas import Bounds, Shape, picture_svg
+from reference.canvas import Bounds, Shape, bounds, picture_svg
 from reference.draw import figures_of
 from reference.drawing import stages
 from reference.drawing.subject import Figure, Subject
 
 MARGIN_MM = 2.5
+LEAST_PICTURE_MM = (40.0, 12.0)
 COLUMN_MM, GAP_MM, TALLEST_MM = 88.0, 6.0, 105.0
 MODEL_SHARE, MODEL_TALLEST_MM = 0.45, 45.0
 """The mechanism beside a plan's step is drawn at this part of its size on the printed page, at most."""
@@ -83,21 +84,25 @@ def chapters(subject: Subject, tongue: Tongue) -> list[Chapter]:
 def _illustrated(subject: Subject, figures: dict[str, Figure], section: Section) -> Iterator[Illustrated]:
     figure, mechanism = figures[section.figure], figures["mechanism"]
     nodes = subject.nodes(section.figure)
-    box, model_box = _box(figure), _box(mechanism)
     base = stages.grey(mechanism)
+    model_box = _box(base)
     earlier: list[str] = []
     for told in section.steps:
         shapes = (*stages.stage(figure, earlier, told.step.node), *stages.compasses(told.step, nodes))
         marked = tuple(stages.models(subject, told.step)) if section.figure != "mechanism" else ()
         model = Picture((*base, *marked), model_box) if marked else None
-        yield Illustrated(told, Picture(shapes, box), model)
+        yield Illustrated(told, Picture(shapes, _box(shapes)), model)
         earlier.append(told.step.node)
 
 
-def _box(figure: Figure) -> Bounds:
-    """The box of a figure without its caption, with a margin."""
-    left, top, right, bottom = Figure(figure.name, tuple(part for part in figure.parts if part.node)).bounds
-    return (left - MARGIN_MM, top - MARGIN_MM, right + MARGIN_MM, bottom + MARGIN_MM)
+def _box(shapes: Sequence[Shape]) -> Bounds:
+    """The box that shapes fill, with a margin; a single point has some paper around it."""
+    left, top, right, bottom = bounds(shapes)
+    across, down = (
+        MARGIN_MM + max(0.0, least - size) / 2.0
+        for least, size in zip(LEAST_PICTURE_MM, (right - left, bottom - top), strict=True)
+    )
+    return (left - across, top - down, right + across, bottom + down)
 
 
 @cache
