@@ -8,6 +8,7 @@ Many variants are solved on arrays, a few on Python's numbers (faster there). A 
 with every result; variants where digits are lost are solved again (`reference.precision`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -56,26 +57,30 @@ class Motion:
     recomputed: BoolArray
 
 
-def move(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
+Solver = Callable[[Mechanism, int, bool], Motion]
+"""Solves a mechanism of so many variants (with accelerations or without) in double precision, unchecked."""
+
+
+def move(mechanism: Mechanism, *, accelerations: bool = True, solver: Solver | None = None) -> Motion:
     """Solve the mechanism for every variant at once.
+
+    `solver` calculates in double precision; NumPy by default, see `reference.compiled` for another.
 
     Raises MechanismError naming the group, the first variant (by its index) and by how much the
     group does not assemble, or that its velocities are not determined there.
     """
-    motion = move_where_possible(mechanism, accelerations=accelerations)
+    motion = move_where_possible(mechanism, accelerations=accelerations, solver=solver)
     if motion.predicted_error.max(initial=0.0) > REFUSED:
         raise reason(mechanism, np.isinf(motion.predicted_error))
     return motion
 
 
-def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
+def move_where_possible(
+    mechanism: Mechanism, *, accelerations: bool = True, solver: Solver | None = None
+) -> Motion:
     """As `move`, but nan (and an infinite predicted error) for variants without a motion."""
     count = _count(mechanism.driver)
-    if count <= FEW:
-        motion = _one_by_one(mechanism, count, accelerations)
-    else:
-        with np.errstate(all="ignore"):
-            motion = _on_arrays(mechanism, count, accelerations)
+    motion = (solver or _by_numpy)(mechanism, count, accelerations)
     if motion.predicted_error.max(initial=0.0) > LOSSY:
         with np.errstate(all="ignore"):
             _refine(motion, mechanism, accelerations)
@@ -119,6 +124,20 @@ def _count(driver: Driver) -> int:
     return max(driver.displacement_m.size, driver.speed.size, driver.acceleration.size)
 
 
+def _by_numpy(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+    if count <= FEW:
+        return _one_by_one(mechanism, count, accelerations)
+    with np.errstate(all="ignore"):
+        return _on_arrays(mechanism, count, accelerations)
+
+
+def predicted_error_of(amplification: Any) -> FloatArray:  # noqa: ANN401 - an array, or one number
+    """What the growth of rounding errors up to a result says of it; infinite where it is nan."""
+    predicted = np.asarray(SAFETY * EPSILON * amplification)
+    predicted[np.isnan(predicted)] = np.inf
+    return predicted
+
+
 def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
     solution = solve(mechanism, accelerations=accelerations)
     shape = (count,)
@@ -128,7 +147,7 @@ def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
 
     joints = solution.joints
     amplification = wide(reduce(larger, [joint.amplification for joint in joints.values()]))
-    predicted = np.nan_to_num(SAFETY * EPSILON * amplification, nan=np.inf, copy=False)
+    predicted = predicted_error_of(amplification)
     return Motion(
         {name: wide(joint.position) for name, joint in joints.items()},
         {name: wide(joint.velocity) for name, joint in joints.items()},

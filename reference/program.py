@@ -1,0 +1,114 @@
+"""A mechanism's calculation written down once, for a machine that repeats it for every variant.
+
+`reference.solving` and its kernels run a single time on numbers that only note what is done with them
+(`reference.noted`). What they noted is a `Program`: the same formulas in the same order, whatever the
+mechanism. `reference.lowering` turns it into steps for `reference.machine`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any, cast
+
+import numpy as np
+
+from reference.mechanism import Mechanism
+from reference.noted import Node, Notes, Number, Op, Plane, Real, parts_of
+from reference.numbers import larger
+from reference.solving import solve
+
+Leaf = np.ndarray[Any, np.dtype[Any]]
+"""An array of a mechanism's data, real or complex: of one number for all variants, or one for each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """What to calculate of a mechanism, and where it goes.
+
+    Attributes
+    ----------
+    nodes : all operations, each after those it needs
+    shared : by leaf, whether it is one number for all variants
+    planes : the real and imaginary node of each complex result: positions of all joints, their
+        velocities, their accelerations
+    reals : the node of each real result: omega, epsilon, transmission, the amplification of errors
+    joints, omega, epsilon, transmission : the names of the results, in order
+    """
+
+    nodes: tuple[Node, ...]
+    shared: tuple[bool, ...]
+    planes: tuple[tuple[int, int], ...]
+    reals: tuple[int, ...]
+    joints: tuple[str, ...]
+    omega: tuple[str, ...]
+    epsilon: tuple[str, ...]
+    transmission: tuple[str, ...]
+
+
+def write_down(mechanism: Mechanism, shared: tuple[bool, ...], *, accelerations: bool) -> Program:
+    """The program of a mechanism, for any data of this form; `shared` says which leaves hold one number."""
+    notes, seen = Notes(), iter(range(len(shared)))
+
+    def note(leaf: Leaf) -> Number:
+        order = next(seen)
+        if not np.iscomplexobj(leaf):
+            return Real(notes, notes.index((Op.INPUT, order)))
+        return Plane(*(Real(notes, notes.index((Op.INPUT, order, part))) for part in (0, 1)))
+
+    solution = solve(cast("Mechanism", _changed(mechanism, note)), accelerations=accelerations)
+    joints = solution.joints.values()
+    orders = ("position", "velocity", "acceleration") if accelerations else ("position", "velocity")
+    planes = [getattr(joint, order) for order in orders for joint in joints]
+    epsilon = solution.epsilon if accelerations else {}
+    rates = (*solution.omega.values(), *epsilon.values(), *solution.transmission.values())
+    amplification = reduce(larger, [joint.amplification for joint in joints])
+    ends = [tuple(map(notes.operand, parts_of(plane))) for plane in planes]
+    reals = [notes.operand(rate) for rate in (*rates, amplification)]
+    return Program(
+        tuple(notes.nodes),
+        shared,
+        cast("tuple[tuple[int, int], ...]", tuple(ends)),
+        tuple(reals),
+        *map(tuple, (solution.joints, solution.omega, epsilon, solution.transmission)),
+    )
+
+
+def leaves_of(mechanism: Mechanism) -> tuple[list[Leaf], tuple[object, ...]]:
+    """The arrays of a mechanism, and everything else about it: mechanisms alike in that have one program."""
+    leaves: list[Leaf] = []
+    form: list[object] = []
+    _collect(mechanism, leaves, form)
+    return leaves, tuple(form)
+
+
+def _collect(part: object, leaves: list[Leaf], form: list[object]) -> None:
+    if isinstance(part, np.ndarray):
+        leaves.append(part)
+        form.append(part.dtype.kind)
+    elif part is None or isinstance(part, str | complex | float | int):
+        form.append(part)
+    else:
+        form.append(type(part))
+        for inner in _inside(part):
+            _collect(inner, leaves, form)
+
+
+def _inside(part: Any) -> list[object]:  # noqa: ANN401 - a record, a tuple or a mapping
+    if isinstance(part, tuple):
+        return [len(part), *part]
+    if isinstance(part, Mapping):
+        return [len(part), *part.keys(), *part.values()]
+    return [getattr(part, name) for name in part.__slots__]
+
+
+def _changed(part: Any, change: Callable[[Leaf], Any]) -> Any:  # noqa: ANN401 - as above
+    """The same with every array replaced, in the order of `leaves_of`."""
+    if isinstance(part, np.ndarray):
+        return change(part)
+    if part is None or isinstance(part, str | complex | float | int):
+        return part
+    if isinstance(part, tuple):
+        return tuple(_changed(inner, change) for inner in part)
+    if isinstance(part, Mapping):
+        return {name: _changed(inner, change) for name, inner in part.items()}
+    return type(part)(*(_changed(getattr(part, name), change) for name in part.__slots__))
