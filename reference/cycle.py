@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from reference.errors import CallError
-from reference.following import TURN, BoolArray, Following, change, follow
+from reference.following import TURN, BoolArray, Event, Following, change, follow
 from reference.geometry import FloatArray
 from reference.mechanism import (
     Crank,
@@ -68,9 +68,12 @@ class Cycle:
         return isinstance(self.mechanism.driver, Crank)
 
     @property
-    def is_bounded(self) -> bool:
-        """Whether something stops the driven link on both sides."""
-        return None not in self.following.stops
+    def passed(self) -> tuple[Event, ...]:
+        """The flat positions on the cycle; of a full one, not again at its end."""
+        low, high = float(self.driven[0]), float(self.driven[-1])
+        slack = AT_IT * (high - low)
+        last = high - slack if self.turns else high + slack
+        return tuple(event for event in self.following.events if low - slack <= event.at < last)
 
 
 def cycle(mechanism: Mechanism, samples: int = 361) -> Cycle:

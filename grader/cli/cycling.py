@@ -61,7 +61,8 @@ def _draw(
     svg, pdf = files
     if svg is None and pdf is None:
         return
-    from grader.cycle.plot import Setting, cycle_diagram
+    from grader.cycle.page import Setting
+    from grader.cycle.plot import cycle_diagram
 
     diagram = cycle_diagram(subject, asked, Setting(assignment, variant, tongue(lang)))
     if svg is not None:
@@ -78,10 +79,10 @@ def _print(assignment: Assignment, variant: Variant, subject: Subject, asked: As
     console = Console()
     console.print(f"[bold]{assignment.file.title.en}[/bold], {variant}", highlight=False)
     for line in (*_range(subject), *_strokes(subject)):
-        console.print(line, highlight=False)
+        console.print(line, highlight=False, soft_wrap=True)
     table = Table("", box=None, header_style="bold")
-    coordinate = "crank angle" if subject.cycle.is_turned else "displacement"
-    for heading in ("unit", "least", f"at {coordinate}", "largest", f"at {coordinate}", "here"):
+    where = "at deg" if subject.cycle.is_turned else "at mm"
+    for heading in ("unit", "least", where, "largest", where, "here"):
         table.add_column(heading, justify="left" if heading == "unit" else "right")
     for quantity in asked.quantities:
         least, largest = extremes(subject, quantity)
@@ -109,7 +110,7 @@ def _path_rows(subject: Subject, point: str, table: Table) -> None:
         cells = [
             cell
             for end in ends
-            for cell in (f"{values[end] + 0.0:.6g}", _at(subject, float(subject.cycle.driven[end])))
+            for cell in (f"{values[end] + 0.0:.6g}", _number(subject, float(subject.cycle.driven[end])))
         ]
         table.add_row(f"{axis}_{point}", "m", *cells, f"{own + 0.0:.6g}")
 
@@ -120,13 +121,19 @@ def _told(subject: Subject, extreme: Extreme, size: float) -> tuple[str, str]:
         text = "∞" if value > 0.0 else "-∞"
     else:
         text = "-" if math.isnan(value) else f"{value + 0.0:.6g}"
-    return text, " and ".join(_at(subject, at) for at in extreme.at)
+    return text, ", ".join(_number(subject, at) for at in extreme.at)
 
 
 def _at(subject: Subject, driven: float) -> str:
+    """A driven coordinate with its unit."""
+    return f"{_number(subject, driven)} {'deg' if subject.cycle.is_turned else 'mm'}"
+
+
+def _number(subject: Subject, driven: float) -> str:
+    """A driven coordinate in degrees or millimetres, without a minus zero."""
     if subject.cycle.is_turned:
-        return f"{math.degrees(driven) + 0.0:.2f} deg"
-    return f"{1e3 * driven + 0.0:.3f} mm"
+        return f"{round(math.degrees(driven), 2) + 0.0:.2f}"
+    return f"{round(1e3 * driven, 3) + 0.0:.3f}"
 
 
 def _range(subject: Subject) -> Iterator[str]:
@@ -148,10 +155,11 @@ def _range(subject: Subject) -> Iterator[str]:
         yield "after a turn it is in its other assembly: the cycle is two turns"
     for low, high in found.elsewhere:
         yield f"it assembles from {_at(subject, low)} to {_at(subject, high)} as well, out of reach from here"
-    for event in found.following.events:
-        if found.driven[0] <= event.at <= found.driven[-1]:
-            told = "both branches meet, the motion goes on smoothly"
-            yield f"flat position of {event.node} at {_at(subject, event.at)}: {told}"
+    flat: dict[str, list[str]] = {}
+    for event in found.passed:
+        flat.setdefault(event.node, []).append(_at(subject, event.at))
+    for node, places in flat.items():
+        yield f"flat position of {node} at {' and '.join(places)}: passed smoothly, nothing is told in it"
 
 
 def _strokes(subject: Subject) -> Iterator[str]:

@@ -75,11 +75,11 @@ def _dead_points(subject: Subject, words: Tongue) -> Iterator[Mark]:
 
 def _flat_positions(subject: Subject, words: Tongue) -> Iterator[Mark]:
     cycle, title = subject.cycle, words.gettext("flat position")
-    slack = 1e-9 * float(cycle.driven[-1] - cycle.driven[0])
-    for event in cycle.following.events:
-        if cycle.driven[0] - slack <= event.at <= cycle.driven[-1] + slack:
-            text = f"{title} ({event.node}): {told(subject, event.at, words)}"
-            yield Mark(_told_at(subject, event.at), text, FLAT, 0.18, (0.6, 1.2))
+    for event in cycle.passed:
+        text = f"{title} ({event.node}): {told(subject, event.at, words)}"
+        yield Mark(_told_at(subject, event.at), text, FLAT, 0.18, (0.6, 1.2))
+        if cycle.turns and _told_at(subject, event.at) < SAME:
+            yield Mark(_told_at(subject, float(cycle.driven[-1])), "", FLAT, 0.18, (0.6, 1.2))
 
 
 def _ends(subject: Subject, words: Tongue) -> Iterator[Mark]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from grader.cycle.axes import Frame, Labelling, decimals_of, dense, step_of, ticks
+from grader.cycle.page import GREY, NAME_MM, TEXT_MM, TICK_MM
 from grader.cycle.quantities import Subject
 from grader.i18n import Tongue
 from reference.canvas import Bounds, Curve, Label, Point, Ring, Shape, Stroke
@@ -14,8 +15,7 @@ from reference.lettering import pieces_of
 from reference.mechanism import Crank, Dyad, Plate, PointOnLine, Slider, SlotPoint, SlottedLink
 
 SCALES = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
-LINK, GRID, AXIS, GREY = "#9aa3ad", "#e6e9ed", "#5b6470", "#5b6470"
-TEXT_MM, TICK_MM, NAME_MM = 3.4, 3.1, 3.8
+LINK, GRID, AXIS = "#9aa3ad", "#e6e9ed", "#5b6470"
 EVERY_DEG = 30
 """A dot on the path for so many degrees of the crank."""
 ROOM = 0.93
