@@ -176,18 +176,17 @@ def scale_findings(assignment: Assignment, plan: Plan, told: Sequence[Proposal])
     """Round scales where the proposed ones are none, and whether normals can be built by the triangle."""
     drawn = {figure for _, figures in pages_of(assignment, plan) for figure in figures}
     names = [name for figure, name in SCALE_OF.items() if figure in drawn]
-    for name in names:
-        values = np.asarray(getattr(plan.scales, name))
-        if not np.allclose(round_up(values, steps_of(name)), values, rtol=1e-6):
-            own, round_, each = told
-            message = (
-                "the proposed scales are not round; these are, and fit every variant:"
-                f" {written(round_.scales, names)}; then {round_.under_8_mm} of {round_.asked} asked"
-                f" vectors are under {WELL_READ_MM:g} mm instead of {own.under_8_mm};"
-                f" with round scales of each variant's own {each.under_8_mm}"
-            )
-            yield LintFinding("hint", "round_scales", "assignment", "$.scales", message)
-            break
+    own, round_, each = told
+    values = {name: np.asarray(getattr(plan.scales, name)) for name in names}
+    is_round = all(np.allclose(round_up(one, steps_of(name)), one, rtol=1e-6) for name, one in values.items())
+    if own.room < 1.0 or not is_round:
+        why = "do not fit" if own.room < 1.0 else "are not round"
+        message = (
+            f"the proposed scales {why}; round ones that fit every variant: {written(round_.scales, names)};"
+            f" then {round_.under_8_mm} of {round_.asked} asked vectors are under {WELL_READ_MM:g} mm"
+            f" instead of {own.under_8_mm}; with round scales of each variant's own {each.under_8_mm}"
+        )
+        yield LintFinding("hint", "round_scales", "assignment", "$.scales", message)
     if "acceleration_plan" in plan.nodes_mm and any("_n" in name for name in plan.vectors_si):
         ratio = plan.scales.kL * plan.scales.ka / plan.scales.kv**2
         if not np.allclose(ratio, 1.0, rtol=1e-6):

@@ -73,3 +73,16 @@ def test_scales_of_each_variants_own_are_never_coarser_than_the_common_ones(name
     assert together.room >= 1.0 - ROUNDING
     assert each.room >= 1.0 - ROUNDING
     assert each.under_8_mm <= together.under_8_mm
+
+
+def test_round_scales_that_do_not_fit_are_told_with_those_that_do(tmp_path):
+    path = with_round_scales(tmp_path, "engine")
+    text = path.read_text(encoding="utf-8")
+    larger = re.sub(r"kv = (.*)", lambda found: f"kv = {float(found.group(1)) / 10}", text)
+    path.write_text(larger, encoding="utf-8")
+    assignment = load_assignment(path)
+    found = lint(assignment, load_rubric("engine"))
+    (told,) = [one for one in found.findings if one.code == "round_scales"]
+    assert "do not fit" in told.message
+    assert f"kv = {float(found.scales[1].scales.kv[0]):g} (m/s)/mm" in told.message
+    assert any(one.code == "does_not_fit" and "velocity plan" in one.message for one in found.findings)
