@@ -22,9 +22,9 @@ LOSSY = 5e-14
 """A predicted relative error from which extended floats are used: a digit or two are gone."""
 DOUBTFUL = 1e-9
 """A predicted relative error from which fifty digits are used."""
-REFUSED = 1e18
+REFUSED = 1e16
 """A predicted relative error beyond which nothing is told: the sine of a transmission angle is then
-below 1e-16, and the data's last digit decides which way the mechanism moves."""
+below 1e-15 (as between guides at 0 and 180 degrees), and the data's last digit decides how it moves."""
 DIGITS = 50
 
 Put = Callable[[Solution, NDArray[np.intp]], None]
