@@ -48,7 +48,14 @@ def plan(
     if every or csv is not None:
         from grader.cli.classes import refuse_single, show_class
 
-        refuse_single(every=every, options={"--n": n, "--position": position, "--svg": svg, "--steps": steps})
+        single = {
+            "--n": n,
+            "--position": position,
+            "--svg": svg,
+            "--steps": steps,
+            "--altitude": altitude or None,
+        }
+        refuse_single(every=every, options=single)
         is_open = show_class(
             assignment, crank_mm, as_json=as_json, csv=csv, pdf=pdf, drawings=drawings, lang=lang
         )

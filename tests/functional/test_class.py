@@ -70,6 +70,8 @@ def test_where_no_variant_can_be_solved_nothing_is_written(planmark, tmp_path):
         ("pump --all --n 3", "--n one of them"),
         ("press --all --position 3", "--position one of them"),
         ("pump --all --svg x.svg", "--pdf"),
+        ("pump --all --pdf x.pdf --altitude", "--altitude one of them"),
+        ("pump --all --steps x.html", "--steps one of them"),
         ("pump --n 3 --csv x.csv", "add --all"),
         ("pump --all --csv x.csv --lang de", "known are en, ro, ru"),
         ("pump --all --crank-mm -3", "above 0"),
