@@ -6,6 +6,7 @@ Widths are those of DejaVu Sans Condensed, the font that the PDF embeds and the 
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 GREEK = {"omega": "ω", "epsilon": "ε"}
 INDEX_SIZE = 0.7
@@ -13,6 +14,7 @@ INDEX_SIZE = 0.7
 RISES = {-1: -0.26, 0: 0.0, 1: 0.44}
 """How far a piece is raised, in sizes of its line."""
 ASCENT, DESCENT = 0.76, 0.24
+KEPT = 4096
 _DESCENDING = frozenset("gjpqyQ,;()[]_/ȘșȚțДЦЩдцщруфμβφ")
 
 _WIDTHS_PER_MILLE = {
@@ -89,6 +91,7 @@ def set_pieces(text: Text, size: float) -> Iterator[Placed]:
         right = max(right, start + wide)
 
 
+@lru_cache(maxsize=KEPT)
 def width_of(text: Text, size: float) -> float:
     """How wide a text is set."""
     return max((piece.right + _width(piece) for piece in set_pieces(text, size)), default=0.0)
@@ -98,6 +101,7 @@ def _width(piece: Placed) -> float:
     return sum(_WIDTH.get(letter, _WIDTH_OF_OTHERS) for letter in piece.text) * piece.size
 
 
+@lru_cache(maxsize=KEPT)
 def rise_and_fall(text: Text, size: float) -> tuple[float, float]:
     """How far a text reaches above and below its line."""
     rise, fall = 0.0, 0.0

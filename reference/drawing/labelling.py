@@ -19,13 +19,17 @@ from reference.lettering import Text, rise_and_fall, width_of
 
 CLEAR_MM, APART_MM = 0.45, 1.1
 """Least distance of a letter's box from a stroke's edge, and from other letters."""
-GAPS_MM = (0.5, 1.2, 2.2, 3.6, 5.5, 8.0, 11.0, 15.0, 20.0)
+GAPS_MM, FAR_GAPS_MM = (0.5, 1.2, 2.2, 3.6, 5.5), (8.0, 11.0, 15.0, 20.0)
+"""Distances from the point's mark that are tried, and those tried where these leave little choice."""
 DIRECTIONS = 24
 LEADER_FROM_MM, LEAST_LEADER_MM = 3.0, 2.0
 """A letter farther than the first from its point gets a thin line to it; farther than the second, where
 another point is nearly as near."""
 DOUBT_MM = 1.0
 SAME_POINT_MM = 1e-6
+TINY_MM = 1e-9
+ENOUGH = 12
+"""So many places that touch nothing, and no farther ones are tried."""
 LEADER_DASH = (0.5, 0.8)
 TOUCHING_COST, CROSSING_COST = 60.0, 12.0
 """Of a millimetre of stroke under a letter (and as much for each stroke); of letters on one another."""
@@ -112,19 +116,21 @@ class _Places:
 
 
 def _places(one: Wanted, segments: FloatArray, points: FloatArray) -> _Places:
-    rise, fall = rise_and_fall(one.text, one.size)
-    wide = width_of(one.text, one.size) + (SLANT * rise if one.italic else 0.0)
-    half = np.array([wide, rise + fall]) / 2.0
-    gap, turn = (
-        grid.ravel()
-        for grid in np.meshgrid(GAPS_MM, np.arange(DIRECTIONS) * math.tau / DIRECTIONS, indexing="ij")
+    near = _places_at(one, GAPS_MM, segments, points)
+    if np.sum(near.cost < TOUCHING_COST) >= ENOUGH:
+        return near
+    far = _places_at(one, FAR_GAPS_MM, segments, points)
+    return _Places(
+        one,
+        np.vstack([near.boxes, far.boxes]),
+        np.vstack([near.leaders, far.leaders]),
+        np.concatenate([near.cost, far.cost]),
     )
-    along = np.stack([np.cos(turn), -np.sin(turn)], axis=1)
-    # So far that the box, not its middle, is the gap away from the point's mark.
-    steep = np.maximum(np.abs(along), 1e-9)
-    reach = np.minimum(half[0] / steep[:, 0], half[1] / steep[:, 1]) + one.radius + gap
-    middles = np.asarray(one.at) + along * reach[:, None]
-    boxes = np.hstack([middles - half, middles + half])
+
+
+def _places_at(one: Wanted, gaps: Sequence[float], segments: FloatArray, points: FloatArray) -> _Places:
+    """Places all round a point, at each of some distances from its mark."""
+    boxes, gap, turn = _boxes_around(one, gaps)
     own, others = _distances(boxes, one, points)
     doubtful = (gap >= LEADER_FROM_MM) | ((others < own + DOUBT_MM) & (gap >= LEAST_LEADER_MM))
     aside = 0.0 if one.outward == 0 else 1.0 - np.cos(turn - np.angle(one.outward))
@@ -132,6 +138,21 @@ def _places(one: Wanted, segments: FloatArray, points: FloatArray) -> _Places:
     cost = gap + 0.9 * aside + OTHERS_POINT_COST * np.maximum(own + DOUBT_MM - others, 0.0)
     cost += TOUCHING_COST * np.sum(np.where(touched > 0.0, touched + 1.0, 0.0), axis=1)
     return _Places(one, boxes, _leaders(one, boxes, doubtful), cost)
+
+
+def _boxes_around(one: Wanted, gaps: Sequence[float]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Boxes (p, 4), the distance of each from the point's mark (p,), the direction of each (p,)."""
+    rise, fall = rise_and_fall(one.text, one.size)
+    wide = width_of(one.text, one.size) + (SLANT * rise if one.italic else 0.0)
+    half = np.array([wide, rise + fall]) / 2.0
+    turns = np.arange(DIRECTIONS) * math.tau / DIRECTIONS
+    gap, turn = (grid.ravel() for grid in np.meshgrid(gaps, turns, indexing="ij"))
+    along = np.stack([np.cos(turn), -np.sin(turn)], axis=1)
+    # So far that the box, not its middle, is the gap away from the mark.
+    steep = np.maximum(np.abs(along), TINY_MM)
+    reach = np.minimum(half[0] / steep[:, 0], half[1] / steep[:, 1]) + one.radius + gap
+    middles = np.asarray(one.at) + along * reach[:, None]
+    return np.hstack([middles - half, middles + half]), gap, turn
 
 
 def _distances(boxes: FloatArray, one: Wanted, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -183,13 +204,17 @@ def lengths_inside(boxes: FloatArray, segments: FloatArray) -> FloatArray:
 
     Liang and Barsky's clipping; a segment with nan is in no box.
     """
-    tails, steps = segments[:, :2], segments[:, 2:4] - segments[:, :2]
-    grown = segments[:, 4:5] + CLEAR_MM
-    steps = np.where(np.abs(steps) < 1e-9, 1e-9, steps)
-    low = (boxes[:, None, :2] - grown - tails) / steps
-    high = (boxes[:, None, 2:] + grown - tails) / steps
-    enter = np.maximum(np.minimum(low, high).max(axis=2), 0.0)
-    leave = np.minimum(np.maximum(low, high).min(axis=2), 1.0)
+    enter: FloatArray | float = 0.0
+    leave: FloatArray | float = 1.0
+    steps = segments[:, 2:4] - segments[:, :2]
+    grown = segments[:, 4] + CLEAR_MM
+    for axis in (0, 1):
+        # A segment along the other axis never meets these sides: a tiny step puts them at infinity.
+        step = np.where(np.abs(steps[:, axis]) < TINY_MM, TINY_MM, steps[:, axis])
+        low = (boxes[:, None, axis] - grown - segments[:, axis]) / step
+        high = (boxes[:, None, axis + 2] + grown - segments[:, axis]) / step
+        enter = np.maximum(np.minimum(low, high), enter)
+        leave = np.minimum(np.maximum(low, high), leave)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     return np.asarray(np.nan_to_num(np.maximum(leave - enter, 0.0) * lengths))
 
