@@ -9,8 +9,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from grader.cli.grading import check_language
 from grader.cycle import Asked, Extreme, Subject, cycle_csv, extremes, strokes_of
+from grader.cycle.page import Setting
 from grader.files import write_whole
 from grader.i18n import tongue
 from reference.assignment import Assignment, Variant, load_assignment
@@ -35,14 +35,14 @@ def show_cycle(
     lang: str,
 ) -> None:
     """Write a variant's cycle as a table or a diagram; without files, print its extremes and strokes."""
-    check_language(lang)
+    words = tongue(lang)
     assignment = load_assignment(name)
     variant = assignment.variant(n, position)
     subject = Subject(cycle(assignment.mechanism([variant]), samples))
     asked = subject.asked([one.strip() for text in of for one in text.split(",") if one.strip()])
     if csv is not None:
-        write_whole(csv, cycle_csv(subject, asked, decimal_comma=lang in DECIMAL_COMMA))
-    _draw(assignment, variant, subject, asked, (svg, pdf), lang)
+        write_whole(csv, cycle_csv(subject, asked, decimal_comma=words.lang in DECIMAL_COMMA))
+    _draw(Setting(assignment, variant, words), subject, asked, (svg, pdf))
     if csv is None and svg is None and pdf is None:
         _print(assignment, variant, subject, asked)
     for file in (csv, svg, pdf):
@@ -50,27 +50,19 @@ def show_cycle(
             typer.echo(f"{'Written to' if file == csv else 'Drawn in'} {file}")
 
 
-def _draw(
-    assignment: Assignment,
-    variant: Variant,
-    subject: Subject,
-    asked: Asked,
-    files: tuple[Path | None, Path | None],
-    lang: str,
-) -> None:
+def _draw(setting: Setting, subject: Subject, asked: Asked, files: tuple[Path | None, Path | None]) -> None:
     svg, pdf = files
     if svg is None and pdf is None:
         return
-    from grader.cycle.page import Setting
     from grader.cycle.plot import cycle_diagram
 
-    diagram = cycle_diagram(subject, asked, Setting(assignment, variant, tongue(lang)))
+    diagram = cycle_diagram(subject, asked, setting)
     if svg is not None:
         write_whole(svg, as_svg([diagram.shapes], diagram.page_mm))
     if pdf is not None:
         from grader.plan_pdf import pdf as as_pdf
 
-        title = f"{assignment.file.title.in_language(lang)}, {variant}"
+        title = f"{setting.assignment.file.title.in_language(setting.words.lang)}, {setting.variant}"
         write_whole(pdf, as_pdf([diagram.shapes], title, diagram.page_mm))
 
 

@@ -16,6 +16,8 @@ DENSE_MM = 0.6
 AWAY_MM = (0.9, 2.2, 4.0, 6.5)
 """How far from its curve a label may stand, the nearest first."""
 MARGIN_MM = 0.6
+NEARBY_MM = 2.5
+CELL_MM = 0.25
 ON_INK, ON_LABEL, BY_OTHER, FARTHER = 10.0, 40.0, 1.5, 1.2
 """What it costs a label: a point of a curve under it, another label, another curve nearby, a millimetre."""
 
@@ -81,7 +83,8 @@ def cut(frame: Frame, x: FloatArray, y: FloatArray) -> Iterator[tuple[Point, ...
             if len(piece) > 1:
                 yield tuple(piece)
             piece = [start]
-        piece.append(end)
+        if end != piece[-1]:
+            piece.append(end)
     if len(piece) > 1:
         yield tuple(piece)
 
@@ -128,10 +131,10 @@ class Labelling:
         middles, far = self._places(self.curves[curve], half)
         if not len(middles):
             return label
-        ink = np.concatenate([*self.curves, self.other])
+        ink = _Ink(self.box, np.concatenate([*self.curves, self.other]))
         others = np.concatenate([np.zeros((0, 2)), *(c for k, c in enumerate(self.curves) if k != curve)])
-        cost = FARTHER * far + ON_INK * _inside(ink, middles, half + MARGIN_MM)
-        cost = cost + BY_OTHER * _inside(others, middles, half + 2.5)
+        cost = FARTHER * far + ON_INK * ink.within(middles, half + MARGIN_MM)
+        cost = cost + BY_OTHER * _Ink(self.box, others).within(middles, half + NEARBY_MM)
         for box in self.taken:
             centre, reach = np.array([box[0] + box[2], box[1] + box[3]]) / 2.0, _half(box)
             cost = cost + ON_LABEL * np.all(np.abs(middles - centre) < half + reach + MARGIN_MM, axis=1)
@@ -161,12 +164,26 @@ def _half(box: Bounds) -> NDArray[np.float64]:
     return np.array([box[2] - box[0], box[3] - box[1]]) / 2.0
 
 
-def _inside(
-    points: NDArray[np.float64], middles: NDArray[np.float64], half: NDArray[np.float64]
-) -> NDArray[np.int64]:
-    """How many points lie in each box."""
-    count = np.zeros(len(middles), dtype=np.int64)
-    for start in range(0, len(middles), 256):
-        away = np.abs(points[None, :, :] - middles[start : start + 256, None, :])
-        count[start : start + 256] = np.sum((away[..., 0] < half[0]) & (away[..., 1] < half[1]), axis=1)
-    return count
+class _Ink:
+    """How much ink there is in boxes: points counted in cells, summed up from the box's corner."""
+
+    def __init__(self, box: Bounds, points: NDArray[np.float64]) -> None:
+        self.corner = np.array(box[:2])
+        shape = np.ceil((np.array(box[2:]) - self.corner) / CELL_MM).astype(int) + 1
+        cells = np.clip(((points - self.corner) / CELL_MM).astype(int), 0, shape - 1)
+        counted = np.zeros(shape + 1)
+        np.add.at(counted, (cells[:, 0] + 1, cells[:, 1] + 1), 1.0)
+        self.summed = counted.cumsum(axis=0).cumsum(axis=1)
+
+    def within(self, middles: NDArray[np.float64], half: NDArray[np.float64]) -> FloatArray:
+        """Points in each box about a middle, (P,)."""
+        most = np.array(self.summed.shape) - 1
+        low = np.clip(np.floor((middles - half - self.corner) / CELL_MM).astype(int), 0, most)
+        high = np.clip(np.ceil((middles + half - self.corner) / CELL_MM).astype(int), 0, most)
+        summed = self.summed
+        return np.asarray(
+            summed[high[:, 0], high[:, 1]]
+            - summed[low[:, 0], high[:, 1]]
+            - summed[high[:, 0], low[:, 1]]
+            + summed[low[:, 0], low[:, 1]]
+        )

@@ -15,7 +15,7 @@ SAME = 1e-3
 REASONS = (
     N_("its links are in line"),
     N_("its rod is perpendicular to the guide"),
-    N_("the pin is at the link's pivot, or nearest to it"),
+    N_("the pin is at the link's pivot, or as near to it as the offset lets it"),
     N_("its guides are parallel"),
     N_("slot and guide are parallel"),
 )
