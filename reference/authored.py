@@ -21,6 +21,8 @@ from reference import formula
 from reference.errors import AuthoredFileError, Finding
 from reference.formula import Formula
 
+MOST_VARIANTS = 10_000
+"""Of a range of n or position: more is a slip of the pen."""
 LENGTH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
@@ -273,6 +275,12 @@ class Range(Authored):
 
     first: Annotated[int, Field(alias="from")]
     last: Annotated[int, Field(alias="to")]
+
+    @model_validator(mode="after")
+    def _is_no_more_than_can_be_graded(self) -> Self:
+        if self.last - self.first >= MOST_VARIANTS:
+            raise ValueError(f"is a range of more than {MOST_VARIANTS} numbers")
+        return self
 
     @property
     def values(self) -> range:

@@ -1,0 +1,226 @@
+"""Other roads to the same motion: loops closed by Newton's method in many digits, and textbook formulas."""
+
+import math
+
+import numpy as np
+import pytest
+from mpmath import mp, mpc
+
+from reference.assembly import build_mechanism
+from reference.authored import MechanismFile, validate
+from reference.checking import check_mechanism
+from reference.motion import move
+
+DIGITS = 40
+NEWTON_STEPS = 10
+DOUBLE_PRECISION = 1e-12
+"""Of the largest velocity or acceleration; the mechanisms here are well conditioned."""
+OMEGA, EPSILON = 3.0, -7.0
+CRANK = {"pivot": "A", "pin": "B", "length": 0.15, "angle_deg": 70, "omega": OMEGA, "epsilon": EPSILON}
+B3 = {"type": "RPR", "node": "B3", "pin": "B", "pivot": "C", "link": "3"}
+
+
+def motion_of(mechanism: dict):
+    table = {"schema_version": 1, "id": "case", "title": {"en": "case"}, "length_unit": "m", **mechanism}
+    file = validate(MechanismFile, table, "case")
+    assert not list(check_mechanism(file))
+    return move(build_mechanism(file, {}, 1))
+
+
+def turn(angle):
+    return mp.expj(angle)
+
+
+def crank_pin(time):
+    """The crank's end at a time, in many digits."""
+    angle = mp.mpf(math.radians(70)) + OMEGA * time + mp.mpf(EPSILON) * time**2 / 2
+    return mp.mpf(0.15) * turn(angle)
+
+
+# Each case: the mechanism; its unknowns at the start, near enough; the loops, as complex equations
+# that vanish; and the joint's place from them.
+
+SLOTTED = {"ground": {"A": [0, 0], "C": [-0.3, 0.05]}, "crank": CRANK}
+
+
+def six_bar_of_two_slotted_links():
+    """R-RTR-RTR: a second block on the crank's shaft line slides on the first slotted link's end."""
+    groups = [
+        B3,
+        {"type": "point", "node": "D", "base": ["C", "B3"], "link": "3", "at": [0.2, 0]},
+        {"type": "RPR", "node": "D5", "pin": "D", "pivot": "E", "link": "5", "side": "ahead"},
+        {"type": "point", "node": "F", "base": ["E", "D5"], "link": "5", "at": [0.4, 0.03]},
+    ]
+    mechanism = {**SLOTTED, "ground": {**SLOTTED["ground"], "E": [0.1, -0.3]}, "group": groups}
+
+    def loops(time, first, reach, second, other):
+        c, e = mpc(-0.3, 0.05), mpc(0.1, -0.3)
+        pin = c + mp.mpf(0.2) * turn(first)
+        return (c + reach * turn(first) - crank_pin(time), e + other * turn(second) - pin)
+
+    def place(unknowns):
+        return mpc(0.1, -0.3) + mpc(0.4, 0.03) * turn(unknowns[2])
+
+    return mechanism, (0.3, 0.4, 2.0, 0.4), loops, "F", place
+
+
+def shaper_with_an_offset_slot():
+    groups = [
+        {**B3, "offset": 0.04, "foot": "P"},
+        {"type": "point", "node": "D", "base": ["C", "B3"], "link": "3", "at": [0.5, 0.02]},
+        {
+            "type": "RRP", "node": "G", "pin": "D", "length": 0.3, "link": "4", "side": "behind",
+            "guide": {"through": [0, 0.4], "angle_deg": 12},
+        },
+    ]  # fmt: skip
+
+    def loops(time, angle, reach, rod, slide):
+        c = mpc(-0.3, 0.05)
+        guide = turn(mp.mpf(math.radians(12)))
+        return (
+            c + mpc(reach, 0.04) * turn(angle) - crank_pin(time),
+            c + mpc(0.5, 0.02) * turn(angle) + mp.mpf(0.3) * turn(rod) - mpc(0, 0.4) - slide * guide,
+        )
+
+    def place(unknowns):
+        return mpc(0, 0.4) + unknowns[3] * turn(mp.mpf(math.radians(12)))
+
+    return {**SLOTTED, "group": groups}, (0.1, 0.36, 2.0, -0.1), loops, "G", place
+
+
+def rod_on_a_coupler_and_blocks_between():
+    """RRR, then RRP on its coupler, then PRP between that rod and the rocker."""
+    groups = [
+        {
+            "type": "RRR", "node": "D", "pins": ["B", "C"], "links": ["2", "3"], "lengths": [0.4, 0.3],
+            "side": "right",
+        },
+        {
+            "type": "RRP", "node": "G", "pin": "E", "length": 0.35, "link": "4", "side": "ahead",
+            "guide": {"joints": ["B", "D"], "coincident": "G2"},
+        },
+        {
+            "type": "PRP", "node": "H",
+            "guides": [
+                {"joints": ["E", "G"], "coincident": "H4"}, {"joints": ["C", "D"], "coincident": "H3"}
+            ],
+        },
+    ]  # fmt: skip
+    ground = {"A": [0, 0], "C": [0.45, 0.05], "E": [0.1, -0.2]}
+
+    def loops(time, coupler, rocker, rod, *along_links):
+        along, first, second = along_links
+        b, c, e = crank_pin(time), mpc(0.45, 0.05), mpc(0.1, -0.2)
+        return (
+            b + mp.mpf(0.4) * turn(coupler) - c - mp.mpf(0.3) * turn(rocker),
+            e + mp.mpf(0.35) * turn(rod) - b - along * turn(coupler),
+            e + first * turn(rod) - c - second * turn(rocker),
+        )
+
+    def place(unknowns):
+        return mpc(0.1, -0.2) + unknowns[4] * turn(unknowns[2])
+
+    return {"ground": ground, "crank": CRANK, "group": groups}, None, loops, "H", place
+
+
+def start_of_the_third(motion):
+    at = {name: complex(z[0]) for name, z in motion.position.items()}
+    coupler, rocker, rod = at["D"] - at["B"], at["D"] - at["C"], at["G"] - at["E"]
+    angles = [math.atan2(z.imag, z.real) for z in (coupler, rocker, rod)]
+    return (
+        *angles,
+        ((at["G"] - at["B"]) / coupler * abs(coupler)).real,
+        ((at["H"] - at["E"]) / rod * abs(rod)).real,
+        ((at["H"] - at["C"]) / rocker * abs(rocker)).real,
+    )
+
+
+def closed(loops, start):
+    """Newton's method from a start near enough, its slopes from differences: real unknowns, complex loops."""
+
+    def parts(unknowns):
+        return mp.matrix([part for loop in loops(unknowns) for part in (loop.real, loop.imag)])
+
+    unknowns, step = [mp.mpf(one) for one in start], mp.mpf(10) ** (-DIGITS // 2)
+    for _ in range(NEWTON_STEPS):
+        here = parts(unknowns)
+        slopes = mp.matrix(len(unknowns))
+        for column in range(len(unknowns)):
+            moved = [one + step * (index == column) for index, one in enumerate(unknowns)]
+            slopes[:, column] = (parts(moved) - here) / step
+        change = mp.lu_solve(slopes, here)
+        unknowns = [one - by for one, by in zip(unknowns, change, strict=True)]
+    assert mp.norm(parts(unknowns)) < mp.mpf(10) ** (-DIGITS + 5)
+    return unknowns
+
+
+@pytest.mark.parametrize(
+    "case",
+    [six_bar_of_two_slotted_links, shaper_with_an_offset_slot, rod_on_a_coupler_and_blocks_between],
+)
+def test_loops_closed_by_newtons_method_and_differentiated_give_the_same_motion(case):
+    mechanism, start, loops, joint, place = case()
+    motion = motion_of(mechanism)
+    start = start or start_of_the_third(motion)
+    with mp.workdps(DIGITS):
+
+        def at(time):
+            return place(closed(lambda unknowns: loops(time, *unknowns), start))
+
+        exact = [at(mp.mpf(0)), mp.diff(at, 0), mp.diff(at, 0, 2)]
+    rates = (motion.position, motion.velocity, motion.acceleration)
+    for rate, true in zip(rates, exact, strict=True):
+        size = max(float(np.abs(z)[0]) for z in rate.values())
+        assert abs(complex(rate[joint][0]) - complex(true)) <= DOUBLE_PRECISION * size
+
+
+def test_a_scotch_yoke_moves_harmonically():
+    """x = r cos phi, x' = -r omega sin phi, x'' = -r omega^2 cos phi - r epsilon sin phi."""
+    yoke = {"type": "RPP", "node": "D", "pin": "B", "slot_deg": 90}
+    yoke |= {"guide": {"through": [0, 0], "angle_deg": 0}}
+    motion = motion_of({"ground": {"A": [0, 0]}, "crank": CRANK, "group": [yoke]})
+    x, y = 0.15 * math.cos(math.radians(70)), 0.15 * math.sin(math.radians(70))
+    for rate, true in (
+        (motion.position, x),
+        (motion.velocity, -OMEGA * y),
+        (motion.acceleration, -(OMEGA**2) * x - EPSILON * y),
+    ):
+        assert rate["D"][0] == pytest.approx(true, rel=DOUBLE_PRECISION, abs=DOUBLE_PRECISION)
+
+
+def test_an_oscillating_cylinder_has_the_rates_of_its_triangle():
+    """s^2 = r^2 + d^2 + 2 r d sin phi for a pivot d below the crank's; s' and theta' from derivatives."""
+    r, d, phi = 0.15, 0.4, math.radians(70)
+    mechanism = {"ground": {"A": [0, 0], "C": [0, -d]}, "crank": CRANK, "group": [B3]}
+    motion = motion_of(mechanism)
+    s = math.sqrt(r * r + d * d + 2 * r * d * math.sin(phi))
+    slide = r * d * math.cos(phi) * OMEGA / s
+    swing = OMEGA * r * (r + d * math.sin(phi)) / s**2
+    relative = motion.velocity["B"][0] - motion.velocity["B3"][0]
+    assert abs(relative) == pytest.approx(abs(slide), rel=DOUBLE_PRECISION)
+    assert motion.omega["3"][0] == pytest.approx(swing, rel=DOUBLE_PRECISION)
+    # (s^2 theta')' = r (r + d sin phi) epsilon + r d cos phi omega^2
+    growth = r * (r + d * math.sin(phi)) * EPSILON + r * d * math.cos(phi) * OMEGA**2
+    assert motion.epsilon["3"][0] == pytest.approx(
+        (growth - 2 * s * slide * swing) / s**2, rel=DOUBLE_PRECISION
+    )
+
+
+def test_an_elliptic_trammels_rod_turns_as_its_ends_slide_on_crossed_guides():
+    """A rod of length l between two guides at right angles: its point at l/2 runs on a circle."""
+    length, place, speed, growth = 0.5, 0.3, 0.7, -1.1
+    driven = {"pin": "B", "guide": {"through": [0, 0], "angle_deg": 0}}
+    driven |= {"displacement": place, "speed": speed, "acceleration": growth}
+    rod = {"type": "RRP", "node": "D", "pin": "B", "length": length, "link": "2", "side": "ahead"}
+    rod |= {"guide": {"through": [0, 0], "angle_deg": 90}}
+    middle = {"type": "point_on_line", "node": "E", "base": ["B", "D"], "link": "2", "ratio": 0.5}
+    motion = motion_of({"ground": {"A": [0, 0]}, "driven_slider": driven, "group": [rod, middle]})
+    y = math.sqrt(length**2 - place**2)
+    y_speed = -place * speed / y
+    y_growth = -(speed**2 + place * growth + y_speed**2) / y
+    assert motion.velocity["D"][0] == pytest.approx(1j * y_speed, rel=DOUBLE_PRECISION)
+    assert motion.acceleration["D"][0] == pytest.approx(1j * y_growth, rel=DOUBLE_PRECISION)
+    assert motion.omega["2"][0] == pytest.approx(speed / y, rel=DOUBLE_PRECISION)
+    centre = motion.position["E"][0]
+    assert abs(centre) == pytest.approx(length / 2, rel=DOUBLE_PRECISION)
+    assert abs((centre.conjugate() * motion.velocity["E"][0]).real) <= DOUBLE_PRECISION
