@@ -201,6 +201,8 @@ def write_caption(
 
 def write_block(sketch: Sketch, lines: list[str], room: Box, taken: list[Box]) -> None:
     """Working written where there is room for it, or not at all."""
+    if not lines:
+        return
     height = 0.8 * sketch.page.letter_mm
     size = max(len(line) for line in lines) * 0.5 * height, len(lines) * 1.9 * height
     place = free_place(size, room, taken, sketch.rng)
