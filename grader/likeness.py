@@ -13,8 +13,9 @@ import numpy as np
 from grader.records import FloatArray
 from reference.assignment import Assignment, Variant
 from reference.construction import Construction, evaluate
-from reference.derivation import construction_of, parameters_of
+from reference.derivation import construction_of
 from reference.outline import bars
+from reference.parameters import parameters_of
 
 _ANCHOR_OFF_RAD = np.radians(2.5)
 _SCALES = (0.4, 1.6)

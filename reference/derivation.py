@@ -5,22 +5,37 @@ plan), ground joints have the pole for their image, a normal component a_BA_n en
 Coriolis component a_B3B_c in ``k_B3B``.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 
 import numpy as np
 
-from reference.construction import AngularRate, Construction, Vector
-from reference.geometry import FloatArray
+from reference.construction import AngularRate, Construction
+from reference.draft import (
+    ACCELERATION_POLE,
+    VELOCITY_POLE,
+    Draft,
+    absolute,
+    guide_line,
+    images_at,
+    images_on_line,
+    in_slot,
+    normal_component,
+    note_similar_images,
+    rates_of,
+    rigid_images,
+    rotations,
+    similar_images,
+    slides,
+    sliding,
+    turning,
+)
 from reference.mechanism import (
     Crank,
     CrossSlider,
     DrivenSlider,
     Driver,
     Dyad,
-    FixedGuide,
     Group,
-    Guide,
     Mechanism,
     Plate,
     PointOnLine,
@@ -30,11 +45,11 @@ from reference.mechanism import (
     Yoke,
     moving_guides,
 )
+from reference.parameters import pair
 from reference.steps import (
     Along,
     ArcAndLine,
     Coincide,
-    Coriolis,
     Divide,
     Fixed,
     FixedLine,
@@ -53,41 +68,6 @@ from reference.steps import (
     TwoLines,
 )
 
-VELOCITY_POLE, ACCELERATION_POLE = "o", "o'"
-
-
-@dataclass(slots=True)
-class _Draft:
-    """The construction while it is being written down."""
-
-    mechanism: Mechanism
-    plate_by_similarity: bool
-    sketch: list[Step] = field(default_factory=list)
-    velocity: list[Step] = field(default_factory=list)
-    acceleration: list[Step] = field(default_factory=list)
-    vectors: dict[str, Vector] = field(default_factory=dict)
-    rates: dict[str, AngularRate] = field(default_factory=dict)
-    images: dict[str, Similar] = field(default_factory=dict)
-
-    def image(self, joint: str, *, primed: bool = False) -> str:
-        """The node of a joint in the velocity (or acceleration) plan."""
-        if self.mechanism.is_ground(joint):
-            return ACCELERATION_POLE if primed else VELOCITY_POLE
-        return image_name(joint, primed=primed)
-
-    def relative(self, node: str, pin: str) -> str:
-        """The subscript of a vector of `node` about `pin`: B about A is BA, about the ground B."""
-        return node if self.mechanism.is_ground(pin) else f"{node}{pin}"
-
-    def vector(self, name: str, tail: str, head: str, **about: object) -> None:
-        scale = "kv" if name.startswith("v") else "ka"
-        self.vectors[name] = Vector(name, tail, head, scale, **about)  # type: ignore[arg-type]
-
-
-def image_name(joint: str, *, primed: bool = False) -> str:
-    """The lower-case image of a moving joint, primed in the acceleration plan."""
-    return joint.lower() + ("'" if primed else "")
-
 
 def construction_of(
     mechanism: Mechanism, *, accelerations: bool = True, plate_by_similarity: bool = False
@@ -100,7 +80,7 @@ def construction_of(
     plate_by_similarity : images of plate points by similar triangles instead of perpendiculars
         (collinear plates always are: their perpendiculars coincide)
     """
-    draft = _Draft(mechanism, plate_by_similarity)
+    draft = Draft(mechanism, plate_by_similarity)
     draft.velocity.append(Pole(VELOCITY_POLE))
     draft.acceleration.append(Pole(ACCELERATION_POLE))
     draft.sketch.extend(Pivot(joint) for joint in mechanism.ground_m)
@@ -123,7 +103,7 @@ def construction_of(
     return Construction(figures, poles, vectors, rates, images, _centres(draft, rates))
 
 
-def _centres(draft: _Draft, rates: Mapping[str, AngularRate]) -> dict[str, Similar]:
+def _centres(draft: Draft, rates: Mapping[str, AngularRate]) -> dict[str, Similar]:
     """I: triangle I A B similar to o a b; J: triangle J A B similar to o' a' b' (Mehmke)."""
     centres = {}
     for name, rate in rates.items():
@@ -138,7 +118,7 @@ def _centres(draft: _Draft, rates: Mapping[str, AngularRate]) -> dict[str, Simil
     return centres
 
 
-def _in_order(draft: _Draft) -> list[str]:
+def _in_order(draft: Draft) -> list[str]:
     """Names of vectors: velocities first, joint by joint, the absolute one before its parts."""
     joints = draft.mechanism.joints
 
@@ -152,7 +132,7 @@ def _in_order(draft: _Draft) -> list[str]:
     return sorted(draft.vectors, key=place)
 
 
-def _draw_driver(draft: _Draft, driver: Driver) -> None:
+def _draw_driver(draft: Draft, driver: Driver) -> None:
     match driver:
         case Crank():
             _draw_crank(draft, driver)
@@ -164,10 +144,10 @@ def _draw_driver(draft: _Draft, driver: Driver) -> None:
             draft.acceleration.append(
                 Given(a_primed, ACCELERATION_POLE, Scaled(f"a_{pin}", "ka"), guide.along)
             )
-            _absolute(draft, pin)
+            absolute(draft, pin)
 
 
-def _draw_crank(draft: _Draft, crank: Crank) -> None:
+def _draw_crank(draft: Draft, crank: Crank) -> None:
     pivot, pin = crank.pivot, crank.pin
     length = f"{pivot}{pin}"
     draft.sketch.append(Given(pin, pivot, Scaled(length, "kL"), Fixed("angle crank")))
@@ -188,169 +168,41 @@ def _draw_crank(draft: _Draft, crank: Crank) -> None:
     draft.vector(f"a_{pin}", ACCELERATION_POLE, a_primed)
 
 
-def _draw_group(draft: _Draft, group: Group) -> None:
+def _draw_group(draft: Draft, group: Group) -> None:
     match group:
         case Dyad(node=node, pins=(p, q), links=(link_p, link_q)):
             radii = (Scaled(pair(p, node), "kL"), Scaled(pair(q, node), "kL"))
             draft.sketch.append(TwoArcs(node, (p, q), radii, group.side))
-            _images(draft, node, _rotations(draft, node, {p: link_p, q: link_q}))
+            images_at(draft, node, rotations(draft, node, {p: link_p, q: link_q}))
         case Plate(node=node, base=(p, q), link=link):
             _draw_plate(draft, group)
-            _note_similar_images(draft, node, (p, q))
+            note_similar_images(draft, node, (p, q))
             if group.is_ever_flat or draft.plate_by_similarity:
-                _similar_images(draft, node, (p, q))
+                similar_images(draft, node, (p, q))
             else:
-                _images(draft, node, _rotations(draft, node, {p: link, q: link}))
+                images_at(draft, node, rotations(draft, node, {p: link, q: link}))
         case PointOnLine(node=node, base=(p, q)):
             draft.sketch.append(Divide(node, (p, q), f"ratio {node}"))
-            _images_on_line(draft, node, (p, q))
+            images_on_line(draft, node, (p, q))
         case Slider(node=node, pin=pin, link=link, guide=guide):
             radius = Scaled(pair(pin, node), "kL")
-            draft.sketch.append(ArcAndLine(node, pin, radius, _guide_line(node, guide), group.side))
-            rotations = _rotations(draft, node, {pin: link})
-            _images(draft, node, rotations + _slides(draft, node, (guide,)))
+            draft.sketch.append(ArcAndLine(node, pin, radius, guide_line(node, guide), group.side))
+            turns = rotations(draft, node, {pin: link})
+            images_at(draft, node, turns + slides(draft, node, (guide,)))
         case CrossSlider(node=node, guides=guides):
-            draft.sketch.append(TwoLines(node, *(_guide_line(node, guide) for guide in guides)))
-            _images(draft, node, _slides(draft, node, guides))
+            draft.sketch.append(TwoLines(node, *(guide_line(node, guide) for guide in guides)))
+            images_at(draft, node, slides(draft, node, guides))
         case Yoke(node=node, pin=pin, guide=guide):
             slot = Fixed(f"angle slot {node}")
-            draft.sketch.append(TwoLines(node, Line(pin, slot), _guide_line(node, guide)))
-            _images(draft, node, [_slot(draft, node, pin, slot), *_slides(draft, node, (guide,))])
+            draft.sketch.append(TwoLines(node, Line(pin, slot), guide_line(node, guide)))
+            images_at(draft, node, [in_slot(draft, node, pin, slot), *slides(draft, node, (guide,))])
         case SlottedLink():
             _draw_slotted_link(draft, group)
         case SlotPoint(node=node):
             _draw_slot_point(draft, group)
 
 
-def pair(pin: str, node: str) -> str:
-    """The name of the real length between two joints among the parameters."""
-    return f"{pin}{node}"
-
-
-@dataclass(frozen=True, slots=True)
-class _Lines:
-    """One condition on a node: a line of each plan, and the vectors that lie along them.
-
-    `vectors` are names, tails and attributes; their heads are the node's images.
-    """
-
-    velocity: Line
-    acceleration: Line
-    vectors: tuple[tuple[str, str, Mapping[str, object]], ...]
-
-
-def _images(draft: _Draft, node: str, lines: Sequence[_Lines]) -> None:
-    """Both images of a node, where the two lines of each plan meet."""
-    image, image_primed = draft.image(node), draft.image(node, primed=True)
-    first, second = lines
-    draft.velocity.append(TwoLines(image, first.velocity, second.velocity))
-    draft.acceleration.append(TwoLines(image_primed, first.acceleration, second.acceleration))
-    for line in lines:
-        for name, tail, about in line.vectors:
-            draft.vector(name, tail, image if name.startswith("v") else image_primed, **about)
-    _absolute(draft, node)
-
-
-def _rotations(draft: _Draft, node: str, links: Mapping[str, str]) -> list[_Lines]:
-    """A node that turns about each pin: across the link, from the pin's image."""
-    found = []
-    for pin, link in links.items():
-        across, about = Along(pin, node, 1), draft.relative(node, pin)
-        end = _normal_component(
-            draft, node, pin, Normal(draft.image(pin), draft.image(node), pair(pin, node))
-        )
-        found.append(_turning(draft, (pin, node), end, across))
-        _rates(draft, link, about, (pin, node))
-    return found
-
-
-def _turning(draft: _Draft, link: tuple[str, str], end: str, across: Along) -> _Lines:
-    pin, node = link
-    about = draft.relative(node, pin)
-    return _Lines(
-        Line(draft.image(pin), across),
-        Line(end, across),
-        (
-            (f"v_{about}", draft.image(pin), {"link": link}),
-            (f"a_{about}_t", end, {"link": link, "part": "t"}),
-        ),
-    )
-
-
-def _normal_component(draft: _Draft, node: str, pin: str, length: Normal) -> str:
-    """Lay off a_(node about pin)^n from the pin's image towards the pin; its end."""
-    about = draft.relative(node, pin)
-    end, start = f"n_{about}", draft.image(pin, primed=True)
-    draft.acceleration.append(Given(end, start, length, Along(node, pin)))
-    draft.vector(f"a_{about}_n", start, end, link=(pin, node), part="n")
-    return end
-
-
-def _guide_line(node: str, guide: Guide) -> Line | FixedLine:
-    """A guide on the sketch."""
-    if isinstance(guide, FixedGuide):
-        return FixedLine(f"guide {node}")
-    return Line(guide.base[0], Along(*guide.base))
-
-
-def _slides(draft: _Draft, node: str, guides: Sequence[Guide]) -> list[_Lines]:
-    """A node that slides on guides: along each, from the image of the point under it."""
-    found = []
-    for guide in guides:
-        if isinstance(guide, FixedGuide):
-            along = FixedLine(f"guide {node}").along
-            found.append(_Lines(Line(VELOCITY_POLE, along), Line(ACCELERATION_POLE, along), ()))
-            continue
-        under, (g, h) = guide.coincident, guide.base
-        draft.sketch.append(Coincide(under, node))
-        for primed, steps in ((False, draft.velocity), (True, draft.acceleration)):
-            ends = (draft.image(g, primed=primed), draft.image(h, primed=primed))
-            steps.append(Similar(draft.image(under, primed=primed), ends, (g, h, under)))
-        _absolute(draft, under)
-        turn = (draft.image(g), draft.image(h))
-        found.append(_sliding(draft, (under, node), Along(g, h), turn, (guide.link, g, h)))
-    return found
-
-
-def _sliding(
-    draft: _Draft, link: tuple[str, str], guide: Along, turn: tuple[str, str], turning: tuple[str, str, str]
-) -> _Lines:
-    """The second joint slides about the first along a turning guide: Coriolis, then along the guide.
-
-    Arguments: `turn`, ends of a velocity that turns the guide's link; `turning`, that link and the two
-    joints of it that the velocity belongs to.
-    """
-    other, node = link
-    about, name = f"{node}{other}", turning[0]
-    start, end = draft.image(other, primed=True), f"k_{node}{other}"
-    length = Coriolis((draft.image(other), draft.image(node)), guide, turn, turning[1:])
-    draft.acceleration.append(Given(end, start, length, guide.perpendicular))
-    draft.vector(f"a_{about}_c", start, end, link=link, part="c", turning=name)
-    return _Lines(
-        Line(draft.image(other), guide),
-        Line(end, guide),
-        (
-            (f"v_{about}", draft.image(other), {"link": link}),
-            (f"a_{about}_r", end, {"link": link, "part": "r"}),
-        ),
-    )
-
-
-def _slot(draft: _Draft, node: str, pin: str, slot: Fixed) -> _Lines:
-    """A yoke's point about the block in its slot: along the slot, which does not turn."""
-    image, image_primed = draft.image(pin), draft.image(pin, primed=True)
-    link = (pin, node)
-    return _Lines(
-        Line(image, slot),
-        Line(image_primed, slot),
-        (
-            (f"v_{node}{pin}", image, {"link": link}),
-            (f"a_{node}{pin}_r", image_primed, {"link": link, "part": "r"}),
-        ),
-    )
-
-
-def _draw_plate(draft: _Draft, group: Plate) -> None:
+def _draw_plate(draft: Draft, group: Plate) -> None:
     node, (p, q) = group.node, group.base
     if group.line_ratio is not None:
         draft.sketch.append(Divide(node, (p, q), f"ratio {node}"))
@@ -365,23 +217,23 @@ def _slot_axis(group: SlottedLink) -> Along:
     return Along(group.foot or group.pivot, group.pin, 2 if behind else 0)
 
 
-def _draw_slotted_link(draft: _Draft, group: SlottedLink) -> None:
+def _draw_slotted_link(draft: Draft, group: SlottedLink) -> None:
     node, pin, pivot = group.node, group.pin, group.pivot
     if group.foot is not None:
         offset = Scaled(f"offset {node}", "kL")
         draft.sketch.append(Tangent(group.foot, pivot, offset, pin, group.side))
     draft.sketch.append(Coincide(node, pin))
     length = Normal(draft.image(pivot), draft.image(node), pair(pivot, node), measured=(pivot, node))
-    end = _normal_component(draft, node, pivot, length)
+    end = normal_component(draft, node, pivot, length)
     turn = (draft.image(pivot), draft.image(node))
     lines = (
-        _turning(draft, (pivot, node), end, Along(pivot, node, 1)),
-        _sliding(draft, (pin, node), _slot_axis(group), turn, (group.link, pivot, node)),
+        turning(draft, (pivot, node), end, Along(pivot, node, 1)),
+        sliding(draft, (pin, node), _slot_axis(group), turn, (group.link, pivot, node)),
     )
-    _images(draft, node, lines)
-    _rates(draft, group.link, draft.relative(node, pivot), (pivot, node))
+    images_at(draft, node, lines)
+    rates_of(draft, group.link, draft.relative(node, pivot), (pivot, node))
     if group.foot is not None and _is_used(draft.mechanism, group.foot):
-        _rigid_images(draft, group.foot, (pivot, node))
+        rigid_images(draft, group.foot, (pivot, node))
 
 
 def _is_used(mechanism: Mechanism, joint: str) -> bool:
@@ -392,123 +244,11 @@ def _is_used(mechanism: Mechanism, joint: str) -> bool:
     return any(joint in joints for joints in (*several, single, *guides))
 
 
-def _draw_slot_point(draft: _Draft, group: SlotPoint) -> None:
+def _draw_slot_point(draft: Draft, group: SlotPoint) -> None:
     node = group.node
     slotted = next(
         one for one in draft.mechanism.groups if isinstance(one, SlottedLink) and one.node == group.slotted
     )
     x, y = Scaled(f"x {node}", "kL"), Scaled(f"y {node}", "kL")
     draft.sketch.append(Local(node, slotted.pivot, _slot_axis(slotted), x, y))
-    _rigid_images(draft, node, (slotted.pivot, slotted.node))
-
-
-def _rigid_images(draft: _Draft, node: str, base: tuple[str, str]) -> None:
-    """Both images of a link's point by similarity, without relative vectors."""
-    _note_similar_images(draft, node, base)
-    draft.velocity.append(draft.images[draft.image(node)])
-    draft.acceleration.append(draft.images[draft.image(node, primed=True)])
-    _absolute(draft, node)
-
-
-def _note_similar_images(draft: _Draft, node: str, base: tuple[str, str]) -> None:
-    """The similarity steps of a plate's third point, for both plans."""
-    p, q = base
-    for primed in (False, True):
-        ends = (draft.image(p, primed=primed), draft.image(q, primed=primed))
-        image = draft.image(node, primed=primed)
-        draft.images[image] = Similar(image, ends, (p, q, node))
-
-
-def _similar_images(draft: _Draft, node: str, base: tuple[str, str]) -> None:
-    _rigid_images(draft, node, base)
-    for pin in base:
-        if not draft.mechanism.is_ground(pin):
-            draft.vector(f"v_{node}{pin}", draft.image(pin), draft.image(node), link=(pin, node))
-
-
-def _images_on_line(draft: _Draft, node: str, base: tuple[str, str]) -> None:
-    p, q = base
-    for primed, steps in ((False, draft.velocity), (True, draft.acceleration)):
-        ends = (draft.image(p, primed=primed), draft.image(q, primed=primed))
-        steps.append(Divide(draft.image(node, primed=primed), ends, f"ratio {node}"))
-    _absolute(draft, node)
-
-
-def _absolute(draft: _Draft, node: str) -> None:
-    if f"v_{node}" not in draft.vectors:
-        draft.vector(f"v_{node}", VELOCITY_POLE, draft.image(node))
-    draft.vector(f"a_{node}", ACCELERATION_POLE, draft.image(node, primed=True))
-
-
-def _rates(draft: _Draft, link: str, about: str, joints: tuple[str, str]) -> None:
-    """Omega and epsilon of a link, from the first vector found that turns it."""
-    for name, vector in ((f"omega_{link}", f"v_{about}"), (f"epsilon_{link}", f"a_{about}_t")):
-        draft.rates.setdefault(name, AngularRate(name, vector, joints, pair(*joints)))
-
-
-def parameters_of(
-    mechanism: Mechanism, k_length: FloatArray, k_velocity: FloatArray, k_acceleration: FloatArray
-) -> dict[str, FloatArray]:
-    """The construction's parameters: real lengths, crank data, guides and the three scales.
-
-    Arguments: scales in real units per millimetre on paper (m/mm, (m/s)/mm, (m/s^2)/mm).
-    """
-    known: dict[str, FloatArray] = {"kL": k_length, "kv": k_velocity, "ka": k_acceleration}
-    known.update(_driver_parameters(mechanism.driver))
-    for joint, place in mechanism.ground_m.items():
-        known[f"x {joint}"], known[f"y {joint}"] = np.asarray(place.real), np.asarray(place.imag)
-    for group in mechanism.groups:
-        known.update(_group_parameters(group))
-    return known
-
-
-def _driver_parameters(driver: Driver) -> dict[str, FloatArray]:
-    pin = driver.pin
-    match driver:
-        case Crank(length_m=arm):
-            return {
-                "angle crank": driver.angle_rad,
-                pair(driver.pivot, pin): arm,
-                f"v_{pin}": driver.omega * arm,
-                f"a_{pin}_n": driver.omega**2 * arm,
-                f"a_{pin}_t": driver.epsilon * arm,
-            }
-        case DrivenSlider():
-            guide = FixedGuide(driver.guide_m, driver.guide_rad)
-            return {
-                f"s {pin}": driver.displacement_m,
-                f"v_{pin}": driver.speed,
-                f"a_{pin}": driver.acceleration,
-                **_guide_parameters(pin, guide),
-            }
-
-
-def _guide_parameters(node: str, guide: Guide) -> dict[str, FloatArray]:
-    if not isinstance(guide, FixedGuide):
-        return {}
-    return {
-        f"x guide {node}": np.asarray(guide.through_m.real),
-        f"y guide {node}": np.asarray(guide.through_m.imag),
-        f"angle guide {node}": guide.angle_rad,
-    }
-
-
-def _group_parameters(group: Group) -> dict[str, FloatArray]:
-    match group:
-        case Dyad(node=node, pins=pins, lengths_m=lengths) | Plate(node=node, base=pins, lengths_m=lengths):
-            known = {pair(pin, node): length for pin, length in zip(pins, lengths, strict=True)}
-            if isinstance(group, Plate) and group.line_ratio is not None:
-                known[f"ratio {node}"] = group.line_ratio
-            return known
-        case PointOnLine(node=node, ratio=ratio):
-            return {f"ratio {node}": ratio}
-        case Slider(node=node, guide=guide):
-            return {pair(group.pin, node): group.length_m, **_guide_parameters(node, guide)}
-        case CrossSlider(node=node, guides=(first, second)):
-            return {**_guide_parameters(node, first), **_guide_parameters(node, second)}
-        case Yoke(node=node, guide=guide):
-            return {f"angle slot {node}": group.slot_rad, **_guide_parameters(node, guide)}
-        case SlottedLink(node=node):
-            return {f"offset {node}": group.offset_m}
-        case SlotPoint(node=node, local_m=local):
-            return {f"x {node}": np.asarray(local.real), f"y {node}": np.asarray(local.imag)}
+    rigid_images(draft, node, (slotted.pivot, slotted.node))

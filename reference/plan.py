@@ -11,11 +11,13 @@ import numpy as np
 
 from reference.assignment import Assignment, Scales, Variant
 from reference.construction import Construction, Vector, evaluate
-from reference.derivation import construction_of, image_name, parameters_of
+from reference.derivation import construction_of
+from reference.draft import image_name
 from reference.geometry import ComplexArray, FloatArray, cross, dot
 from reference.mechanism import Mechanism
 from reference.mistakes import Drawing
 from reference.motion import Motion, move
+from reference.parameters import parameters_of
 from reference.steps import Given, Normal, TwoLines, View
 
 ZERO_SHARE = 1e-9

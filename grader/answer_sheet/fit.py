@@ -9,7 +9,8 @@ from grader.layout import TEMPLATES, Template
 from grader.records import ACCELERATION_PLAN, MECHANISM
 from reference.assignment import Assignment, Variant
 from reference.construction import Construction, evaluate
-from reference.derivation import construction_of, parameters_of
+from reference.derivation import construction_of
+from reference.parameters import parameters_of
 
 MARGIN_MM = 12.0
 """Around a figure: letters, arrowheads, hatching of the guides."""

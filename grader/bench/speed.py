@@ -30,10 +30,11 @@ from grader.bench.timing import medians_us
 from reference.assembly import build_mechanism
 from reference.assignment import Assignment, load_assignment
 from reference.construction import evaluate
-from reference.derivation import construction_of, parameters_of
+from reference.derivation import construction_of
 from reference.geometry import FloatArray
 from reference.mechanism import Mechanism
 from reference.motion import Motion, move
+from reference.parameters import parameters_of
 from reference.plan import exact_plan
 
 BATCHES = (1, 30, 10_000)

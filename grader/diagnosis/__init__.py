@@ -24,8 +24,8 @@ from grader.records import VELOCITY_PLAN
 from reference import mistakes as operators
 from reference.assignment import Assignment, Variant
 from reference.construction import ancestors, evaluate
-from reference.derivation import parameters_of
 from reference.mistakes import Drawing
+from reference.parameters import parameters_of
 from reference.steps import Along, Coriolis, Given, Line, Nodes, Step, TwoLines
 
 LEAST_CONFIDENCE = 0.6

@@ -10,7 +10,7 @@ from grader.rubric import RubricFile, check_rubric
 from reference.assignment import Assignment
 from reference.authored import TRADITIONS
 from reference.construction import Construction, ancestors
-from reference.derivation import image_name
+from reference.draft import image_name
 from reference.formula import Formula
 
 SCALES = ("kL", "kv", "ka")

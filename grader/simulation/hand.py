@@ -13,10 +13,11 @@ from grader.simulation.settings import Hand, Student
 from grader.simulation.strokes import Rng
 from reference.assignment import Assignment, Scales, Variant
 from reference.construction import Construction, evaluate
-from reference.derivation import construction_of, parameters_of
+from reference.derivation import construction_of
 from reference.geometry import FloatArray
 from reference.mechanism import Mechanism
 from reference.mistakes import RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
+from reference.parameters import parameters_of
 from reference.steps import (
     ArcAndLine,
     Coincide,

@@ -6,9 +6,10 @@ from hypothesis import strategies as st
 
 from reference.assignment import Scales
 from reference.construction import evaluate
-from reference.derivation import construction_of, parameters_of
+from reference.derivation import construction_of
 from reference.mechanism import Mechanism
 from reference.motion import move
+from reference.parameters import parameters_of
 from reference.plan import _nodes
 from reference.steps import View
 

@@ -17,9 +17,10 @@ from reference.assembly import build_mechanism
 from reference.assignment import Variant, load_assignment
 from reference.authored import MechanismFile, validate
 from reference.construction import Vector, evaluate
-from reference.derivation import construction_of, parameters_of
+from reference.derivation import construction_of
 from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, MovingGuide, Slider
 from reference.motion import move
+from reference.parameters import parameters_of
 from reference.plan import _measured
 
 FAR = 0.1

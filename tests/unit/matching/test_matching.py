@@ -10,7 +10,8 @@ from grader.records import Identity
 from grader.roster import parse_roster
 from reference.assignment import load_assignment
 from reference.construction import evaluate
-from reference.derivation import construction_of, parameters_of
+from reference.derivation import construction_of
+from reference.parameters import parameters_of
 
 PUMP = load_assignment("pump")
 ROSTER = parse_roster("student_id,name,n,kv,scans\ns1,Ana,1,0.2 (m/s)/mm,\ns2,Ion,10,,\ns3,Eva,20,,\n")
