@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from grader.i18n import N_, Tongue
 from grader.plan_steps import sentences
-from grader.plan_steps.words import TITLES, Speaker
+from grader.plan_steps.words import TITLES, Speaker, speaker_of
 from reference.construction import Vector
 from reference.drawing.subject import SCALE_OF, Subject
 from reference.mechanism import Crank
@@ -22,7 +22,12 @@ INTRODUCTIONS = {
     "acceleration_plan": N_(
         "Every acceleration is divided by %(scale)s; normal components point towards the centre of rotation."
     ),
+    "centres": N_(
+        "Points of a moving link that have no velocity (instantaneous centres I) or no acceleration "
+        "(acceleration poles J) at this moment, by Mehmke's similarity."
+    ),
 }
+CENTRES = "centres"
 COUNTER_CLOCKWISE, CLOCKWISE = N_("counter-clockwise"), N_("clockwise")
 LENGTHS_MM = N_("Directions count counter-clockwise from the horizontal to the right.")
 
@@ -55,7 +60,7 @@ class Section:
 
 def explain(subject: Subject, tongue: Tongue) -> list[Section]:
     """Every figure's steps, in the order in which they are drawn."""
-    speaker = Speaker(subject, tongue)
+    speaker = speaker_of(subject, tongue)
     sections, number = [], 0
     for figure, steps in subject.plan.construction.figures.items():
         told = []
@@ -64,7 +69,20 @@ def explain(subject: Subject, tongue: Tongue) -> list[Section]:
             told.append(_explanation(speaker, number, step))
         introduction = speaker.say(INTRODUCTIONS[figure], scale=speaker.scale_told(SCALE_OF[figure]))
         sections.append(Section(figure, tongue.gettext(TITLES[figure]), introduction, tuple(told)))
+    centres = tuple(
+        Explanation(number + k, step, (), sentences.sentence(speaker, step), ())
+        for k, step in enumerate(_centres_found(speaker), start=1)
+    )
+    if centres:
+        introduction = speaker.say(INTRODUCTIONS[CENTRES])
+        sections.append(Section(CENTRES, tongue.gettext(TITLES[CENTRES]), introduction, centres))
     return sections
+
+
+def _centres_found(speaker: Speaker) -> list[Step]:
+    """The steps of the centres that lie on any paper at all."""
+    found = speaker.subject.centres
+    return [step for name, step in speaker.subject.plan.construction.centres.items() if name in found]
 
 
 def _explanation(speaker: Speaker, number: int, step: Step) -> Explanation:
@@ -92,7 +110,7 @@ def _computed(speaker: Speaker, step: Step) -> Iterator[Markup]:
 
 def _datum(speaker: Speaker, step: Step, length: Scaled) -> tuple[Markup, float]:
     """A given quantity's name and the amount of it."""
-    real = abs(float(speaker.subject.view.parameters[length.quantity]))
+    real = abs(float(speaker.view.parameters[length.quantity]))
     if length.scale == "kL" and " " not in length.quantity:
         return speaker.name(length.quantity), real
     if isinstance(step, Given):
@@ -118,7 +136,7 @@ def _crank_formula(speaker: Speaker, length: Scaled) -> Markup | None:
 
 def _component(speaker: Speaker, step: Given) -> Iterator[Markup]:
     """A normal or Coriolis component, from velocities of the plan drawn before."""
-    mm = abs(float(step.length.at(speaker.subject.view)))
+    mm = abs(float(step.length.at(speaker.view)))
     if sentences.is_nothing(speaker, step.node, mm):
         return
     name, real = sentences.named_vector(speaker, step), mm * speaker.scale_value("ka")
@@ -151,7 +169,7 @@ def _speed(speaker: Speaker, ends: tuple[str, str]) -> tuple[Markup, float]:
 
 
 def _arm(speaker: Speaker, length: Normal) -> float:
-    view = speaker.subject.view
+    view = speaker.view
     if length.measured is not None:
         return float(view.real_length(*length.measured))
     return float(view.parameters[length.length])
@@ -199,7 +217,7 @@ def _turning(speaker: Speaker, name: str, vector: Vector) -> Markup:
     """An angular velocity or acceleration: relative vector over length, with its sense."""
     plan = speaker.subject.plan
     rate = plan.construction.rates[name]
-    arm = float(speaker.subject.view.parameters[rate.length])
+    arm = float(speaker.view.parameters[rate.length])
     zero = speaker.subject.is_zero(vector.name)
     turn = 0.0 if zero else speaker.subject.one(plan.rates[name])
     unit = "rad/s" if name.startswith("omega") else "rad/s²"

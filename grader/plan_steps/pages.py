@@ -24,8 +24,8 @@ from reportlab.platypus import (
 from grader.answer_sheet.words import REGULAR, embed_fonts
 from grader.i18n import Tongue
 from grader.plan_pdf import put_shapes
-from grader.plan_steps.explanation import LENGTHS_MM, Explanation, Section, explain
-from reference.canvas import Bounds, Shape, bounds, picture_svg
+from grader.plan_steps.explanation import CENTRES, LENGTHS_MM, Explanation, Section, explain
+from reference.canvas import A3_MM, Bounds, Shape, bounds, picture_svg
 from reference.draw import figures_of
 from reference.drawing import stages
 from reference.drawing.subject import Figure, Subject
@@ -60,7 +60,7 @@ class Illustrated:
     """A step's words, its figure so far, and what it takes from the mechanism."""
 
     told: Explanation
-    picture: Picture
+    picture: Picture | None
     model: Picture | None
 
 
@@ -82,6 +82,9 @@ def chapters(subject: Subject, tongue: Tongue) -> list[Chapter]:
 
 
 def _illustrated(subject: Subject, figures: dict[str, Figure], section: Section) -> Iterator[Illustrated]:
+    if section.figure == CENTRES:
+        yield from _centres(subject, figures["mechanism"], section)
+        return
     figure, mechanism = figures[section.figure], figures["mechanism"]
     nodes = subject.nodes(section.figure)
     base = stages.grey(mechanism)
@@ -93,6 +96,16 @@ def _illustrated(subject: Subject, figures: dict[str, Figure], section: Section)
         model = Picture((*base, *marked), model_box) if marked else None
         yield Illustrated(told, Picture(shapes, _box(shapes)), model)
         earlier.append(told.step.node)
+
+
+def _centres(subject: Subject, mechanism: Figure, section: Section) -> Iterator[Illustrated]:
+    """Each centre with its triangle on the finished sketch; one far off the sheet has no picture."""
+    base = stages.grey(mechanism)
+    for told in section.steps:
+        shapes = (*base, *stages.centre(subject, told.step))
+        box = _box(shapes)
+        fits = max(box[2] - box[0], box[3] - box[1]) <= A3_MM[0]
+        yield Illustrated(told, Picture(shapes, box) if fits else None, None)
 
 
 def _box(shapes: Sequence[Shape]) -> Bounds:
@@ -183,7 +196,8 @@ def _printed_step(step: Illustrated) -> Table:
         words += [Spacer(1, 2 * mm), _Drawn(step.model, MODEL_SHARE, MODEL_TALLEST_MM)]
     widths = ((COLUMN_MM + GAP_MM) * mm, COLUMN_MM * mm)
     style = [("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)]
-    return Table([[words, _Drawn(step.picture)]], colWidths=widths, style=style)
+    picture = _Drawn(step.picture) if step.picture is not None else ""
+    return Table([[words, picture]], colWidths=widths, style=style)
 
 
 def _style(size: float, indent: float = 0.0) -> ParagraphStyle:

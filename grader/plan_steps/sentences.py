@@ -70,7 +70,7 @@ def sentence(speaker: Speaker, step: Step) -> Markup:
 
 def place(speaker: Speaker, node: str) -> complex:
     """Where a node is, complex millimetres."""
-    return complex(speaker.subject.view.nodes[node])
+    return complex(speaker.view.nodes[node])
 
 
 def distance(speaker: Speaker, p: str, q: str) -> float:
@@ -79,11 +79,11 @@ def distance(speaker: Speaker, p: str, q: str) -> float:
 
 
 def _length(speaker: Speaker, length: Length) -> float:
-    return float(length.at(speaker.subject.view))
+    return float(length.at(speaker.view))
 
 
 def _direction(speaker: Speaker, line: AnyLine) -> complex:
-    return complex(line.along.at(speaker.subject.view))
+    return complex(line.along.at(speaker.view))
 
 
 def _pivot(speaker: Speaker, node: str) -> Markup:
@@ -200,7 +200,7 @@ def side_of(speaker: Speaker, side: object) -> float:
 
 def _divide(speaker: Speaker, step: Divide) -> Markup:
     p, q = step.base
-    ratio = float(speaker.subject.view.parameters[step.ratio])
+    ratio = float(speaker.view.parameters[step.ratio])
     return speaker.say(
         texts.DIVIDE if ratio >= 0.0 else texts.DIVIDE_BACK,
         p=speaker.name(p), q=speaker.name(q), node=speaker.name(step.node),
@@ -212,7 +212,7 @@ def _divide(speaker: Speaker, step: Divide) -> Markup:
 def _similar(speaker: Speaker, step: Similar) -> Markup:
     (p, q), (model_p, model_q, third) = step.base, step.model
     node = speaker.name(step.node)
-    if is_nothing(speaker, step.node, distance(speaker, p, q)):
+    if is_nothing(speaker, p, distance(speaker, p, q)):
         return speaker.say(texts.SIMILAR_TO_NOTHING, p=speaker.name(p), q=speaker.name(q), node=node)
     base, arm = (place(speaker, corner) - place(speaker, model_p) for corner in (model_q, third))
     flat = abs(geometry.cross(np.asarray(base), np.asarray(arm))) <= NEXT_TO_NOTHING * abs(base) ** 2
@@ -245,7 +245,7 @@ def _link_under(speaker: Speaker, node: str) -> str:
 
 
 def _local(speaker: Speaker, step: Local) -> Markup:
-    axis = complex(step.axis.at(speaker.subject.view))
+    axis = complex(step.axis.at(speaker.view))
     x, y = _length(speaker, step.x), _length(speaker, step.y)
     text = texts.LOCAL_ON_AXIS if is_nothing(speaker, step.node, y) else texts.LOCAL
     return speaker.say(

@@ -9,12 +9,13 @@ from grader.i18n import N_, UNITS, Tongue
 from grader.plan_steps import texts
 from reference.drawing.subject import SCALE_UNITS, VECTOR_UNITS, Subject, Wording
 from reference.lettering import Piece, pieces_of, scale_pieces
-from reference.steps import Along, Direction, Fixed
+from reference.steps import Along, Direction, Fixed, View
 
 TITLES = {
     "mechanism": N_("Mechanism"),
     "velocity_plan": N_("Velocity plan"),
     "acceleration_plan": N_("Acceleration plan"),
+    "centres": N_("Instantaneous centres and acceleration poles"),
 }
 VARIANT = {"n": N_("n"), "position": N_("position")}
 COLUMNS = (N_("vector"), N_("on paper"), N_("mm"), N_("real value"), N_("direction"))
@@ -46,10 +47,11 @@ def markup_of(pieces: tuple[Piece, ...]) -> Markup:
 
 @dataclass(frozen=True, slots=True)
 class Speaker:
-    """Says a variant's names and numbers in a language."""
+    """Says a variant's names and numbers in a language; `view` has all nodes, the centres too."""
 
     subject: Subject
     tongue: Tongue
+    view: View
 
     def say(self, text: str, **values: object) -> Markup:
         """A sentence of the catalogue with its values in place."""
@@ -117,7 +119,7 @@ class Speaker:
     def vector_direction(self, along: Direction, sign: float) -> Markup:
         """Where a vector points: a negative length turns it about."""
         if not isinstance(along, Along):
-            angle = self.degrees(complex(along.at(self.subject.view)) * (-1.0 if sign < 0.0 else 1.0))
+            angle = self.degrees(complex(along.at(self.view)) * (-1.0 if sign < 0.0 else 1.0))
             kind, joint = _guided(along)
             if kind == "guide":
                 return self.say(texts.ALONG_GUIDE, joint=self.name(joint), angle=angle)
@@ -127,6 +129,13 @@ class Speaker:
         ends = (along.head, along.tail) if turns == 2 else (along.tail, along.head)
         text = {0: texts.TOWARDS, 1: texts.TURNED_LEFT, 2: texts.TOWARDS, 3: texts.TURNED_RIGHT}[turns]
         return self.say(text, link=link, tail=self.name(ends[0]), head=self.name(ends[1]))
+
+
+def speaker_of(subject: Subject, tongue: Tongue) -> Speaker:
+    """Who says a variant's steps."""
+    view = subject.view
+    nodes = {**view.nodes, **{name: np.asarray(at) for name, at in subject.centres.items()}}
+    return Speaker(subject, tongue, View(nodes, view.parameters))
 
 
 def _guided(along: Fixed) -> tuple[str, str]:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from reference.canvas import PAPER, Area, Curve, Ring, Shape, Stroke
+from reference.canvas import PAPER, Area, Curve, Label, Ring, Shape, Stroke
 from reference.drawing import symbols
-from reference.drawing.sketch import PLATE_FILL
+from reference.drawing.sketch import LETTER_MM, PLATE_FILL
 from reference.drawing.subject import Figure, Subject
 from reference.drawing.symbols import point
 from reference.steps import Along, ArcAndLine, Given, Similar, Step, TwoArcs, TwoLines
@@ -78,6 +78,20 @@ def models(subject: Subject, step: Step) -> Iterator[Shape]:
         known = [nodes[joint] for joint in joints if joint in nodes]
         if len(known) == len(joints):
             yield from (Stroke(point(p), point(q), MODEL_MM, NOW) for p, q in itertools.pairwise(known))
+
+
+def centre(subject: Subject, step: Step) -> Iterator[Shape]:
+    """An instantaneous centre or acceleration pole, with its triangle on the link that it belongs to."""
+    if not isinstance(step, Similar):
+        return
+    nodes, at = subject.nodes("mechanism"), subject.centres[step.node]
+    p, q = (nodes[joint] for joint in step.base)
+    yield Stroke(point(p), point(q), MODEL_MM, NOW)
+    for corner in (p, q):
+        yield Stroke(point(corner), point(at), symbols.HAIR_MM, NOW)
+    yield symbols.marked_point(at, NOW)
+    x, y = point(at)
+    yield Label((x + 1.5, y - 1.5), subject.letter(step.node), LETTER_MM, colour=NOW, italic=True)
 
 
 def _model_joints(step: Step) -> Iterator[tuple[str, ...]]:

@@ -16,6 +16,7 @@ SCALE_OF = {"mechanism": "kL", "velocity_plan": "kv", "acceleration_plan": "ka"}
 SCALE_UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}
 VECTOR_UNITS = {"kv": "m/s", "ka": "m/s²"}
 PLAN_COLOURS = {"velocity_plan": "#1456a0", "acceleration_plan": "#a03014"}
+FARTHEST_MM = 1e4
 TOUCHING_MM = 0.05
 """Nodes nearer than this are one point on paper."""
 
@@ -125,6 +126,17 @@ class Subject:
             for name, value in self.plan.drawing.parameters.items()
         }
         return View(nodes, known)
+
+    @property
+    def centres(self) -> dict[str, complex]:
+        """Instantaneous centres and acceleration poles on the sketch, those on any paper at all."""
+        view = self.view
+        with np.errstate(all="ignore"):
+            found = {
+                name: complex(step.place(view)) for name, step in self.plan.construction.centres.items()
+                if set(step.needs) <= view.nodes.keys()
+            }  # fmt: skip
+        return {name: at for name, at in found.items() if abs(at) < FARTHEST_MM}
 
     def is_zero(self, vector: str) -> bool:
         """Whether a vector is too short, against its plan, to have a direction."""
