@@ -21,7 +21,7 @@ from reference import formula
 from reference.errors import AuthoredFileError, Finding
 from reference.formula import Formula
 
-MOST_VARIANTS = 10_000
+MOST_VARIANTS = 1_000_000
 """Of a range of n or position: more is a slip of the pen."""
 LENGTH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
