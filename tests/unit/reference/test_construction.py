@@ -9,7 +9,7 @@ from reference.derivation import construction_of
 from reference.plan import exact_plan
 from reference.steps import Similar
 
-BUILT_IN = ["pump", "pump-230", "pump-collinear", "engine", "press"]
+BUILT_IN = ["pump", "pump-230", "pump-collinear", "engine", "press", "shaper", "piston"]
 SHARE_OF_PLAN = 1e-12
 SMALL_ERROR = 1e-6
 LINEAR = 1e-3
@@ -86,7 +86,7 @@ def test_only_what_is_asked_for_and_its_ancestors_are_drawn(wanted):
         np.testing.assert_array_equal(place, whole[node])
 
 
-@pytest.mark.parametrize("name", ["pump", "press", "engine", "pump-collinear"])
+@pytest.mark.parametrize("name", ["pump", "press", "engine", "pump-collinear", "shaper", "piston"])
 def test_small_errors_of_the_hand_move_the_nodes_in_proportion(name):
     plan = plan_of(name)
     drawn = evaluate(plan.construction, plan.drawing.parameters)

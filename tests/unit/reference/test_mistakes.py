@@ -25,7 +25,8 @@ def shifts(plan, mistake):
 
 
 @pytest.mark.parametrize(
-    ("name", "n", "position"), [("pump", 7, None), ("press", None, 1), ("engine", 5, None)]
+    ("name", "n", "position"),
+    [("pump", 7, None), ("press", None, 1), ("engine", 5, None), ("shaper", 4, None), ("piston", 2, None)],
 )
 @pytest.mark.parametrize("figure", FIGURES)
 def test_every_single_mistake_moves_only_nodes_drawn_from_it_and_its_own(name, n, position, figure):
