@@ -8,6 +8,7 @@ import numpy as np
 
 from reference.canvas import PAPER, Area, Curve, Label, Ring, Shape, Stroke
 from reference.drawing import symbols
+from reference.drawing.links import unit
 from reference.drawing.sketch import LETTER_MM, PLATE_FILL
 from reference.drawing.subject import Figure, Subject
 from reference.drawing.symbols import point
@@ -17,7 +18,7 @@ BEFORE, NOW = "#a3abb3", "#c8380a"
 NOW_WIDTH_MM = 0.3
 """Least width of a line that a step adds."""
 ARC_HALF_RAD = 0.22
-MODEL_MM = 1.0
+MODEL_MM, LARGE_MM = 1.0, 90.0
 
 
 def stage(figure: Figure, earlier: Collection[str], node: str) -> tuple[Shape, ...]:
@@ -90,8 +91,11 @@ def centre(subject: Subject, step: Step) -> Iterator[Shape]:
     for corner in (p, q):
         yield Stroke(point(corner), point(at), symbols.HAIR_MM, NOW)
     yield symbols.marked_point(at, NOW)
-    x, y = point(at)
-    yield Label((x + 1.5, y - 1.5), subject.letter(step.node), LETTER_MM, colour=NOW, italic=True)
+    # On a large picture, which is printed smaller, the letter is larger.
+    size = LETTER_MM * max(1.0, abs(at - p) / LARGE_MM)
+    away = unit(at - (p + q) / 2.0)
+    x, y = point(at + 1.1 * size * away)
+    yield Label((x, y + 0.35 * size), subject.letter(step.node), size, "middle", NOW, italic=True)
 
 
 def _model_joints(step: Step) -> Iterator[tuple[str, ...]]:
