@@ -41,7 +41,10 @@ def reason(mechanism: Mechanism, broken: NDArray[np.bool_]) -> MechanismError:
     with np.errstate(all="ignore"):
         for count, group in enumerate(groups):
             before = solve(replace(mechanism, groups=groups[:count]), take)
-            after = solve(replace(mechanism, groups=groups[: count + 1]), take)
+            try:
+                after = solve(replace(mechanism, groups=groups[: count + 1]), take)
+            except ZeroDivisionError:
+                break
             node = after.joints[group.node]
             if not np.isfinite(node.position) or np.isnan(after.transmission.get(group.node, 1.0)):
                 gap, reach = _gap(group, before), max(abs(one.position) for one in before.joints.values())

@@ -372,3 +372,10 @@ def test_a_variant_without_a_motion_is_refused_as_ever():
         cycle(four_bar(3.0, (0.1, 1.0, 1.0)))
     with pytest.raises(MechanismError, match="not determined"):
         cycle(four_bar(3.0, (1.0, 3.0, 1.0), 180.0))
+
+
+def test_a_pin_exactly_on_its_links_pivot_is_refused_in_words():
+    slotted = SlottedLink("A3", "A", "O2", "3", one(0.0), None, 1)
+    mechanism = Mechanism({"O1": one(0j), "O2": one(1.0 + 0j)}, crank(1.0, 0.0), (slotted,))
+    with pytest.raises(MechanismError, match="the pin is at the link's pivot"):
+        cycle(mechanism)
