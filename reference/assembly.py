@@ -62,16 +62,19 @@ class _Numbers:
         self.values, self.count, self.unit_m = values, count, unit_m
 
     def number(self, formula: Formula) -> FloatArray:
-        numbers = np.broadcast_to(formula(self.values), (self.count,)).astype(np.float64)
-        if np.any(np.abs(numbers) > LARGEST):
+        numbers = formula(self.values)
+        if np.abs(numbers).max(initial=0.0) > LARGEST:
             raise FormulaError(f"'{formula.text}' is larger than {LARGEST:g}: beyond any mechanism")
-        return numbers
+        filled = np.empty(self.count)
+        filled[:] = numbers
+        return filled
 
     def length(self, formula: Formula, what: str) -> FloatArray:
         lengths = self.distance(formula)
-        if np.any(lengths <= 0.0):
+        least = lengths.min(initial=LARGEST)
+        if least <= 0.0:
             raise FormulaError(f"'{formula.text}' ({what}) must be a positive length")
-        if np.any(lengths < SHORTEST_M):
+        if least < SHORTEST_M:
             raise FormulaError(f"'{formula.text}' ({what}) is shorter than {SHORTEST_M:g} m")
         return lengths
 
@@ -114,12 +117,17 @@ def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int
     """
     numbers = _Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
     bodies = _Bodies()
-    driver = _driver(file.crank or file.driven_slider, numbers)
+    driver = _driver(file, numbers)
     if isinstance(driver, Crank):
         bodies.carry(driver.link, driver.pivot, driver.pin, driver.length_m)
     ground = {joint: numbers.point(point) for joint, point in file.ground.items()}
     groups_ = (_located(index, table, numbers, bodies) for index, table in enumerate(file.group))
     return Mechanism(ground, driver, tuple(groups_))
+
+
+def build_driver(file: MechanismFile, values: Mapping[str, Value], count: int) -> Driver:
+    """The driven link alone, as `build_mechanism` has it."""
+    return _driver(file, _Numbers(values, count, LENGTH_UNITS_M[file.length_unit]))
 
 
 def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _Bodies) -> Group:
@@ -130,10 +138,10 @@ def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _Bodie
         raise FormulaError(f"group[{index}]: {error}") from error
 
 
-def _driver(table: CrankTable | DrivenSliderTable | None, numbers: _Numbers) -> Driver:
+def _driver(file: MechanismFile, numbers: _Numbers) -> Driver:
     zero = np.zeros(numbers.count)
-    match table:
-        case CrankTable():
+    match file.crank or file.driven_slider:
+        case CrankTable() as table:
             return Crank(
                 link=table.link,
                 pivot=table.pivot,
@@ -144,7 +152,7 @@ def _driver(table: CrankTable | DrivenSliderTable | None, numbers: _Numbers) -> 
                 epsilon=zero if table.epsilon is None else numbers.number(table.epsilon),
                 accelerated=table.epsilon is not None,
             )
-        case DrivenSliderTable():
+        case DrivenSliderTable() as table:
             return DrivenSlider(
                 link=table.link,
                 pin=table.pin,

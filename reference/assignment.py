@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from reference import authored
-from reference.assembly import LARGEST, build_mechanism
+from reference.assembly import LARGEST, build_driver, build_mechanism
 from reference.authored import AssignmentFile, MechanismFile
 from reference.checking import check_mechanism
 from reference.errors import AuthoredFileError, CallError, Finding
@@ -112,7 +112,8 @@ class Assignment:
 
         A declared kL, or the drawn crank, replaces the proposed length of the crank.
         """
-        known = {**self.values(variants), **_speeds(self.mechanism(variants).driver)}
+        known = self.values(variants)
+        known |= _speeds(build_driver(self.mechanism_file, known, len(variants)))
         rule = self.file.scales
         if crank_mm is not None:
             known["crank_mm"] = np.asarray(crank_mm, float)

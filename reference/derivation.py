@@ -46,6 +46,7 @@ from reference.mechanism import (
     moving_guides,
 )
 from reference.parameters import pair
+from reference.program import leaves_of
 from reference.steps import (
     Along,
     ArcAndLine,
@@ -80,6 +81,36 @@ def construction_of(
     plate_by_similarity : images of plate points by similar triangles instead of perpendiculars
         (collinear plates always are: their perpendiculars coincide)
     """
+    form = (_form_of(mechanism), accelerations, plate_by_similarity)
+    if form not in _written:
+        if len(_written) >= KEPT:
+            _written.clear()
+        _written[form] = _write_down(mechanism, accelerations, plate_by_similarity)
+    return _written[form]
+
+
+KEPT = 256
+"""Constructions that are kept: it is the same for all variants, and for the same mechanism again."""
+_written: dict[tuple[object, ...], Construction] = {}
+
+
+def _form_of(mechanism: Mechanism) -> tuple[object, ...]:
+    """All that the construction depends on: names, kinds, sides, and which points are in line."""
+    _, form = leaves_of(mechanism)
+    in_line = tuple(
+        (group.is_ever_flat, group.line_ratio is None)
+        for group in mechanism.groups
+        if isinstance(group, Plate)
+    )
+    sides = tuple(
+        side.tobytes()
+        for group in mechanism.groups
+        if isinstance(side := getattr(group, "side", 1), np.ndarray)
+    )
+    return (form, in_line, sides)
+
+
+def _write_down(mechanism: Mechanism, accelerations: bool, plate_by_similarity: bool) -> Construction:
     draft = Draft(mechanism, plate_by_similarity)
     draft.velocity.append(Pole(VELOCITY_POLE))
     draft.acceleration.append(Pole(ACCELERATION_POLE))

@@ -10,6 +10,7 @@ import difflib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -62,14 +63,26 @@ class Formula:
         Raises FormulaError for an unknown name (with the near ones) and for a result that is not
         finite everywhere.
         """
+        if not self.names:
+            return _constant(self.text)
         unknown = sorted(self.names - values.keys())
         if unknown:
             raise FormulaError(f"'{self.text}': {_unknown_name(unknown[0], values)}")
-        with np.errstate(all="ignore"):
-            result = np.asarray(_evaluate(self.tree, values), dtype=np.float64)
-        if not np.all(np.isfinite(result)):
-            raise FormulaError(f"'{self.text}' does not give a finite number for these data")
-        return result
+        return _finite(self, values)
+
+
+@cache
+def _constant(text: str) -> FloatArray:
+    """A formula without names, worked out once."""
+    return _finite(parse(text), {})
+
+
+def _finite(formula: Formula, values: Mapping[str, Value]) -> FloatArray:
+    with np.errstate(all="ignore"):
+        result = np.asarray(_evaluate(formula.tree, values), dtype=np.float64)
+    if not np.isfinite(result).all():
+        raise FormulaError(f"'{formula.text}' does not give a finite number for these data")
+    return result
 
 
 def parse(text: str | float) -> Formula:
