@@ -43,8 +43,13 @@ def _speed(title: str, rows: Sequence[SpeedRow]) -> Table:
 def _time(row: SpeedRow, ours: SpeedRow, count: int) -> str:
     if count not in row.us:
         return row.note or NOTHING
-    ratio = "" if row is ours else f" ({row.us[count] / ours.us[count]:.2g})"
-    return f"{row.us[count]:.3g}{ratio}"
+    ratio = "" if row is ours else f" ({_digits(row.us[count] / ours.us[count], 2)})"
+    return f"{_digits(row.us[count], 3)}{ratio}"
+
+
+def _digits(number: float, digits: int) -> str:
+    """So many digits at least, never as a power of ten."""
+    return f"{number:.0f}" if number >= 10.0 ** (digits - 1) else f"{number:.{digits}g}"
 
 
 def _plans(rows: Sequence[SpeedRow]) -> Table:
