@@ -1,0 +1,132 @@
+"""Motion of many variants: those without one stand out by name and number, the others are untouched."""
+
+import numpy as np
+import pytest
+
+from reference.errors import MechanismError
+from reference.mechanism import (
+    Crank,
+    CrossSlider,
+    Dyad,
+    FixedGuide,
+    Mechanism,
+    MovingGuide,
+    PointOnLine,
+    Slider,
+    SlottedLink,
+    Yoke,
+)
+from reference.motion import move, move_where_possible
+from reference.precision import EPSILON
+
+HALF_TURN = np.pi
+
+
+def array(*values):
+    return np.array(values)
+
+
+def crank(*angles, **data) -> Crank:
+    told = {"length_m": array(1.0), "omega": array(2.0), "epsilon": array(0.0), "accelerated": False}
+    return Crank(link="1", pivot="O1", pin="A", angle_rad=array(*angles), **{**told, **data})
+
+
+def mechanism(*groups, angles=(0.0,), o2=3 + 0j) -> Mechanism:
+    return Mechanism({"O1": array(0j), "O2": array(o2)}, crank(*angles), groups)
+
+
+def dyad(first, second) -> Dyad:
+    return Dyad("B", ("A", "O2"), ("3", "2"), (array(first), array(second)), 1)
+
+
+def rod(length, guide_y) -> Slider:
+    return Slider("B", "A", "3", array(length), FixedGuide(array(guide_y * 1j), array(0.0)), 1)
+
+
+FLAT_SLOT = MovingGuide("1", ("O1", "A"), "C1")
+CASES = [
+    (dyad(1.0, 0.5), "does_not_assemble", r"group of B .* miss each other by 0\.5 m"),
+    (dyad(4.0, 1.5), "does_not_assemble", r"group of B .* miss each other by 0\.5 m"),
+    (dyad(1.5, 0.5), "singular", "group of B .* its links are in line"),
+    (rod(0.5, -2.0), "does_not_assemble", r"group of B .* miss each other by 1\.5 m"),
+    (rod(2.0, -2.0), "singular", "group of B .* its rod is perpendicular to the guide"),
+    (
+        SlottedLink("A3", "A", "O2", "3", array(2.5), "F", 1),
+        "does_not_assemble",
+        r"group of A3 .* miss each other by 0\.5 m",
+    ),
+    (SlottedLink("A3", "A", "O2", "3", array(2.0), "F", 1), "singular", "group of A3 .* as near to it"),
+    (
+        CrossSlider("C", (FLAT_SLOT, FixedGuide(array(1j), array(0.0)))),
+        "singular",
+        "group of C .* its guides are parallel",
+    ),
+    (
+        Yoke("C", "A", array(0.5), FixedGuide(array(0j), array(0.5))),
+        "singular",
+        "group of C .* slot and guide are parallel .* give slot and guide two directions",
+    ),
+]
+
+
+@pytest.mark.parametrize(("group", "code", "words"), CASES)
+@pytest.mark.parametrize("angles", [(0.0,), (0.0, 0.0, 0.0, 0.0, 0.0)])
+def test_what_has_no_motion_is_refused_with_its_group_the_reason_and_the_gap(group, code, words, angles):
+    with pytest.raises(MechanismError, match=words) as error:
+        move(mechanism(group, angles=angles))
+    assert error.value.code == code
+
+
+def test_a_pin_at_the_pivot_of_its_slotted_link_is_refused():
+    group = SlottedLink("A3", "A", "O2", "3", array(0.0), None, 1)
+    with pytest.raises(MechanismError, match="the pin is at the link's pivot"):
+        move(mechanism(group, o2=1 + 0j))
+
+
+@pytest.mark.parametrize("count", [2, 3, 6])
+def test_one_variant_without_a_motion_leaves_the_others_as_they_are(count):
+    angles = np.linspace(0.4, 1.0, count)
+    angles[1] = HALF_TURN
+    whole = mechanism(dyad(1.5, 2.0), angles=tuple(angles))
+    motion = move_where_possible(whole)
+    broken = np.arange(count) == 1
+    np.testing.assert_array_equal(np.isinf(motion.predicted_error), broken)
+    for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
+        for values in rates.values():
+            np.testing.assert_array_equal(np.isnan(values), broken)
+    alone = move(mechanism(dyad(1.5, 2.0), angles=(angles[0],)))
+    np.testing.assert_allclose(motion.velocity["B"][0], alone.velocity["B"][0], rtol=1e-13)
+    with pytest.raises(MechanismError, match=rf"\(1 of {count} variant\(s\), the first at index 1\)"):
+        move(whole)
+
+
+def test_near_a_singular_position_digits_are_won_back_and_that_is_told():
+    near = mechanism(dyad(1.5, 0.5 + 1e-13))
+    motion = move(near)
+    assert motion.recomputed[0]
+    assert motion.predicted_error[0] <= 2 * EPSILON
+    assert motion.transmission["B"][0] < 1e-6
+    assert not move(mechanism(dyad(1.5, 1.5))).recomputed[0]
+
+
+def test_only_velocities_where_only_they_are_asked_for():
+    motion = move(mechanism(dyad(1.5, 1.5)), accelerations=False)
+    assert motion.acceleration == {}
+    assert motion.epsilon == {}
+    assert set(motion.velocity) == {"O1", "O2", "A", "B"}
+
+
+def test_the_group_that_fails_is_named_not_one_that_stands_on_it():
+    end = PointOnLine("E", ("A", "B"), "3", array(2.0))
+    with pytest.raises(MechanismError, match="group of B does not assemble"):
+        move(mechanism(dyad(1.0, 0.5), end))
+
+
+def test_a_data_of_one_entry_hold_for_all_variants():
+    angles = np.linspace(0.1, 0.9, 7)
+    motion = move(mechanism(dyad(1.5, 2.0), angles=tuple(angles)))
+    assert all(place.shape == (7,) for place in motion.position.values())
+    assert all(rate.shape == (7,) for rate in (*motion.omega.values(), *motion.epsilon.values()))
+    for index, angle in enumerate(angles):
+        one = move(mechanism(dyad(1.5, 2.0), angles=(angle,)))
+        np.testing.assert_allclose(motion.acceleration["B"][index], one.acceleration["B"][0], rtol=1e-12)
