@@ -57,8 +57,9 @@ class _Lowering:
                 for operand in _operands(self.nodes[index]):
                     self.uses[operand] = self.uses.get(operand, 0) + 1
         self._fuse()
+        placed: set[int] = set()
         for end in ends:
-            self._need(end)
+            self._need(end, placed)
         for index in self.order:
             self.shared[index] = self._is_shared(index)
 
@@ -82,9 +83,8 @@ class _Lowering:
         alone = op is Op.MUL and self.uses[index] == 1 and index not in self.wanted
         return (operands[0], operands[1]) if alone else None
 
-    def _need(self, end: int) -> None:
+    def _need(self, end: int, placed: set[int]) -> None:
         """Put a node, and first what it needs, in order: nothing is calculated long before its use."""
-        placed = set(self.order)
         waiting = [end]
         while waiting:
             index = waiting[-1]
