@@ -124,8 +124,9 @@ def cycle(
 ) -> None:
     """Velocities and accelerations over the cycle: a table of extremes, a CSV file, or a diagram.
 
-    Over 0 to 360 degrees of the crank, or the range in which it can turn, followed without branch
-    jumps. In every position the driven link has the variant's own speed and acceleration.
+    Over 0 to 360 degrees of the crank, or the range in which it can turn; followed without branch jumps.
+
+    In every position the driven link has the variant's own speed and acceleration.
     """
     from grader.cli.cycling import show_cycle
 

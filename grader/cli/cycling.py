@@ -20,6 +20,8 @@ from reference.cycle import cycle
 DECIMAL_COMMA = frozenset({"ro", "ru"})
 CONSTANT = 1e-9
 """Relative: what changes by less over a cycle is constant but for rounding."""
+ZERO = 1e-8
+"""Of a quantity's usual size: a least value below it is zero but for rounding."""
 
 
 def show_cycle(
@@ -84,7 +86,7 @@ def _print(assignment: Assignment, variant: Variant, subject: Subject, asked: As
         if finite and largest.value - least.value <= CONSTANT * abs(largest.value):
             table.add_row(quantity.name, unit, "constant", "", "", "", f"{here:.6g}")
             continue
-        size = max((abs(one.value) for one in (least, largest) if math.isfinite(one.value)), default=0.0)
+        size = float(np.nanmedian(np.abs(subject.values(quantity))))
         cells = (*_told(subject, least, size), *_told(subject, largest, size), f"{here + 0.0:.6g}")
         table.add_row(quantity.name, unit, *cells)
     for point in asked.points:
@@ -108,7 +110,7 @@ def _path_rows(subject: Subject, point: str, table: Table) -> None:
 
 
 def _told(subject: Subject, extreme: Extreme, size: float) -> tuple[str, str]:
-    value = extreme.value if abs(extreme.value) > CONSTANT * size else 0.0
+    value = extreme.value if abs(extreme.value) > ZERO * size else 0.0
     if math.isinf(value):
         text = "∞" if value > 0.0 else "-∞"
     else:

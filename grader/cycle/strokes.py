@@ -13,7 +13,7 @@ from reference.mechanism import CrossSlider, Dyad, FixedGuide, Group, Slider, Sl
 from reference.motion import Motion
 
 POINTS = 17
-ROUNDS = 8
+ROUNDS = 11
 APPROACH = np.array([1e-3, 1e-4, 1e-5])
 """Of the range, from its end: where a quantity is compared to see whether it grows without bound."""
 GROWS = 1.8
