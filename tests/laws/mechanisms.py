@@ -304,6 +304,86 @@ def mechanisms():
     )
 
 
+# The same as an authored file ---------------------------------------------------------------------
+
+
+def authored(mechanism: Mechanism) -> dict:
+    """The table that a person would have written, in metres and degrees."""
+    table = {"schema_version": 1, "id": "random", "title": {"en": "random"}, "length_unit": "m"}
+    driver, ground = mechanism.driver, mechanism.ground_m
+    if isinstance(driver, Crank):
+        table["crank"] = {
+            "pivot": driver.pivot,
+            "pin": driver.pin,
+            "length": float(driver.length_m[0]),
+            "angle_deg": degrees(driver.angle_rad),
+            "omega": float(driver.omega[0]),
+            "epsilon": float(driver.epsilon[0]),
+        }
+    else:
+        table["driven_slider"] = {
+            "pin": driver.pin,
+            "guide": fixed_table(FixedGuide(driver.guide_m, driver.guide_rad)),
+            "displacement": float(driver.displacement_m[0]),
+            "speed": float(driver.speed[0]),
+            "acceleration": float(driver.acceleration[0]),
+        }
+        # A file has a ground pivot, whether anything turns about it or not.
+        ground = ground or {"O1": array(0j)}
+    table["ground"] = {name: point_table(place) for name, place in ground.items()}
+    return table | {"group": [group_table(group, mechanism) for group in mechanism.groups]}
+
+
+def degrees(angle_rad) -> str:
+    return f"degrees({float(angle_rad[0])!r})"
+
+
+def point_table(place) -> list[float]:
+    return [float(place[0].real), float(place[0].imag)]
+
+
+def fixed_table(guide: FixedGuide) -> dict:
+    return {"through": point_table(guide.through_m), "angle_deg": degrees(guide.angle_rad)}
+
+
+def guide_table(guide) -> dict:
+    if isinstance(guide, FixedGuide):
+        return fixed_table(guide)
+    return {"joints": list(guide.base), "coincident": guide.coincident}
+
+
+def group_table(group, mechanism: Mechanism) -> dict:
+    """One group's table; in every second mechanism a plate's point is given by its local coordinates."""
+    told = {"node": group.node}
+    match group:
+        case Dyad(pins=pins, links=links, lengths_m=lengths, side=side):
+            told |= {"type": "RRR", "pins": list(pins), "links": list(links)}
+            told |= {"lengths": [float(one[0]) for one in lengths], "side": "left" if side > 0 else "right"}
+        case Slider(pin=pin, link=link, length_m=length, side=side):
+            told |= {"type": "RRP", "pin": pin, "link": link, "length": float(length[0])}
+            told |= {"guide": guide_table(group.guide), "side": "ahead" if side > 0 else "behind"}
+        case SlottedLink(pin=pin, pivot=pivot, link=link, offset_m=offset, foot=foot, side=side):
+            told |= {"type": "RPR", "pin": pin, "pivot": pivot, "link": link}
+            told |= {"side": "ahead" if side > 0 else "behind"}
+            told |= {"offset": float(offset[0]), "foot": foot} if foot else {}
+        case CrossSlider(guides=guides):
+            told |= {"type": "PRP", "guides": [guide_table(guide) for guide in guides]}
+        case Yoke(pin=pin, slot_rad=slot):
+            told |= {"type": "RPP", "pin": pin, "slot_deg": degrees(slot), "guide": guide_table(group.guide)}
+        case Plate(base=base, link=link, lengths_m=lengths, side=side) if len(mechanism.groups) % 2:
+            told |= {"type": "plate", "base": list(base), "link": link}
+            told |= {"lengths": [float(one[0]) for one in lengths], "side": "left" if side > 0 else "right"}
+        case Plate(base=base, link=link, lengths_m=lengths, shape=shape):
+            along = lengths[0] * shape / abs(shape)
+            told |= {"type": "point", "base": list(base), "link": link, "at": point_table(along)}
+        case PointOnLine(base=base, link=link, ratio=ratio):
+            told |= {"type": "point_on_line", "base": list(base), "link": link, "ratio": float(ratio[0])}
+        case SlotPoint(slotted=slotted, link=link, local_m=local):
+            pivot = next(one.pivot for one in mechanism.groups if one.node == slotted)
+            told |= {"type": "point", "base": [pivot, slotted], "link": link, "at": point_table(local)}
+    return told
+
+
 # What a mechanism says of itself, and what may be done to it ------------------------------------
 
 
