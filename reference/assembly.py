@@ -26,6 +26,7 @@ from reference.authored import (
 from reference.formula import Formula, FormulaError, Value
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import (
+    Array,
     Crank,
     CrossSlider,
     DrivenSlider,
@@ -42,6 +43,7 @@ from reference.mechanism import (
     SlotPoint,
     SlottedLink,
     Yoke,
+    with_arrays,
 )
 
 IN_LINE_TOLERANCE = 1e-9
@@ -56,7 +58,7 @@ SIDES = {"left": 1, "right": -1, "ahead": 1, "behind": -1}
 
 
 class _Numbers:
-    """Formulas to arrays of shape (N,), in SI."""
+    """Formulas to arrays in SI, of shape (N,) or, where they do not depend on the variant, (1,)."""
 
     def __init__(self, values: Mapping[str, Value], count: int, unit_m: float) -> None:
         self.values, self.count, self.unit_m = values, count, unit_m
@@ -65,9 +67,7 @@ class _Numbers:
         numbers = formula(self.values)
         if np.abs(numbers).max(initial=0.0) > LARGEST:
             raise FormulaError(f"'{formula.text}' is larger than {LARGEST:g}: beyond any mechanism")
-        filled = np.empty(self.count)
-        filled[:] = numbers
-        return filled
+        return numbers if numbers.ndim else numbers[None]
 
     def length(self, formula: Formula, what: str) -> FloatArray:
         lengths = self.distance(formula)
@@ -90,6 +90,14 @@ class _Numbers:
     def point(self, point: list[Formula]) -> ComplexArray:
         x, y = (self.distance(formula) for formula in point)
         return np.asarray(x + 1j * y)
+
+    def for_all(self, numbers: Array) -> Array:
+        """Of shape (N,); what all variants share stands in memory once, and is read only."""
+        if numbers.size != 1 or self.count == 1:
+            return numbers
+        shared = np.ndarray((self.count,), numbers.dtype, numbers, strides=(0,))
+        shared.flags.writeable = False
+        return shared
 
 
 @dataclass(slots=True)
@@ -122,12 +130,13 @@ def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int
         bodies.carry(driver.link, driver.pivot, driver.pin, driver.length_m)
     ground = {joint: numbers.point(point) for joint, point in file.ground.items()}
     groups_ = (_located(index, table, numbers, bodies) for index, table in enumerate(file.group))
-    return Mechanism(ground, driver, tuple(groups_))
+    return with_arrays(Mechanism(ground, driver, tuple(groups_)), numbers.for_all)
 
 
 def build_driver(file: MechanismFile, values: Mapping[str, Value], count: int) -> Driver:
     """The driven link alone, as `build_mechanism` has it."""
-    return _driver(file, _Numbers(values, count, LENGTH_UNITS_M[file.length_unit]))
+    numbers = _Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
+    return with_arrays(_driver(file, numbers), numbers.for_all)
 
 
 def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _Bodies) -> Group:
@@ -139,7 +148,7 @@ def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _Bodie
 
 
 def _driver(file: MechanismFile, numbers: _Numbers) -> Driver:
-    zero = np.zeros(numbers.count)
+    zero = np.zeros(1)
     match file.crank or file.driven_slider:
         case CrankTable() as table:
             return Crank(
@@ -220,9 +229,9 @@ def _group(table: AnyGroupTable, numbers: _Numbers, bodies: _Bodies) -> Group:
 
 
 def _slotted_link(table: SlottedLinkTable, numbers: _Numbers, bodies: _Bodies) -> SlottedLink:
-    zero = np.zeros(numbers.count)
+    zero = np.zeros(1)
     offset = zero if table.offset is None else numbers.distance(table.offset)
-    bodies.axes[table.link] = {table.pivot: np.zeros(numbers.count, complex)}
+    bodies.axes[table.link] = {table.pivot: np.zeros(1, complex)}
     if table.foot is not None:
         if np.any(offset == 0.0):
             raise FormulaError(f"the offset of link {table.link} is zero: leave out offset and foot")

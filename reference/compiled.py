@@ -14,9 +14,9 @@ import numpy as np
 from reference.errors import CallError
 from reference.geometry import ComplexArray, FloatArray
 from reference.lowering import Steps, lower
-from reference.mechanism import Mechanism
+from reference.mechanism import Array, Mechanism
 from reference.motion import Motion, move, predicted_error_of
-from reference.program import Leaf, Program, leaves_of, write_down
+from reference.program import Program, leaves_of, write_down
 
 BLOCK = 256
 """Variants that the machine takes at once: some dozens of registers of 2 KiB, near the processor."""
@@ -77,7 +77,7 @@ def _machine() -> Callable[..., None]:
     return found
 
 
-def _fitting(leaf: Leaf, count: int) -> Leaf:
+def _fitting(leaf: Array, count: int) -> Array:
     """The data as the machine reads them: one after another, doubles."""
     if count == 1:
         leaf = leaf.reshape(-1)[:1]

@@ -6,8 +6,9 @@ left of the directed line between the group's pins (for a slider: ahead along it
 right (behind); an array where it differs between variants.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from reference.geometry import ComplexArray, FloatArray
 
 Pins = tuple[str, str]
 Side = int | FloatArray
+Array = np.ndarray[Any, np.dtype[Any]]
+"""Real or complex: one number for all variants, or one for each."""
+Part = TypeVar("Part")
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,6 +216,23 @@ class Mechanism:
     def is_ground(self, joint: str) -> bool:
         """Whether a joint does not move."""
         return joint in self.ground_m
+
+
+def with_arrays(part: Part, change: Callable[[Array], Any]) -> Part:
+    """A mechanism, or a part of it, with every array replaced, in the order of its fields."""
+    return cast("Part", _changed(part, change))
+
+
+def _changed(part: Any, change: Callable[[Array], Any]) -> Any:  # noqa: ANN401 - whatever a part is made of
+    if isinstance(part, np.ndarray):
+        return change(part)
+    if part is None or isinstance(part, str | complex | float | int):
+        return part
+    if isinstance(part, tuple):
+        return tuple([_changed(inner, change) for inner in part])
+    if isinstance(part, Mapping):
+        return {name: _changed(inner, change) for name, inner in part.items()}
+    return type(part)(*[_changed(getattr(part, name), change) for name in part.__slots__])
 
 
 def moving_guides(group: Group) -> tuple[MovingGuide, ...]:

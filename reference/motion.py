@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import Crank, Driver, Mechanism
 from reference.numbers import larger
-from reference.picking import one_variant
+from reference.picking import each_number_once, one_variant
 from reference.precision import EPSILON, LOSSY, REFUSED, refine
 from reference.refusal import reason
 from reference.solving import Solution, solve
@@ -139,7 +139,7 @@ def predicted_error_of(amplification: Any) -> FloatArray:  # noqa: ANN401 - an a
 
 
 def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
-    solution = solve(mechanism, accelerations=accelerations)
+    solution = solve(mechanism, each_number_once, accelerations=accelerations)
     shape = (count,)
 
     def wide(values: Any) -> Any:  # noqa: ANN401 - real or complex, array or number

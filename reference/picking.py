@@ -9,6 +9,11 @@ from numpy.typing import NDArray
 from reference.solving import Take
 
 
+def each_number_once(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
+    """Takes all variants at once; what they share and an array only repeats, one time."""
+    return values[:1] if type(values) is not int and values.strides == (0,) else values
+
+
 def one_variant(index: int, number: Callable[[Any], Any] | None = None) -> Take:
     """Takes the numbers of one variant out of arrays over variants (those of one entry hold for all).
 

@@ -5,20 +5,17 @@
 mechanism. `reference.lowering` turns it into steps for `reference.machine`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any, cast
 
 import numpy as np
 
-from reference.mechanism import Mechanism
+from reference.mechanism import Array, Mechanism, with_arrays
 from reference.noted import Node, Notes, Number, Op, Plane, Real, parts_of
 from reference.numbers import larger
 from reference.solving import solve
-
-Leaf = np.ndarray[Any, np.dtype[Any]]
-"""An array of a mechanism's data, real or complex: of one number for all variants, or one for each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +46,13 @@ def write_down(mechanism: Mechanism, shared: tuple[bool, ...], *, accelerations:
     """The program of a mechanism, for any data of this form; `shared` says which leaves hold one number."""
     notes, seen = Notes(), iter(range(len(shared)))
 
-    def note(leaf: Leaf) -> Number:
+    def note(leaf: Array) -> Number:
         order = next(seen)
         if not np.iscomplexobj(leaf):
             return Real(notes, notes.index((Op.INPUT, order)))
         return Plane(*(Real(notes, notes.index((Op.INPUT, order, part))) for part in (0, 1)))
 
-    solution = solve(cast("Mechanism", _changed(mechanism, note)), accelerations=accelerations)
+    solution = solve(with_arrays(mechanism, note), accelerations=accelerations)
     joints = solution.joints.values()
     orders = ("position", "velocity", "acceleration") if accelerations else ("position", "velocity")
     planes = [getattr(joint, order) for order in orders for joint in joints]
@@ -73,15 +70,15 @@ def write_down(mechanism: Mechanism, shared: tuple[bool, ...], *, accelerations:
     )
 
 
-def leaves_of(mechanism: Mechanism) -> tuple[list[Leaf], tuple[object, ...]]:
+def leaves_of(mechanism: Mechanism) -> tuple[list[Array], tuple[object, ...]]:
     """The arrays of a mechanism, and everything else about it: mechanisms alike in that have one program."""
-    leaves: list[Leaf] = []
+    leaves: list[Array] = []
     form: list[object] = []
     _collect(mechanism, leaves, form)
     return leaves, tuple(form)
 
 
-def _collect(part: object, leaves: list[Leaf], form: list[object]) -> None:
+def _collect(part: object, leaves: list[Array], form: list[object]) -> None:
     if isinstance(part, np.ndarray):
         leaves.append(part)
         form.append(part.dtype.kind)
@@ -99,16 +96,3 @@ def _inside(part: Any) -> list[object]:  # noqa: ANN401 - a record, a tuple or a
     if isinstance(part, Mapping):
         return [len(part), *part.keys(), *part.values()]
     return [getattr(part, name) for name in part.__slots__]
-
-
-def _changed(part: Any, change: Callable[[Leaf], Any]) -> Any:  # noqa: ANN401 - as above
-    """The same with every array replaced, in the order of `leaves_of`."""
-    if isinstance(part, np.ndarray):
-        return change(part)
-    if part is None or isinstance(part, str | complex | float | int):
-        return part
-    if isinstance(part, tuple):
-        return tuple(_changed(inner, change) for inner in part)
-    if isinstance(part, Mapping):
-        return {name: _changed(inner, change) for name, inner in part.items()}
-    return type(part)(*(_changed(getattr(part, name), change) for name in part.__slots__))
