@@ -11,10 +11,13 @@ from grader.cycle import Subject, extremes, strokes_of
 from grader.cycle.axes import Frame, Labelling, cut, decimals_of, dense, step_of, ticks
 from grader.cycle.flags import Across, flags_of
 from grader.cycle.marks import REASONS, Mark, marks_of
+from grader.cycle.page import NAME_MM, Setting
+from grader.cycle.plot import cycle_diagram
 from grader.i18n import tongue
 from reference.assignment import load_assignment
-from reference.canvas import Label
+from reference.canvas import Curve, Label
 from reference.cycle import cycle
+from reference.mechanism import FixedGuide, Yoke
 from reference.refusal import WHAT_IS_IN_LINE
 
 ROUNDING = 1e-12
@@ -82,6 +85,19 @@ def test_an_engine_off_its_guide_returns_quicker():
     assert stroke.time_ratio == pytest.approx(back / (2 * np.pi - back), abs=1e-9)
     ends = [np.sqrt((0.6 + sign * 0.15) ** 2 - offset**2) for sign in (-1, 1)]
     assert stroke.travel == pytest.approx(ends[1] - ends[0], abs=1e-9)
+
+
+def test_a_scotch_yoke_goes_and_returns_alike():
+    """Of yokes and crossed guides: the pin's height above the pivot, r sin(phi), 2 r from end to end."""
+    engine = load_assignment("engine").mechanism([load_assignment("engine").variant(1)])
+    upright = FixedGuide(np.zeros(1, complex), np.array([np.pi / 2]))
+    yoke = Yoke("B", "A", np.zeros(1), upright)
+    subject = Subject(cycle(replace(engine, groups=(yoke,))))
+    (stroke,) = strokes_of(subject)
+    assert (stroke.name, stroke.is_angle) == ("B", False)
+    assert stroke.dead_points == pytest.approx((np.pi / 2, 3 * np.pi / 2), abs=1e-9)
+    assert stroke.travel == pytest.approx(0.3, abs=1e-12)
+    assert stroke.time_ratio == pytest.approx(1.0, abs=1e-9)
 
 
 def test_extremes_do_not_hang_on_the_samples():
@@ -181,3 +197,49 @@ def test_dead_points_at_one_place_are_marked_once(press):
     texts = [mark.text for mark in marks_of(press, tongue("en"))]
     assert texts.count("dead point (link 2, D): 180°") == 1
     assert "this variant: φ = 45°" in texts
+
+
+@pytest.mark.parametrize("lang", ["en", "ru"])
+@pytest.mark.parametrize(
+    ("name", "n", "position", "of"),
+    [
+        ("pump", 7, None, ""),
+        ("pump", 30, None, "v_B,v_D_x,omega_2,omega_3,epsilon_3"),
+        ("pump-collinear", 3, None, ""),
+        ("press", None, 1, ""),
+        ("press", None, 0, "B,C,D"),
+        ("engine", 24, None, "v_B_x,v_D,a_B_x,a_D_y,omega_2,epsilon_2,D"),
+        ("shaper", 3, None, "v_E,v_D,a_E_x,a_E,D"),
+    ],
+)
+def test_names_in_a_diagram_keep_clear_of_curves_and_of_each_other(name, n, position, of, lang):
+    assignment = load_assignment(name)
+    subject = subject_of(name, n, position)
+    setting = Setting(assignment, assignment.variant(n, position), tongue(lang))
+    diagram = cycle_diagram(subject, subject.asked(of.split(",") if of else []), setting)
+    curves = dense(
+        [shape.points for shape in diagram.shapes if isinstance(shape, Curve) and shape.width == 0.5]
+    )
+    names = [shape.bounds for shape in diagram.shapes if isinstance(shape, Label) and shape.size == NAME_MM]
+    texts = [shape.bounds for shape in diagram.shapes if isinstance(shape, Label)]
+    assert names
+    for left, top, right, bottom in names:
+        under = (
+            (curves[:, 0] > left) & (curves[:, 0] < right) & (curves[:, 1] > top) & (curves[:, 1] < bottom)
+        )
+        assert not under.any()
+    for k, (left, top, right, bottom) in enumerate(texts):
+        assert min(left, top) >= 0.0
+        assert right <= diagram.page_mm[0]
+        assert bottom <= diagram.page_mm[1]
+        for other in texts[:k]:
+            assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top
+
+
+def test_of_very_many_samples_some_are_drawn():
+    assignment = load_assignment("engine")
+    subject = subject_of("engine", n=1, samples=20_001)
+    setting = Setting(assignment, assignment.variant(1), tongue("en"))
+    diagram = cycle_diagram(subject, subject.asked(["v_B_x"]), setting)
+    (curve,) = (shape for shape in diagram.shapes if isinstance(shape, Curve) and shape.width == 0.5)
+    assert 1000 < len(curve.points) <= 1600

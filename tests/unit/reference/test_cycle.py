@@ -238,6 +238,65 @@ def test_a_driven_slider_goes_as_far_as_rod_and_crank_reach():
     assert found.elsewhere[0] == pytest.approx((-3.0, -1.0), abs=1e-12)
 
 
+def driven(*groups, at=0.3, **ground):
+    """A slider B driven along the x axis at 0.5 m/s."""
+    driver = DrivenSlider("1", "B", one(0j), one(0.0), one(at), one(0.5), one(0.0))
+    return Mechanism({name: one(place) for name, place in ground.items()}, driver, groups)
+
+
+def test_a_trammel_goes_from_end_to_end_of_its_rod():
+    """Both ends of a rod on crossed guides: x^2 + y^2 = l^2."""
+    upright = FixedGuide(one(0j), one(np.pi / 2))
+    found = cycle(driven(Slider("D", "B", "2", one(1.0), upright, 1)), 101)
+    x = found.driven
+    assert (x[0], x[-1]) == pytest.approx((-1.0, 1.0), abs=END_RAD)
+    middle = slice(1, -1)
+    assert found.motion.position["D"][middle] == pytest.approx(1j * np.sqrt(1 - x[middle] ** 2), abs=1e-9)
+    speed = -0.5 * x[middle] / np.sqrt(1 - x[middle] ** 2)
+    assert found.motion.velocity["D"][middle].imag == pytest.approx(speed, abs=1e-9)
+
+
+def test_a_driven_slider_that_nothing_stops_is_followed_some_way():
+    slotted = SlottedLink("B3", "B", "O2", "3", one(0.0), None, 1)
+    found = cycle(driven(slotted, O2=-1j), 101)
+    assert found.following.stops == (None, None)
+    assert found.elsewhere == ()
+    assert found.driven[0] < found.start < found.driven[-1]
+    assert found.motion.omega["3"] == pytest.approx(-0.5 / (1.0 + found.driven**2), abs=1e-12)
+    yoke = Yoke("D", "B", one(1.0), FixedGuide(one(0j), one(0.5)))
+    assert cycle(driven(yoke), 5).following.stops == (None, None)
+    alone = cycle(driven(at=0.0), 5)
+    assert alone.driven == pytest.approx([-1.0, -0.5, 0.0, 0.5, 1.0])
+
+
+def test_crossed_guides_of_a_driven_slider():
+    """The crossing of a line through the driven slider and a pivot with an upright guide: y = 1 - 1 / x."""
+    rod = SlottedLink("B3", "B", "O2", "3", one(0.0), None, 1)
+    guides = (FixedGuide(one(1.0 + 0j), one(np.pi / 2)), MovingGuide("3", ("O2", "B3"), "D3"))
+    found = cycle(driven(rod, CrossSlider("D", guides), at=2.0, O2=1j), 101)
+    assert found.following.low == pytest.approx(0.0, abs=1e-9)
+    assert found.motion.position["D"][1:].imag == pytest.approx(1.0 - 1.0 / found.driven[1:], rel=1e-9)
+
+
+def test_samples_very_near_a_flat_position_are_right_or_untold():
+    """Two parallelograms whose ground is turned by a hundred-millionth of a radian."""
+    off = 1e-8
+    turned = np.exp(1j * off)
+    side = 1 if abs(move(four_bar(3.0, (1.0, 3.0, 1.0), 40.0, 1)).omega["2"][0]) < ROUNDING else -1
+    pins = [("A", "O2", "B", "2", "3"), ("B", "O3", "C", "4", "5")]
+    groups = tuple(
+        Dyad(node, (pin, pivot), (coupler, rocker), (one(3.0), one(1.0)), side)
+        for pin, pivot, node, coupler, rocker in pins
+    )
+    ground = {"O1": one(0j), "O2": one(3.0 * turned), "O3": one(6.0 * turned)}
+    found = cycle(Mechanism(ground, crank(1.0, 40.0), groups))
+    assert [round(np.degrees(event.at)) for event in found.passed] == [0, 0, 180, 180]
+    here = told(found)
+    for link in ("3", "5"):
+        assert np.max(np.abs(found.motion.omega[link][here] - 1.0)) < 1e-4
+    assert all("determined" in reason or "in line" in reason for reason in found.untold.values())
+
+
 def test_guides_that_become_parallel_end_the_range():
     """A line carried by the crank against a fixed upright one: x = tan(phi), infinite at 90 degrees."""
     guides = (FixedGuide(one(1.0 + 0j), one(np.pi / 2)), MovingGuide("1", ("O1", "A"), "D1"))
