@@ -29,6 +29,7 @@ from reference.authored import findings_of
 from reference.construction import Construction
 from reference.derivation import construction_of
 from reference.errors import Finding, InputFileError
+from reference.outline import coincident
 
 KEYS = ("student_id", "n", "position")
 SCALES = ("kL", "kv", "ka")
@@ -86,6 +87,10 @@ def names_of(assignment: Assignment) -> Names:
     abouts = [*joints, *(f"{head}{tail}" for head in joints for tail in joints if head != tail)]
     possible = [f"v_{about}" for about in abouts]
     possible += [f"a_{about}{part}" for about in abouts for part in ("", "_n", "_t")]
+    under = [
+        f"{one}{other}" for pair in coincident(construction).items() for one, other in (pair, pair[::-1])
+    ]
+    possible += [f"a_{about}_{part}" for about in under for part in ("c", "r")]
     unused = frozenset(possible) - construction.vectors.keys()
     vectors = {name: plans[name[0]] for name in (*construction.vectors, *sorted(unused))}
     return Names(vectors, tuple(construction.rates), unused)

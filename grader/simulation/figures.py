@@ -63,7 +63,10 @@ def _sliders(sketch: Sketch, task: Task, nodes: Nodes, turn: complex) -> None:
     for group in task.mechanism.groups:
         for at, tail, head in blocks_of(task, group):
             along = nodes[head] - nodes[tail]
-            symbols.block(sketch, nodes[at], along / max(abs(along), 1e-9))
+            beyond = ((nodes[at] - nodes[tail]) / along).real
+            if not 0.0 <= beyond <= 1.0:
+                sketch.line(sketch.pen("line"), nodes[head if beyond > 1.0 else tail], nodes[at])
+            symbols.block(sketch, nodes[at], along / abs(along))
 
 
 def _link(sketch: Sketch, name: str, tail: complex, head: complex) -> None:
