@@ -102,7 +102,7 @@ def moved(shape: Shape, by: Point) -> Shape:
             return replace(shape, centre=shifted(shape.centre))
         case Area() | Curve():
             return replace(shape, points=tuple(shifted(point) for point in shape.points))
-        case Label():
+        case _:
             return replace(shape, at=shifted(shape.at))
 
 
@@ -123,7 +123,7 @@ def _bounds_of(shape: Shape) -> Bounds:
             return (x - reach, y - reach, x + reach, y + reach)
         case Stroke():
             points: Sequence[Point] = (shape.start, shape.end)
-        case Area() | Curve():
+        case _:
             points = shape.points
     xs, ys = zip(*points, strict=True)
     return (min(xs), min(ys), max(xs), max(ys))
@@ -178,7 +178,7 @@ def _element(shape: Shape) -> str:
                 f'<polyline points="{_corners(points)}" fill="none" stroke="{colour}"'
                 f' stroke-width="{width:g}" stroke-linecap="round"{_dashes(dash)}/>'
             )
-        case Label():
+        case _:
             return _text(shape)
 
 

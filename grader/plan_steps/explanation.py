@@ -160,12 +160,7 @@ def _component(speaker: Speaker, step: Given) -> Iterator[Markup]:
 
 def _speed(speaker: Speaker, ends: tuple[str, str]) -> tuple[Markup, float]:
     """A velocity of the plan by its ends: its name and its amount."""
-    known = speaker.subject.plan.construction.vectors
-    real = sentences.distance(speaker, *ends) * speaker.scale_value("kv")
-    for vector in known.values():
-        if (vector.tail, vector.head) == ends:
-            return speaker.name(vector.name), real
-    return speaker.name(*ends), real
+    return sentences.named(speaker, *ends), sentences.distance(speaker, *ends) * speaker.scale_value("kv")
 
 
 def _arm(speaker: Speaker, length: Normal) -> float:

@@ -102,7 +102,7 @@ def _centres(subject: Subject, mechanism: Figure, section: Section) -> Iterator[
     """Each centre with its triangle on the finished sketch; one far off the sheet has no picture."""
     base = stages.grey(mechanism)
     for told in section.steps:
-        shapes = (*base, *stages.centre(subject, told.step))
+        shapes = (*base, *stages.centre(subject, told.step.node))
         box = _box(shapes)
         fits = max(box[2] - box[0], box[3] - box[1]) <= A3_MM[0]
         yield Illustrated(told, Picture(shapes, box) if fits else None, None)

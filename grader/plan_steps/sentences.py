@@ -100,7 +100,7 @@ def _given(speaker: Speaker, step: Given) -> Markup:
     if is_nothing(speaker, step.node, mm):
         return speaker.say(texts.NOTHING_TO_LAY_OFF, name=named_vector(speaker, step), node=node, start=start)
     if isinstance(step.length, Coriolis):
-        slide = _named(speaker, *step.length.slide)
+        slide = named(speaker, *step.length.slide)
         rate = speaker.rate(f"omega_{coriolis_link(speaker, step)}")
         direction = speaker.say(texts.CORIOLIS_DIRECTION, slide=slide, rate=rate)
     else:
@@ -119,15 +119,14 @@ def is_nothing(speaker: Speaker, node: str, mm: float) -> bool:
 
 
 def named_vector(speaker: Speaker, step: Given) -> Markup:
-    """The vector that a step lays off, or its segment where it has no name."""
-    return _named(speaker, step.start, step.node)
+    """The vector that a step lays off."""
+    return named(speaker, step.start, step.node)
 
 
-def _named(speaker: Speaker, tail: str, head: str) -> Markup:
-    for vector in speaker.subject.plan.construction.vectors.values():
-        if (vector.tail, vector.head) == (tail, head):
-            return speaker.name(vector.name)
-    return speaker.name(tail, head)
+def named(speaker: Speaker, tail: str, head: str) -> Markup:
+    """The vector between two nodes of a plan."""
+    vectors = speaker.subject.plan.construction.vectors.values()
+    return next(speaker.name(one.name) for one in vectors if (one.tail, one.head) == (tail, head))
 
 
 def coriolis_link(speaker: Speaker, step: Given) -> str:
@@ -235,13 +234,11 @@ def _similar(speaker: Speaker, step: Similar) -> Markup:
 
 
 def _link_under(speaker: Speaker, node: str) -> str:
-    for group in speaker.subject.plan.mechanism.groups:
-        if isinstance(group, SlottedLink) and group.node == node:
-            return group.link
-        for guide in moving_guides(group):
-            if guide.coincident == node:
-                return guide.link
-    return ""
+    """The link of a point that lies under another only at this moment."""
+    groups = speaker.subject.plan.mechanism.groups
+    links = {group.node: group.link for group in groups if isinstance(group, SlottedLink)}
+    links |= {guide.coincident: guide.link for group in groups for guide in moving_guides(group)}
+    return links[node]
 
 
 def _local(speaker: Speaker, step: Local) -> Markup:

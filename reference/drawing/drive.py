@@ -26,42 +26,43 @@ Turn = tuple[float, float, float]
 def drive_arrow(subject: Subject, nodes: dict[str, complex]) -> Iterator[Shape]:
     """The arrow, unless the driven link stands still."""
     driver = subject.plan.mechanism.driver
-    if isinstance(driver, DrivenSlider):
-        thrust = _thrust(subject, driver, nodes)
-        if thrust is not None:
-            yield from symbols.arrow(*thrust, THIN_MM, INK)
+    if _stands(subject):
         return
-    turn = _turn(subject, driver, nodes)
-    if turn is not None:
-        yield from symbols.turning(nodes[driver.pivot], *turn)
+    if isinstance(driver, DrivenSlider):
+        yield from symbols.arrow(*_thrust(subject, driver, nodes), THIN_MM, INK)
+    else:
+        yield from symbols.turning(nodes[driver.pivot], *_turn(subject, driver, nodes))
 
 
 def drive_letter(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted]:
     """The angular velocity or the velocity that the arrow stands for."""
     driver = subject.plan.mechanism.driver
-    if isinstance(driver, DrivenSlider):
-        thrust = _thrust(subject, driver, nodes)
-        if thrust is not None:
-            name = subject.letter(f"v_{driver.pin}")
-            yield Wanted(driver.pin, point(sum(thrust) / 2.0), name, LETTER_MM, INK, 0.6)
+    if _stands(subject):
         return
-    turn = _turn(subject, driver, nodes)
-    if turn is not None:
-        radius, start, sweep = turn
+    if isinstance(driver, DrivenSlider):
+        at = point(sum(_thrust(subject, driver, nodes)) / 2.0)
+        yield Wanted(driver.pin, at, subject.letter(f"v_{driver.pin}"), LETTER_MM, INK, 0.6)
+    else:
+        radius, start, sweep = _turn(subject, driver, nodes)
         outward = complex(np.exp(1j * (start + 0.5 * sweep)))
         at = point(nodes[driver.pivot] + radius * outward)
         yield Wanted(driver.pin, at, pieces_of(f"omega_{driver.link}"), LETTER_MM, INK, 0.6, outward)
 
 
-def _thrust(
-    subject: Subject, driver: DrivenSlider, nodes: dict[str, complex]
-) -> tuple[complex, complex] | None:
+def _rate(subject: Subject) -> float:
+    """The crank's angular velocity, or the driven slider's speed."""
+    driver = subject.plan.mechanism.driver
+    return subject.one(np.asarray(driver.speed if isinstance(driver, DrivenSlider) else driver.omega))
+
+
+def _stands(subject: Subject) -> bool:
+    return _rate(subject) == 0.0
+
+
+def _thrust(subject: Subject, driver: DrivenSlider, nodes: dict[str, complex]) -> tuple[complex, complex]:
     """Beside the block, in the sense of its velocity, where it meets the fewest links."""
     block = next(block for block in blocks(subject, nodes) if block.node == driver.pin)
-    speed = subject.one(np.asarray(driver.speed))
-    if speed == 0.0:
-        return None
-    along = block.along * float(np.sign(speed))
+    along = block.along * float(np.sign(_rate(subject)))
     above = 1j * block.along * (1 if block.along.real >= 0.0 else -1)
     length, width = symbols.BLOCK_MM
     starts = (
@@ -74,14 +75,11 @@ def _thrust(
     return min(ways, key=lambda way: _meets(Curve((point(way[0]), point(way[1]))), links))
 
 
-def _turn(subject: Subject, crank: Crank, nodes: dict[str, complex]) -> Turn | None:
+def _turn(subject: Subject, crank: Crank, nodes: dict[str, complex]) -> Turn:
     """About the crank's pivot, in the sense in which it turns, where it meets the fewest links."""
-    rate = subject.one(np.asarray(crank.omega))
     centre = nodes[crank.pivot]
     arm = nodes[crank.pin] - centre
-    if rate == 0.0 or abs(arm) == 0.0:
-        return None
-    sign, largest = float(np.sign(rate)), min(RADIUS_MM, 0.45 * abs(arm))
+    sign, largest = float(np.sign(_rate(subject))), min(RADIUS_MM, 0.45 * abs(arm))
     links = _links(subject, nodes)
     turns = [
         (radius, float(np.angle(arm)) + sign * start, sign * SWEEP)

@@ -28,8 +28,6 @@ another point is nearly as near."""
 DOUBT_MM = 1.0
 SAME_POINT_MM = 1e-6
 TINY_MM = 1e-9
-ENOUGH = 12
-"""So many places that touch nothing, and no farther ones are tried."""
 LEADER_DASH = (0.5, 0.8)
 TOUCHING_COST, CROSSING_COST = 60.0, 12.0
 """Of a millimetre of stroke under a letter (and as much for each stroke); of letters on one another."""
@@ -70,14 +68,19 @@ def place_labels(wanted: Sequence[Wanted], obstacles: Iterable[Shape], rounds: i
     """A place for each letter; those with the least room are placed first, then all once more in turn."""
     segments = segments_of(obstacles)
     points = np.array([one.at for one in wanted]).reshape(-1, 2)
-    tries = [_places(one, segments, points) for one in wanted]
+    tries = [_places_at(one, GAPS_MM, segments, points) for one in wanted]
     order = sorted(range(len(wanted)), key=lambda k: int(np.sum(tries[k].cost < TOUCHING_COST)))
     standing: dict[int, Standing] = {}
+    crowded: set[int] = set()
     for _ in range(rounds):
         before = dict(standing)
         for k in order:
             others = [standing[other] for other in standing if other != k]
-            standing[k] = tries[k].best(others)
+            standing[k], cost = tries[k].best(others)
+            if cost >= CROSSING_COST and k not in crowded:
+                crowded.add(k)
+                tries[k] = tries[k].with_more(_places_at(wanted[k], FAR_GAPS_MM, segments, points))
+                standing[k], _cost = tries[k].best(others)
         if before == standing:
             break
     return [standing[k] for k in range(len(wanted))]
@@ -92,8 +95,13 @@ class _Places:
     leaders: FloatArray
     cost: FloatArray
 
-    def best(self, others: Sequence[Standing]) -> Standing:
-        """The cheapest place beside the letters that stand already."""
+    def with_more(self, far: "_Places") -> "_Places":
+        """These places and others farther off."""
+        pairs = ((self.boxes, far.boxes), (self.leaders, far.leaders), (self.cost, far.cost))
+        return _Places(self.wanted, *(np.concatenate(pair) for pair in pairs))
+
+    def best(self, others: Sequence[Standing]) -> tuple[Standing, float]:
+        """The cheapest place beside the letters that stand already, and its cost."""
         cost = self.cost.copy()
         if others:
             taken = np.array([other.label.bounds for other in others])
@@ -102,7 +110,8 @@ class _Places:
             cost += np.where(led, CROSSING_COST * np.sum(lengths_inside(taken, self.leaders), axis=0), 0.0)
             lines = segments_of(other.leader for other in others if other.leader)
             cost += TOUCHING_COST * np.sum(lengths_inside(self.boxes, lines), axis=1)
-        return self._standing(int(np.argmin(cost)))
+        k = int(np.argmin(cost))
+        return self._standing(k), float(cost[k])
 
     def _standing(self, k: int) -> Standing:
         one = self.wanted
@@ -113,19 +122,6 @@ class _Places:
             return Standing(one, label, None)
         x0, y0, x1, y1 = (float(value) for value in self.leaders[k][:4])
         return Standing(one, label, Stroke((x0, y0), (x1, y1), HAIR_MM, CONSTRUCTION, LEADER_DASH))
-
-
-def _places(one: Wanted, segments: FloatArray, points: FloatArray) -> _Places:
-    near = _places_at(one, GAPS_MM, segments, points)
-    if np.sum(near.cost < TOUCHING_COST) >= ENOUGH:
-        return near
-    far = _places_at(one, FAR_GAPS_MM, segments, points)
-    return _Places(
-        one,
-        np.vstack([near.boxes, far.boxes]),
-        np.vstack([near.leaders, far.leaders]),
-        np.concatenate([near.cost, far.cost]),
-    )
 
 
 def _places_at(one: Wanted, gaps: Sequence[float], segments: FloatArray, points: FloatArray) -> _Places:
@@ -195,7 +191,7 @@ def _edges(shape: Shape) -> Iterator[tuple[Point, Point, float]]:
             rim = [(x + radius * math.cos(turn), y + radius * math.sin(turn)) for turn in turns]
             yield from ((p, q, width / 2.0) for p, q in itertools.pairwise(rim))
             yield (x - radius, y), (x + radius, y), width / 2.0
-        case Label():
+        case _:
             return
 
 

@@ -100,12 +100,10 @@ def _carriers(group: Group, nodes: dict[str, complex]) -> Iterator[Bar]:
     """A moving guide that its link's joints do not reach: the link goes on past the block."""
     for guide in moving_guides(group):
         g, h = (nodes[joint] for joint in guide.base)
-        at, along = nodes[guide.coincident], unit(h - g)
-        share = float((np.conj(along) * (at - g)).real) / abs(h - g) if h != g else 0.0
-        if share > 1.0:
-            yield Bar(guide.coincident, guide.link, guide.base, (h, at + BEYOND_MM * along))
-        elif share < 0.0:
-            yield Bar(guide.coincident, guide.link, guide.base, (g, at - BEYOND_MM * along))
+        at = nodes[guide.coincident]
+        near, far = (h, g) if abs(at - h) < abs(at - g) else (g, h)
+        if abs(at - far) > abs(far - near):
+            yield Bar(guide.coincident, guide.link, guide.base, (near, at + BEYOND_MM * unit(at - near)))
 
 
 def slotted_link(subject: Subject, node: str) -> SlottedLink:

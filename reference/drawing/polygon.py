@@ -40,13 +40,9 @@ def _lines(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator
 def construction_lines(step: Step, view: View, nodes: dict[str, complex]) -> Iterator[Shape]:
     """The lines that a node is found by, thin, going on a little at both ends."""
     lines = (step.first, step.second) if isinstance(step, TwoLines) else ()
-    for line in lines:
-        if not isinstance(line, Line):
-            continue
-        foot, node = nodes[line.through], nodes[step.node]
-        along = complex(line.along.at(view))
-        if not np.isfinite(along):
-            continue
+    drawn = [(line.through, complex(line.along.at(view))) for line in lines if isinstance(line, Line)]
+    for through, along in drawn:
+        foot, node = nodes[through], nodes[step.node]
         sign = 1.0 if (np.conj(along) * (node - foot)).real >= 0.0 else -1.0
         over = sign * OVERRUN_MM * along
         yield Stroke(point(foot - over), point(node + over), HAIR_MM, CONSTRUCTION)

@@ -1,8 +1,8 @@
 """A figure as it grows: what a step adds stands out, what was there before is grey."""
 
-import itertools
 from collections.abc import Collection, Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -67,26 +67,22 @@ def compasses(step: Step, nodes: dict[str, complex]) -> Iterator[Shape]:
         centres = (step.centre,)
     for centre in centres:
         arm = nodes[step.node] - nodes[centre]
-        if np.isfinite(arm) and abs(arm) > 0.0:
-            start = float(np.angle(arm)) - ARC_HALF_RAD
-            yield symbols.arc(nodes[centre], abs(arm), start, 2 * ARC_HALF_RAD, NOW_WIDTH_MM, NOW)
+        start = float(np.angle(arm)) - ARC_HALF_RAD
+        yield symbols.arc(nodes[centre], abs(arm), start, 2 * ARC_HALF_RAD, NOW_WIDTH_MM, NOW)
 
 
 def models(subject: Subject, step: Step) -> Iterator[Shape]:
     """What the step takes its directions or its triangle from, on the mechanism sketch."""
     nodes = subject.nodes("mechanism")
     for joints in _model_joints(step):
-        known = [nodes[joint] for joint in joints if joint in nodes]
-        if len(known) == len(joints):
-            yield from (Stroke(point(p), point(q), MODEL_MM, NOW) for p, q in itertools.pairwise(known))
+        corners = [point(nodes[joint]) for joint in joints]
+        yield from (Stroke(p, q, MODEL_MM, NOW) for p, q in pairwise(corners))
 
 
-def centre(subject: Subject, step: Step) -> Iterator[Shape]:
+def centre(subject: Subject, name: str) -> Iterator[Shape]:
     """An instantaneous centre or acceleration pole, with its triangle on the link that it belongs to."""
-    if not isinstance(step, Similar):
-        return
-    nodes, at = subject.nodes("mechanism"), subject.centres[step.node]
-    p, q = (nodes[joint] for joint in step.base)
+    nodes, at = subject.nodes("mechanism"), subject.centres[name]
+    p, q = (nodes[joint] for joint in subject.plan.construction.centres[name].base)
     yield Stroke(point(p), point(q), MODEL_MM, NOW)
     for corner in (p, q):
         yield Stroke(point(corner), point(at), symbols.HAIR_MM, NOW)
@@ -95,7 +91,7 @@ def centre(subject: Subject, step: Step) -> Iterator[Shape]:
     size = LETTER_MM * max(1.0, abs(at - p) / LARGE_MM)
     away = unit(at - (p + q) / 2.0)
     x, y = point(at + 1.1 * size * away)
-    yield Label((x, y + 0.35 * size), subject.letter(step.node), size, "middle", NOW, italic=True)
+    yield Label((x, y + 0.35 * size), subject.letter(name), size, "middle", NOW, italic=True)
 
 
 def _model_joints(step: Step) -> Iterator[tuple[str, ...]]:

@@ -9,10 +9,14 @@ import pypdfium2
 import pytest
 
 from grader.i18n import LANGUAGES, tongue
+from grader.plan_pdf import pdf
 from grader.plan_steps import explain, html_page, pdf_pages, wording_of
 from grader.plan_steps.pages import chapters
+from grader.plan_steps.sentences import sentence
+from grader.plan_steps.words import speaker_of
 from reference.assignment import load_assignment
-from reference.canvas import Label
+from reference.canvas import Label, Ring
+from reference.draw import reference_drawing
 from reference.drawing.stages import BEFORE, NOW
 from reference.drawing.subject import Subject
 from reference.lettering import as_pieces, pieces_of
@@ -20,7 +24,7 @@ from reference.plan import exact_plan
 from reference.steps import Given, Pole
 from tests.drawn import CASES, planned
 
-A4_POINTS = (595.28, 841.89)
+A3_POINTS, A4_POINTS = (1190.55, 841.89), (595.28, 841.89)
 POINT = 0.01
 ROUNDED = 0.0051
 """Half the last digit of a length told with two decimals."""
@@ -236,10 +240,8 @@ def test_centres_are_told_and_shown_where_they_are(case, folder):
             [abs(centre - nodes[joint]) for joint in step.told.step.base], abs=ROUNDED
         )
         if step.picture is not None:
-            dots = [shape for shape in step.picture.shapes if getattr(shape, "colour", "") == NOW]
-            assert any(
-                abs(complex(*getattr(dot, "centre", (9e9, 0))).conjugate() - centre) < POINT for dot in dots
-            )
+            dots = [s for s in step.picture.shapes if isinstance(s, Ring) and s.colour == NOW]
+            assert [complex(*dot.centre).conjugate() for dot in dots] == [pytest.approx(centre, abs=POINT)]
 
 
 def test_a_similar_image_of_a_link_that_does_not_turn_is_told_as_one_point():
@@ -251,6 +253,24 @@ def test_a_similar_image_of_a_link_that_does_not_turn_is_told_as_one_point():
     steps = explain(Subject(pump, plan), tongue("en"))[1].steps
     image = next(step for step in steps if step.step.node == "c")
     assert plain(image.sentence).startswith("a and b coincide, and so does c")
+
+
+def test_a_kind_of_step_without_words_is_refused(folder):
+    speaker = speaker_of(subject_of("pump 7", "en", folder), tongue("en"))
+    with pytest.raises(ValueError, match="a step with words is expected, not str"):
+        sentence(speaker, "step")
+
+
+def test_the_drawing_and_the_steps_are_the_same_shapes_in_the_pdf(folder):
+    assignment, plan = planned("pump 7", folder)
+    sheets = [sheet.shapes for sheet in reference_drawing(assignment, plan)]
+    document = pypdfium2.PdfDocument(io.BytesIO(pdf(sheets, "Pump, n = 7")))
+    assert len(document) == len(sheets)
+    assert document[0].get_size() == pytest.approx(A3_POINTS, abs=POINT)
+    assert document.get_metadata_value("Title") == "Pump, n = 7"
+    printed = document[0].get_textpage().get_text_range()
+    for datum in ("49.78", "0.19373", "Velocity plan"):
+        assert datum in printed
 
 
 def test_digits_in_the_middle_of_a_joints_name_are_set_below():

@@ -11,8 +11,9 @@ from reference.assignment import load_assignment
 from reference.canvas import Area, Curve, Label, Stroke, moved
 from reference.draw import FRAME, figures_of, reference_drawing
 from reference.drawing import symbols
-from reference.drawing.labelling import segments_of
+from reference.drawing.labelling import Wanted, place_labels, segments_of
 from reference.drawing.layout import CELL_MM, LEAST_GAP_MM, lay_out
+from reference.drawing.links import bars
 from reference.drawing.sketch import support_direction
 from reference.drawing.subject import Subject, Wording
 from reference.drawing.tables import column, table_rows
@@ -27,8 +28,12 @@ def text_of(label):
     return "".join(piece.text for piece in as_pieces(label.text))
 
 
+def labels_of(shapes):
+    return [text_of(shape) for shape in shapes if isinstance(shape, Label)]
+
+
 def labels(sheets):
-    return [text_of(shape) for sheet in sheets for shape in sheet.shapes if isinstance(shape, Label)]
+    return [text for sheet in sheets for text in labels_of(sheet.shapes)]
 
 
 @pytest.fixture(scope="module")
@@ -141,6 +146,64 @@ def test_the_arrow_at_the_crank_turns_as_the_crank_does(omega, folder):
     assert len(bows) == 1
     (x0, y0), (x1, y1) = bows[0].points[0], bows[0].points[-1]
     assert np.sign((complex(x0, -y0).conjugate() * complex(x1, -y1)).imag) == np.sign(omega)
+
+
+@pytest.mark.parametrize("case", ["pump 7", "driven slider"])
+def test_a_driven_link_that_stands_still_has_no_arrow(case, folder):
+    assignment, plan = planned(case, folder)
+    driver = plan.mechanism.driver
+    rate = "speed" if case == "driven slider" else "omega"
+    still = replace(plan.mechanism, driver=replace(driver, **{rate: np.array([0.0])}))
+    moving, stopped = (
+        labels_of(figures_of(Subject(assignment, one))["mechanism"].shapes)
+        for one in (plan, replace(plan, mechanism=still))
+    )
+    assert set(moving) - set(stopped) == {"vA" if rate == "speed" else "ω1"}
+
+
+@pytest.mark.parametrize(("case", "reaches"), [("slider on a moving link", 1), ("two crossed guides", 0)])
+def test_a_moving_guide_goes_on_to_the_slider_beyond_its_joints(case, reaches, folder):
+    assignment, plan = planned(case, folder)
+    subject = Subject(assignment, plan)
+    nodes = subject.nodes("mechanism")
+    beyond = [bar for bar in bars(subject, nodes) if bar.node in {"D3", "D2"}]
+    assert len(beyond) == reaches
+    for bar in beyond:
+        line = [bar.ends[0], nodes["D3"], bar.ends[1]]
+        along = line[2] - line[0]
+        assert abs((along.conjugate() * (line[1] - line[0])).imag) <= 1e-9 * abs(along) ** 2
+        assert 0.0 < ((line[1] - line[0]) / along).real < 1.0
+
+
+@pytest.mark.parametrize("name", ["pump", "shaper"])
+def test_the_altitude_construction_is_drawn_true_to_the_normal_components(name):
+    assignment = load_assignment(name)
+    plan = exact_plan(assignment, [assignment.variant(7)])
+    subject = Subject(assignment, plan, altitude=True)
+    sketch = figures_of(subject)["mechanism"]
+    nodes = subject.nodes("mechanism")
+    normals = [v for v in plan.construction.vectors.values() if v.part == "n"]
+    for vector in normals:
+        tips = [
+            complex(*part.shape.points[0]).conjugate()
+            for part in sketch.parts
+            if part.node == vector.head and isinstance(part.shape, Area)
+        ]
+        drawn = complex(plan.drawn_mm(vector.name)[0])
+        assert min(abs(tip - nodes[vector.link[1]] - drawn) for tip in tips) <= 1e-9 * abs(drawn)
+    marks = [text_of(part.shape) for part in sketch.parts if isinstance(part.shape, Label)]
+    assert sum("IV" in mark for mark in marks) == len(normals)
+
+
+def test_letters_that_need_several_rounds_are_placed_after_one_too():
+    crowd = [Wanted(str(k), (0.4 * k, 0.0), f"letter {k}", 4.0, "#000000") for k in range(6)]
+    for rounds in (1, 3):
+        standing = place_labels(crowd, [], rounds)
+        boxes = [one.label.bounds for one in standing]
+        for one, other in itertools.combinations(boxes, 2):
+            across = min(one[2], other[2]) - max(one[0], other[0])
+            down = min(one[3], other[3]) - max(one[1], other[1])
+            assert min(across, down) <= 0.0
 
 
 def test_arrowheads_are_shorter_on_short_vectors():
