@@ -21,6 +21,7 @@ from reference.mechanism import (
     MovingGuide,
     PointOnLine,
     Slider,
+    SlotPoint,
     SlottedLink,
     Yoke,
     moving_guides,
@@ -306,6 +307,30 @@ def test_guides_that_become_parallel_end_the_range():
     assert "parallel" in found.following.stops[1].why
     middle = slice(1, -1)
     assert found.motion.position["D"][middle].imag == pytest.approx(np.tan(found.driven[middle]), rel=1e-9)
+
+
+def test_guides_that_become_parallel_and_part_again_end_the_range_as_well():
+    """A rocking slotted link against a fixed guide along its extreme position, 30 degrees from upright."""
+    rocking = whitworth(0.5, 1.0)
+    guides = (FixedGuide(one(1.0 + 0j), one(np.pi / 3)), MovingGuide("3", ("O2", "A3"), "D3"))
+    found = cycle(replace(rocking, groups=(*rocking.groups, CrossSlider("D", guides))))
+    assert found.turns == 0
+    assert (found.following.low, found.following.high) == pytest.approx(
+        (-np.pi / 6, 11 * np.pi / 6), abs=1e-6
+    )
+
+
+def test_what_comes_to_rest_in_its_flat_position_goes_back_on_its_own_side():
+    """A pin that stops at its slotted link's pivot, and turns back: the link never moves."""
+    yoke = Yoke("B", "A", one(np.pi / 2), FixedGuide(one(0j), one(0.0)))
+    slotted = SlottedLink("B3", "B", "O2", "3", one(0.0), None, 1)
+    point = SlotPoint("D", "B3", "3", one(0.5 + 0j))
+    ground = {"O1": one(0j), "O2": one(1.0 + 0j)}
+    found = cycle(Mechanism(ground, crank(1.0, 40.0), (yoke, slotted, point)))
+    assert found.turns == 1
+    here = told(found)
+    assert np.max(np.abs(found.motion.position["D"][here] - 0.5)) < NEAR_FLAT
+    assert not here[0]
 
 
 def test_a_yoke_moves_harmonically():
