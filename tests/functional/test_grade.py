@@ -12,8 +12,10 @@ import pikepdf
 import pytest
 
 from grader.documents import schema
-from reference.assignment import load_assignment
+from reference.assignment import built_in, load_assignment
+from reference.mistakes import Mistake
 from reference.plan import exact_plan
+from tests.hands import measured, task_for
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SAMPLES = ROOT / "samples"
@@ -68,7 +70,7 @@ def results_of(folder: Path) -> dict:
     return results
 
 
-@pytest.mark.parametrize("name", ["pump", "pump-230", "pump-collinear", "press", "engine"])
+@pytest.mark.parametrize("name", built_in())
 def test_a_perfect_hand_scores_full_marks_in_every_variant(planmark, tmp_path, name):
     rows = perfect_rows(name)
     write_table(tmp_path / "in" / "measured.csv", rows)
@@ -207,6 +209,30 @@ def test_a_students_wrong_value_is_told_without_giving_the_answer_away(planmark,
     assert "✗" in ran.stdout
     assert f"{right_mm:.1f}" not in ran.stdout
     assert f"{right_mm:.0f} mm" not in ran.stdout
+
+
+def forgotten_two(tmp_path: Path) -> Path:
+    """A student's own values with a Coriolis component of omega v instead of 2 omega v."""
+    reading = measured(task_for("shaper", 7), mistakes=(Mistake("arithmetic", "k_A3A", factor=0.5),))
+    vectors = {name: one for figure in reading.figures.values() for name, one in figure.vectors.items()}
+    document = {
+        "n": 7,
+        "segments_mm": {name: one.length_mm for name, one in vectors.items()},
+        "directions_deg": {name: one.direction_deg for name, one in vectors.items()},
+    }
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(("lang", "told"), [("en", "half of what it should be"), ("ro", "jumătate din cât")])
+def test_the_likely_mistake_is_told_to_instructors_alone(planmark, tmp_path, lang, told):
+    call = ("check", "shaper", "--measured", forgotten_two(tmp_path), "--lang", lang)
+    student, instructor = planmark(*call), planmark(*call, "--level", "full")
+    assert student.returncode == instructor.returncode == 1
+    assert "arithmetic" not in student.stdout
+    assert "arithmetic" in instructor.stdout
+    assert told in " ".join(instructor.stdout.split())
 
 
 def test_a_roster_that_is_wrong_stops_before_anything_is_written(planmark, tmp_path):

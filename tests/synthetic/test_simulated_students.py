@@ -37,7 +37,7 @@ def vectors_of(sheets):
     return {name: vector for figure in figures for name, vector in figure.get("vectors", {}).items()}
 
 
-@pytest.mark.parametrize("name", ["pump", "press", "engine", "pump-collinear"])
+@pytest.mark.parametrize("name", ["pump", "press", "engine", "pump-collinear", "shaper", "piston"])
 def test_a_perfect_hand_draws_the_exact_plan(name):
     assignment = load_assignment(name)
     variant = assignment.variants()[2]
@@ -158,7 +158,7 @@ def test_every_stroke_of_a_vector_joins_its_nodes():
                     assert np.hypot(*gap) < 6 * settings.hand.redraw_mm
 
 
-@pytest.mark.parametrize("name", ["pump", "press", "engine"])
+@pytest.mark.parametrize("name", ["pump", "press", "engine", "shaper", "piston"])
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_a_mixed_class_draws_inside_its_paper(name, seed):
     assignment = load_assignment(name)

@@ -9,7 +9,7 @@ import pytest
 
 from grader.reading import read_figures
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Reading
-from reference.assignment import Assignment, Variant
+from reference.assignment import Assignment, Variant, built_in
 from reference.mistakes import Mistake, commit
 from tests.unit.reading.drawn import PLACES, Drawn, Pen, draw, ink_of, task
 
@@ -18,6 +18,7 @@ NEAR_MM = 0.5
 ALONG_MM = 0.7
 """A stroke's end that no other line crosses tells this much."""
 SILENTLY_WRONG_MM = 1.0
+TOGETHER_MM = 0.05
 MEASURABLE_MM = 5.0
 
 
@@ -54,7 +55,7 @@ def silently_wrong(drawn: Drawn, reading: Reading) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("name", ["pump", "pump-230", "pump-collinear", "press", "engine"])
+@pytest.mark.parametrize("name", built_in())
 def test_a_right_drawing_of_any_mechanism_is_read_whole(name):
     assignment, _, _ = task(name)
     variant = assignment.variants()[len(assignment.variants()) // 3]
@@ -63,6 +64,14 @@ def test_a_right_drawing_of_any_mechanism_is_read_whole(name):
     reading = read(drawn, assignment, variant)
     assert right_share(drawn, reading) == 1.0
     assert not silently_wrong(drawn, reading)
+
+
+def test_joints_in_one_place_are_read_as_one():
+    assignment, variant, drawing = task("shaper")
+    drawn = draw(drawing)
+    joints = read(drawn, assignment, variant).figures[MECHANISM].nodes
+    assert abs(joints["A"].at - joints["A3"].at) < TOGETHER_MM
+    assert abs(joints["A3"].at - drawn.nodes["A"]) < NEAR_MM
 
 
 def test_joints_are_found_in_their_circles():
@@ -203,3 +212,16 @@ def test_a_node_is_no_surer_than_the_surest_vector_that_ends_there(redraw_mm):
                 if name in {vector.tail, vector.head} and vector.name in found.vectors
             ]
             assert node.confidence <= max(touching, default=0.0)
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [Mistake("normal_missing", "k_A3A"), Mistake("normal_reversed", "k_A3A"), Mistake("sense_reversed", "a")],
+    ids=lambda one: f"{one.code} at {one.at}",
+)
+def test_a_wrong_drawing_of_a_slotted_link_is_read_as_wrong_as_it_is(mistake):
+    assignment, variant, drawing = task("shaper")
+    drawn = draw(commit(mistake, drawing))
+    reading = read(drawn, assignment, variant)
+    assert right_share(drawn, reading) >= 0.8
+    assert not silently_wrong(drawn, reading)
