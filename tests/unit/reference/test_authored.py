@@ -321,6 +321,13 @@ def test_an_empty_range_of_variants_is_a_fault_of_the_file(assignment):
         load_assignment(assignment(("from = 1, to = 30", "from = 30, to = 1")))
 
 
+@pytest.mark.parametrize("last", ["1_000_001", "9223372036854775807", "1" + "0" * 30])
+def test_a_range_of_more_variants_than_anyone_has_students_is_a_fault_of_the_file(assignment, last):
+    with pytest.raises(AuthoredFileError, match="is a range of more than 1000000 numbers") as error:
+        load_assignment(assignment(("to = 30", f"to = {last}")))
+    assert error.value.findings[0].path == "$.variant.n"
+
+
 @pytest.mark.parametrize(
     ("n", "position", "code"), [(None, None, "n_needed"), (31, None, "n_range"), (0, None, "n_range")]
 )
