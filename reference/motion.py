@@ -8,10 +8,10 @@ Many variants are solved on arrays, a few on Python's numbers (faster there). A 
 with every result; variants where digits are lost are solved again (`reference.precision`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import Crank, Driver, Mechanism
 from reference.numbers import larger
-from reference.picking import each_number_once, one_variant
+from reference.picking import a_stretch, each_number_once, one_variant
 from reference.precision import EPSILON, LOSSY, REFUSED, refine
 from reference.refusal import reason
 from reference.solving import Solution, solve
@@ -28,6 +28,9 @@ SAFETY = 32.0
 """Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""
 FEW = 3
 """So many variants are faster one by one, on Python's numbers."""
+
+MANY, STRETCH = 100_000, 8192
+"""From so many variants on, arrays are taken so long at a time: what is between stays near the processor."""
 
 BoolArray = NDArray[np.bool_]
 
@@ -91,18 +94,7 @@ def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
     """More digits for what has lost some; nothing is told of a variant without a motion."""
 
     def put(solution: Solution, rows: NDArray[np.intp]) -> None:
-        for name, joint in solution.joints.items():
-            motion.position[name][rows] = _rounded(joint.position)
-            motion.velocity[name][rows] = _rounded(joint.velocity)
-            if accelerations:
-                motion.acceleration[name][rows] = _rounded(joint.acceleration)
-        for given, found in (
-            (motion.omega, solution.omega),
-            (motion.epsilon, solution.epsilon),
-            (motion.transmission, solution.transmission),
-        ):
-            for name in given:
-                given[name][rows] = np.real(_rounded(found[name]))
+        _put(motion, solution, rows)
 
     predicted = motion.predicted_error
     motion.recomputed[:] = refine(mechanism, predicted, put, accelerations=accelerations)
@@ -111,6 +103,22 @@ def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
         for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
             for values in rates.values():
                 values[broken] = np.nan
+
+
+def _put(motion: Motion, solution: Solution, rows: NDArray[np.intp] | slice) -> None:
+    """Take the solution of some variants over into the motion."""
+    for name, joint in solution.joints.items():
+        motion.position[name][rows] = _rounded(joint.position)
+        motion.velocity[name][rows] = _rounded(joint.velocity)
+        if motion.acceleration:
+            motion.acceleration[name][rows] = _rounded(joint.acceleration)
+    for given, found in (
+        (motion.omega, solution.omega),
+        (motion.epsilon, solution.epsilon),
+        (motion.transmission, solution.transmission),
+    ):
+        for name in given:
+            given[name][rows] = np.real(_rounded(found[name]))
 
 
 def _rounded(number: Any) -> Any:  # noqa: ANN401 - of extended floats or of many digits
@@ -128,12 +136,49 @@ def _by_numpy(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
     if count <= FEW:
         return _one_by_one(mechanism, count, accelerations)
     with np.errstate(all="ignore"):
-        return _on_arrays(mechanism, count, accelerations)
+        if count < MANY:
+            return _on_arrays(mechanism, count, accelerations)
+        return _in_stretches(mechanism, count, accelerations)
+
+
+def _in_stretches(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+    """As `_on_arrays`, on a part of the variants after another: intermediate results stay near."""
+    motion: Motion | None = None
+    for start in range(0, count, STRETCH):
+        rows = slice(start, start + STRETCH)
+        solution = solve(mechanism, a_stretch(rows), accelerations=accelerations)
+        motion = motion or _room_for(solution, count, accelerations)
+        _put(motion, solution, rows)
+        motion.predicted_error[rows] = predicted_error_of(_amplification(solution))
+    return cast("Motion", motion)
+
+
+def _room_for(solution: Solution, count: int, accelerations: bool) -> Motion:
+    """A motion not yet filled in, with the names of a solution."""
+
+    def rows(names: Iterable[str], kind: type) -> Any:  # noqa: ANN401 - real or complex
+        return {name: np.empty(count, dtype=kind) for name in names}
+
+    return Motion(
+        rows(solution.joints, complex),
+        rows(solution.joints, complex),
+        rows(solution.joints, complex) if accelerations else {},
+        rows(solution.omega, float),
+        rows(solution.epsilon, float) if accelerations else {},
+        rows(solution.transmission, float),
+        np.empty(count),
+        np.zeros(count, dtype=np.bool_),
+    )
+
+
+def _amplification(solution: Solution) -> Any:  # noqa: ANN401 - an array, or one number
+    """By how much a rounding error may have grown anywhere."""
+    return reduce(larger, [joint.amplification for joint in solution.joints.values()])
 
 
 def predicted_error_of(amplification: Any) -> FloatArray:  # noqa: ANN401 - an array, or one number
     """What the growth of rounding errors up to a result says of it; infinite where it is nan."""
-    predicted = np.asarray(SAFETY * EPSILON * amplification)
+    predicted = np.atleast_1d(SAFETY * EPSILON * amplification)
     predicted[np.isnan(predicted)] = np.inf
     return predicted
 
@@ -146,8 +191,7 @@ def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
         return values if np.shape(values) == shape else np.array(np.broadcast_to(values, shape))
 
     joints = solution.joints
-    amplification = wide(reduce(larger, [joint.amplification for joint in joints.values()]))
-    predicted = predicted_error_of(amplification)
+    predicted = predicted_error_of(wide(_amplification(solution)))
     return Motion(
         {name: wide(joint.position) for name, joint in joints.items()},
         {name: wide(joint.velocity) for name, joint in joints.items()},
@@ -170,7 +214,7 @@ def _one_by_one(mechanism: Mechanism, count: int, accelerations: bool) -> Motion
         with np.errstate(all="ignore"):
             return _on_arrays(mechanism, count, accelerations)
     first = solutions[0]
-    grown = [reduce(larger, [joint.amplification for joint in one.joints.values()]) for one in solutions]
+    grown = [_amplification(one) for one in solutions]
     predicted = [SAFETY * EPSILON * one if one == one else np.inf for one in grown]  # noqa: PLR0124 - nan
 
     states = np.array(

@@ -14,6 +14,16 @@ def each_number_once(values: Any) -> Any:  # noqa: ANN401 - an array, or a side 
     return values[:1] if type(values) is not int and values.strides == (0,) else values
 
 
+def a_stretch(rows: slice) -> Take:
+    """Takes neighbouring variants; what all variants share, one time."""
+
+    def take(values: Any) -> Any:  # noqa: ANN401 - as above
+        once = each_number_once(values)
+        return once if type(once) is int or once.size == 1 else once[rows]
+
+    return take
+
+
 def one_variant(index: int, number: Callable[[Any], Any] | None = None) -> Take:
     """Takes the numbers of one variant out of arrays over variants (those of one entry hold for all).
 
