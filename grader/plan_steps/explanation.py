@@ -149,8 +149,9 @@ def _component(speaker: Speaker, step: Given) -> Iterator[Markup]:
         )
     if isinstance(step.length, Coriolis):
         slide = _speed(speaker, step.length.slide)
-        rate = f"omega_{sentences.coriolis_link(speaker, step)}"
-        omega = abs(speaker.subject.one(speaker.subject.plan.rates[rate]))
+        carrier = sentences.coriolis_link(speaker, step)
+        rate, turn = f"omega_{carrier}", speaker.subject.plan.motion.omega[carrier]
+        omega = abs(speaker.subject.one(np.asarray(turn)))
         yield Markup("{} = 2 · {} · {} = 2 · {} · {} = {}").format(
             name, speaker.rate(rate), slide[0], speaker.bare(omega), speaker.bare(slide[1]),
             speaker.real(real, unit),

@@ -195,15 +195,15 @@ def _edges(shape: Shape) -> Iterator[tuple[Point, Point, float]]:
             return
 
 
-def lengths_inside(boxes: FloatArray, segments: FloatArray) -> FloatArray:
-    """Length of each of (m, 5) segments in each of (p, 4) boxes grown by the clearance, (p, m).
+def lengths_inside(boxes: FloatArray, segments: FloatArray, clear: float = CLEAR_MM) -> FloatArray:
+    """Length of each of (m, 5) segments in each of (p, 4) boxes grown by a clearance, (p, m).
 
     Liang and Barsky's clipping; a segment with nan is in no box.
     """
     enter: FloatArray | float = 0.0
     leave: FloatArray | float = 1.0
     steps = segments[:, 2:4] - segments[:, :2]
-    grown = segments[:, 4] + CLEAR_MM
+    grown = segments[:, 4] + clear
     for axis in (0, 1):
         # A segment along the other axis never meets these sides: a tiny step puts them at infinity.
         step = np.where(np.abs(steps[:, axis]) < TINY_MM, TINY_MM, steps[:, axis])

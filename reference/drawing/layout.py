@@ -70,6 +70,9 @@ def _where_there_is_room(figures: Sequence[Figure], room: Bounds, kept_free: Bou
 
     Of these ways the one whose figures keep farthest apart; None where none has room for all.
     """
+    sizes = _sizes(figures)
+    if any(width > room[2] - room[0] or height > room[3] - room[1] for width, height in sizes):
+        return None
     ways = [_packed(figures, room, kept_free, corner) for corner in CORNERS]
     gap, moves = max(ways, key=lambda way: way[0])
     return moves if gap > 0.0 else None
