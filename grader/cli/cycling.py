@@ -19,9 +19,9 @@ from reference.cycle import cycle
 
 DECIMAL_COMMA = frozenset({"ro", "ru"})
 CONSTANT = 1e-9
-"""Relative: what changes by less over a cycle is constant but for rounding."""
+"""What changes by less over a cycle, against the largest of its kind, is constant but for rounding."""
 ZERO = 1e-8
-"""Of a quantity's usual size: a least value below it is zero but for rounding."""
+"""Against the largest of its kind: a least value below it is zero but for rounding."""
 
 
 def show_cycle(
@@ -82,11 +82,11 @@ def _print(assignment: Assignment, variant: Variant, subject: Subject, asked: As
         least, largest = extremes(subject, quantity)
         here = float(subject.values_at(quantity, np.array([subject.cycle.start]))[0])
         unit = quantity.unit.replace("²", "^2")
-        finite = math.isfinite(largest.value - least.value)
-        if finite and largest.value - least.value <= CONSTANT * abs(largest.value):
-            table.add_row(quantity.name, unit, "constant", "", "", "", f"{here:.6g}")
+        size = subject.size(quantity)
+        if largest.value - least.value <= CONSTANT * size:
+            told = here if abs(here) > ZERO * size else 0.0
+            table.add_row(quantity.name, unit, "constant", "", "", "", f"{told:.6g}")
             continue
-        size = float(np.nanmedian(np.abs(subject.values(quantity))))
         cells = (*_told(subject, least, size), *_told(subject, largest, size), f"{here + 0.0:.6g}")
         table.add_row(quantity.name, unit, *cells)
     for point in asked.points:

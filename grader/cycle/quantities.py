@@ -7,6 +7,7 @@
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -23,6 +24,7 @@ from reference.plan import vectors_of
 Kind = Literal["velocity", "acceleration", "omega", "epsilon"]
 UNITS: dict[Kind, str] = {"velocity": "m/s", "acceleration": "m/s²", "omega": "rad/s", "epsilon": "rad/s²"}
 AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
+FINE = 361
 MANY = 24
 """Of so many known names an error tells no more."""
 
@@ -105,9 +107,32 @@ class Subject:
         told = ", ".join(everything[:MANY]) + (", ..." if len(everything) > MANY else "")
         return f"nothing on this cycle is called '{name}'{meant}: known are {told}; _x or _y for a component"
 
+    @cached_property
+    def fine(self) -> tuple[FloatArray, Motion]:
+        """Driven coordinates close enough to find extremes and dead points by, and the motion there."""
+        cycle = self.cycle
+        if cycle.driven.size >= FINE:
+            return cycle.driven, cycle.motion
+        driven = np.linspace(cycle.driven[0], cycle.driven[-1], FINE)
+        driven = driven if cycle.turns else driven[1:-1]
+        return driven, self.motion_at(driven)
+
     def values(self, quantity: Quantity, motion: Motion | None = None) -> FloatArray:
-        """A quantity over the cycle, or in another motion of the mechanism, SI, (N,)."""
+        """A quantity over the cycle, or in another motion of the mechanism, SI, (N,).
+
+        What is smaller than its own predicted error (relative to the largest of its kind) is zero.
+        """
         motion = motion or self.cycle.motion
+        values = self._values(quantity, motion)
+        with np.errstate(invalid="ignore"):
+            is_rounding = np.abs(values) <= motion.predicted_error * _largest(quantity.kind, motion)
+        return np.where(is_rounding, 0.0, values)
+
+    def size(self, quantity: Quantity) -> float:
+        """How large the largest of a kind usually is over the cycle: against it others are small."""
+        return float(np.nanmedian(_largest(quantity.kind, self.fine[1])))
+
+    def _values(self, quantity: Quantity, motion: Motion) -> FloatArray:
         if quantity.kind in {"omega", "epsilon"}:
             rates: Mapping[str, FloatArray] = motion.omega if quantity.kind == "omega" else motion.epsilon
             return rates[quantity.of.partition("_")[2]]
@@ -134,6 +159,21 @@ class Subject:
         """The motion at other driven coordinates, nan in singular ones."""
         mechanism: Mechanism = self.cycle.following.at(driven)
         return move_where_possible(mechanism)
+
+
+def _largest(kind: Kind, motion: Motion) -> FloatArray:
+    """The size of all that is of a kind, at each sample; angular accelerations are squares of velocities."""
+    match kind:
+        case "velocity":
+            parts = [np.abs(one) for one in motion.velocity.values()]
+        case "acceleration":
+            parts = [np.abs(one) for one in motion.acceleration.values()]
+        case "omega":
+            parts = [np.abs(one) for one in motion.omega.values()]
+        case "epsilon":
+            parts = [np.abs(one) for one in motion.epsilon.values()]
+            parts += [one * one for one in motion.omega.values()]
+    return np.asarray(np.max(parts, axis=0))
 
 
 _LETTERS: dict[str, Kind] = {"v": "velocity", "a": "acceleration"}

@@ -125,9 +125,10 @@ def _stroke(subject: Subject, output: _Output) -> Stroke:
 def _turning_points(subject: Subject, output: _Output) -> Iterator[float]:
     """Where the rate changes its sign, refined from the samples; over a full cycle its two ends are one."""
     cycle = subject.cycle
-    rate = output.rate(cycle.motion)
+    samples, motion = subject.fine
+    rate = output.rate(motion)
     told = np.isfinite(rate) & (np.abs(rate) > REST * np.nanmax(np.abs(rate), initial=0.0))
-    driven, signs = cycle.driven[told], np.sign(rate[told])
+    driven, signs = samples[told], np.sign(rate[told])
     if cycle.turns and driven.size:
         period = cycle.driven[-1] - cycle.driven[0]
         driven, signs = np.append(driven, driven[0] + period), np.append(signs, signs[0])
@@ -146,7 +147,7 @@ def _turning_points(subject: Subject, output: _Output) -> Iterator[float]:
 
 def _travel(subject: Subject, output: _Output, dead: tuple[float, ...]) -> float:
     """Between two dead points, an angle followed from sample to sample."""
-    driven = subject.cycle.driven
+    driven, _ = subject.fine
     between = driven[(driven > dead[0]) & (driven < dead[1])]
     place = output.place(subject.motion_at(np.array([dead[0], *between, dead[1]])))
     if not output.is_angle:
@@ -157,7 +158,7 @@ def _travel(subject: Subject, output: _Output, dead: tuple[float, ...]) -> float
 
 def extremes(subject: Subject, quantity: Quantity) -> tuple[Extreme, Extreme]:
     """The smallest and the largest value over the cycle, not only at its samples."""
-    values = subject.values(quantity)
+    values = subject.values(quantity, subject.fine[1])
     smallest, largest = (_refined(subject, quantity, values, sign) for sign in (-1.0, 1.0))
     ends = list(unbounded_ends(subject, quantity))
     falls, grows = (tuple(end for end, way in ends if way == sign) for sign in (-1.0, 1.0))
@@ -168,7 +169,7 @@ def extremes(subject: Subject, quantity: Quantity) -> tuple[Extreme, Extreme]:
 
 
 def _refined(subject: Subject, quantity: Quantity, values: FloatArray, sign: float) -> Extreme:
-    driven = subject.cycle.driven
+    driven, _ = subject.fine
     if not np.isfinite(values).any():
         return Extreme(np.nan, ())
     best = int(np.nanargmax(sign * values))

@@ -243,3 +243,20 @@ def test_of_very_many_samples_some_are_drawn():
     diagram = cycle_diagram(subject, subject.asked(["v_B_x"]), setting)
     (curve,) = (shape for shape in diagram.shapes if isinstance(shape, Curve) and shape.width == 0.5)
     assert 1000 < len(curve.points) <= 1600
+
+
+def test_what_is_smaller_than_its_own_error_is_zero(press):
+    """The horizontal slider's velocity has no upright part, and at the dead points none at all."""
+    upright, along = (press.values(quantity) for quantity in press.asked(["v_D_y", "v_D_x"]).quantities)
+    assert not upright.any()
+    assert along[[0, 180, 360]].tolist() == [0.0, 0.0, 0.0]
+    assert np.count_nonzero(along) == 358
+
+
+@pytest.mark.parametrize("samples", [3, 5, 37])
+def test_dead_points_do_not_hang_on_the_samples(samples):
+    for name, n in (("pump", 7), ("shaper", 3)):
+        coarse, fine = (strokes_of(subject_of(name, n=n, samples=count)) for count in (samples, 721))
+        assert [stroke.name for stroke in coarse] == [stroke.name for stroke in fine]
+        for one, other in zip(coarse, fine, strict=True):
+            assert one.dead_points == pytest.approx(other.dead_points, abs=1e-9)
