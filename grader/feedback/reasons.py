@@ -15,6 +15,11 @@ REASONS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
             r"no stroke between (?P<start>\S+) and (?P<end>\S+) could be told apart",
             N_("no stroke between %(start)s and %(end)s could be told apart"),
         ),
+        (
+            r"(?P<nodes>.+), on which it hangs, was not read for certain",
+            N_("%(nodes)s, on which it hangs, was not read for certain"),
+        ),
+        (r"(?P<name>\S+) was not found on the sheets", N_("%(name)s was not found on the sheets")),
         (r"no mechanism sketch was found on the sheets", N_("no mechanism sketch was found on the sheets")),
         (r"no velocity plan was found on the sheets", N_("no velocity plan was found on the sheets")),
         (r"no acceleration plan was found on the sheets", N_("no acceleration plan was found on the sheets")),
