@@ -17,7 +17,8 @@ LINE_HEIGHT = 1.45
 ROW_MM, LEAST_ROW_MM = 4.6, 3.0
 LETTER_SHARE = 0.68
 """Of a row's height."""
-COLUMNS_MM = (0.0, 17.0, 35.0, 50.0, 74.0, 96.0)
+COLUMNS_MM = (0.0, 15.0, 33.0, 48.0, 75.0, 96.0)
+WORDS, CELL_EDGE_MM = (0, 1), 1.3
 RULE_COLOUR = "#9aa3ad"
 
 
@@ -128,6 +129,15 @@ def four_digits(value: float) -> str:
     return f"{value:#.4g}".rstrip(".") if value else "0"
 
 
+def _cell(column_at: int, text: Text, at: tuple[float, float], size: float) -> Label:
+    """A text in its column: words to the left, numbers to the right; smaller where it is too long."""
+    start, end = COLUMNS_MM[column_at] + CELL_EDGE_MM, COLUMNS_MM[column_at + 1] - CELL_EDGE_MM
+    fitting = size * min(1.0, (end - start) / width_of(text, size))
+    if column_at in WORDS:
+        return Label((at[0] + start, at[1]), text, fitting)
+    return Label((at[0] + end, at[1]), text, fitting, "end")
+
+
 def _table(rows: Sequence[Row], at: tuple[float, float], height: float) -> Iterator[Shape]:
     left, top = at
     size = LETTER_SHARE * height
@@ -135,12 +145,10 @@ def _table(rows: Sequence[Row], at: tuple[float, float], height: float) -> Itera
         y = top + k * height
         base = y + 0.72 * height
         yield Stroke((left, y), (left + COLUMN_MM, y), 0.13 if k > 1 else 0.3, RULE_COLOUR if k > 1 else INK)
-        yield Label((left + 1.5, base), row.name, size)
-        if row.segment:
-            yield Label((left + COLUMNS_MM[1] + 1.5, base), row.segment, size)
-        for edge, text in zip(COLUMNS_MM[3:], (row.drawn, row.value, row.direction), strict=True):
+        cells: Sequence[Text] = (row.name, row.segment, row.drawn, row.value, row.direction)
+        for column_at, text in enumerate(cells):
             if text:
-                yield Label((left + edge - 1.5, base), text, size, "end")
+                yield _cell(column_at, text, (left, base), size)
         if row.turns:
             yield from symbols.sense(complex(left + COLUMNS_MM[5] - 4.5, -(y + height / 2)), row.turns)
     bottom = top + len(rows) * height
