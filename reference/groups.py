@@ -14,8 +14,10 @@ from reference.numbers import Complex, Number, cosine, cross, dot, nearest, root
 
 QUARTERS = 0.6366197723675814
 """Quarter turns in a radian."""
-QUARTER_1, QUARTER_2, QUARTER_3 = 1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21
-"""A quarter turn in three parts, the first two of 33 bits: Cody and Waite's reduction of an angle."""
+QUARTER_1, QUARTER_2 = 1.5707963267341256, 6.077100506303966e-11
+QUARTER_3, QUARTER_4 = 2.0222662487959506e-21, 1.0085854035872483e-37
+"""A quarter turn in four parts, the first two of 33 bits (Cody and Waite's reduction of an angle); the last
+counts in fifty digits alone."""
 
 
 def arm(length: Number, angle: Number) -> tuple[Complex, Complex]:
@@ -25,7 +27,7 @@ def arm(length: Number, angle: Number) -> tuple[Complex, Complex]:
     cancellation of cos psi - 1.
     """
     turns = nearest(angle * QUARTERS)
-    rest = ((angle - turns * QUARTER_1) - turns * QUARTER_2) - turns * QUARTER_3
+    rest = (((angle - turns * QUARTER_1) - turns * QUARTER_2) - turns * QUARTER_3) - turns * QUARTER_4
     half_sine, half_cosine = sine(0.5 * rest), cosine(0.5 * rest)
     quarter = turns - 4.0 * nearest(0.25 * turns)
     axis = (1.0 - abs(quarter)) + 1j * (quarter * (2.0 - abs(quarter)))
