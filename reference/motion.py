@@ -216,29 +216,25 @@ def _one_by_one(mechanism: Mechanism, count: int, accelerations: bool) -> Motion
     first = solutions[0]
     grown = [_amplification(one) for one in solutions]
     predicted = [SAFETY * EPSILON * one if one == one else np.inf for one in grown]  # noqa: PLR0124 - nan
-
-    states = np.array(
-        [
-            [(joint.position, joint.velocity, joint.acceleration) for joint in one.joints.values()]
-            for one in solutions
-        ]
-    )
-    position, velocity, acceleration = (
-        {name: states[:, row, order] for row, name in enumerate(first.joints)} for order in range(3)
-    )
-
-    def links(what: str) -> dict[str, FloatArray]:
-        rates: dict[str, float] = getattr(first, what)
-        numbers = np.array([list(getattr(one, what).values()) for one in solutions])
-        return {name: numbers[:, row] for row, name in enumerate(rates)}
-
+    states = iter(np.array([_states(one) for one in solutions]).T)
+    rates = iter(np.array([_rates(one, accelerations) for one in solutions]).T)
     return Motion(
-        position,
-        velocity,
-        acceleration if accelerations else {},
-        links("omega"),
-        links("epsilon") if accelerations else {},
-        links("transmission"),
+        *(dict(zip(first.joints, states, strict=False)) for _ in range(2)),
+        dict(zip(first.joints if accelerations else (), states, strict=False)),
+        dict(zip(first.omega, rates, strict=False)),
+        dict(zip(first.epsilon if accelerations else (), rates, strict=False)),
+        dict(zip(first.transmission, rates, strict=False)),
         np.array(predicted),
         np.zeros(count, dtype=np.bool_),
     )
+
+
+def _states(one: Solution) -> list[complex]:
+    joints = one.joints.values()
+    positions, velocities = [joint.position for joint in joints], [joint.velocity for joint in joints]
+    return positions + velocities + [joint.acceleration for joint in joints]
+
+
+def _rates(one: Solution, accelerations: bool) -> list[float]:
+    epsilon = one.epsilon.values() if accelerations else ()
+    return [*one.omega.values(), *epsilon, *one.transmission.values()]

@@ -81,6 +81,8 @@ def nearest(x: Number) -> Number:
 
 def larger(x: Number, y: Number) -> Number:
     """The larger of two; nan where either is."""
+    if isinstance(x, float) and isinstance(y, float):
+        return x if x > y or x != x else y  # noqa: PLR0124 - only nan differs from itself
     if isinstance(x, np.ndarray) or isinstance(y, np.ndarray):
         return np.maximum(x, y)
     if isinstance(x, Noted):
