@@ -211,7 +211,7 @@ def _add_slotted(solution: Solution, group: SlottedLink, accelerations: bool) ->
         solution.epsilon[group.link] = epsilon
         node.acceleration = pivot.acceleration + groups.turned(d, omega, epsilon)
     nearness = abs(d) / (abs(d) + abs(pin.position) + abs(pivot.position))
-    node.amplification = larger(pin.amplification, pivot.amplification) / (sine * nearness) ** 2
+    node.amplification = larger(pin.amplification, pivot.amplification) / (sine * sine * nearness)
     solution.joints[group.node] = node
     solution.transmission[group.node] = sine
     solution.slots[group.node] = (group.pivot, along)

@@ -68,7 +68,7 @@ def condition_findings(assignment: Assignment, plan: Plan, conditions: Condition
             )  # fmt: skip
     again = np.broadcast_to(plan.motion.recomputed, (len(plan.variants),))
     if np.any(again):
-        told = "so near a singular position that the plan was computed with more digits than usual"
+        told = "would lose a digit or two in double precision, and was computed with more"
         yield LintFinding(
             "hint", "recomputed", *mechanism_place(assignment), told, chosen(plan.variants, again)
         )
