@@ -279,7 +279,7 @@ DAMAGE = [
 ]  # fmt: skip
 
 
-DRAWN = 5
+DRAWN = 3
 """Of the plans of damaged files, so many are drawn as well."""
 
 
