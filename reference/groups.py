@@ -10,14 +10,7 @@ group is solved in the frame of `d`, where a kite's flat position (d -> 0) is as
 Derivations: the rigid-body equations of each group with one unknown eliminated, see docs/solver.md.
 """
 
-from reference.numbers import Complex, Number, cosine, cross, dot, nearest, root, sine
-
-QUARTERS = 0.6366197723675814
-"""Quarter turns in a radian."""
-QUARTER_1, QUARTER_2 = 1.5707963267341256, 6.077100506303966e-11
-QUARTER_3, QUARTER_4 = 2.0222662487959506e-21, 1.0085854035872483e-37
-"""A quarter turn in four parts, the first two of 33 bits (Cody and Waite's reduction of an angle); the last
-counts in fifty digits alone."""
+from reference.numbers import Complex, Number, cosine, cross, dot, nearest, quarters, root, sine
 
 
 def arm(length: Number, angle: Number) -> tuple[Complex, Complex]:
@@ -26,8 +19,7 @@ def arm(length: Number, angle: Number) -> tuple[Complex, Complex]:
     The rest of a turn by psi from the axis is length (-2 sin^2(psi/2) + i sin psi): without the
     cancellation of cos psi - 1.
     """
-    turns = nearest(angle * QUARTERS)
-    rest = (((angle - turns * QUARTER_1) - turns * QUARTER_2) - turns * QUARTER_3) - turns * QUARTER_4
+    turns, rest = quarters(angle)
     half_sine, half_cosine = sine(0.5 * rest), cosine(0.5 * rest)
     quarter = turns - 4.0 * nearest(0.25 * turns)
     axis = (1.0 - abs(quarter)) + 1j * (quarter * (2.0 - abs(quarter)))

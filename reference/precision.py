@@ -1,7 +1,7 @@
 """Variants near a singular position, solved again with more digits, their data (doubles) taken as exact.
 
 First in the processor's extended floating point, on arrays, where it has one; where that is not enough,
-in fifty digits one by one. The closed forms are the same: only the numbers differ.
+in eighty digits one by one. The closed forms are the same: only the numbers differ.
 """
 
 from collections.abc import Callable
@@ -21,11 +21,11 @@ EXTENDED = float(np.finfo(np.longdouble).eps)
 LOSSY = 5e-14
 """A predicted relative error from which extended floats are used: a digit or two are gone."""
 DOUBTFUL = 1e-9
-"""A predicted relative error from which fifty digits are used."""
+"""A predicted relative error from which eighty digits are used."""
 REFUSED = 1e16
 """A predicted relative error beyond which nothing is told: the sine of a transmission angle is then
 below 1e-15 (as between guides at 0 and 180 degrees), and the data's last digit decides how it moves."""
-DIGITS = 50
+DIGITS = 80
 
 Put = Callable[[Solution, NDArray[np.intp]], None]
 """Takes a solution of some variants over into the motion."""
@@ -57,7 +57,7 @@ def refine(
 
 
 def _in_digits(mechanism: Mechanism, index: int, accelerations: bool) -> Solution | None:
-    """One variant in fifty digits; None where it divides by zero even so, or does not close."""
+    """One variant in eighty digits; None where it divides by zero even so, or does not close."""
     from mpmath import mp  # noqa: PLC0415 - seldom needed, and slow to import
 
     with mp.workdps(DIGITS):
