@@ -258,8 +258,11 @@ def _link_point(
             return PointOnLine(node, (p, q), link, ratio)
         case PlateTable():
             first, second = (numbers.length(length, node) for length in table.lengths)
-            side: int | FloatArray = SIDES[table.side]
-            shape = _shape(np.abs(base), first, second, SIDES[table.side])
+            side: int | FloatArray = SIDES[table.side or "left"]
+            shape = _shape(np.abs(base), first, second, SIDES[table.side or "left"])
+            if table.side is None and np.any(shape.imag != 0.0):
+                told = f"{node} may lie to the left or to the right of {p} -> {q}; say which: side"
+                raise FormulaError(f"side of {node} is missing: {told}")
         case PointTable():
             shape = np.asarray(numbers.point(table.at) / np.abs(base))
             if np.all(shape.imag == 0.0):

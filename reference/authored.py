@@ -219,8 +219,8 @@ class PlateTable(Authored):
     base: TwoJoints
     link: LinkName
     lengths: TwoFormulas
-    side: Literal["left", "right"] = "left"
-    """Of the directed line base[0] -> base[1]; without meaning where the three are in line."""
+    side: Literal["left", "right"] | None = None
+    """Of the directed line base[0] -> base[1]; needed unless the three are in line for every variant."""
 
 
 class PointOnLineTable(Authored):

@@ -132,7 +132,7 @@ KEYS: dict[str, dict[str, Key]] = {
         "base": Key("two joints of the link"),
         "link": SAME_LINK,
         "lengths": Key("distances from the two; in line with them, its image comes by similarity"),
-        "side": Key("left or right of the directed base", '"left"'),
+        "side": Key("left or right of the directed base; needed unless in line with it", '"left"'),
     },
     "PointOnLineTable": {
         "type": Key("a point in line with a link"),

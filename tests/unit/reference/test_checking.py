@@ -198,6 +198,10 @@ def test_faults_of_form_are_told_with_what_is_expected(changes, path, words):
         (("crank", "gear_ratio", 0), r"gear_ratio\) must not be zero"),
         (("group", 9, "offset", 0), r"group\[9\]: the offset of link 9 is zero: leave out offset and foot"),
         (("crank", "angle_deg", "fi"), "unknown name fi"),
+        (
+            ("group", 4, "side", MISSING),
+            r"group\[4\]: side of C is missing: C may lie to the left or to the right",
+        ),
     ],
 )
 def test_numbers_that_no_mechanism_has_are_told_with_their_group(change, words):
@@ -232,6 +236,12 @@ def test_what_does_not_close_or_move_is_told_by_its_group_and_by_how_much(change
     with pytest.raises(MechanismError, match=words) as error:
         moved(edited(change))
     assert error.value.code == code
+
+
+def test_a_plate_in_line_needs_no_side():
+    table = edited(("group", 4, "lengths", [100, 250]), ("group", 4, "side", MISSING))
+    at = moved(table).position
+    assert at["C"][0] == pytest.approx(at["A"][0] + (at["B"][0] - at["A"][0]) * 100 / 350, rel=1e-12)
 
 
 def test_where_a_slider_drives_its_displacement_is_what_to_check():
