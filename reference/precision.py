@@ -18,9 +18,9 @@ from reference.solving import Solution, solve
 EPSILON = float(np.finfo(np.float64).eps)
 EXTENDED = float(np.finfo(np.longdouble).eps)
 """As `EPSILON` where the processor or compiler has no wider floats."""
-LOSSY = 5e-14
+LOSSY = 3e-14
 """A predicted relative error from which extended floats are used: a digit or two are gone."""
-DOUBTFUL = 1e-9
+DOUBTFUL = 1e-11
 """A predicted relative error from which eighty digits are used."""
 REFUSED = 1e16
 """A predicted relative error beyond which nothing is told: the sine of a transmission angle is then

@@ -66,7 +66,8 @@ def condition_findings(assignment: Assignment, plan: Plan, conditions: Condition
                 f"the construction lines of {' and '.join(nodes)} meet at only {least:.1f} degrees{moved}",
                 chosen(plan.variants, flat),
             )  # fmt: skip
-    again = np.broadcast_to(plan.motion.recomputed, (len(plan.variants),))
+    sines = [np.ones(len(plan.variants)), *plan.motion.transmission.values()]
+    again = plan.motion.recomputed & (np.min(sines, axis=0) < LEAST_TRANSMISSION)
     if np.any(again):
         told = "would lose a digit or two in double precision, and was computed with more"
         yield LintFinding(
