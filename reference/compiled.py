@@ -20,6 +20,7 @@ from reference.program import Program, leaves_of, write_down
 
 BLOCK = 256
 """Variants that the machine takes at once: some dozens of registers of 2 KiB, near the processor."""
+DOUBLES = (np.dtype(np.float64), np.dtype(np.complex128))
 FORMS = 64
 """Programs that are kept."""
 
@@ -44,7 +45,7 @@ def by_machine(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
     if key not in _prepared:
         _prepare(mechanism, key)
     program, steps = _prepared[key]
-    data = [_fitting(leaf, 1 if one else count) for leaf, one in zip(leaves, shared, strict=True)]
+    data = [_fitting(leaf, None if one else count) for leaf, one in zip(leaves, shared, strict=True)]
     addresses = np.array([leaf.ctypes.data for leaf in data], dtype=np.int64)
     registers = np.empty((steps.registers, min(BLOCK, max(count, 1))))
     planes = np.empty((len(program.planes), count), dtype=np.complex128)
@@ -77,13 +78,15 @@ def _machine() -> Callable[..., None]:
     return found
 
 
-def _fitting(leaf: Array, count: int) -> Array:
-    """The data as the machine reads them: one after another, doubles."""
-    if count == 1:
-        leaf = leaf.reshape(-1)[:1]
-    elif leaf.shape != (count,):
+def _fitting(leaf: Array, count: int | None) -> Array:
+    """The data as the machine reads them: doubles, one after another; no count where all share the first."""
+    if leaf.dtype not in DOUBLES:
+        leaf = leaf.astype(np.complex128 if np.iscomplexobj(leaf) else np.float64)
+    if count is None:
+        return leaf
+    if leaf.shape != (count,):
         raise ValueError(f"data of shape {leaf.shape} for {count} variants; expected (1,) or ({count},)")
-    return np.ascontiguousarray(leaf, np.complex128 if np.iscomplexobj(leaf) else np.float64)
+    return np.ascontiguousarray(leaf)
 
 
 def _motion(program: Program, planes: ComplexArray, reals: FloatArray, accelerations: bool) -> Motion:

@@ -72,7 +72,7 @@ class _Lowering:
     def _fuse(self) -> None:
         """Sums and differences of products as single steps."""
         for index, (op, *operands) in enumerate(self.nodes):
-            if op in {Op.ADD, Op.SUB} and index in self.uses:
+            if (op is Op.ADD or op is Op.SUB) and index in self.uses:
                 a, b = (self._product(operand) for operand in operands)
                 fused = _fused(op, operands, a, b)
                 if fused is not None:
@@ -167,7 +167,8 @@ class _Lowering:
 
 
 def _operands(node: Node) -> tuple[int, ...]:
-    return () if node[0] in {Op.INPUT, Op.CONSTANT} else node[1:]
+    op = node[0]
+    return () if op is Op.INPUT or op is Op.CONSTANT else node[1:]
 
 
 def _fused(op: Op, operands: list[int], a: tuple[int, int] | None, b: tuple[int, int] | None) -> Node | None:

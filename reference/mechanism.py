@@ -8,6 +8,7 @@ right (behind); an array where it differs between variants.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -19,6 +20,8 @@ Side = int | FloatArray
 Array = np.ndarray[Any, np.dtype[Any]]
 """Real or complex: one number for all variants, or one for each."""
 Part = TypeVar("Part")
+PLAIN = (str, int, float, complex, NoneType)
+"""What a mechanism is made of besides records, tuples, mappings and arrays."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,7 +229,7 @@ def with_arrays(part: Part, change: Callable[[Array], Any]) -> Part:
 def _changed(part: Any, change: Callable[[Array], Any]) -> Any:  # noqa: ANN401 - whatever a part is made of
     if isinstance(part, np.ndarray):
         return change(part)
-    if part is None or isinstance(part, str | complex | float | int):
+    if isinstance(part, PLAIN):
         return part
     if isinstance(part, tuple):
         return tuple([_changed(inner, change) for inner in part])

@@ -219,7 +219,8 @@ def _one_by_one(mechanism: Mechanism, count: int, accelerations: bool) -> Motion
     states = iter(np.array([_states(one) for one in solutions]).T)
     rates = iter(np.array([_rates(one, accelerations) for one in solutions]).T)
     return Motion(
-        *(dict(zip(first.joints, states, strict=False)) for _ in range(2)),
+        dict(zip(first.joints, states, strict=False)),
+        dict(zip(first.joints, states, strict=False)),
         dict(zip(first.joints if accelerations else (), states, strict=False)),
         dict(zip(first.omega, rates, strict=False)),
         dict(zip(first.epsilon if accelerations else (), rates, strict=False)),

@@ -68,7 +68,7 @@ class Notes:
     def real(self, op: Op, *operands: "Scalar") -> "Real":
         """A new number from others."""
         places = [self.operand(x) for x in operands]
-        if op in {Op.ADD, Op.MUL}:
+        if op is Op.ADD or op is Op.MUL:
             places.sort()
         return Real(self, self.index((op, *places)))
 

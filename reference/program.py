@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from reference.mechanism import Array, Mechanism, with_arrays
+from reference.mechanism import PLAIN, Array, Mechanism, with_arrays
 from reference.noted import Node, Notes, Number, Op, Plane, Real, parts_of
 from reference.numbers import larger
 from reference.solving import solve
@@ -82,7 +82,7 @@ def _collect(part: object, leaves: list[Array], form: list[object]) -> None:
     if isinstance(part, np.ndarray):
         leaves.append(part)
         form.append(part.dtype.kind)
-    elif part is None or isinstance(part, str | complex | float | int):
+    elif isinstance(part, PLAIN):
         form.append(part)
     else:
         form.append(type(part))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from reference.assignment import built_in, load_assignment
 from reference.errors import CallError, MechanismError
-from reference.mechanism import Crank, Mechanism
+from reference.mechanism import Crank, Mechanism, with_arrays
 from reference.motion import move, move_where_possible
 from tests.laws.mechanisms import KINDS, after, array, mechanisms, random_mechanism
 
@@ -21,6 +21,8 @@ from reference.compiled import by_machine, move_compiled
 ROUNDINGS = 4.0
 """In predicted errors: by how much two ways of rounding the same formulas may differ."""
 LEAST_ERROR = 1e-15
+COINCIDENT = 1e-9
+"""Metres; nearer points are one, on two links."""
 QUANTITIES = ("position", "velocity", "acceleration", "omega", "epsilon", "transmission")
 MOMENTS = np.linspace(0.0, 0.6, 300)
 """Seconds; more moments than a block of the machine, and not a multiple of it."""
@@ -40,11 +42,21 @@ def assert_same(compiled, numpy):
         if not ours:
             continue
         size = np.max([np.abs(values) for values in theirs.values()], axis=0)
+        if quantity in {"omega", "epsilon"}:
+            size = size + swing(numpy, "velocity" if quantity == "omega" else "acceleration")
         allowed = ROUNDINGS * np.maximum(numpy.predicted_error, LEAST_ERROR) * size
         for name, values in theirs.items():
             assert ours[name].dtype == values.dtype
             assert ours[name].shape == values.shape
             assert np.all(np.abs(ours[name] - values)[sure] <= allowed[sure]), (quantity, name)
+
+
+def swing(motion, rate):
+    """The angular rate at which the largest velocity (or acceleration) turns the shortest link."""
+    places = np.array(list(motion.position.values()))
+    gaps = np.abs(places[:, None] - places[None])
+    shortest = np.min(np.where(gaps > COINCIDENT, gaps, np.inf), axis=(0, 1))
+    return np.max(np.abs(list(getattr(motion, rate).values())), axis=0) / shortest
 
 
 def by_both(mechanism, **how):
@@ -141,6 +153,21 @@ def test_data_of_another_number_of_variants_are_a_wrong_call():
     wrong = replace(mechanism.groups[0], lengths_m=(np.full(7, 0.4), np.full(30, 0.3)))
     with pytest.raises(ValueError, match=r"shape \(7,\) for 30 variants"):
         move_compiled(replace(mechanism, groups=(wrong, *mechanism.groups[1:])))
+
+
+def test_one_variant_has_no_data_for_several():
+    crank = Crank("1", "O", "A", array(0.1), array(0.2), array(1.0), array(0.0), accelerated=False)
+    mechanism = Mechanism({"O": np.zeros(5, complex)}, crank, ())
+    with pytest.raises(ValueError, match=r"shape \(5,\) for 1 variants"):
+        move_compiled(mechanism)
+
+
+@given(mechanisms())
+@settings(FEW)
+def test_data_of_other_types_and_layouts_are_taken_as_they_are(mechanism):
+    many = after(mechanism, MOMENTS)
+    wide = with_arrays(many, lambda values: np.repeat(values, 2)[::2] if values.size > 1 else values)
+    assert_same(*by_both(wide))
 
 
 def test_without_numba_the_error_says_what_to_install(monkeypatch):
