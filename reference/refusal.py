@@ -35,7 +35,9 @@ WHAT_IS_IN_LINE = {
 def reason(mechanism: Mechanism, broken: NDArray[np.bool_]) -> MechanismError:
     """The error for the first of the broken variants, from the first group that fails there."""
     first = int(np.argmax(broken))
-    where = f"({int(broken.sum())} of {broken.size} variant(s), the first at index {first})"
+    where = f" ({int(broken.sum())} of {broken.size} variant(s), the first at index {first})"
+    if broken.size == 1:
+        where = ""
     take = one_variant(first, _quiet)
     groups = mechanism.groups
     with np.errstate(all="ignore"):
@@ -73,7 +75,7 @@ def _quiet(number: complex) -> np.generic:
 def _open(group: Group, gap_m: float, where: str, driven: str) -> MechanismError:
     return MechanismError(
         "does_not_assemble",
-        f"the group of {group.node} does not assemble: its links miss each other by {gap_m:.6g} m {where};"
+        f"the group of {group.node} does not assemble: its links miss each other by {gap_m:.6g} m{where};"
         f" check the lengths, the {driven}, and the sides of the groups before it",
     )
 
@@ -83,7 +85,7 @@ def _singular(group: Group, where: str, driven: str) -> MechanismError:
     why = WHAT_IS_IN_LINE.get(type(group), "its base has no length")
     return MechanismError(
         "singular",
-        f"the velocities of the group of {group.node} are not determined: {why} {where}; {advice}",
+        f"the velocities of the group of {group.node} are not determined: {why}{where}; {advice}",
     )
 
 

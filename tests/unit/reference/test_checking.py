@@ -229,7 +229,7 @@ def test_numbers_that_no_mechanism_has_are_told_with_their_group(change, words):
         ),
         (("group", 4, "lengths", [20, 26]), "does_not_assemble", r"group of C .* by 0\.304 m"),
         (("group", 9, "offset", 500), "does_not_assemble", r"group of C9 .* by 0\.2\d+ m"),
-        (("group", 8, "slot_deg", 180), "singular", "slot and guide are parallel .* two directions"),
+        (("group", 8, "slot_deg", 180), "singular", "slot and guide are parallel.* two directions"),
     ],
 )
 def test_what_does_not_close_or_move_is_told_by_its_group_and_by_how_much(change, code, words):

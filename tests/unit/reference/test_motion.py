@@ -64,7 +64,7 @@ CASES = [
     (
         Yoke("C", "A", array(0.5), FixedGuide(array(0j), array(0.5))),
         "singular",
-        "group of C .* slot and guide are parallel .* give slot and guide two directions",
+        "group of C .* slot and guide are parallel.* give slot and guide two directions",
     ),
 ]
 
