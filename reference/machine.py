@@ -6,6 +6,7 @@ variants at a time. Nothing is reordered or approximated: without `fastmath`, on
 """
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numba
@@ -37,9 +38,22 @@ CROSS, DOT = int(Op.CROSS), int(Op.DOT)
 ROOT, ABS, LARGER, NEAREST = int(Op.ROOT), int(Op.ABS), int(Op.LARGER), int(Op.NEAREST)
 SINE, COSINE = int(Op.SINE), int(Op.COSINE)
 
-compiled = numba.njit(cache=True, error_model="numpy", nogil=True)
-part = numba.njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
-"""A function that only compiled ones call."""
+
+def _kept(**options: Any) -> Callable[[Callable[..., Any]], Any]:  # noqa: ANN401 - numba's options
+    """A decorator: compiled at the first call, and kept on disk where there is a place for it."""
+
+    def decorate(function: Callable[..., Any]) -> Any:  # noqa: ANN401 - numba has no types
+        try:
+            return numba.njit(cache=True, error_model="numpy", **options)(function)
+        except RuntimeError:  # neither beside the module nor in the user's own cache
+            return numba.njit(error_model="numpy", **options)(function)
+
+    return decorate
+
+
+compiled = _kept(nogil=True)
+part = _kept(no_cpython_wrapper=True)
+"""For functions that only compiled ones call."""
 
 
 @intrinsic
