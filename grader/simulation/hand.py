@@ -166,6 +166,8 @@ def choose_mistake(code: str, assignment: Assignment, variant: Variant, right: D
         return Mistake(code, VELOCITY, factor=RPM_FACTOR)
     if code == "arithmetic":
         ends = [v.head for v in right.construction.vectors.values() if v.part in {"n", "c"}]
+        if not ends:
+            raise ValueError(f"no component is computed in {assignment.id}")
         return Mistake(code, str(rng.choice(ends)), factor=float(rng.choice([0.5, 2.0, 0.1, 1.4])))
     choices = [m for plan in PLANS for m in single_mistakes(right, plan) if m.code == code]
     choices += [m for m in single_mistakes(right, MECHANISM) if m.code == code]

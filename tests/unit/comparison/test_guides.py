@@ -15,6 +15,7 @@ from tests.hands import changed, measured, sheet, task_for
 
 SHAPER = task_for("shaper", 7)
 PISTON = task_for("piston", 5)
+PUMP = task_for("pump", 7)
 LONGER = 1.25
 """How much longer a vector is made: far beyond its tolerance."""
 ROUNDING = 1e-9
@@ -65,6 +66,14 @@ def test_a_coriolis_component_follows_from_the_own_value_of_omega():
     assert outcomes["omega_3"].verdict == "none"
     assert outcomes["a_A3A_c"].verdict == "follow_through"
     assert ("follows", "omega_3") in {(one.code, one.params.get("of")) for one in outcomes["a_A3A_c"].reasons}
+
+
+def test_a_normal_component_follows_from_the_own_value_of_omega():
+    values = {"omega_3": PUMP.rates["omega_3"] * LONGER}
+    reading = stretched(measured(PUMP, directions=False), {"a_BA_n": LONGER**2})
+    assert verdicts(judge(PUMP, Submission(measured=reading)))["a_BA_n"] == "none"
+    found = verdicts(judge(PUMP, Submission(measured=reading, values=values)))
+    assert (found["omega_3"], found["a_BA_n"]) == ("none", "follow_through")
 
 
 def test_a_reversed_sliding_velocity_reverses_the_coriolis_component():
