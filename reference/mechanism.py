@@ -7,7 +7,7 @@ right (behind); an array where it differs between variants.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import NoneType
 from typing import Any, TypeVar, cast
 
@@ -219,6 +219,29 @@ class Mechanism:
     def is_ground(self, joint: str) -> bool:
         """Whether a joint does not move."""
         return joint in self.ground_m
+
+
+def moved(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
+    """The whole mechanism moved on the ground, metres."""
+
+    def onward(guide: Guide) -> Guide:
+        return replace(guide, through_m=guide.through_m + by) if isinstance(guide, FixedGuide) else guide
+
+    def carried(group: Group) -> Group:
+        match group:
+            case Slider(guide=guide):
+                return replace(group, guide=onward(guide))
+            case CrossSlider(guides=(first, second)):
+                return replace(group, guides=(onward(first), onward(second)))
+            case Yoke(guide=guide):
+                return replace(group, guide=replace(guide, through_m=guide.through_m + by))
+        return group
+
+    driver = mechanism.driver
+    if isinstance(driver, DrivenSlider):
+        driver = replace(driver, guide_m=driver.guide_m + by)
+    ground = {joint: place + by for joint, place in mechanism.ground_m.items()}
+    return Mechanism(ground, driver, tuple(carried(group) for group in mechanism.groups))
 
 
 def with_arrays(part: Part, change: Callable[[Array], Any]) -> Part:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.geometry import ComplexArray, FloatArray
-from reference.mechanism import Crank, Driver, Mechanism
+from reference.mechanism import Crank, Driver, Mechanism, moved
 from reference.numbers import larger
 from reference.picking import a_stretch, each_number_once, one_variant
 from reference.precision import EPSILON, LOSSY, REFUSED, refine
@@ -82,12 +82,24 @@ def move_where_possible(
     mechanism: Mechanism, *, accelerations: bool = True, solver: Solver | None = None
 ) -> Motion:
     """As `move`, but nan (and an infinite predicted error) for variants without a motion."""
+    origin = _origin(mechanism)
+    if np.any(origin):
+        # Far from the coordinates' origin, differences of places lose digits: solved about the driven link.
+        motion = move_where_possible(moved(mechanism, -origin), accelerations=accelerations, solver=solver)
+        motion.position.update({name: place + origin for name, place in motion.position.items()})
+        return motion
     count = _count(mechanism.driver)
     motion = (solver or _by_numpy)(mechanism, count, accelerations)
     if motion.predicted_error.max(initial=0.0) > LOSSY:
         with np.errstate(all="ignore"):
             _refine(motion, mechanism, accelerations)
     return motion
+
+
+def _origin(mechanism: Mechanism) -> ComplexArray:
+    """The driven crank's pivot, or a point of the driven slider's guide."""
+    driver = mechanism.driver
+    return mechanism.ground_m[driver.pivot] if isinstance(driver, Crank) else driver.guide_m
 
 
 def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
@@ -208,7 +220,8 @@ def _one_by_one(mechanism: Mechanism, count: int, accelerations: bool) -> Motion
     """The same on Python's numbers, a variant after another; where they divide by zero, on arrays."""
     try:
         solutions = [
-            solve(mechanism, one_variant(index), accelerations=accelerations) for index in range(count)
+            solve(mechanism, one_variant(index, among=count), accelerations=accelerations)
+            for index in range(count)
         ]
     except (ZeroDivisionError, OverflowError):
         with np.errstate(all="ignore"):

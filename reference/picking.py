@@ -24,15 +24,18 @@ def a_stretch(rows: slice) -> Take:
     return take
 
 
-def one_variant(index: int, number: Callable[[Any], Any] | None = None) -> Take:
+def one_variant(index: int, number: Callable[[Any], Any] | None = None, *, among: int | None = None) -> Take:
     """Takes the numbers of one variant out of arrays over variants (those of one entry hold for all).
 
-    Arguments: `number` makes another kind of number of a float or complex.
+    Arguments: `number` makes another kind of number of a float or complex; `among`, where given, is the
+    number of variants, and an array of another size raises ValueError.
     """
 
     def take(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
         if type(values) is int:
             return values
+        if values.size != 1 and among is not None and values.size != among:
+            raise ValueError(f"data of {values.size} variants in a mechanism whose driver has {among}")
         one = values.item() if values.size == 1 else values.item(index)
         return one if number is None else number(one)
 

@@ -1,8 +1,11 @@
 """Motion of many variants: those without one stand out by name and number, the others are untouched."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from reference.assignment import load_assignment
 from reference.errors import MechanismError
 from reference.mechanism import (
     Crank,
@@ -15,11 +18,14 @@ from reference.mechanism import (
     Slider,
     SlottedLink,
     Yoke,
+    moved,
 )
 from reference.motion import move, move_where_possible
 from reference.precision import EPSILON
 
 HALF_TURN = np.pi
+FAR_OFF = 1e-8
+"""A thousand kilometres away, places themselves are rounded to 1e-10 m, and links are 0.1 m long."""
 
 
 def array(*values):
@@ -130,3 +136,20 @@ def test_a_data_of_one_entry_hold_for_all_variants():
     for index, angle in enumerate(angles):
         one = move(mechanism(dyad(1.5, 2.0), angles=(angle,)))
         np.testing.assert_allclose(motion.acceleration["B"][index], one.acceleration["B"][0], rtol=1e-12)
+
+
+def test_a_mechanism_far_from_the_origin_moves_as_exactly_as_at_home():
+    assignment = load_assignment("shaper")
+    at_home = assignment.mechanism(assignment.variants())
+    far = move(moved(at_home, np.full(30, 2.0**20 + 2.0**20 * 1j)))
+    near = move(at_home)
+    for joint, velocity in near.velocity.items():
+        assert np.all(np.abs(far.velocity[joint] - velocity) <= FAR_OFF * np.max(np.abs(velocity)))
+
+
+def test_arrays_of_more_variants_than_the_driver_has_are_told():
+    assignment = load_assignment("pump")
+    one = assignment.mechanism(assignment.variants()[:1])
+    many = assignment.mechanism(assignment.variants())
+    with pytest.raises(ValueError, match="30 variants in a mechanism whose driver has 1"):
+        move(replace(one, groups=many.groups))
