@@ -1,0 +1,97 @@
+"""Whatever the mechanism: a perfect hand has full marks, a wrong component costs, nothing falls over."""
+
+import contextlib
+from pathlib import Path
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from grader.comparison import Submission, Task, task_of
+from grader.judging import judge
+from grader.measurements import names_of
+from grader.rubric import RubricFile
+from reference.assignment import Assignment, Variant
+from reference.authored import AssignmentFile, validate
+from reference.mechanism import Mechanism
+from reference.mistakes import Drawing, Mistake, single_mistakes
+from reference.motion import move
+from tests.hands import drawn_nodes, measured, sheet
+from tests.laws.mechanisms import authored
+
+LARGEST_MM = 120.0
+"""Of a plan's longest vector as drawn."""
+FEW = 25
+
+
+def largest(vectors) -> float:
+    """The largest of a plan's vectors; 1 where all are zero."""
+    size = max((float(np.abs(vector).max()) for vector in vectors.values()), default=0.0)
+    return size or 1.0
+
+
+def task_for(mechanism: Mechanism) -> Task:
+    """The task of a random mechanism: everything asked for, at scales that suit the paper."""
+    motion = move(mechanism)
+    scales = {
+        "kL": largest(motion.position) / LARGEST_MM,
+        "kv": largest(motion.velocity) / LARGEST_MM,
+        "ka": largest(motion.acceleration) / LARGEST_MM,
+    }
+    table = {
+        "schema_version": 1,
+        "id": "random",
+        "title": {"en": "random"},
+        "task": {"en": "Draw."},
+        "mechanism": authored(mechanism),
+        "rubric": "random",
+        "scales": {name: repr(scale) for name, scale in scales.items()},
+        "page": [{"kind": "all", "figures": ["mechanism", "velocity_plan", "acceleration_plan"]}],
+    }
+    file = validate(AssignmentFile, table, "random")
+    assert not isinstance(file.mechanism, str)
+    assignment = Assignment(file, file.mechanism, Path("random"))
+    names = names_of(assignment)
+    asked = [("vector", name) for name in names.vectors if name not in names.unused]
+    asked += [("angular", name) for name in names.rates]
+    criteria = [{"id": name, kind: name, "points": 1.0, "title": {"en": name}} for kind, name in asked]
+    rubric = {"schema_version": 1, "id": "random", "title": {"en": "random"}, "criterion": criteria}
+    return task_of(assignment, validate(RubricFile, rubric, "random"), Variant())
+
+
+def lost(judgement) -> list[tuple[str, str]]:
+    return [(one.criterion, one.verdict) for one in judgement.outcomes if one.verdict != "full"]
+
+
+@given(mechanism=...)
+@settings(max_examples=FEW, deadline=None)
+def test_a_perfect_hand_has_full_marks_on_any_mechanism(mechanism: Mechanism):
+    task = task_for(mechanism)
+    values = {**{name: abs(real) for name, real in task.real.items()}, **task.rates}
+    for submission in (
+        Submission(measured=measured(task), values=values),
+        Submission(measured=measured(task, directions=False), values=values),
+        Submission(readings=(sheet(task, se_mm=0.0),), values=values),
+    ):
+        judgement = judge(task, submission)
+        assert not lost(judgement)
+        assert not judgement.mistakes
+
+
+@given(mechanism=..., lot=st.randoms())
+@settings(max_examples=FEW, deadline=None)
+def test_any_mistake_on_any_mechanism_is_marked_and_told(mechanism: Mechanism, lot):
+    task = task_for(mechanism)
+    drawing = Drawing(task.construction, task.parameters)
+    offered = [one for figure in task.construction.figures for one in single_mistakes(drawing, figure)]
+    mistake: Mistake = lot.choice(offered)
+    with contextlib.suppress(ValueError):  # some have no drawing: parallel lines do not meet
+        nodes = drawn_nodes(task, mistakes=(mistake,))
+        if all(np.isfinite(node) for node in nodes.values()):
+            submission = Submission(readings=(sheet(task, mistakes=(mistake,)),))
+            judgement = judge(task, submission)
+            assert len(judgement.outcomes) == len(task.rubric.criterion)
+            assert 0.0 <= judgement.score.low <= judgement.score.high <= judgement.score.maximum
+            assert {one.code for one in judgement.mistakes} <= {one.code for one in offered} | {
+                "arithmetic", "labels_swapped", "other_variant",
+            }  # fmt: skip
