@@ -22,13 +22,15 @@ from reference.numbers import larger
 from reference.picking import a_stretch, each_number_once, one_variant
 from reference.precision import EPSILON, LOSSY, REFUSED, refine
 from reference.refusal import reason
-from reference.solving import Solution, solve
+from reference.solving import Solution, as_it_is, solve
 
 SAFETY = 32.0
 """Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""
 FEW = 3
 """So many variants are faster one by one, on Python's numbers."""
 
+CLASSES = 200
+"""From so many variants on it pays to calculate once what they share."""
 MANY, STRETCH = 100_000, 8192
 """From so many variants on, arrays are taken so long at a time: what is between stays near the processor."""
 
@@ -196,11 +198,13 @@ def predicted_error_of(amplification: Any) -> FloatArray:  # noqa: ANN401 - an a
 
 
 def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
-    solution = solve(mechanism, each_number_once, accelerations=accelerations)
+    take = as_it_is if count < CLASSES else each_number_once
+    solution = solve(mechanism, take, accelerations=accelerations)
     shape = (count,)
 
     def wide(values: Any) -> Any:  # noqa: ANN401 - real or complex, array or number
-        return values if np.shape(values) == shape else np.array(np.broadcast_to(values, shape))
+        own = np.shape(values) == shape and values.flags.writeable
+        return values if own else np.array(np.broadcast_to(values, shape))
 
     joints = solution.joints
     predicted = predicted_error_of(wide(_amplification(solution)))

@@ -47,10 +47,10 @@ def with_variants(motion, rows):
     )
 
 
-@pytest.mark.parametrize("count", [1, 3, 30])
+@pytest.mark.parametrize("count", [1, 3, 30, 300])
 def test_data_that_all_variants_share_are_as_good_as_a_copy_for_each(count):
     assignment = load_assignment("pump")
-    mechanism = assignment.mechanism(assignment.variants()[:count])
+    mechanism = assignment.mechanism((assignment.variants() * 10)[:count])
     shared, copied = mechanism.groups[0].lengths_m[0], with_arrays(mechanism, np.array)
     assert shared.shape == (count,)
     assert count == 1 or shared.strides == (0,)
