@@ -1,7 +1,9 @@
 """Marking where blocks slide on turning links, and where a slider drives instead of a crank."""
 
+import cmath
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from grader.comparison import Submission, compare
@@ -10,8 +12,9 @@ from grader.judging import judge
 from grader.measurements import names_of
 from grader.records import Figure, Reading
 from reference.assignment import load_assignment
+from reference.construction import evaluate
 from reference.mistakes import Mistake
-from tests.hands import changed, measured, sheet, task_for
+from tests.hands import changed, drawn_nodes, measured, sheet, task_for
 
 SHAPER = task_for("shaper", 7)
 PISTON = task_for("piston", 5)
@@ -19,6 +22,8 @@ PUMP = task_for("pump", 7)
 LONGER = 1.25
 """How much longer a vector is made: far beyond its tolerance."""
 ROUNDING = 1e-9
+ASTRAY_RAD = 0.1
+"""By which a crank is drawn in a wrong position."""
 
 
 def verdicts(judgement):
@@ -156,3 +161,14 @@ def test_a_sketch_without_pivots_still_has_its_plans_marked():
     reading = replace(whole, figures={**whole.figures, "mechanism": Figure(joints, {})})
     judgement = judge(PISTON, Submission(readings=(Reading(reading.figures),)))
     assert set(verdicts(judgement).values()) <= {"full", "not_judged"}
+
+
+def test_what_follows_from_a_wrong_sketch_with_its_own_distances_is_charged_once():
+    right = drawn_nodes(SHAPER)
+    astray = right["O1"] + (right["A"] - right["O1"]) * cmath.rect(1.0, ASTRAY_RAD)
+    found = evaluate(SHAPER.construction, SHAPER.parameters, given={"A": np.asarray(astray)})
+    moved = {name: complex(at) - right[name] for name, at in found.items()}
+    judgement = judge(SHAPER, Submission(readings=(sheet(SHAPER, moved=moved),)))
+    found_verdicts = verdicts(judgement)
+    assert {name for name, verdict in found_verdicts.items() if verdict in {"none", "partial"}} == {"v_A"}
+    assert found_verdicts["a_A3A_c"] == found_verdicts["a_A3_n"] == "follow_through"
