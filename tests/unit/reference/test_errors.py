@@ -49,7 +49,7 @@ def test_a_dyad_in_line_is_singular_and_named():
             "side": "left",
         }
     )
-    with pytest.raises(MechanismError, match="group of B are not determined: its links are in line;") as error:
+    with pytest.raises(MechanismError, match="group of B are not determined: its links are in line") as error:
         move(build_mechanism(file, {}, 1))
     assert error.value.code == "singular"
 
