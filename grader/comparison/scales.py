@@ -81,7 +81,8 @@ def _parsed(task: Task, name: str, text: str | None) -> ParsedScale | None:
     bare = next((unit for scale, unit in units.items() if scale == name), None)
     parsed = parse_scale(name, text, bare_unit=bare)
     if isinstance(parsed, ByRule) and "omega" in parsed.powers and task.omega is None:
-        return Refused(f"a slider drives this mechanism, there is no crank's omega; write {EXAMPLES[name]}")
+        with_unit, _, _ = EXAMPLES[name].partition(" or ")
+        return Refused(f"a slider drives this mechanism, there is no crank's omega; write {with_unit}")
     return parsed
 
 

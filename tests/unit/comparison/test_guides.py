@@ -142,6 +142,8 @@ def test_a_scale_by_the_cranks_omega_is_refused_where_there_is_no_crank():
     declared = {"kL": "1:5", "kv": "kv = omega kL"}
     judgement = judge(PISTON, Submission(measured=measured(PISTON), declared=declared))
     assert "a slider drives" in judgement.scales["kv"].refused
+    assert "(m/s)/mm" in judgement.scales["kv"].refused
+    assert "omega kL" not in judgement.scales["kv"].refused
     assert judgement.scales["kv"].assumed
 
 
