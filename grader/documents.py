@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from reference.authored import AssignmentFile, MechanismFile
+from reference.assignment_file import AssignmentFile
 from reference.errors import CallError
+from reference.mechanism_file import MechanismFile
 from reference.mistakes import Code
 
 SCHEMA_VERSION = 1

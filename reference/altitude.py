@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reference.construction import Construction, Vector, evaluate
+from reference.elements import Along, Component, Line, Normal
 from reference.errors import CallError
 from reference.geometry import ComplexArray
 from reference.plan import Plan
-from reference.steps import Along, Component, Given, Line, Normal, Step, TwoLines
+from reference.steps import Given, Step, TwoLines
 
 FIGURE = "altitude"
 RATIO_TOLERANCE = 1e-6

@@ -6,23 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from reference import groups
-from reference.authored import (
-    LENGTH_UNITS_M,
-    AnyGroupTable,
-    CrankTable,
-    CrossSliderTable,
-    DrivenSliderTable,
-    DyadTable,
-    FixedGuideTable,
-    GuideTable,
-    MechanismFile,
-    PlateTable,
-    PointOnLineTable,
-    PointTable,
-    SliderTable,
-    SlottedLinkTable,
-    YokeTable,
-)
+from reference.authored import LENGTH_UNITS_M
 from reference.formula import Formula, FormulaError, Value
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import (
@@ -44,6 +28,22 @@ from reference.mechanism import (
     SlottedLink,
     Yoke,
     with_arrays,
+)
+from reference.mechanism_file import (
+    AnyGroupTable,
+    CrankTable,
+    CrossSliderTable,
+    DrivenSliderTable,
+    DyadTable,
+    FixedGuideTable,
+    GuideTable,
+    MechanismFile,
+    PlateTable,
+    PointOnLineTable,
+    PointTable,
+    SliderTable,
+    SlottedLinkTable,
+    YokeTable,
 )
 
 IN_LINE_TOLERANCE = 1e-9

@@ -15,12 +15,13 @@ import numpy as np
 
 from reference import authored
 from reference.assembly import LARGEST, build_driver, build_mechanism
-from reference.authored import AssignmentFile, MechanismFile
+from reference.assignment_file import AssignmentFile
 from reference.checking import check_mechanism
 from reference.errors import AuthoredFileError, CallError, Finding
 from reference.formula import Formula, FormulaError, Value
 from reference.geometry import FloatArray
 from reference.mechanism import Crank, Driver, Mechanism
+from reference.mechanism_file import MechanismFile
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,8 @@ import difflib
 from collections.abc import Iterator
 from itertools import permutations
 
-from reference.authored import (
+from reference.errors import Finding
+from reference.mechanism_file import (
     AnyGroupTable,
     CrossSliderTable,
     DyadTable,
@@ -17,7 +18,6 @@ from reference.authored import (
     SlottedLinkTable,
     YokeTable,
 )
-from reference.errors import Finding
 
 Keyed = Iterator[tuple[str, str]]
 """A key of the group's table, and the joint that stands there."""

@@ -17,8 +17,9 @@ from typing import Literal
 
 import numpy as np
 
+from reference.elements import Errors, Nodes, Parameters, View
 from reference.geometry import ComplexArray
-from reference.steps import Errors, Nodes, Parameters, Similar, Step, View
+from reference.steps import Similar, Step
 
 Part = Literal["", "n", "t", "c", "r"]
 

@@ -29,6 +29,7 @@ from reference.draft import (
     sliding,
     turning,
 )
+from reference.elements import Along, Fixed, FixedLine, Line, Normal, Scaled
 from reference.mechanism import (
     Crank,
     CrossSlider,
@@ -48,20 +49,14 @@ from reference.mechanism import (
 from reference.parameters import pair
 from reference.program import leaves_of
 from reference.steps import (
-    Along,
     ArcAndLine,
     Coincide,
     Divide,
-    Fixed,
-    FixedLine,
     Given,
-    Line,
     Local,
-    Normal,
     OnGuide,
     Pivot,
     Pole,
-    Scaled,
     Similar,
     Step,
     Tangent,

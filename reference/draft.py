@@ -8,22 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from reference.construction import AngularRate, Vector
+from reference.elements import Along, Coriolis, Fixed, FixedLine, Line, Normal
 from reference.mechanism import FixedGuide, Guide, Mechanism
 from reference.parameters import pair
-from reference.steps import (
-    Along,
-    Coincide,
-    Coriolis,
-    Divide,
-    Fixed,
-    FixedLine,
-    Given,
-    Line,
-    Normal,
-    Similar,
-    Step,
-    TwoLines,
-)
+from reference.steps import Coincide, Divide, Given, Similar, Step, TwoLines
 
 VELOCITY_POLE, ACCELERATION_POLE = "o", "o'"
 

@@ -13,24 +13,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from reference.construction import Construction, Vector, ancestors
-from reference.steps import (
-    Along,
-    ArcAndLine,
-    Coincide,
-    Coriolis,
-    Direction,
-    Fixed,
-    Given,
-    Line,
-    Local,
-    Normal,
-    Parameters,
-    Similar,
-    Step,
-    TwoArcs,
-    TwoLines,
-    View,
-)
+from reference.elements import Along, Coriolis, Direction, Fixed, Line, Normal, Parameters, View
+from reference.steps import ArcAndLine, Coincide, Given, Local, Similar, Step, TwoArcs, TwoLines
 
 Code = Literal[
     "parallel_for_perpendicular",

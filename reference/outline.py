@@ -3,19 +3,8 @@
 from collections.abc import Iterator, Mapping
 
 from reference.construction import Construction
-from reference.steps import (
-    ArcAndLine,
-    Coincide,
-    Divide,
-    Fixed,
-    Given,
-    Line,
-    Local,
-    Step,
-    Tangent,
-    TwoArcs,
-    TwoLines,
-)
+from reference.elements import Fixed, Line
+from reference.steps import ArcAndLine, Coincide, Divide, Given, Local, Step, Tangent, TwoArcs, TwoLines
 
 
 def bars(construction: Construction) -> tuple[tuple[str, str], ...]:

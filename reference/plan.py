@@ -13,12 +13,13 @@ from reference.assignment import Assignment, Scales, Variant
 from reference.construction import Construction, Vector, evaluate
 from reference.derivation import construction_of
 from reference.draft import image_name
+from reference.elements import Normal, View
 from reference.geometry import ComplexArray, FloatArray, cross, dot
 from reference.mechanism import Mechanism
 from reference.mistakes import Drawing
 from reference.motion import Motion, move
 from reference.parameters import parameters_of
-from reference.steps import Given, Normal, TwoLines, View
+from reference.steps import Given, TwoLines
 
 ZERO_SHARE = 1e-9
 """A vector shorter than this share of its plan's size is a zero vector and has no direction."""

@@ -12,7 +12,7 @@ from grader.layout import MAX_FIELDS, SCALE_BOXES, Layout, PageLayout, field_box
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, Identity, Problem
 from grader.roster import RosterRow
 from reference.assignment import Assignment, Variant
-from reference.authored import PageTable
+from reference.assignment_file import PageTable
 from reference.errors import AuthoredFileError, CallError, Finding
 
 _SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}

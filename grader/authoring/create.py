@@ -12,8 +12,10 @@ from grader.authoring.toml import commented
 from grader.files import create_whole
 from grader.rubric import RubricFile, load_rubric
 from reference.assignment import SUFFIXES, Assignment, load_assignment
-from reference.authored import TRADITIONS, AssignmentFile, MechanismFile, validate
+from reference.assignment_file import TRADITIONS, AssignmentFile
+from reference.authored import validate
 from reference.errors import CallError
+from reference.mechanism_file import MechanismFile
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 GROUPS = (

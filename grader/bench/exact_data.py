@@ -9,18 +9,6 @@ from mpmath import mp, mpf
 
 from grader.bench.arrays import one_of
 from reference.assignment import Assignment, Variant
-from reference.authored import (
-    CrankTable,
-    DyadTable,
-    FixedGuideTable,
-    GuideTable,
-    PlateTable,
-    PointOnLineTable,
-    PointTable,
-    SliderTable,
-    SlottedLinkTable,
-    YokeTable,
-)
 from reference.formula import Formula
 from reference.mechanism import (
     Crank,
@@ -39,6 +27,18 @@ from reference.mechanism import (
     SlotPoint,
     SlottedLink,
     Yoke,
+)
+from reference.mechanism_file import (
+    CrankTable,
+    DyadTable,
+    FixedGuideTable,
+    GuideTable,
+    PlateTable,
+    PointOnLineTable,
+    PointTable,
+    SliderTable,
+    SlottedLinkTable,
+    YokeTable,
 )
 
 DIGITS = 60

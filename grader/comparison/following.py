@@ -16,7 +16,8 @@ import numpy as np
 from grader.comparison.evidence import Evidence
 from grader.comparison.task import SCALE_NAMES, Task
 from reference.construction import AngularRate, Vector, ancestors, evaluate
-from reference.steps import Coriolis, Divide, Given, Normal, Similar
+from reference.elements import Coriolis, Normal
+from reference.steps import Divide, Given, Similar
 
 
 @dataclass(frozen=True, slots=True)

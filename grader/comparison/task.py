@@ -8,9 +8,9 @@ import numpy as np
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference.assignment import Assignment, Variant
 from reference.construction import Construction, evaluate
+from reference.elements import Nodes, Parameters
 from reference.mechanism import Crank, Dyad, Mechanism, Slider
 from reference.plan import exact_plan
-from reference.steps import Nodes, Parameters
 
 SCALE_NAMES = ("kL", "kv", "ka")
 UNITS: Mapping[str, str] = {

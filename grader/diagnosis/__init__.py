@@ -24,9 +24,10 @@ from grader.records import VELOCITY_PLAN
 from reference import mistakes as operators
 from reference.assignment import Assignment, Variant
 from reference.construction import ancestors, evaluate
+from reference.elements import Along, Coriolis, Line, Nodes
 from reference.mistakes import Drawing
 from reference.parameters import parameters_of
-from reference.steps import Along, Coriolis, Given, Line, Nodes, Step, TwoLines
+from reference.steps import Given, Step, TwoLines
 
 LEAST_CONFIDENCE = 0.6
 """An explanation less certain than this is not told."""

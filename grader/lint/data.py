@@ -8,7 +8,7 @@ from grader.lint.findings import LintFinding
 from grader.lint.places import mechanism_place
 from grader.rubric import RubricFile, check_rubric
 from reference.assignment import Assignment
-from reference.authored import TRADITIONS
+from reference.assignment_file import TRADITIONS
 from reference.construction import Construction, ancestors
 from reference.draft import image_name
 from reference.formula import Formula

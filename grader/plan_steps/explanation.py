@@ -11,8 +11,9 @@ from grader.plan_steps import sentences
 from grader.plan_steps.words import TITLES, Speaker, speaker_of
 from reference.construction import Vector
 from reference.drawing.subject import SCALE_OF, Subject
+from reference.elements import Coriolis, Normal, Scaled
 from reference.mechanism import Crank
-from reference.steps import Coriolis, Given, Normal, Scaled, Step
+from reference.steps import Given, Step
 
 INTRODUCTIONS = {
     "mechanism": N_("Every real length is divided by %(scale)s."),

@@ -8,22 +8,17 @@ from markupsafe import Markup
 from grader.plan_steps import texts
 from grader.plan_steps.words import Speaker
 from reference import geometry
+from reference.elements import AnyLine, Coriolis, FixedLine, Length, Line, Scaled
 from reference.mechanism import SlottedLink, moving_guides
 from reference.steps import (
-    AnyLine,
     ArcAndLine,
     Coincide,
-    Coriolis,
     Divide,
-    FixedLine,
     Given,
-    Length,
-    Line,
     Local,
     OnGuide,
     Pivot,
     Pole,
-    Scaled,
     Similar,
     Step,
     Tangent,

@@ -8,8 +8,8 @@ from markupsafe import Markup, escape
 from grader.i18n import N_, UNITS, Tongue
 from grader.plan_steps import texts
 from reference.drawing.subject import SCALE_UNITS, VECTOR_UNITS, Subject, Wording
+from reference.elements import Along, Direction, Fixed, View
 from reference.lettering import Piece, pieces_of, scale_pieces
-from reference.steps import Along, Direction, Fixed, View
 
 TITLES = {
     "mechanism": N_("Mechanism"),

@@ -12,6 +12,7 @@ import numpy as np
 
 from grader.records import FloatArray
 from reference.construction import Construction, evaluate
+from reference.elements import Scaled
 from reference.geometry import ComplexArray
 from reference.mistakes import Drawing
 from reference.outline import bars, coincident
@@ -22,7 +23,6 @@ from reference.steps import (
     Given,
     Local,
     OnGuide,
-    Scaled,
     Similar,
     Step,
     Tangent,

@@ -7,8 +7,9 @@ import numpy as np
 
 from grader.records import FloatArray
 from reference.construction import Construction
+from reference.elements import Normal
 from reference.mistakes import Drawing, Mistake, commit, single_mistakes
-from reference.steps import Given, Normal
+from reference.steps import Given
 
 REGULAR = ("as constructed", "plates by similarity")
 COST_OF_SIMILARITY = 0.7

@@ -15,9 +15,10 @@ from grader.reading.placing import Place, Search, places
 from grader.records import FloatArray
 from reference.assignment import Assignment, Scales, Variant
 from reference.derivation import construction_of
+from reference.elements import FixedLine
 from reference.mistakes import Drawing, commit, single_mistakes
 from reference.parameters import parameters_of
-from reference.steps import ArcAndLine, FixedLine, OnGuide, Step, TwoLines
+from reference.steps import ArcAndLine, OnGuide, Step, TwoLines
 
 LEAST_LINK_MM = 6.0
 HARDLY = 0.4

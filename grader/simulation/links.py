@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from grader.simulation.hand import Task
+from reference.elements import FixedLine, Line
 from reference.mechanism import (
     Crank,
     Dyad,
@@ -17,7 +18,7 @@ from reference.mechanism import (
     Yoke,
     moving_guides,
 )
-from reference.steps import ArcAndLine, FixedLine, Line, OnGuide, Step, TwoLines
+from reference.steps import ArcAndLine, OnGuide, Step, TwoLines
 
 
 def links_of(task: Task) -> Iterator[tuple[str, str, str]]:

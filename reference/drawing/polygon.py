@@ -10,7 +10,8 @@ from reference.drawing.letters import Style, letters
 from reference.drawing.sketch import captioned
 from reference.drawing.subject import PLAN_COLOURS, Figure, Part, Subject
 from reference.drawing.symbols import HAIR_MM, point
-from reference.steps import Line, Step, TwoLines, View
+from reference.elements import Line, View
+from reference.steps import Step, TwoLines
 
 LETTER_MM, SMALL_LETTER_MM = 4.2, 3.4
 OVERRUN_MM = 5.0

@@ -12,7 +12,8 @@ from reference.drawing.links import unit
 from reference.drawing.sketch import LETTER_MM, PLATE_FILL
 from reference.drawing.subject import Figure, Subject
 from reference.drawing.symbols import point
-from reference.steps import Along, ArcAndLine, Given, Similar, Step, TwoArcs, TwoLines
+from reference.elements import Along
+from reference.steps import ArcAndLine, Given, Similar, Step, TwoArcs, TwoLines
 
 BEFORE, NOW = "#a3abb3", "#c8380a"
 NOW_WIDTH_MM = 0.3

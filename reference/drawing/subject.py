@@ -7,10 +7,10 @@ import numpy as np
 
 from reference.assignment import Assignment, Variant
 from reference.canvas import Bounds, Shape, bounds
+from reference.elements import View
 from reference.geometry import FloatArray
 from reference.lettering import Piece, Text, pieces_of, scale_pieces
 from reference.plan import ZERO_SHARE, Plan
-from reference.steps import View
 
 SCALE_OF = {"mechanism": "kL", "velocity_plan": "kv", "acceleration_plan": "ka"}
 SCALE_UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}

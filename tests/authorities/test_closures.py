@@ -7,8 +7,9 @@ import pytest
 from mpmath import mp, mpc
 
 from reference.assembly import build_mechanism
-from reference.authored import MechanismFile, validate
+from reference.authored import validate
 from reference.checking import check_mechanism
+from reference.mechanism_file import MechanismFile
 from reference.motion import move
 
 DIGITS = 40

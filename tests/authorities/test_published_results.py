@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from reference.assembly import build_mechanism
-from reference.authored import MechanismFile, validate
+from reference.authored import validate
 from reference.checking import check_mechanism
+from reference.mechanism_file import MechanismFile
 from reference.motion import Motion, move
 
 DOUBLE_PRECISION = 1e-12

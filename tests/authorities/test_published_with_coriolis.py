@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from reference.assembly import build_mechanism
-from reference.authored import MechanismFile, validate
+from reference.authored import validate
 from reference.checking import check_mechanism
 from reference.construction import evaluate
 from reference.derivation import construction_of
+from reference.mechanism_file import MechanismFile
 from reference.motion import move
 from reference.parameters import parameters_of
 

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from grader.cli.app import app
 from grader.documents import schema_names
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
-from reference import authored
+from reference import assignment_file, mechanism_file
 from reference.errors import PlanmarkError
 from reference.mistakes import CODES
 
@@ -112,17 +112,17 @@ def test_every_schema_is_named_where_its_document_is_described(name):
 
 
 TABLES = [
-    authored.MechanismFile,
-    authored.CrankTable,
-    authored.DyadTable,
-    authored.SliderTable,
-    authored.PlateTable,
-    authored.PointOnLineTable,
-    authored.AssignmentFile,
-    authored.VariantTable,
-    authored.ScalesTable,
-    authored.PageTable,
-    authored.GivenTable,
+    mechanism_file.MechanismFile,
+    mechanism_file.CrankTable,
+    mechanism_file.DyadTable,
+    mechanism_file.SliderTable,
+    mechanism_file.PlateTable,
+    mechanism_file.PointOnLineTable,
+    assignment_file.AssignmentFile,
+    assignment_file.VariantTable,
+    assignment_file.ScalesTable,
+    assignment_file.PageTable,
+    assignment_file.GivenTable,
     RubricFile,
     CriterionTable,
     ToleranceTable,

@@ -5,9 +5,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from reference.assembly import build_mechanism
-from reference.authored import MechanismFile, validate
+from reference.authored import validate
 from reference.checking import check_mechanism
 from reference.mechanism import Mechanism
+from reference.mechanism_file import MechanismFile
 from reference.motion import move
 from tests.laws.mechanisms import authored
 

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from reference.assignment import Scales
 from reference.construction import evaluate
 from reference.derivation import construction_of
+from reference.elements import View
 from reference.mechanism import Mechanism
 from reference.motion import move
 from reference.parameters import parameters_of
 from reference.plan import _nodes
-from reference.steps import View
 
 ROUNDING = 1e-9
 """Relative to the figure's size; lines may meet at 14 degrees, and errors add up over a dozen steps."""

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from grader.i18n import tongue
 from grader.plan_steps import explain, html_page, wording_of
 from reference.assignment import Assignment
-from reference.authored import AssignmentFile, MechanismFile, validate
+from reference.assignment_file import AssignmentFile
+from reference.authored import validate
 from reference.canvas import Label
 from reference.checking import check_mechanism
 from reference.draw import reference_drawing
@@ -17,6 +18,7 @@ from reference.drawing.labelling import lengths_inside, segments_of
 from reference.drawing.subject import Subject
 from reference.errors import MechanismError
 from reference.mechanism import Mechanism
+from reference.mechanism_file import MechanismFile
 from reference.plan import exact_plan
 from tests.laws.mechanisms import authored
 

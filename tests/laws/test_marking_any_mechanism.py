@@ -12,7 +12,8 @@ from grader.judging import judge
 from grader.measurements import names_of
 from grader.rubric import RubricFile
 from reference.assignment import Assignment, Variant
-from reference.authored import AssignmentFile, validate
+from reference.assignment_file import AssignmentFile
+from reference.authored import validate
 from reference.mechanism import Mechanism
 from reference.mistakes import Drawing, Mistake, single_mistakes
 from reference.motion import move

@@ -17,7 +17,8 @@ from grader.files import OutputError
 from grader.lint import lint
 from grader.rubric import CriterionTable, RubricFile, load_rubric, rubric_of
 from reference.assignment import built_in, load_assignment
-from reference.authored import AssignmentFile, Text
+from reference.assignment_file import AssignmentFile
+from reference.authored import Text
 from reference.errors import CallError
 from reference.plan import exact_plan
 

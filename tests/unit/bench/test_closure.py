@@ -15,10 +15,11 @@ from grader.bench.jets import Jet, dot, fixed, follow
 from grader.bench.singular import KINDS
 from reference.assembly import build_mechanism
 from reference.assignment import Variant, load_assignment
-from reference.authored import MechanismFile, validate
+from reference.authored import validate
 from reference.construction import Vector, evaluate
 from reference.derivation import construction_of
 from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, MovingGuide, Slider
+from reference.mechanism_file import MechanismFile
 from reference.motion import move
 from reference.parameters import parameters_of
 from reference.plan import _measured

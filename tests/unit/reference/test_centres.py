@@ -6,8 +6,8 @@ import pytest
 from reference.assignment import load_assignment
 from reference.centres import acceleration_poles, instantaneous_centres
 from reference.construction import evaluate
+from reference.elements import View
 from reference.plan import exact_plan
-from reference.steps import View
 
 ROUNDING = 1e-11
 """Of the centre's own distance: centres may lie far off."""

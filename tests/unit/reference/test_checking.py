@@ -3,11 +3,12 @@
 import pytest
 
 from reference.assembly import build_mechanism
-from reference.authored import MechanismFile, validate
+from reference.authored import validate
 from reference.checking import check_mechanism
 from reference.errors import AuthoredFileError, MechanismError
 from reference.formula import FormulaError
 from reference.mechanism import DrivenSlider, joints_of
+from reference.mechanism_file import MechanismFile
 from reference.motion import Motion, move
 from tests.every_group import mechanism_table
 

@@ -5,8 +5,9 @@ import pickle
 import pytest
 
 from reference.assembly import build_mechanism
-from reference.authored import MechanismFile, validate
+from reference.authored import validate
 from reference.errors import AuthoredFileError, CallError, Finding, MechanismError
+from reference.mechanism_file import MechanismFile
 from reference.motion import move
 
 
