@@ -84,14 +84,13 @@ def move_where_possible(
     mechanism: Mechanism, *, accelerations: bool = True, solver: Solver | None = None
 ) -> Motion:
     """As `move`, but nan (and an infinite predicted error) for variants without a motion."""
-    origin = _origin(mechanism)
+    count, origin = _count(mechanism.driver), _origin(mechanism)
     if np.any(origin):
         # Far from the coordinates' origin, differences of places lose digits: solved about the driven link.
-        motion = move_where_possible(moved(mechanism, -origin), accelerations=accelerations, solver=solver)
+        motion = (solver or _by_numpy)(moved(mechanism, -origin), count, accelerations)
         motion.position.update({name: place + origin for name, place in motion.position.items()})
-        return motion
-    count = _count(mechanism.driver)
-    motion = (solver or _by_numpy)(mechanism, count, accelerations)
+    else:
+        motion = (solver or _by_numpy)(mechanism, count, accelerations)
     if motion.predicted_error.max(initial=0.0) > LOSSY:
         with np.errstate(all="ignore"):
             _refine(motion, mechanism, accelerations)

