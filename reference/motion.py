@@ -75,7 +75,7 @@ def move(mechanism: Mechanism, *, accelerations: bool = True, solver: Solver | N
     group does not assemble, or that its velocities are not determined there.
     """
     motion = move_where_possible(mechanism, accelerations=accelerations, solver=solver)
-    if motion.predicted_error.max(initial=0.0) > REFUSED:
+    if motion.predicted_error.max() > REFUSED:
         raise reason(mechanism, np.isinf(motion.predicted_error))
     return motion
 
@@ -85,13 +85,13 @@ def move_where_possible(
 ) -> Motion:
     """As `move`, but nan (and an infinite predicted error) for variants without a motion."""
     count, origin = _count(mechanism.driver), _origin(mechanism)
-    if np.any(origin):
+    if origin.any():
         # Far from the coordinates' origin, differences of places lose digits: solved about the driven link.
         motion = (solver or _by_numpy)(moved(mechanism, -origin), count, accelerations)
         motion.position.update({name: place + origin for name, place in motion.position.items()})
     else:
         motion = (solver or _by_numpy)(mechanism, count, accelerations)
-    if motion.predicted_error.max(initial=0.0) > LOSSY:
+    if motion.predicted_error.max() > LOSSY:
         with np.errstate(all="ignore"):
             _refine(motion, mechanism, accelerations)
     return motion
