@@ -34,9 +34,12 @@ def one_variant(index: int, number: Callable[[Any], Any] | None = None, *, among
     def take(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
         if type(values) is int:
             return values
-        if values.size != 1 and among is not None and values.size != among:
+        if values.size == 1:
+            one = values.item()
+        elif among in {None, values.size}:
+            one = values.item(index)
+        else:
             raise ValueError(f"data of {values.size} variants in a mechanism whose driver has {among}")
-        one = values.item() if values.size == 1 else values.item(index)
         return one if number is None else number(one)
 
     return take
