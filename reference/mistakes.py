@@ -6,7 +6,7 @@ codes are those of the published contract.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
@@ -127,9 +127,13 @@ def _changed_step(mistake: Mistake, construction: Construction) -> Step:
     raise ValueError(f"{mistake.code} cannot be made at the step of {mistake.at}")
 
 
-def _with_line(step: TwoLines, slot: int, change) -> TwoLines:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _with_line(step: TwoLines, slot: int, change: Callable[[Line], Line]) -> TwoLines:
+    """One of the two lines changed; raises ValueError for a fixed guide on the sketch."""
     lines = [step.first, step.second]
-    lines[slot] = change(lines[slot])
+    line = lines[slot]
+    if not isinstance(line, Line):
+        raise ValueError(f"line {slot} of {step.node} is a guide on the ground: it is given")  # noqa: TRY004
+    lines[slot] = change(line)
     return TwoLines(step.node, *lines)
 
 

@@ -133,12 +133,12 @@ class Real(Noted):
 
     def __pow__(self, exponent: int) -> "Scalar":
         if exponent != 2:
-            raise NotImplementedError(f"a power of {exponent}: only squares are noted")
+            raise ValueError(f"a power of {exponent}: only squares are noted")
         return _times(self, self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plane(Noted):
+class Plane:
     """A complex number of two such; known parts are plain floats."""
 
     real: "Scalar"

@@ -5,6 +5,7 @@ not give. A root of a negative number is nan: the figure does not close there.
 """
 
 import math
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -15,30 +16,30 @@ Complex = Any
 """complex, mpc, or an array of shape (N,) of complex numbers."""
 
 
-class Noted:
-    """A number that only notes what is done with it (`reference.program`), these functions included."""
+class Noted(ABC):
+    """A real number that only notes what is done with it (`reference.program`), these functions included."""
 
     __slots__ = ()
 
+    @abstractmethod
     def root(self) -> Number:
         """The square root."""
-        raise NotImplementedError
 
+    @abstractmethod
     def sine(self) -> Number:
         """The sine."""
-        raise NotImplementedError
 
+    @abstractmethod
     def cosine(self) -> Number:
         """The cosine."""
-        raise NotImplementedError
 
+    @abstractmethod
     def nearest(self) -> Number:
         """The nearest whole number."""
-        raise NotImplementedError
 
+    @abstractmethod
     def larger(self, other: Number) -> Number:
         """The larger of two."""
-        raise NotImplementedError
 
 
 def root(x: Number) -> Number:
