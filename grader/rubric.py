@@ -141,7 +141,8 @@ def load_rubric(name: str | Path, *, beside: Path | None = None) -> RubricFile:
     """
     path = locate("rubric", str(name), beside)
     if not path.is_file() and not str(name).endswith(".toml"):
-        raise CallError("unknown_rubric", f"there is no rubric '{name}' (looked for {path})")
+        places = "among the built-in ones" if beside is None else f"in {beside.parent} and the built-in ones"
+        raise CallError("unknown_rubric", f"there is no rubric '{name}': {path.name} was looked for {places}")
     return _load(path.resolve(), path.stat().st_mtime_ns if path.is_file() else 0)
 
 
