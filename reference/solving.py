@@ -65,22 +65,30 @@ class Solution:
     take: Take = as_it_is
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Rail:
-    """A guide in motion: a point of it, its direction, and the rates of the link that carries it."""
+    """A guide in motion: a point of it, its direction, and the rates of the link that carries it.
+
+    Most guides are fixed: what does not turn moves as its point does, and nothing is calculated.
+    """
 
     joint: Joint
     along: Complex
-    omega: Number
-    epsilon: Number
-    amplification: Number
+    amplification: Number = 1.0
+    omega: Number = 0.0
+    epsilon: Number = 0.0
+    turns: bool = False
 
     def velocity(self, place: Complex) -> Complex:
         """Of the link's point at a place."""
+        if not self.turns:
+            return self.joint.velocity
         return self.joint.velocity + 1j * self.omega * (place - self.joint.position)
 
     def acceleration(self, place: Complex) -> Complex:
         """Of the link's point at a place."""
+        if not self.turns:
+            return self.joint.acceleration
         swing = groups.turned(place - self.joint.position, self.omega, self.epsilon)
         return self.joint.acceleration + swing
 
@@ -134,7 +142,7 @@ def _add(solution: Solution, group: Group, accelerations: bool) -> None:
                 _add_coincident(solution, guide, rail, node)
         case Yoke(node=node):
             pin = solution.joints[group.pin]
-            slot = Rail(pin, groups.heading(solution.take(group.slot_rad)), 0.0, 0.0, pin.amplification)
+            slot = Rail(pin, groups.heading(solution.take(group.slot_rad)), pin.amplification)
             _add_crossing(solution, node, (rail_of(solution, group.guide), slot), accelerations)
         case SlotPoint():
             _add_slot_point(solution, group, solution.take(group.local_m))
@@ -185,7 +193,7 @@ def _add_slider(solution: Solution, group: Slider, accelerations: bool) -> None:
     node = Joint(place, under + along * speed)
     if accelerations:
         under = rail.acceleration(place)
-        coriolis = 2.0 * rail.omega * speed
+        coriolis = 2.0 * rail.omega * speed if rail.turns else 0.0
         epsilon, slide = groups.rrp_acceleration(
             reach, height, along, pin.acceleration - under, omega, coriolis
         )
@@ -245,12 +253,12 @@ def rail_of(solution: Solution, guide: Guide) -> Rail:
     """A guide as it moves; raises KeyError where its link is not placed yet."""
     if isinstance(guide, FixedGuide):
         through, angle = solution.take(guide.through_m), solution.take(guide.angle_rad)
-        return Rail(Joint(through), groups.heading(angle), 0.0, 0.0, 1.0)
+        return Rail(Joint(through), groups.heading(angle))
     g, h = (solution.joints[joint] for joint in guide.base)
     d = _between(g, h)
     amplification = larger(g.amplification, h.amplification)
     epsilon = solution.epsilon.get(guide.link, 0.0)
-    return Rail(g, d / abs(d), solution.omega[guide.link], epsilon, amplification)
+    return Rail(g, d / abs(d), amplification, solution.omega[guide.link], epsilon, turns=True)
 
 
 def _add_coincident(solution: Solution, guide: Guide, rail: Rail, node: str) -> None:
