@@ -12,11 +12,12 @@ from collections.abc import Callable
 import numpy as np
 
 from reference.errors import CallError
+from reference.form import Array, leaves_of
 from reference.geometry import ComplexArray, FloatArray
 from reference.lowering import Steps, lower
-from reference.mechanism import Array, Mechanism
+from reference.mechanism import Mechanism
 from reference.motion import Motion, move, predicted_error_of
-from reference.program import Program, leaves_of, write_down
+from reference.program import Program, write_down
 
 BLOCK = 256
 """Variants that the machine takes at once: some dozens of registers of 2 KiB, near the processor."""

@@ -30,6 +30,7 @@ from reference.draft import (
     turning,
 )
 from reference.elements import Along, Fixed, FixedLine, Line, Normal, Scaled
+from reference.form import leaves_of
 from reference.mechanism import (
     Crank,
     CrossSlider,
@@ -47,7 +48,6 @@ from reference.mechanism import (
     moving_guides,
 )
 from reference.parameters import pair
-from reference.program import leaves_of
 from reference.steps import (
     ArcAndLine,
     Coincide,

@@ -6,10 +6,8 @@ left of the directed line between the group's pins (for a slider: ahead along it
 right (behind); an array where it differs between variants.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from types import NoneType
-from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -17,11 +15,6 @@ from reference.geometry import ComplexArray, FloatArray
 
 Pins = tuple[str, str]
 Side = int | FloatArray
-Array = np.ndarray[Any, np.dtype[Any]]
-"""Real or complex: one number for all variants, or one for each."""
-Part = TypeVar("Part")
-PLAIN = (str, int, float, complex, NoneType)
-"""What a mechanism is made of besides records, tuples, mappings and arrays."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,23 +235,6 @@ def moved(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
         driver = replace(driver, guide_m=driver.guide_m + by)
     ground = {joint: place + by for joint, place in mechanism.ground_m.items()}
     return Mechanism(ground, driver, tuple(carried(group) for group in mechanism.groups))
-
-
-def with_arrays(part: Part, change: Callable[[Array], Any]) -> Part:
-    """A mechanism, or a part of it, with every array replaced, in the order of its fields."""
-    return cast("Part", _changed(part, change))
-
-
-def _changed(part: Any, change: Callable[[Array], Any]) -> Any:  # noqa: ANN401 - whatever a part is made of
-    if isinstance(part, np.ndarray):
-        return change(part)
-    if isinstance(part, PLAIN):
-        return part
-    if isinstance(part, tuple):
-        return tuple([_changed(inner, change) for inner in part])
-    if isinstance(part, Mapping):
-        return {name: _changed(inner, change) for name, inner in part.items()}
-    return type(part)(*[_changed(getattr(part, name), change) for name in part.__slots__])
 
 
 def moving_guides(group: Group) -> tuple[MovingGuide, ...]:

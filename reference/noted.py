@@ -73,8 +73,30 @@ class Notes:
         return Real(self, self.index((op, *places)))
 
 
+class _Arithmetic:
+    """Sums, differences and products of real and complex numbers alike."""
+
+    __slots__ = ()
+
+    def __add__(self, other: "Number") -> "Number":
+        return _sum(cast("Number", self), other)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: "Number") -> "Number":
+        return _difference(cast("Number", self), other)
+
+    def __rsub__(self, other: "Number") -> "Number":
+        return _difference(other, cast("Number", self))
+
+    def __mul__(self, other: "Number") -> "Number":
+        return _product(cast("Number", self), other)
+
+    __rmul__ = __mul__
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Real(Noted):
+class Real(_Arithmetic, Noted):
     """A real number that notes what is done with it."""
 
     notes: Notes
@@ -109,22 +131,6 @@ class Real(Noted):
             return Real(self.notes, self.notes.index((op, *reversed(operands))))
         return _times(-1.0, self)
 
-    def __add__(self, other: "Number") -> "Number":
-        return _sum(self, other)
-
-    __radd__ = __add__
-
-    def __sub__(self, other: "Number") -> "Number":
-        return _difference(self, other)
-
-    def __rsub__(self, other: "Number") -> "Number":
-        return _difference(other, self)
-
-    def __mul__(self, other: "Number") -> "Number":
-        return _product(self, other)
-
-    __rmul__ = __mul__
-
     def __truediv__(self, other: "Scalar") -> "Scalar":
         return _over(self, other)
 
@@ -138,7 +144,7 @@ class Real(Noted):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plane:
+class Plane(_Arithmetic):
     """A complex number of two such; known parts are plain floats."""
 
     real: "Scalar"
@@ -154,22 +160,6 @@ class Plane:
 
     def __neg__(self) -> "Plane":
         return Plane(-self.real, -self.imag)
-
-    def __add__(self, other: "Number") -> "Number":
-        return _sum(self, other)
-
-    __radd__ = __add__
-
-    def __sub__(self, other: "Number") -> "Number":
-        return _difference(self, other)
-
-    def __rsub__(self, other: "Number") -> "Number":
-        return _difference(other, self)
-
-    def __mul__(self, other: "Number") -> "Number":
-        return _product(self, other)
-
-    __rmul__ = __mul__
 
     def __truediv__(self, other: "Scalar") -> "Plane":
         return Plane(_over(self.real, other), _over(self.imag, other))

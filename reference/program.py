@@ -5,14 +5,14 @@
 mechanism. `reference.lowering` turns it into steps for `reference.machine`.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
-from reference.mechanism import PLAIN, Array, Mechanism, with_arrays
+from reference.form import Array, with_arrays
+from reference.mechanism import Mechanism
 from reference.noted import Node, Notes, Number, Op, Plane, Real, parts_of
 from reference.numbers import larger
 from reference.solving import solve
@@ -68,31 +68,3 @@ def write_down(mechanism: Mechanism, shared: tuple[bool, ...], *, accelerations:
         tuple(reals),
         *map(tuple, (solution.joints, solution.omega, epsilon, solution.transmission)),
     )
-
-
-def leaves_of(mechanism: Mechanism) -> tuple[list[Array], tuple[object, ...]]:
-    """The arrays of a mechanism, and everything else about it: mechanisms alike in that have one program."""
-    leaves: list[Array] = []
-    form: list[object] = []
-    _collect(mechanism, leaves, form)
-    return leaves, tuple(form)
-
-
-def _collect(part: object, leaves: list[Array], form: list[object]) -> None:
-    if isinstance(part, np.ndarray):
-        leaves.append(part)
-        form.append(part.dtype.kind)
-    elif isinstance(part, PLAIN):
-        form.append(part)
-    else:
-        form.append(type(part))
-        for inner in _inside(part):
-            _collect(inner, leaves, form)
-
-
-def _inside(part: Any) -> list[object]:  # noqa: ANN401 - a record, a tuple or a mapping
-    if isinstance(part, tuple):
-        return [len(part), *part]
-    if isinstance(part, Mapping):
-        return [len(part), *part.keys(), *part.values()]
-    return [getattr(part, name) for name in part.__slots__]

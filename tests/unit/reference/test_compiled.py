@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from reference.assignment import built_in, load_assignment
 from reference.errors import CallError, MechanismError
-from reference.mechanism import Crank, Mechanism, with_arrays
+from reference.form import with_arrays
+from reference.mechanism import Crank, Mechanism
 from reference.motion import move, move_where_possible
 from tests.laws.mechanisms import KINDS, after, array, mechanisms, random_mechanism
 
