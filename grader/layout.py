@@ -4,7 +4,7 @@ Every printed page follows one of `TEMPLATES`. The template's number is in the i
 that a scanned page tells by itself where its zones are and grading needs no file beside it.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import accumulate
 from typing import Literal
@@ -33,8 +33,16 @@ SCALE_BOXES: dict[str, Box] = {
 _ZONE_GAP_MM = 4.0
 _FIELD_COLUMNS = ((39.0, 103.0), (159.0, 113.0), (289.0, 103.0))
 """Left edge and width of the three stretches between the foot's markers."""
-_FIELD_TOP_MM, _FIELD_HEIGHT_MM = 265.5, 20.0
-MAX_FIELDS = 60
+_FIELD_TOP_MM, _FIELD_HEIGHT_MM = 265.7, 20.2
+_FIELD_TIERS = ((1, 3), (2, 3), (3, 3), (3, 4), (4, 4))
+"""Rows, and boxes side by side in a stretch."""
+_FIELD_GAP_MM, _FIELD_MOST_MM = 0.9, 7.5
+EASY_FIELDS, MAX_FIELDS = 27, 48
+"""Up to how many boxes a cell is large enough for anybody's digits, and to be written in at all."""
+WHOLE_CELLS, TENTH_CELLS = 3, 1
+"""Of a measured length: hundreds, tens and ones of millimetres, then tenths after the printed mark."""
+_CELL_GAP_MM, _MARK_GAP_MM = 0.6, 2.2
+_CELL_MOST_MM = 5.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +113,8 @@ def _divisions() -> list[dict[str, Box]]:
         left, right = _cut(DRAWING_MM, (share, 1.0 - share), across=True)
         found.extend(_zones((m, v), left, (top, 1.0 - top), rows) | {a: right} for top in (0.4, 0.55))
         found.append({m: left} | _zones((v, a), right, (0.45, 0.55), rows))
+    # A plan nearly as wide as the sheet, and a small sketch beside it.
+    found.extend(_zones((m, plan), DRAWING_MM, (0.22, 0.78), columns) for plan in (v, a))
     return found
 
 
@@ -122,7 +132,7 @@ def template_of(marker_id: int) -> Template | None:
 
 
 def field_boxes(names: tuple[str, ...]) -> dict[str, Box]:
-    """Boxes for written lengths in the sheet's foot, as large as their number allows.
+    """Boxes for measured lengths in the sheet's foot, as large as their number allows.
 
     The label is printed left of the box, within the same cell. Beyond `MAX_FIELDS` names none is given.
     """
@@ -130,22 +140,40 @@ def field_boxes(names: tuple[str, ...]) -> dict[str, Box]:
         return {}
     rows, per_stretch = next(
         (rows, per_stretch)
-        for rows, per_stretch in ((1, 3), (1, 4), (2, 3), (2, 4), (2, 5), (3, 4), (3, 5), (4, 5))
+        for rows, per_stretch in _FIELD_TIERS
         if rows * per_stretch * len(_FIELD_COLUMNS) >= len(names)
     )
-    height = min(_FIELD_HEIGHT_MM / rows - 1.0, 8.0)
-    top = _FIELD_TOP_MM + (_FIELD_HEIGHT_MM - rows * (height + 1.0)) / 2.0 + 0.5
+    pitch = _FIELD_HEIGHT_MM / rows
+    height = min(pitch - _FIELD_GAP_MM, _FIELD_MOST_MM)
     cells: list[Box] = []
     for row in range(rows):
+        y = round(_FIELD_TOP_MM + row * pitch + (pitch - height) / 2.0, 3)
         for left, width in _FIELD_COLUMNS:
-            cell = width / per_stretch
-            label = min(12.0, 0.42 * cell)
-            y = round(top + row * (height + 1.0), 3)
+            share = width / per_stretch
+            most = (WHOLE_CELLS + TENTH_CELLS) * (_CELL_MOST_MM + _CELL_GAP_MM) + _MARK_GAP_MM
+            wide = min(most, 0.7 * share)
             cells.extend(
-                (round(left + k * cell + label, 3), y, round(cell - label - 1.0, 3), round(height, 3))
+                (round(left + (k + 1) * share - wide - 0.5, 3), y, round(wide, 3), round(height, 3))
                 for k in range(per_stretch)
             )
     return dict(zip(names, cells, strict=False))
+
+
+def comb_cells(box: Box) -> tuple[Box, ...]:
+    """The cells of a box for a measured length, a digit each, from the left; the last is the tenths'."""
+    x, y, wide, high = box
+    count = WHOLE_CELLS + TENTH_CELLS
+    cell = (wide - _MARK_GAP_MM - (count - 1 - TENTH_CELLS) * _CELL_GAP_MM) / count
+    steps = [k * (cell + _CELL_GAP_MM) for k in range(WHOLE_CELLS)]
+    steps += [
+        wide - (TENTH_CELLS - k) * cell - (TENTH_CELLS - 1 - k) * _CELL_GAP_MM for k in range(TENTH_CELLS)
+    ]
+    return tuple((round(x + step, 3), y, round(cell, 3), high) for step in steps)
+
+
+def combs_of(fields: Mapping[str, Box]) -> dict[str, tuple[Box, ...]]:
+    """The cells of every box for a measured length among a page's boxes; scales are written freely."""
+    return {name: comb_cells(box) for name, box in fields.items() if name not in SCALE_BOXES}
 
 
 class _Told(BaseModel):
@@ -160,11 +188,16 @@ class MarkerPlace(_Told):
 
 
 class PageLayout(_Told):
-    """Where everything is on the pages of one kind. `zones` holds the figures' boxes and `fields`."""
+    """Where everything is on the pages of one kind. `zones` holds the figures' boxes and `fields`.
+
+    `cells` holds, for each box of `fields` that a measured length is written in (millimetres), its
+    cells from the left: three digits, then the tenths.
+    """
 
     kind: Literal["all", "velocity", "acceleration", "calibration"]
     markers: list[MarkerPlace]
     zones: dict[str, Box | dict[str, Box]]
+    cells: dict[str, tuple[Box, ...]] = {}
 
 
 class Layout(_Told):

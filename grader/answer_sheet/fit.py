@@ -10,6 +10,7 @@ from grader.records import ACCELERATION_PLAN, MECHANISM
 from reference.assignment import Assignment, Variant
 from reference.construction import Construction, evaluate
 from reference.derivation import construction_of
+from reference.geometry import ComplexArray
 from reference.parameters import parameters_of
 
 MARGIN_MM = 12.0
@@ -41,20 +42,54 @@ def construction_for(assignment: Assignment, figures: Sequence[str]) -> Construc
     )
 
 
-def extents_mm(
+def places_mm(
     assignment: Assignment, figures: Sequence[str], variants: list[Variant]
-) -> dict[str, tuple[float, float]]:
-    """Largest width and height of each figure over variants, at the assignment's own scales."""
+) -> dict[str, ComplexArray]:
+    """Where the nodes of each figure are about its pole, at the assignment's own scales.
+
+    (nodes, variants) complex millimetres by figure, y up; a sketch's about its own origin.
+    """
     scales = assignment.scales(variants)
     construction = construction_for(assignment, figures)
     parameters = parameters_of(assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
     nodes = evaluate(construction, parameters)
-    found: dict[str, tuple[float, float]] = {}
-    for figure in figures:
-        places = np.stack(
+    return {
+        figure: np.stack(
             [np.broadcast_to(nodes[step.node], (len(variants),)) for step in construction.figures[figure]]
         )
-        found[figure] = (float(np.ptp(places.real, axis=0).max()), float(np.ptp(places.imag, axis=0).max()))
+        for figure in figures
+    }
+
+
+def extents_mm(
+    assignment: Assignment, figures: Sequence[str], variants: list[Variant]
+) -> dict[str, tuple[float, float]]:
+    """Largest width and height of each figure over variants, at the assignment's own scales."""
+    return {
+        figure: (float(np.ptp(places.real, axis=0).max()), float(np.ptp(places.imag, axis=0).max()))
+        for figure, places in places_mm(assignment, figures, variants).items()
+    }
+
+
+def poles_mm(
+    assignment: Assignment, template: Template, variants: list[Variant]
+) -> dict[str, list[tuple[float, float]]]:
+    """Where the poles of a template's plans are best put, sheet millimetres for each variant.
+
+    A plan begun there is in the middle of its zone. None of a plan that is larger than its zone, at
+    least in one variant: the student will choose another scale.
+    """
+    plans = [figure for figure in template.zones if figure != MECHANISM]
+    found = {}
+    for figure, places in places_mm(assignment, plans, variants).items():
+        x, y, wide, high = template.zones[figure]
+        low = places.real.min(axis=0) + 1j * places.imag.min(axis=0)
+        top = places.real.max(axis=0) + 1j * places.imag.max(axis=0)
+        if np.all((top - low).real <= wide - 2 * MARGIN_MM) and np.all(
+            (top - low).imag <= high - 2 * MARGIN_MM
+        ):
+            pole = complex(x + wide / 2.0, -y - high / 2.0) - (low + top) / 2.0
+            found[figure] = [(float(one.real), float(-one.imag)) for one in pole]
     return found
 
 

@@ -1,14 +1,24 @@
 """One printed page: head with the student's data and code, zones, boxes for written lengths."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import segno
 
 from grader.answer_sheet.drawing import GREY, Drawing, runs
-from grader.answer_sheet.words import BOLD, REGULAR, fitted, number, pieces_width_mm, wrap
+from grader.answer_sheet.words import (
+    BOLD,
+    REGULAR,
+    decimal_mark,
+    fitted,
+    number,
+    pieces_width_mm,
+    width_mm,
+    wrap,
+)
 from grader.i18n import N_, Tongue
-from grader.layout import CODE_MM, SCALE_BOXES, Template
+from grader.layout import CODE_MM, SCALE_BOXES, WHOLE_CELLS, Template, comb_cells
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, Identity
 from grader.sheet_code import code_of
 from reference.assignment import Assignment, Variant
@@ -29,11 +39,23 @@ UNITS = (N_("rev/min"), N_("cm"), N_("°"))
 
 _STUDENT_MM: Box = (39.0, 12.5, 103.0, 36.0)
 _TASK_MM: Box = (159.0, 12.5, 113.0, 36.0)
-_ADVICE = N_(
-    "Draw inside the zones. Keep letters 2 mm clear of lines; leave the black squares and the code free."
+_ADVICE = (
+    N_("Draw with a dark, sharp pencil or pen, inside the zones; a plan best from the grey cross."),
+    N_("Draw lines through the joints, arrowheads up to 4 mm long, letters 3 mm clear of lines."),
 )
-_ADVICE_MM: Box = (289.0, 42.0, 118.0, 7.0)
+_ADVICE_MM: Box = (39.0, 37.8, 103.0, 11.7)
+_CLEAR = N_("Leave the black squares and the code free of ink.")
+_CLEAR_MM: Box = (289.0, 43.0, 118.0, 6.0)
+_MEASURED = N_(
+    "Lengths measured on the drawing, in millimetres with one decimal: one digit in each cell, nothing else"
+)
+_MEASURED_AT_MM = (39.0, 265.2)
 _TICK_MM = 5.0
+_POLE_MM = (2.0, 4.5)
+"""Ends of the arms of the cross for a pole: open in the middle, where lines are to begin."""
+_FAINT = 0.82
+"""Lighter than any pencil: people see it, and the scan's strokes are looked for in darker ink."""
+_CELL_GREY = 0.6
 _RULER_MM = (24.0, 291.0, 100.0)
 _PT = 25.4 / 72.0
 
@@ -45,20 +67,30 @@ class PageText:
     Attributes
     ----------
     sheet, sheets : this page's number among the student's, from 1, and how many there are
+    poles : where a plan is best begun, x, y in sheet mm by figure
     """
 
     identity: Identity
     name: str
     sheet: int
     sheets: int
+    poles: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class PageForm:
-    """What is alike on a page for every student: its template, and the boxes to write in by name."""
+    """What is alike on a page for every student.
+
+    Attributes
+    ----------
+    template : the page's
+    fields : boxes to write in, by scale or vector
+    poles : the names of the plans' poles, by figure
+    """
 
     template: Template
     fields: dict[str, Box]
+    poles: dict[str, str]
 
 
 def draw_page(
@@ -77,6 +109,9 @@ def draw_page(
     _advice(drawing, tongue)
     for figure, zone in form.template.zones.items():
         _zone(drawing, zone, tongue.gettext(FIGURES[figure]))
+    for figure, at in text.poles.items():
+        pole = form.poles[figure]
+        _pole(drawing, at, assignment.file.names.get(pole, pole))
     _fields(drawing, assignment, form.fields, tongue)
     draw_ruler(drawing, tongue)
     drawing.next_page()
@@ -105,13 +140,13 @@ def _student(drawing: Drawing, assignment: Assignment, text: PageText, tongue: T
     ]
     sheet = tongue.gettext(N_("sheet {number} of {count}")).format(number=text.sheet, count=text.sheets)
     name = wrap(text.name, BOLD, 12.0, wide)[:1] or [""]
-    drawing.text((x, y + 17.0), name[0], 12.0, BOLD)
+    drawing.text((x, y + 13.5), name[0], 12.0, BOLD)
     size, lines = fitted(
-        [",  ".join([identity.student_id, *variant])], REGULAR, (10.0, 8.0, 6.5), (wide, 5.0)
+        [",  ".join([identity.student_id, *variant])], REGULAR, (10.0, 8.0, 6.5), (wide, 4.6)
     )
     for row, line in enumerate(lines):
-        drawing.text((x, y + 23.0 + row * 1.2 * size * _PT), line, size)
-    drawing.text((x, y + 29.0), f"{tongue.gettext(KINDS[identity.kind])}, {sheet}", 9.0)
+        drawing.text((x, y + 18.8 + row * 1.2 * size * _PT), line, size)
+    drawing.text((x, y + 23.6), f"{tongue.gettext(KINDS[identity.kind])}, {sheet}", 9.0)
 
 
 def _task(drawing: Drawing, assignment: Assignment, identity: Identity, tongue: Tongue) -> None:
@@ -172,11 +207,12 @@ def _flow(data: list[tuple[Piece, ...]], size_pt: float, wide_mm: float) -> list
 
 
 def _advice(drawing: Drawing, tongue: Tongue) -> None:
-    x, y, wide, high = _ADVICE_MM
-    advice = tongue.gettext(_ADVICE)
-    size, lines = fitted([advice], REGULAR, (7.0, 6.5, 6.0, 5.5), (wide, high))
-    for row, line in enumerate(lines):
-        drawing.text((x, y + (row + 1) * 1.2 * size * _PT), line, size)
+    """What makes a drawing easy to read, and what the registration of the scan needs."""
+    for texts, (x, y, wide, high) in ((_ADVICE, _ADVICE_MM), ((_CLEAR,), _CLEAR_MM)):
+        told = [tongue.gettext(text) for text in texts]
+        size, lines = fitted(told, REGULAR, (7.5, 7.0, 6.5, 6.0, 5.5), (wide, high))
+        for row, line in enumerate(lines):
+            drawing.text((x, y + (row + 1) * 1.2 * size * _PT), line, size)
 
 
 def _zone(drawing: Drawing, zone: Box, title: str) -> None:
@@ -189,19 +225,41 @@ def _zone(drawing: Drawing, zone: Box, title: str) -> None:
     drawing.text((x + _TICK_MM + 1.5, y - 0.5), title, 6.5, REGULAR, GREY)
 
 
+def _pole(drawing: Drawing, at: tuple[float, float], name: str) -> None:
+    """A faint cross, open in the middle, with the pole's letter."""
+    x, y = at
+    near, far = _POLE_MM
+    for dx, dy in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
+        drawing.line((x + near * dx, y + near * dy, x + far * dx, y + far * dy), 0.2, _FAINT)
+    drawing.text((x - 5.0, y + 5.5), name, 8.0, REGULAR, _FAINT)
+
+
 def _fields(drawing: Drawing, assignment: Assignment, fields: dict[str, Box], tongue: Tongue) -> None:
     names = assignment.file.names
-    for name, (x, y, w, h) in fields.items():
-        drawing.box((x, y, w, h), 0.25)
+    for name, box in fields.items():
+        x, y, _, h = box
         shown = names.get(name, name)
         label = _scale_label(shown) if name in SCALE_BOXES else pieces_of(shown)
         size = 10.0 if name in SCALE_BOXES else 8.0
         wide = pieces_width_mm(label, REGULAR, size)
         drawing.pieces((x - wide - 0.8, y + 0.68 * h), label, size)
-    if len(fields) > len(SCALE_BOXES):
-        drawing.text(
-            (39.0, 265.0), tongue.gettext(N_("Lengths measured on the drawing, mm")), 6.5, REGULAR, GREY
-        )
+        if name in SCALE_BOXES:
+            drawing.box(box, 0.25)
+        else:
+            _comb(drawing, box, tongue)
+    if fields.keys() - SCALE_BOXES.keys():
+        drawing.text(_MEASURED_AT_MM, tongue.gettext(_MEASURED), 6.5, REGULAR, GREY)
+
+
+def _comb(drawing: Drawing, box: Box, tongue: Tongue) -> None:
+    """A cell for each digit, light so that digits stand out, and the decimal mark."""
+    cells = comb_cells(box)
+    for cell in cells:
+        drawing.box(cell, 0.18, _CELL_GREY)
+    x, y, wide, high = cells[WHOLE_CELLS - 1]
+    middle = (x + wide + cells[WHOLE_CELLS][0]) / 2.0
+    mark = decimal_mark(tongue.lang)
+    drawing.text((middle - width_mm(mark, BOLD, 11.0) / 2.0, y + high - 1.0), mark, 11.0, BOLD)
 
 
 def _scale_label(name: str) -> tuple[Piece, ...]:

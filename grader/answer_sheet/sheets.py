@@ -1,14 +1,22 @@
 """Answer sheets of a class, and the layout that all of them share."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from grader.answer_sheet.drawing import Drawing
-from grader.answer_sheet.fit import Fit, best_template, construction_for
+from grader.answer_sheet.fit import Fit, best_template, construction_for, poles_mm
 from grader.answer_sheet.page import PageForm, PageText, draw_page
 from grader.answer_sheet.words import unprintable
 from grader.i18n import tongue
-from grader.layout import MAX_FIELDS, SCALE_BOXES, Layout, PageLayout, field_boxes, marker_places
+from grader.layout import (
+    EASY_FIELDS,
+    SCALE_BOXES,
+    Layout,
+    PageLayout,
+    combs_of,
+    field_boxes,
+    marker_places,
+)
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, Identity, Problem
 from grader.roster import RosterRow
 from reference.assignment import Assignment, Variant
@@ -43,7 +51,12 @@ class _PagePlan:
 
 
 def make_sheets(
-    assignment: Assignment, rows: Sequence[RosterRow], lang: str = "en", *, roster: str = "roster.csv"
+    assignment: Assignment,
+    rows: Sequence[RosterRow],
+    lang: str = "en",
+    *,
+    roster: str = "roster.csv",
+    asked: Collection[str] | None = None,
 ) -> Sheets:
     """Answer sheets for every row of a roster: a page per page of the assignment, in the rows' order.
 
@@ -51,16 +64,19 @@ def make_sheets(
     ---------
     rows : their `lang`, where given, goes before `lang`
     roster : the file's name, for messages
+    asked : the vectors that have a box for the measured length, all by default
 
     Raises AuthoredFileError with every row whose n or position does not suit the assignment.
     """
     variants = _variants(assignment, rows, roster)
-    plans, problems = _plans(assignment)
+    plans, problems = _plans(assignment, asked)
+    poles = [poles_mm(assignment, plan.form.template, variants) for plan in plans]
     drawing = Drawing.begin(assignment.file.title.in_language(lang))
-    for row, variant in zip(rows, variants, strict=True):
+    for index, (row, variant) in enumerate(zip(rows, variants, strict=True)):
         for number, plan in enumerate(plans, start=1):
             identity = Identity(assignment.id, row.student_id, variant.n, variant.position, plan.table.kind)
-            text = PageText(identity, row.name, number, len(plans))
+            own = {figure: places[index] for figure, places in poles[number - 1].items()}
+            text = PageText(identity, row.name, number, len(plans), own)
             draw_page(drawing, assignment, text, plan.form, tongue(row.lang or lang))
     layout = Layout(pages=[_layout(plan) for plan in plans])
     return Sheets(drawing.finish(), layout, (*problems, *_unprintable(rows, roster)))
@@ -74,9 +90,9 @@ def _unprintable(rows: Sequence[RosterRow], roster: str) -> Iterator[Problem]:
             yield Problem("sheet_letters", told, roster)
 
 
-def page_layouts(assignment: Assignment) -> Layout:
-    """The layout of an assignment's pages, without printing any."""
-    return Layout(pages=[_layout(plan) for plan in _plans(assignment)[0]])
+def page_layouts(assignment: Assignment, asked: Collection[str] | None = None) -> Layout:
+    """The layout of an assignment's pages, without printing any; `asked` as for `make_sheets`."""
+    return Layout(pages=[_layout(plan) for plan in _plans(assignment, asked)[0]])
 
 
 def _variants(assignment: Assignment, rows: Sequence[RosterRow], roster: str) -> list[Variant]:
@@ -92,26 +108,38 @@ def _variants(assignment: Assignment, rows: Sequence[RosterRow], roster: str) ->
     return variants
 
 
-def _plans(assignment: Assignment) -> tuple[list[_PagePlan], tuple[Problem, ...]]:
+def _plans(
+    assignment: Assignment, asked: Collection[str] | None
+) -> tuple[list[_PagePlan], tuple[Problem, ...]]:
     plans: list[_PagePlan] = []
     problems: list[Problem] = []
     for table in assignment.file.page:
         figures = list(dict.fromkeys(table.figures))
         fit = best_template(assignment, figures)
-        names = _written(assignment, figures)
-        if len(names) > MAX_FIELDS:
+        construction = construction_for(assignment, figures)
+        names = [vector.name for figure in figures for vector in construction.vectors_of(figure)]
+        boxes = _boxes(names, asked)
+        if names and not boxes and (asked is None or set(names) & set(asked)):
             told = f"page {table.kind}: {len(names)} lengths are too many for boxes; none are printed"
             problems.append(Problem("sheet_boxes", told, str(assignment.path)))
         problems.extend(_too_small(assignment, table, fit))
         scales = {_SCALE_OF[figure]: SCALE_BOXES[_SCALE_OF[figure]] for figure in figures}
-        plans.append(_PagePlan(table, PageForm(fit.template, scales | field_boxes(names))))
+        plans.append(_PagePlan(table, PageForm(fit.template, scales | boxes, dict(construction.poles))))
     return plans, tuple(problems)
 
 
-def _written(assignment: Assignment, figures: Sequence[str]) -> tuple[str, ...]:
-    """The vectors whose lengths are written on a page."""
-    construction = construction_for(assignment, figures)
-    return tuple(vector.name for figure in figures for vector in construction.vectors_of(figure))
+def _boxes(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:
+    """The boxes for the lengths asked for.
+
+    A vector's box is where it would be if all had one: a rubric that asks for others tomorrow finds
+    those printed today in their places. Only where all would be too small are those asked for alone
+    counted.
+    """
+    if asked is None:
+        return field_boxes(tuple(names))
+    wanted = [name for name in names if name in asked]
+    boxes = field_boxes(tuple(names if len(names) <= EASY_FIELDS else wanted))
+    return {name: boxes[name] for name in wanted if name in boxes}
 
 
 def _too_small(assignment: Assignment, table: PageTable, fit: Fit) -> list[Problem]:
@@ -131,4 +159,9 @@ def _too_small(assignment: Assignment, table: PageTable, fit: Fit) -> list[Probl
 
 def _layout(plan: _PagePlan) -> PageLayout:
     zones: dict[str, Box | dict[str, Box]] = {**plan.form.template.zones, "fields": plan.form.fields}
-    return PageLayout(kind=plan.table.kind, markers=marker_places(plan.form.template), zones=zones)
+    return PageLayout(
+        kind=plan.table.kind,
+        markers=marker_places(plan.form.template),
+        zones=zones,
+        cells=combs_of(plan.form.fields),
+    )

@@ -42,7 +42,12 @@ def number(value: float, lang: str) -> str:
     text = f"{value:.6g}"
     if "e" in text and 1e-6 < abs(value) < 1e9:
         text = f"{value:.6f}".rstrip("0").rstrip(".") if abs(value) < 1.0 else f"{value:.0f}"
-    return text.replace(".", ",") if lang in _DECIMAL_COMMA else text
+    return text.replace(".", decimal_mark(lang))
+
+
+def decimal_mark(lang: str) -> str:
+    """Comma or point."""
+    return "," if lang in _DECIMAL_COMMA else "."
 
 
 def pieces_width_mm(pieces: Iterable[Piece], font: str, size_pt: float) -> float:

@@ -18,6 +18,7 @@ from grader.ownership import PageSource
 from grader.pipeline import Place, see
 from grader.records import FloatArray
 from grader.roster import read_roster
+from grader.rubric import rubric_of
 from grader.survey import survey
 from reference.assignment import load_assignment
 from reference.errors import CallError, InputFileError
@@ -34,7 +35,9 @@ def print_sheets(
         raise CallError("roster_needed", "answer sheets need --roster: a sheet carries its student's code")
     else:
         students = read_roster(roster)
-        sheets = make_sheets(load_assignment(name), students.rows, lang, roster=students.file)
+        assignment = load_assignment(name)
+        rubric = rubric_of(assignment)
+        sheets = make_sheets(assignment, students.rows, lang, roster=students.file, asked=rubric.vectors)
     write_whole(out, sheets.pdf)
     typer.echo(f"{out}: to be printed on A3 at 100 %, not fitted to the page")
     if layout is not None:
