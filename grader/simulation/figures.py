@@ -245,6 +245,7 @@ def _unnamed_sides(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> Non
 
 def _letters(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
     circles = sketch.chance(sketch.style.node_circles)
+    dots = not circles and sketch.chance(sketch.style.node_dots)
     for node, at in nodes.items():
         letter = task.letter_of(node)
         if node.startswith(("n_", "k_")):
@@ -253,7 +254,9 @@ def _letters(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
                 sketch.letter(at, text, height, names=node, distance_mm=0.8)
             continue
         if circles:
-            symbols.circle(sketch, at, sketch.rng.uniform(0.7, 1.1), sketch.pen("thin"))
+            symbols.circle(sketch, at, sketch.rng.uniform(0.5, 1.1), sketch.pen("thin"))
+        elif dots:
+            symbols.dot(sketch, at, sketch.rng.uniform(0.35, 0.55))
         is_pole = node == task.wrong.construction.poles[figure]
         text = pole_text(task, figure) if is_pole else re.sub(r"(\d+)", r"_{\1}", letter)
         sketch.letter(at, text, sketch.page.letter_mm, names=node, distance_mm=1.2)

@@ -74,7 +74,9 @@ class PenStyle:
     pressure, wobble_mm, grain : unevenness along a stroke, across it, and of its surface
     plan_colour : another colour for vectors, None for the same pen
     overrun_mm : mean length by which construction lines run past the points they gave
-    construction_lines, node_circles, erased, doubled, arcs : shares of the chances to draw such a thing
+    arrow_half_deg : mean angle between an arrowhead's barb and the vector
+    construction_lines, node_circles, node_dots, erased, doubled, arcs : shares of the chances to draw
+        such a thing
     dashed_absolutes : vectors that only join two known points are dashed
     """
 
@@ -89,10 +91,12 @@ class PenStyle:
     plan_colour: Colour | None = None
     arrow: Literal["open", "filled", "half", "none"] = "open"
     arrow_mm: float = 3.5
+    arrow_half_deg: float = 13.0
     overrun_mm: float = 8.0
     construction_lines: float = 0.7
     dashed_absolutes: bool = False
     node_circles: float = 0.3
+    node_dots: float = 0.0
     support: Literal["triangle", "arch", "fork"] = "triangle"
     links_stop_short: bool = True
     plate_hatched: bool = False

@@ -17,7 +17,7 @@ def arrowhead(sketch: Sketch, pen: Pen, tail: complex, tip: complex, size_mm: fl
     rng = sketch.rng
     size = min(size_mm * rng.uniform(0.85, 1.15), 0.6 * length)
     back = -(tip - tail) / length
-    spread = np.radians(rng.uniform(9.0, 17.0))
+    spread = np.radians(sketch.style.arrow_half_deg * rng.uniform(0.8, 1.2))
     left, right = (tip + size * back * np.exp(1j * s * spread * rng.uniform(0.8, 1.2)) for s in (1, -1))
     fine = Pen(pen.layer, 0.75 * pen.width_mm, pen.dark, pen.pressure, 0.0)
     if kind == "filled":
@@ -38,6 +38,13 @@ def circle(sketch: Sketch, centre: complex, radius_mm: float, pen: Pen) -> None:
     points = arc(centre, radius_mm, rng.uniform(0, 2 * np.pi), sweep)
     wobble = 1.0 + 0.02 * np.cos(2 * np.angle(points - centre) + rng.uniform(0, 6))
     sketch.curve(pen, centre + (points - centre) * wobble)
+
+
+def dot(sketch: Sketch, centre: complex, radius_mm: float) -> None:
+    """A point pressed or turned into the paper."""
+    pen = sketch.pen("line", plan=True)
+    fine = Pen(pen.layer, 0.7 * radius_mm, pen.dark, pen.pressure, 0.0)
+    sketch.curve(fine, arc(centre, 0.55 * radius_mm, sketch.rng.uniform(0, 2 * np.pi), 4 * np.pi))
 
 
 def hatching(sketch: Sketch, p: complex, q: complex, depth_mm: float, gap_mm: float = 1.6) -> None:
