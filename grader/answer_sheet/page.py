@@ -53,8 +53,8 @@ _MEASURED_AT_MM = (39.0, 265.2)
 _TICK_MM = 5.0
 _POLE_MM = (2.0, 4.5)
 """Ends of the arms of the cross for a pole: open in the middle, where lines are to begin."""
-_FAINT = 0.82
-"""Lighter than any pencil: people see it, and the scan's strokes are looked for in darker ink."""
+_FAINT, _FAINT_PEN_MM = 0.9, 0.25
+"""Lighter than any pencil: people see it, and no stroke is found in it on a scan."""
 _CELL_GREY = 0.6
 _RULER_MM = (24.0, 291.0, 100.0)
 _PT = 25.4 / 72.0
@@ -230,7 +230,7 @@ def _pole(drawing: Drawing, at: tuple[float, float], name: str) -> None:
     x, y = at
     near, far = _POLE_MM
     for dx, dy in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
-        drawing.line((x + near * dx, y + near * dy, x + far * dx, y + far * dy), 0.2, _FAINT)
+        drawing.line((x + near * dx, y + near * dy, x + far * dx, y + far * dy), _FAINT_PEN_MM, _FAINT)
     drawing.text((x - 5.0, y + 5.5), name, 8.0, REGULAR, _FAINT)
 
 

@@ -1,6 +1,6 @@
 """A student at the desk: figures laid out on a sheet, plain or printed, and drawn out with the pen."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,11 +28,13 @@ class PrintedSheet:
     background : the page as printed
     zones : boxes in sheet millimetres by figure (``mechanism``, ``velocity_plan``, ...)
     fields : boxes to write in, by scale (``kL``) or vector (``v_A``)
+    cells : of the boxes that have one for each digit, the last for the tenths
     """
 
     background: Background
     zones: Mapping[str, Box]
     fields: Mapping[str, Box] = field(default_factory=dict)
+    cells: Mapping[str, Sequence[Box]] = field(default_factory=dict)
 
 
 Printed = Mapping[str, PrintedSheet]
@@ -145,7 +147,7 @@ class Desk:
         paper = (self.printed or {})[sheet.kind]
         origins = page.place_in_zones(sheet.figures, paper.zones, sketch.rng)
         missing = self._figures(sketch, sheet, origins)
-        filled = self._fill_fields(sketch, sheet, paper.fields)
+        filled = self._fill_fields(sketch, sheet, paper)
         told = truth.drawing_truth(self.task, sheet, sketch, origins, missing)
         told["scales"]["written"] = {n: text for n, text in filled.items() if n in self.task.declared}
         return {**told, "fields": filled}
@@ -164,7 +166,7 @@ class Desk:
                 missing[figure.name] = figures.draw_plan(sketch, self.task, figure.name, nodes, student)
         return missing
 
-    def _fill_fields(self, sketch: Sketch, sheet: DrawnSheet, fields: Mapping[str, Box]) -> dict[str, str]:
+    def _fill_fields(self, sketch: Sketch, sheet: DrawnSheet, paper: PrintedSheet) -> dict[str, str]:
         """The scales and the measured lengths written into the printed boxes; what was written, by box."""
         task, style = self.task, sketch.page
         texts = {}
@@ -173,19 +175,36 @@ class Desk:
         for figure in sheet.figures:
             for vector in task.wrong.construction.vectors_of(figure.name):
                 length = abs(figure.nodes[vector.head] - figure.nodes[vector.tail])
-                texts[vector.name] = ruler_text(length, style, sketch.rng)
+                texts[vector.name] = ruler_text(
+                    length, style, sketch.rng, in_cells=vector.name in paper.cells
+                )
         filled = {}
-        for name, (x, y, w, h) in fields.items():
-            if name in texts:
+        for name, (x, y, w, h) in paper.fields.items():
+            if name in texts and name in paper.cells:
+                _write_digits(sketch, texts[name], paper.cells[name], name)
+                filled[name] = texts[name]
+            elif name in texts:
                 height = min(0.5 * h, 1.5 * w / max(1, len(texts[name])), 4.5)
                 sketch.text(complex(x + 1.5, -y - h / 2 - 0.4 * height), texts[name], height, names=name)
                 filled[name] = wording.plain(texts[name])
         return filled
 
 
-def ruler_text(length_mm: float, style: PageStyle, rng: Rng) -> str:
-    """A length as read off a ruler, to half a millimetre."""
-    return wording.number(max(0.0, round(2.0 * (length_mm + rng.normal(0.0, 0.2))) / 2.0), style)
+def ruler_text(length_mm: float, style: PageStyle, rng: Rng, *, in_cells: bool = False) -> str:
+    """A length as read off a ruler, to half a millimetre; cells have room for its tenths, zero too."""
+    read = max(0.0, round(2.0 * (length_mm + rng.normal(0.0, 0.2))) / 2.0)
+    if in_cells:
+        return f"{read:.1f}".replace(".", "," if style.decimal_comma else ".")
+    return wording.number(read, style)
+
+
+def _write_digits(sketch: Sketch, text: str, cells: Sequence[Box], name: str) -> None:
+    """A digit in each cell, the last in the last one, each somewhat off its cell's middle."""
+    digits = [letter for letter in text if letter.isdigit()][-len(cells) :]
+    for digit, (x, y, w, h) in zip(digits, cells[-len(digits) :], strict=True):
+        height = min(0.72 * h, 0.95 * w) * float(sketch.rng.uniform(0.85, 1.1))
+        middle = complex(x + w / 2.0, -y - h / 2.0) + complex(*sketch.rng.normal(0.0, 0.06 * w, 2))
+        sketch.text(middle - complex(0.25, 0.5) * height, digit, height, names=name)
 
 
 def _stacked(drawn: tuple[DrawnFigure, ...], room: Box) -> dict[str, complex]:

@@ -23,8 +23,10 @@ def printed_sheets(pdf: bytes, layout: Layout, first_page: int = 0) -> dict[str,
         zones = {name: box for name, box in page.zones.items() if isinstance(box, tuple)}
         fields = page.zones.get("fields", {})
         sheets[page.kind] = PrintedSheet(
-            Background(np.ascontiguousarray(grey), _DPI / 25.4), zones,
+            Background(np.ascontiguousarray(grey), _DPI / 25.4),
+            zones,
             dict(fields) if isinstance(fields, dict) else {},
+            page.cells,
         )
     document.close()
     return sheets
