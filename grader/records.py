@@ -160,6 +160,43 @@ class InkMap:
 
 
 @dataclass(frozen=True, slots=True)
+class Letters:
+    """Pieces of ink that can be written signs, a row each, with what each may be.
+
+    Attributes
+    ----------
+    box_mm : (k, 4) x, y, width, height in sheet mm, y down
+    probability : (k, s) of each sign; a row's sum is 1, with the probability that it is no sign
+    whole : (k,) a piece of ink of its own; otherwise what was left when strokes were taken out
+    column : the columns of `probability` by sign; `""` is no sign, and signs that look alike at any
+        size (o, O and 0) share one
+    """
+
+    box_mm: FloatArray
+    probability: FloatArray
+    whole: NDArray[np.bool_]
+    column: Mapping[str, int]
+
+    def __len__(self) -> int:
+        return len(self.whole)
+
+    @property
+    def at(self) -> NDArray[np.complex128]:
+        """(k,) middles of the boxes, x - i y."""
+        x, y, w, h = self.box_mm.T
+        return np.asarray(x + w / 2.0 - 1j * (y + h / 2.0))
+
+    @property
+    def height_mm(self) -> FloatArray:
+        """(k,) heights of the boxes."""
+        return self.box_mm[:, 3]
+
+    def chance(self, sign: str) -> FloatArray:
+        """(k,) probability of a sign. Raises KeyError for one that is not told apart."""
+        return self.probability[:, self.column[sign]]
+
+
+@dataclass(frozen=True, slots=True)
 class Ink:
     """Everything that was found on a sheet, in millimetres, y down.
 
@@ -170,6 +207,7 @@ class Ink:
     arrowheads : (k, 3) x, y of the tip and direction in radians counter-clockwise (y up) it points to
     marks : (j, 4) boxes x, y, w, h of what is neither: letters, digits, hatching, blobs
     where : the ink map
+    letters : what can be written signs, None where they were not looked for
     """
 
     strokes: Strokes
@@ -177,6 +215,7 @@ class Ink:
     arrowheads: FloatArray
     marks: FloatArray
     where: InkMap
+    letters: Letters | None = None
 
 
 @dataclass(frozen=True, slots=True)
