@@ -4,8 +4,9 @@ Every figure is one evaluation of the assignment's own construction. The errors 
 and mark enter where they are made; later steps start from what was drawn.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from reference.construction import Construction, evaluate
 from reference.derivation import construction_of
 from reference.geometry import FloatArray
 from reference.mechanism import Mechanism
-from reference.mistakes import RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
+from reference.mistakes import CODES, RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
 from reference.parameters import parameters_of
 from reference.steps import (
     ArcAndLine,
@@ -150,31 +151,49 @@ def choose_mistake(code: str, assignment: Assignment, variant: Variant, right: D
 
     Raises ValueError where the drawing offers no place for it.
     """
-    if code == "other_variant":
-        return _other_variant(assignment, variant, rng)
-    if code == "vector_missing":
-        vectors = right.construction.vectors.items()
-        names = [name for name, vector in vectors if vector.part not in {"n", "c"}]
-        return Mistake(code, str(rng.choice(names)))
-    if code == "labels_swapped":
-        plan = str(rng.choice(PLANS))
-        steps = right.construction.figures[plan]
-        nodes = [step.node for step in steps if not step.node.startswith(("n_", "k_"))]
-        swapped = rng.choice(nodes[1:], 2, replace=False)
-        return Mistake(code, plan, other=(str(swapped[0]), str(swapped[1])))
-    if code == "rpm_not_converted" and "angle crank" in right.parameters:
-        return Mistake(code, VELOCITY, factor=RPM_FACTOR)
-    if code == "arithmetic":
-        ends = [v.head for v in right.construction.vectors.values() if v.part in {"n", "c"}]
-        if not ends:
-            raise ValueError(f"no component is computed in {assignment.id}")
-        return Mistake(code, str(rng.choice(ends)), factor=float(rng.choice([0.5, 2.0, 0.1, 1.4])))
-    choices = [m for plan in PLANS for m in single_mistakes(right, plan) if m.code == code]
-    choices += [m for m in single_mistakes(right, MECHANISM) if m.code == code]
-    choices = [m for m in choices if drawable(commit(m, right), right)]
+    choices = _choices(code, assignment, variant, right)
     if not choices:
         raise ValueError(f"{code} cannot be made in {assignment.id} {variant}")
-    return choices[rng.integers(len(choices))]
+    chosen = choices[rng.integers(len(choices))]
+    return _other_variant(assignment, chosen) if code == "other_variant" else chosen
+
+
+def possible_mistakes(
+    assignment: Assignment, variant: Variant, student: Student, codes: Sequence[str] = CODES
+) -> tuple[str, ...]:
+    """Those of the codes of mistakes for which this student's drawing offers a place."""
+    right = _right_drawing(assignment, variant, student)
+    return tuple(code for code in codes if _choices(code, assignment, variant, right))
+
+
+def _choices(code: str, assignment: Assignment, variant: Variant, right: Drawing) -> list[Mistake]:
+    """Every mistake of this kind that can be made and drawn."""
+    vectors = right.construction.vectors.items()
+    match code:
+        case "other_variant":
+            others = (one for one in assignment.variants() if one != variant)
+            return [Mistake(code, "", n=other.n, position=other.position) for other in others]
+        case "vector_missing":
+            return [Mistake(code, name) for name, vector in vectors if vector.part not in {"n", "c"}]
+        case "labels_swapped":
+            return list(_swaps(right))
+        case "rpm_not_converted":
+            turns = "angle crank" in right.parameters
+            return [Mistake(code, VELOCITY, factor=RPM_FACTOR)] if turns else []
+        case "arithmetic":
+            ends = [vector.head for _, vector in vectors if vector.part in {"n", "c"}]
+            return [Mistake(code, end, factor=factor) for end in ends for factor in (0.5, 2.0, 0.1, 1.4)]
+    offered = [m for figure in (*PLANS, MECHANISM) for m in single_mistakes(right, figure) if m.code == code]
+    return [m for m in offered if drawable(commit(m, right), right)]
+
+
+def _swaps(right: Drawing) -> Iterator[Mistake]:
+    """Two letters of a plan changed over; the pole keeps its own."""
+    for plan in PLANS:
+        steps = right.construction.figures[plan]
+        nodes = [step.node for step in steps if not step.node.startswith(("n_", "k_"))]
+        for pair in combinations(nodes[1:], 2):
+            yield Mistake("labels_swapped", plan, other=pair)
 
 
 def drawable(drawing: Drawing, right: Drawing) -> bool:
@@ -186,18 +205,13 @@ def drawable(drawing: Drawing, right: Drawing) -> bool:
     return all(np.isfinite(node) and abs(complex(node)) < limit for node in nodes.values())
 
 
-def _other_variant(assignment: Assignment, variant: Variant, rng: Rng) -> Mistake:
-    others = [other for other in assignment.variants() if other != variant]
-    other = others[rng.integers(len(others))]
+def _other_variant(assignment: Assignment, chosen: Mistake) -> Mistake:
+    """The mistake with the other student's data in it."""
+    other = Variant(chosen.n, chosen.position)
     scales = assignment.scales([other])
-    parameters = scalars(parameters_of(assignment.mechanism([other]), scales.kL, scales.kv, scales.ka))
-    return Mistake(
-        "other_variant",
-        "n" if other.n is not None else "position",
-        n=other.n,
-        position=other.position,
-        parameters=parameters,
-    )
+    parameters = parameters_of(assignment.mechanism([other]), scales.kL, scales.kv, scales.ka)
+    at = "n" if other.n is not None else "position"
+    return replace(chosen, at=at, parameters=scalars(parameters))
 
 
 # The hand -----------------------------------------------------------------------------------------

@@ -1,10 +1,12 @@
 """A mixed class: hands, habits, pens, pages and scanners drawn by lot."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from grader.simulation.hand import possible_mistakes
 from grader.simulation.settings import (
     CAREFUL,
     SLOPPY,
@@ -18,6 +20,7 @@ from grader.simulation.settings import (
     Student,
 )
 from grader.simulation.strokes import Rng
+from reference.assignment import Assignment, Variant
 from reference.mistakes import CODES
 
 Device = Literal["flatbed", "copier", "phone"]
@@ -29,21 +32,33 @@ def any_settings(
     device: Device | None = None,
     dpi: float | None = None,
     mistakes: float = 0.5,
+    work: tuple[Assignment, Variant] | None = None,
 ) -> Settings:
     """Somebody of a mixed class: hand, habits, pen, page and scanner drawn by lot from the seed.
 
-    Arguments: `device` and `dpi` may be fixed; `mistakes` is the mean number of mistakes.
+    Arguments
+    ---------
+    device, dpi : fixed where given
+    mistakes : mean number of mistakes
+    work : what is to be drawn; only mistakes are made then for which it offers a place. Without it any
+        code may come, and `simulate` refuses one that cannot be made
     """
     rng = np.random.default_rng([seed, 7])
     hand = (CAREFUL, TYPICAL, SLOPPY)[rng.choice(3, p=[0.35, 0.45, 0.2])]
     page = any_page(rng)
-    return Settings(hand, any_student(rng, mistakes), any_pen(rng, hand), page, any_scan(rng, device, dpi))
+    codes = CODES if work is None or not mistakes else possible_mistakes(*work, Student())
+    student = any_student(rng, mistakes, codes)
+    if work is not None and student.mistakes:
+        # At this student's own scales a mistake may lead off the paper.
+        able = possible_mistakes(*work, student, student.mistakes)
+        student = replace(student, mistakes=able)
+    return Settings(hand, student, any_pen(rng, hand), page, any_scan(rng, device, dpi))
 
 
-def any_student(rng: Rng, mistakes: float) -> Student:
-    """Somebody's choices."""
+def any_student(rng: Rng, mistakes: float, possible: Sequence[str] = CODES) -> Student:
+    """Somebody's choices; mistakes are taken from the possible ones."""
     count = min(2, int(rng.poisson(mistakes)))
-    codes = rng.choice(CODES, size=count, replace=False)
+    codes = rng.choice(np.array(possible), size=count, replace=False)
     return Student(
         crank_mm=None if rng.random() < 0.5 else float(rng.choice([50.0, 55.0, 60.0])),
         ka_ratio=float(rng.choice([1.0, 1.25, 0.8], p=[0.7, 0.15, 0.15])),
@@ -93,6 +108,8 @@ def any_pen(rng: Rng, hand: Hand) -> PenStyle:
         smudges=int(rng.integers(0, 4)),
         doubled=float(rng.choice([0.0, 0.2], p=[0.75, 0.25])),
         arcs=float(rng.choice([0.0, 0.5, 1.0])),
+        arrow_half_deg=float(rng.uniform(9.0, 21.0)),
+        node_dots=float(rng.choice([0.0, 0.4, 1.0], p=[0.6, 0.2, 0.2])),
     )
 
 

@@ -1,0 +1,366 @@
+"""Why vectors are not read, scene by scene, with a picture of each.
+
+    python tests/bench/why_missed.py [--scene plain --scene press ...] [--students 12]
+    python tests/bench/why_missed.py --shared ../shared/sheets/pump-clean [--pictures /tmp/missed]
+
+Of every asked vector that is drawn and not both right and confident, the first that holds:
+
+    sheet    the page was refused, or its scale or turn is off
+    ink      no stroke was found along it (60 % of its length within 0.3 mm of a found stroke)
+    plan     the whole plan was not found, or was explained by another one (most of its nodes are off)
+    choice   a stroke was found along it, but another one or none was taken for it
+    place    its own stroke was taken, but a node or an end is off
+    doubt    right, but with a confidence below 0.9
+
+and apart from these every silent misread. In a close-up the truth is green (its stroke thick, from
+node to node thin), what was read is red, strokes found are blue.
+"""
+
+import argparse
+import json
+import tempfile
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from grader.bench.reading_scenes import SCENES, scene_named, works
+from grader.bench.reading_truth import (
+    RIGHT_MM,
+    Judged,
+    Segment,
+    TrueFigure,
+    figures_of,
+    judged,
+    true_places,
+)
+from grader.pipeline import Place, Seen, read, see
+from grader.records import Figure, Reading
+from grader.roster import read_roster
+from grader.rubric import load_rubric
+from reference.assignment import Assignment, Variant, load_assignment
+from reference.derivation import construction_of
+
+CAUSES = ("sheet", "ink", "plan", "choice", "place", "doubt")
+FOUND_SHARE = 0.6
+NEAR_NODE_MM = 1.0
+OFF_SCALE, OFF_TURN_DEG = 0.003, 0.5
+CLOSE_UP_MM, CLOSE_UP_PX_PER_MM = 6.0, 14.0
+END_MM, END_PX_PER_MM = 4.0, 60.0
+
+
+@dataclass
+class Student:
+    """One student's pages, whatever made them."""
+
+    name: str
+    assignment: Assignment
+    variant: Variant
+    declared: dict[str, str]
+    wanted: tuple[str, ...]
+    truths: list[dict[str, Any]]
+    places: list[Place]
+
+
+def simulated(scene: str, students: int, first: int, folder: Path) -> Iterator[Student]:
+    for work in works(scene_named(scene), students, first):
+        name = f"{scene}-{work.seed}"
+        paths = [sheet.save(folder / f"{name}_{number}") for number, sheet in enumerate(work.sheets, 1)]
+        yield Student(
+            name, work.assignment, work.variant, work.declared, work.rubric.vectors,
+            [sheet.truth for sheet in work.sheets], [Place(path, 1, path.name) for path in paths],
+        )  # fmt: skip
+
+
+def from_folder(folder: Path, students: int | None) -> Iterator[Student]:
+    truths = defaultdict(list)
+    for line in (folder / "truth.jsonl").read_text(encoding="utf-8").splitlines():
+        truth = json.loads(line)
+        truths[truth["student_id"]].append(truth)
+    roster = read_roster(folder / "roster.csv")
+    for student, own in list(truths.items())[:students]:
+        assignment = load_assignment(own[0]["assignment"])
+        row = roster.rows_of(student)[0]
+        wanted = load_rubric(assignment.file.rubric, beside=assignment.path).vectors
+        places = [Place(folder / t["class_file"], t["page"], t["class_file"]) for t in own]
+        variant = assignment.variant(row.n, row.position)
+        yield Student(f"{folder.name}-{student}", assignment, variant, dict(row.scales), wanted, own, places)
+
+
+# Where things lie on the paper ----------------------------------------------------------------------
+
+
+class OnPaper:
+    """Sheet millimetres as read, to the true millimetres of the paper, by way of the picture's pixels."""
+
+    def __init__(self, truth: dict[str, Any], seen: Seen):
+        assert seen.sheet is not None
+        assert seen.page is not None
+        self.truth, self.sheet, self.page = truth, seen.sheet, seen.page
+
+    def __call__(self, at: np.ndarray) -> np.ndarray:
+        """Complex (n,) as read to complex (n,) in truth."""
+        px = self.pixels(at)
+        lens = self.sheet.lens
+        if lens is not None and self.sheet.mm_to_px is lens.straight:
+            height, width = self.page.grey.shape
+            centre = np.array([(width - 1) / 2.0, (height - 1) / 2.0])
+            arm = (px - centre) / np.hypot(width / 2.0, height / 2.0)
+            bent = 1.0 + lens.bend * (arm**2).sum(axis=1, keepdims=True)
+            px = centre + (px - centre) * bent
+        true = true_places(self.truth, px)
+        return true[:, 0] - 1j * true[:, 1]
+
+    def pixels(self, at: np.ndarray) -> np.ndarray:
+        """Pixels (n, 2) of the page as it was read."""
+        lifted = np.column_stack([at.real, -at.imag, np.ones(len(at))]) @ self.sheet.mm_to_px.T
+        return lifted[:, :2] / lifted[:, 2:]
+
+    def back(self, true: np.ndarray) -> np.ndarray:
+        """Places in truth as they would be read: the affine map that undoes this one best."""
+        grid = np.array([complex(x, -y) for x in (20, 150, 280, 400) for y in (20, 110, 200, 280)])
+        there = self(grid)
+        columns = np.column_stack([there, np.conj(there), np.ones(len(there))])
+        weights = np.linalg.lstsq(columns, grid, rcond=None)[0]
+        return np.column_stack([true, np.conj(true), np.ones(len(true))]) @ weights
+
+    def fault(self) -> str:
+        """What is wrong with scale or turn, by long lines across the sheet; empty where they are good."""
+        ends = self(np.array([60 - 60j, 360 - 60j, 60 - 240j]))
+        spans = np.array([(ends[1] - ends[0]) / 300.0, (ends[2] - ends[0]) / -180j])
+        scale, turn = np.abs(spans) - 1.0, np.degrees(np.angle(spans))
+        if np.all(np.abs(scale) <= OFF_SCALE) and np.all(np.abs(turn) <= OFF_TURN_DEG):
+            return ""
+        return (
+            f"scale off by {100 * scale[0]:.2f} % along, {100 * scale[1]:.2f} % across,"
+            f" turned by {turn[0]:.2f} and {turn[1]:.2f} deg"
+        )
+
+
+def found_along(true: Segment, strokes: np.ndarray) -> float:
+    """The share of a segment that found strokes (n, 2) run along within `RIGHT_MM`."""
+    tail, head = true
+    length = abs(head - tail)
+    if length == 0.0 or not len(strokes):
+        return 0.0
+    local = (strokes - tail) / ((head - tail) / length)
+    low, high = local.real.min(axis=1), local.real.max(axis=1)
+    start, end = np.maximum(low, 0.0), np.minimum(high, length)
+    slope = (local[:, 1].imag - local[:, 0].imag) / np.where(
+        np.abs(local[:, 1].real - local[:, 0].real) < 1e-6, 1e-6, local[:, 1].real - local[:, 0].real
+    )
+    off = [np.abs(local[:, 0].imag + slope * (x - local[:, 0].real)) for x in (start, end)]
+    near = (end > start) & (np.maximum(*off) <= RIGHT_MM)
+    grid = np.linspace(0.0, length, 100)
+    covered = ((grid[:, None] >= start[near]) & (grid[:, None] <= end[near])).any(axis=1)
+    return float(covered.mean())
+
+
+# Causes -----------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Miss:
+    """A vector not right, or not confident, and why."""
+
+    student: str
+    page: int
+    cause: str
+    judged: Judged
+    read: Segment | None
+    """As read, in true millimetres."""
+
+
+def cause_of(one: Judged, read: Segment | None, strokes: np.ndarray, plan_is_off: bool) -> str:
+    true = one.true.stroke or one.true.ends
+    if one.right:
+        return "doubt"
+    if true is None or found_along(true, strokes) < FOUND_SHARE:
+        return "ink"
+    if plan_is_off:
+        return "plan"
+    if read is None or found_along(read, np.array([true])) < FOUND_SHARE:
+        return "choice"
+    return "place"
+
+
+def is_off(figure: TrueFigure, found: Figure | None, on_paper: OnPaper) -> bool:
+    """Whether most of a plan's nodes are not where they were drawn."""
+    if found is None:
+        return True
+    common = [name for name in figure.nodes if name in found.nodes]
+    if not common:
+        return True
+    read = on_paper(np.array([found.nodes[name].at for name in common]))
+    true = np.array([figure.nodes[name] for name in common])
+    return bool((np.abs(read - true) > NEAR_NODE_MM).mean() > 0.5)
+
+
+def sheet_fault(seen: Seen, on_paper: OnPaper | None) -> str:
+    """Why the page's millimetres cannot be used; empty where they can."""
+    if on_paper is not None:
+        return on_paper.fault()
+    return "; ".join(problem.message for problem in seen.problems) or "no sheet"
+
+
+def misses_of(student: Student, seen: Seen, reading: Reading, truth: dict[str, Any]) -> Iterator[tuple]:
+    """Every asked vector of a page: how it fared, and the miss, if it is one."""
+    construction = construction_of(student.assignment.mechanism([student.variant]))
+    registered = seen.sheet is not None and seen.ink is not None
+    on_paper = OnPaper(truth, seen) if registered else None
+    strokes = np.empty((0, 2), complex)
+    if on_paper is not None:
+        ends = seen.ink.strokes.ends.reshape(-1, 2)
+        strokes = on_paper(ends[:, 0] - 1j * ends[:, 1]).reshape(-1, 2)
+    fault = sheet_fault(seen, on_paper)
+    for name, figure in figures_of(truth, construction).items():
+        found = reading.figures.get(name)
+        plan_is_off = on_paper is None or is_off(figure, found, on_paper)
+        for vector in (v for v in figure.vectors.values() if v.name in student.wanted):
+            one = judged(vector, found.vectors.get(vector.name) if found else None)
+            ends = construction.vectors[vector.name]
+            segment = None
+            if one.reported and on_paper and {ends.tail, ends.head} <= found.nodes.keys():
+                at = on_paper(np.array([found.nodes[ends.tail].at, found.nodes[ends.head].at]))
+                segment = complex(at[0]), complex(at[1])
+            if vector.missing or (one.right and one.sure):
+                yield one, None
+                continue
+            off_sheet = fault and not one.right
+            cause = "sheet" if off_sheet else cause_of(one, segment, strokes, plan_is_off)
+            yield one, Miss(student.name, truth.get("page", 1), cause, one, segment)
+
+
+# Pictures -----------------------------------------------------------------------------------------------
+
+
+def close_up(miss: Miss, seen: Seen, truth: dict[str, Any], path: Path) -> None:
+    """The miss as a whole, and below it the surroundings of its two ends."""
+    on_paper = OnPaper(truth, seen)
+    segments = [*filter(None, (miss.judged.true.ends, miss.judged.true.stroke, miss.read))]
+    places = on_paper.back(np.array(segments).ravel())
+    low = complex(places.real.min(), places.imag.min()) - complex(CLOSE_UP_MM, CLOSE_UP_MM)
+    high = complex(places.real.max(), places.imag.max()) + complex(CLOSE_UP_MM, CLOSE_UP_MM)
+    span = max((high - low).real, (high - low).imag)
+    whole = panel(miss, seen, on_paper, (low, high, min(CLOSE_UP_PX_PER_MM, 1200.0 / span)))
+    half = complex(END_MM, END_MM)
+    ends = [panel(miss, seen, on_paper, (at - half, at + half, END_PX_PER_MM)) for at in places[:2].tolist()]
+    below = np.hstack([ends[0], np.zeros((ends[0].shape[0], 4, 3), np.uint8), ends[1]])
+    wide = max(whole.shape[1], below.shape[1])
+    padded = [np.pad(one, ((0, 4), (0, wide - one.shape[1]), (0, 0))) for one in (whole, below)]
+    cv2.imwrite(str(path), np.vstack(padded))
+
+
+def panel(miss: Miss, seen: Seen, on_paper: OnPaper, box: tuple[complex, complex, float]) -> np.ndarray:
+    """A box of the sheet (low and high corner as read, px/mm) with truth, reading and found strokes."""
+    low, high, scale = box
+    size = round((high - low).real * scale), round((high - low).imag * scale)
+    window = np.array([[1 / scale, 0, low.real], [0, 1 / scale, -high.imag], [0, 0, 1.0]])
+    warp, flags = on_paper.sheet.mm_to_px @ window, cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    grey = cv2.warpPerspective(seen.page.grey, warp, size, flags=flags, borderValue=255)
+    canvas = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
+
+    def line(ends, colour, thick) -> None:
+        at = np.array(ends) - complex(low.real, high.imag)
+        px = np.round(np.column_stack([at.real, -at.imag]) * scale * 16)
+        p, q = (tuple(int(v) for v in np.clip(x, -(2**20), 2**20)) for x in px)
+        cv2.line(canvas, p, q, colour, thick, cv2.LINE_AA, shift=4)
+        cv2.circle(canvas, q, 3 * 16, colour, -1, cv2.LINE_AA, shift=4)
+
+    strokes = seen.ink.strokes.ends
+    for ends in strokes[..., 0] - 1j * strokes[..., 1]:
+        line(ends, (230, 140, 60), 1)
+    for ends, thick in ((miss.judged.true.stroke, 2), (miss.judged.true.ends, 1)):
+        if ends is not None:
+            line(on_paper.back(np.array(ends)), (60, 170, 0), thick)
+    if miss.read is not None:
+        line(on_paper.back(np.array(miss.read)), (40, 40, 220), 1)
+    return canvas
+
+
+# Counting -----------------------------------------------------------------------------------------------
+
+
+def look_at(title: str, students: Iterator[Student], pictures: Path | None, *, tell: bool) -> None:
+    counts: dict[str, Counter[str]] = {"long": Counter(), "short": Counter()}
+    sheets = Counter()
+    for student in students:
+        seen = [see(place) for place in student.places]
+        readings = read(seen, student.assignment, student.variant, student.declared, student.wanted)
+        for page, reading, truth in zip(seen, readings, student.truths, strict=True):
+            right = True
+            on_paper = OnPaper(truth, page) if page.sheet is not None and page.ink is not None else None
+            fault = sheet_fault(page, on_paper)
+            if fault:
+                print(f"  page not registered: {student.name} page {truth.get('page', 1)}: {fault}")
+            for one, miss in misses_of(student, page, reading, truth):
+                if not one.true.missing:
+                    size = "short" if one.short else "long"
+                    counts[size]["of" if miss is None else miss.cause] += 1
+                    right &= one.right or one.short
+                if one.misread:
+                    counts["long"]["misread"] += 1
+                    print(f"  silent misread: {told(student.name, truth, one)}", flush=True)
+                if miss is None:
+                    continue
+                if tell:
+                    print(f"  {miss.cause:7s} {told(student.name, truth, one)}", flush=True)
+                if pictures is not None and miss.cause != "doubt" and page.ink is not None:
+                    name = f"{student.name}_{truth.get('page', 1)}_{one.true.name}_{miss.cause}.png"
+                    close_up(miss, page, truth, pictures / name)
+            sheets[right] += 1
+    report(title, counts, sheets)
+
+
+def told(student: str, truth: dict[str, Any], one: Judged) -> str:
+    mistakes = ",".join(m.get("code") or m.get("id") for m in truth.get("mistakes", []))
+    state = one.true.missing or f"{one.true.length_mm:.1f} mm"
+    error = f"error {one.error_mm:.2f} mm" if one.reported else "unread"
+    return (
+        f"{student} page {truth.get('page', 1)} {one.true.name} ({state}): {error}"
+        f" at {one.confidence:.2f} {mistakes}"
+    )
+
+
+def report(title: str, counts: dict[str, Counter[str]], sheets: Counter) -> None:
+    print(f"{title}: sheets right {sheets[True]} of {sum(sheets.values())}")
+    for size, words in (("long", "5 mm and more"), ("short", "shorter")):
+        misreads = counts[size].pop("misread", 0)
+        total = max(1, sum(counts[size].values()))
+        causes = ", ".join(
+            f"{cause} {counts[size][cause]} ({100 * counts[size][cause] / total:.1f} %)" for cause in CAUSES
+        )
+        good = counts[size]["of"]
+        print(f"  {words}: right and confident {good} of {total} ({100 * good / total:.1f} %); {causes}")
+        if size == "long":
+            print(f"  silent misreads: {misreads}", flush=True)
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    asked.add_argument("--scene", action="append", choices=[scene.name for scene in SCENES])
+    asked.add_argument("--students", type=int, help="12 of a scene, all of a folder")
+    asked.add_argument("--first", type=int, default=1, help="first seed")
+    asked.add_argument("--shared", action="append", type=Path, help="a folder of sheets with truth.jsonl")
+    asked.add_argument("--pictures", type=Path, help="folder for close-ups of misses")
+    asked.add_argument("--quiet", action="store_true", help="only counts, and silent misreads")
+    options = asked.parse_args()
+    cv2.setNumThreads(1)
+    if options.pictures:
+        options.pictures.mkdir(parents=True, exist_ok=True)
+    for folder in options.shared or []:
+        students = from_folder(folder, options.students)
+        look_at(folder.name, students, options.pictures, tell=not options.quiet)
+    scenes = options.scene or ([] if options.shared else [scene.name for scene in SCENES])
+    for scene in scenes:
+        with tempfile.TemporaryDirectory() as folder:
+            students = simulated(scene, options.students or 12, options.first, Path(folder))
+            look_at(scene, students, options.pictures, tell=not options.quiet)
+
+
+if __name__ == "__main__":
+    main()
