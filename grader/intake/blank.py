@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 
+from grader.pixels import shrink
 from grader.records import Page
 
 _LONG_SIDE_PX = 1700
@@ -23,11 +24,11 @@ def is_blank(page: Page) -> bool:
     shadows; a sheet with a single short line is not blank.
     """
     scale = min(1.0, _LONG_SIDE_PX / max(page.grey.shape))
-    small = cv2.resize(page.grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    small = shrink(page.grey, scale)
     paper = cv2.morphologyEx(small, cv2.MORPH_CLOSE, np.ones((31, 31), np.uint8))
-    contrast = 1.0 - small.astype(np.float32) / np.maximum(paper, 1).astype(np.float32)
+    share = np.asarray(cv2.divide(small, paper, scale=255), dtype=np.uint8)
     rim = int(_RIM * max(small.shape))
-    inner = np.ascontiguousarray((contrast > _DARK)[rim:-rim, rim:-rim]).astype(np.uint8)
+    inner = np.ascontiguousarray(share[rim:-rim, rim:-rim] < (1.0 - _DARK) * 255).astype(np.uint8)
     _, _, stats, _ = cv2.connectedComponentsWithStats(inner, connectivity=8)
     extent = np.hypot(stats[1:, cv2.CC_STAT_WIDTH], stats[1:, cv2.CC_STAT_HEIGHT])
     long_side = max(small.shape)

@@ -13,6 +13,8 @@ _POINTS = 5
 _FIRST, _LAST = 0.05, 0.95
 _STEPS = 12
 _CENTRE_MM = np.array([PAGE_MM[0] / 2.0, PAGE_MM[1] / 2.0])
+_LOOSE = np.array([0.1, 0.1, 0.1, 20.0, 20.0])
+"""How far a scanner's map may be from its first guess, mm for the place: keeps what no line settles."""
 DPI_SE = 0.002
 """Relative error of a scanner's or copier's stated resolution along one axis."""
 _MM_PER_INCH = 25.4
@@ -105,12 +107,16 @@ def fit_sides(
         (homography_of, homography_params(start)) if perspective else (affine_of, affine_params(start))
     )
     stated = None if dpi is None or perspective else np.log(np.array(dpi) / _MM_PER_INCH)
+    guess = params
+    loose = _LOOSE * np.array([1.0, 1.0, 1.0, *np.exp(params[:2])]) if not perspective else None
 
     def residuals(p: FloatArray) -> FloatArray:
         inverse = inverted(to_matrix(p))
         parts = [_off(inverse, side) / (side.model.side_se_mm * np.sqrt(_POINTS / 2.0)) for side in sides]
         if stated is not None:
             parts.append((p[:2] - stated) / DPI_SE)
+        if loose is not None:
+            parts.append((p - guess) / loose)
         return np.concatenate(parts) if parts else np.zeros(0)
 
     params, jacobian = gauss_newton(residuals, params)

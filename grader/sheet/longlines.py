@@ -2,21 +2,23 @@
 
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from grader.pixels import Flat, cut_across, robust_lines, shrink
-from grader.records import FloatArray, GreyImage
+from grader.records import FloatArray
+from grader.sheet.borders import borders
 from grader.sheet.edges import bright_towards, edge_offsets
 
 _LONG_SIDE_PX = 1400
 """About 3.3 px/mm on A3: a frame's stroke is still two pixels wide."""
-_AXIS_DEG = 16.0
+_STEEPEST = float(np.tan(np.radians(16.0)))
 """Skew, roll and the convergence of a photo together stay under this."""
-_COLLINEAR_PX = 1.8
+_COLLINEAR_PX, _BENT_SHARE, _MOST_BENT_PX = 1.8, 0.003, 4.0
+"""Distance of pieces of one line from it, and how much of its length a lens adds to that, at most."""
 _GAP_PX = 80.0
-_LEAST_PX = 12.0
+_SEED_PX = 40.0
+"""Of a chain's longest piece: dashes and letters in a row are no side of a sheet."""
 _LEAST_SHARE = 0.12
 """Of the image's width or height; the title block's lines are kept too."""
 _STROKE_PX = (0.3, 6.5)
@@ -42,6 +44,7 @@ class LongLine:
     ends : (2, 2) left and right, or upper and lower, end
     inked : share of the length that was seen
     width : of a drawn line's ink, px; 0 for a step
+    dark : contrast of a drawn line's ink, 0..1
     """
 
     across: bool
@@ -50,6 +53,7 @@ class LongLine:
     ends: FloatArray
     inked: float
     width: float = 0.0
+    dark: float = 0.0
 
     @property
     def length(self) -> float:
@@ -67,47 +71,15 @@ def long_lines(flat: Flat) -> list[LongLine]:
     """All long lines, longest first, with drawn strokes fitted to their middle at full resolution."""
     scale = min(1.0, _LONG_SIDE_PX / max(flat.grey.shape))
     small = shrink(flat.grey, scale)
-    pieces = _pieces(small)
     found: list[LongLine] = []
     for across in (True, False):
-        edges = _edges(small, pieces, across=across)
+        edges = borders(small if across else np.ascontiguousarray(small.T), _STEEPEST)
         chains = {sign: _chains(edges[edges[:, 4] == sign], small.shape, across=across) for sign in (-1, 1)}
         found += _paired(chains, across=across)
     full = [_full_size(line, scale) for line in found]
     steps = [_settled_step(flat, line, 1.0 / scale) for line in full if line.kind == STEP]
     drawn = _refined(flat, [line for line in full if line.kind == RIDGE], 1.0 / scale)
     return sorted(steps + drawn, key=lambda line: -line.length * line.inked)
-
-
-def _pieces(small: GreyImage) -> FloatArray:
-    """(n, 4) straight borders between dark and bright: x, y, x, y."""
-    lines = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD, scale=1.0).detect(small)[0]
-    return np.zeros((0, 4)) if lines is None else np.asarray(lines, dtype=np.float64).reshape(-1, 4)
-
-
-def _edges(small: GreyImage, pieces: FloatArray, *, across: bool) -> FloatArray:
-    """(n, 5) of position and value at both ends, and which side is bright, for lines along one axis."""
-    ends = pieces.copy() if across else pieces[:, [1, 0, 3, 2]]
-    flip = ends[:, 0] > ends[:, 2]
-    ends[flip] = ends[flip][:, [2, 3, 0, 1]]
-    length = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1])
-    flat_enough = np.abs(ends[:, 3] - ends[:, 1]) <= np.tan(np.radians(_AXIS_DEG)) * (ends[:, 2] - ends[:, 0])
-    ends = ends[flat_enough & (length >= _LEAST_PX)]
-    return np.column_stack([ends, _bright_side(small if across else small.T, ends)])
-
-
-def _bright_side(image: GreyImage, ends: FloatArray) -> FloatArray:
-    share = np.linspace(0.1, 0.9, 9)[None, :]
-    x = ends[:, [0]] + share * (ends[:, [2]] - ends[:, [0]])
-    y = ends[:, [1]] + share * (ends[:, [3]] - ends[:, [1]])
-    high, wide = image.shape
-    column = np.clip(np.rint(x), 0, wide - 1).astype(int)
-
-    def level(shift: float) -> FloatArray:
-        row = np.clip(np.rint(y + shift), 0, high - 1).astype(int)
-        return np.asarray(image[row, column].mean(axis=1), dtype=np.float64)
-
-    return np.where(level(1.2) >= level(-1.2), 1.0, -1.0)
 
 
 def _chains(edges: FloatArray, shape: tuple[int, ...], *, across: bool) -> list[tuple[FloatArray, float]]:
@@ -118,16 +90,20 @@ def _chains(edges: FloatArray, shape: tuple[int, ...], *, across: bool) -> list[
     free = np.ones(len(edges), dtype=bool)
     chains: list[tuple[FloatArray, float]] = []
     for first in map(int, order):
+        if length[first] < _SEED_PX:
+            break
         if not free[first]:
             continue
         members = np.array([first])
         for _ in range(4):
             line = _weighted_line(edges[members], length[members])
             near = np.maximum(
-                np.abs(edges[:, 1] - np.polyval(line, edges[:, 0])),
-                np.abs(edges[:, 3] - np.polyval(line, edges[:, 2])),
+                np.abs(edges[:, 1] - line[0] * edges[:, 0] - line[1]),
+                np.abs(edges[:, 3] - line[0] * edges[:, 2] - line[1]),
             )
-            grown = _reached(edges, np.flatnonzero(free & (near <= _COLLINEAR_PX)), first)
+            span = edges[members, 2].max() - edges[members, 0].min()
+            within = min(_COLLINEAR_PX + _BENT_SHARE * span, _MOST_BENT_PX)
+            grown = _reached(edges, np.flatnonzero(free & (near <= within)), first)
             if len(grown) == 0 or np.array_equal(grown, members):
                 break
             members = grown
@@ -153,9 +129,14 @@ def _reached(edges: FloatArray, near: NDArray[np.intp], first: int) -> NDArray[n
 
 
 def _weighted_line(edges: FloatArray, length: FloatArray) -> FloatArray:
-    x = np.concatenate([edges[:, 0], edges[:, 2]])
-    y = np.concatenate([edges[:, 1], edges[:, 3]])
-    return np.asarray(np.polyfit(x, y, 1, w=np.sqrt(np.concatenate([length, length]))))
+    """Slope and value at 0 of the line through both ends of all edges, weighed by their lengths."""
+    x, y = edges[:, [0, 2]], edges[:, [1, 3]]
+    weight = np.maximum(length, 1e-9)[:, None] / (2.0 * max(float(length.sum()), 1e-9))
+    x_mean, y_mean = float((weight * x).sum()), float((weight * y).sum())
+    slope = float(
+        (weight * (x - x_mean) * (y - y_mean)).sum() / max((weight * (x - x_mean) ** 2).sum(), 1e-9)
+    )
+    return np.array([slope, y_mean - slope * x_mean])
 
 
 def _paired(chains: dict[int, list[tuple[FloatArray, float]]], *, across: bool) -> list[LongLine]:
@@ -234,5 +215,6 @@ def _refined(flat: Flat, lines: list[LongLine], full_per_small: float) -> list[L
             refined.append(line)
             continue
         moved = _shifted(line, float(fit.a[index]), float(fit.b[index]))
-        refined.append(replace(moved, inked=float(good[index].mean()), width=float(usual[index])))
+        dark = float(np.median(cuts.dark[index][good[index]]))
+        refined.append(replace(moved, inked=float(good[index].mean()), width=float(usual[index]), dark=dark))
     return refined

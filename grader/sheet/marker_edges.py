@@ -69,6 +69,16 @@ def refine(grey: GreyImage, guess_px: FloatArray) -> Corners:
 
 _T = np.linspace(_ENDS, 1.0 - _ENDS, _SAMPLES)
 _Y = np.linspace(-_REACH, _REACH, _ACROSS)
+_LOOKED_AT = (
+    (
+        _START[:, None, None, :]
+        + _T[None, :, None, None] * _ALONG[:, None, None, :]
+        + _Y[None, None, :, None] * _OUTWARD[:, None, None, :]
+    )
+    .reshape(-1, 2)
+    .T.astype(np.float32)
+)
+"""(2, places) all places of the four sides, in the marker's own square."""
 
 
 def _square_to(corners: FloatArray) -> FloatArray:
@@ -78,14 +88,9 @@ def _square_to(corners: FloatArray) -> FloatArray:
 
 def _edges(grey: GreyImage, to_px: FloatArray) -> tuple[FloatArray, BoolArray]:
     """(4k, samples) how far outward the sides are crossed, and where a crossing was seen."""
-    unit = (
-        _START[:, None, None, :]
-        + _T[None, :, None, None] * _ALONG[:, None, None, :]
-        + _Y[None, None, :, None] * _OUTWARD[:, None, None, :]
-    )
-    places = _project(to_px[:, None, None, None], unit[None]).astype(np.float32)
-    flat = places.reshape(-1, _ACROSS, 2)
-    x, y = np.ascontiguousarray(flat[..., 0]), np.ascontiguousarray(flat[..., 1])
+    matrix = to_px.astype(np.float32)
+    mapped = matrix[:, :, :2] @ _LOOKED_AT + matrix[:, :, 2:]
+    x, y = (np.ascontiguousarray(mapped[:, k] / mapped[:, 2]).reshape(-1, _ACROSS) for k in (0, 1))
     values = cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return _crossings(values.astype(np.float64).reshape(-1, _SAMPLES, _ACROSS))
 

@@ -8,6 +8,7 @@ from grader.pixels import Flat, flatten
 from grader.records import FloatArray, Page, Problem, Sheet, Unread
 from grader.sheet.bend import find_lens
 from grader.sheet.fitting import Fit, affine_of, apply, fit_sides, inverted
+from grader.sheet.grid import find_grid
 from grader.sheet.hypotheses import Hypothesis, Resolution, hypotheses, on_sides
 from grader.sheet.longlines import LongLine, long_lines
 from grader.sheet.models import PAGE_MM, PAPER, Model, drawable
@@ -41,11 +42,11 @@ def register_plain(page: Page) -> Sheet | Unread:
     if long_px < _LEAST_PX_PER_MM * PAGE_MM[0]:
         return Unread("sheet", f"{long_px} pixels along the long side are too few for an A3 drawing")
     flat = flatten(page.grey)
-    lines = long_lines(flat)
+    shape = (page.grey.shape[0], page.grey.shape[1])
+    _, lines = find_grid(long_lines(flat), shape)
     problems: list[Problem] = []
     resolution = _resolution(page, problems)
     dpi = resolution.dpi if resolution is not None and resolution.stated else None
-    shape = (page.grey.shape[0], page.grey.shape[1])
     ranked = hypotheses(lines, shape, resolution)
     if ranked:
         rival = None if dpi is not None else _rival_scale(ranked)
