@@ -1,36 +1,32 @@
 """A folder of submissions: survey, owners, marking in parallel, results. One bad file stops nothing."""
 
-import hashlib
-import multiprocessing
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 from pydantic import ValidationError
 
-from grader import __version__
 from grader.documents import ReportDocument, ResultsDocument, UnmatchedDocument
 from grader.exports import write_summary
 from grader.feedback import Level, write_feedback, write_index
 from grader.files import make_folder, write_whole
 from grader.folder import submissions
 from grader.judging import unjudged_report
+from grader.kept import digest_of, forget_surveys, keep_looked, kept_looked, survey_kept
 from grader.measurements import names_of
+from grader.moved import earlier_standings, moved
 from grader.ownership import Unmatched, assign_pages
-from grader.pipeline import Work, mark
+from grader.parallel import in_parallel
+from grader.pipeline import Looked, Work, asked_of, look, mark_looked
 from grader.records import Problem
 from grader.roster import Roster, read_roster
 from grader.rubric import RubricFile
-from grader.survey import Survey, survey
+from grader.survey import Survey
 from grader.works import works_of
 from reference.assignment import Assignment, Variant
-from reference.errors import CallError, PlanmarkError
+from reference.errors import CallError
 
-Result = TypeVar("Result")
-KEYS_FOLDER = ".planmark"
+KEPT_FOLDER = ".planmark"
 Progress = Callable[[str, int, int], None]
 """Told what is being done, how many are done, and of how many."""
 
@@ -67,15 +63,27 @@ def grade(batch: Batch, progress: Progress) -> ResultsDocument:
     """
     roster = _roster(batch)
     files = _files(batch)
+    if not files and roster is None:
+        raise _nothing(batch)
+    make_folder(batch.out)
     surveys = _surveys(batch, files, progress)
     works, unmatched = _works(batch, roster, files, surveys)
     if not works and not unmatched:
-        raise CallError("nothing_to_grade", f"{batch.folder}: there is nothing to grade in this folder")
-    make_folder(batch.out)
-    reports = _marked(batch, works, progress)
-    results = ResultsDocument(assignment=batch.assignment.id, reports=reports, unmatched=unmatched)
+        raise _nothing(batch)
+    before = earlier_standings(batch.out / "results.json", batch.assignment.id)
+    reports = _marked(batch, _jobs(batch, works, surveys), progress)
+    results = ResultsDocument(
+        assignment=batch.assignment.id,
+        reports=reports,
+        unmatched=unmatched,
+        moved=moved(before, reports),
+    )
     _write_results(batch, results, works)
     return results
+
+
+def _nothing(batch: Batch) -> CallError:
+    return CallError("nothing_to_grade", f"{batch.folder}: there is nothing to grade in this folder")
 
 
 def needs_person(results: ResultsDocument) -> bool:
@@ -100,14 +108,16 @@ def _files(batch: Batch) -> list[Path]:
 def _surveys(batch: Batch, files: Sequence[Path], progress: Progress) -> list[Survey]:
     names = names_of(batch.assignment)
     found: dict[int, Survey] = {}
-    calls = [(path, path.relative_to(batch.folder).as_posix(), names) for path in files]
-    for index, result in _in_parallel(survey, calls, batch.jobs):
+    notes = batch.out / KEPT_FOLDER / "surveys"
+    calls = [(path, path.relative_to(batch.folder).as_posix(), names, notes) for path in files]
+    for index, result in in_parallel(survey_kept, calls, batch.jobs):
         if isinstance(result, Problem):
             told = UnmatchedDocument(file=calls[index][1], code=result.code, message=result.message)
             found[index] = Survey(refused=told)
         else:
             found[index] = result
         progress("looking", len(found), len(calls))
+    forget_surveys(notes, {one.digest for one in found.values()})
     return [found[index] for index in range(len(files))]
 
 
@@ -144,27 +154,61 @@ def _unmatched(one: Unmatched, broken: str | None) -> UnmatchedDocument:
 # Marking ------------------------------------------------------------------------------------------
 
 
-def _marked(batch: Batch, works: Sequence[Work], progress: Progress) -> list[ReportDocument]:
-    """Reports in the order of the works; each with its files written."""
-    folders = folders_of(works)
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One submission to mark.
+
+    Attributes
+    ----------
+    folder : below the results: the student's, with several positions one for each
+    reading_key : a digest of everything that the reading of its pages depends on
+    key : a digest of everything that its report depends on
+    """
+
+    work: Work
+    folder: str
+    reading_key: str
+    key: str
+
+    @property
+    def name(self) -> str:
+        """Of what is kept of it."""
+        return self.folder.replace("/", "#")
+
+
+def _jobs(batch: Batch, works: Sequence[Work], surveys: Sequence[Survey]) -> list[Job]:
+    """The works with digests of what they depend on; a file of many pages is looked at once."""
+    content = {source.file: one.digest for one in surveys for source in one.pages}
+    assignment = (batch.assignment.file.model_dump_json(), batch.assignment.mechanism_file.model_dump_json())
+    read = digest_of((*assignment, *asked_of(batch.assignment, batch.rubric)))
+    marked = digest_of((*assignment, batch.rubric.model_dump_json(), batch.level))
+    jobs = []
+    for work, folder in zip(works, folders_of(works), strict=True):
+        pages = [(place.name, place.page, content.get(place.name, "")) for place in work.pages]
+        declared = sorted(work.declared.items())
+        reading_key = digest_of((read, work.student_id, work.variant, declared, pages))
+        key = digest_of((marked, reading_key, replace(work, pages=())))
+        jobs.append(Job(work, folder, reading_key, key))
+    return jobs
+
+
+def _marked(batch: Batch, jobs: Sequence[Job], progress: Progress) -> list[ReportDocument]:
+    """Reports in the order of the jobs; each with its files written."""
     reports: dict[int, ReportDocument] = {}
     waiting: list[int] = []
-    for index, (work, folder) in enumerate(zip(works, folders, strict=True)):
-        known = _known(batch, work, folder)
+    for index, job in enumerate(jobs):
+        known = _known(batch, job)
         if known is None:
             waiting.append(index)
         else:
             reports[index] = known
-    progress("marking", len(reports), len(works))
-    calls = [(batch, works[index], folders[index]) for index in waiting]
-    for number, result in _in_parallel(_mark_one, calls, batch.jobs):
+    progress("marking", len(reports), len(jobs))
+    calls = [(batch, jobs[index]) for index in waiting]
+    for number, result in in_parallel(_mark_one, calls, batch.jobs):
         index = waiting[number]
-        if isinstance(result, Problem):
-            reports[index] = _failed(batch, works[index], folders[index], result)
-        else:
-            reports[index] = result
-        progress("marking", len(reports), len(works))
-    return [reports[index] for index in range(len(works))]
+        reports[index] = _failed(batch, jobs[index], result) if isinstance(result, Problem) else result
+        progress("marking", len(reports), len(jobs))
+    return [reports[index] for index in range(len(jobs))]
 
 
 def folders_of(works: Iterable[Work]) -> list[str]:
@@ -181,10 +225,10 @@ def _position(work: Work) -> str:
     return "unknown" if position is None else str(position)
 
 
-def _mark_one(batch: Batch, work: Work, folder: str) -> ReportDocument:
-    """Mark one submission and write its files; the report last, so that it stands for all of them."""
-    marked = mark(work, batch.assignment, batch.rubric, batch.level)
-    where = batch.out / folder
+def _mark_one(batch: Batch, job: Job) -> ReportDocument:
+    """Mark one submission and write its files; its key last, so that it stands for all of them."""
+    work, where = job.work, batch.out / job.folder
+    marked = mark_looked(work, batch.assignment, batch.rubric, _looked(batch, job), batch.level)
     title = batch.assignment.file.title.in_language(work.lang)
     names = batch.assignment.file.names
     write_feedback(
@@ -192,17 +236,30 @@ def _mark_one(batch: Batch, work: Work, folder: str) -> ReportDocument:
         title=title, student_name=work.name, names=names,
     )  # fmt: skip
     write_whole(where / "report.json", marked.report.model_dump_json(indent=2))
-    write_whole(_key_file(batch, folder), _key(batch, work))
+    write_whole(_key_file(batch, job), job.key)
     return marked.report
 
 
-def _failed(batch: Batch, work: Work, folder: str, problem: Problem) -> ReportDocument:
+def _looked(batch: Batch, job: Job) -> Sequence[Looked]:
+    """The pages as read by an earlier run, else now."""
+    folder = batch.out / KEPT_FOLDER / "readings"
+    kept = kept_looked(folder, job.name, job.reading_key)
+    if kept is not None:
+        return kept
+    looked = look(job.work, batch.assignment, batch.rubric)
+    if looked:
+        keep_looked(folder, job.name, job.reading_key, looked)
+    return looked
+
+
+def _failed(batch: Batch, job: Job, problem: Problem) -> ReportDocument:
+    work, where = job.work, batch.out / job.folder
     report = unjudged_report(
         batch.assignment, batch.rubric, work.variant or Variant(), work.student_id, "unreadable",
         problems=(*work.problems, problem),
     )  # fmt: skip
-    write_feedback(report, [], batch.out / folder, work.lang, batch.level, student_name=work.name)
-    write_whole(batch.out / folder / "report.json", report.model_dump_json(indent=2))
+    write_feedback(report, [], where, work.lang, batch.level, student_name=work.name)
+    write_whole(where / "report.json", report.model_dump_json(indent=2))
     return report
 
 
@@ -217,74 +274,18 @@ def _write_results(batch: Batch, results: ResultsDocument, works: Sequence[Work]
 # What need not be done again ----------------------------------------------------------------------
 
 
-def _key_file(batch: Batch, folder: str) -> Path:
-    return batch.out / KEYS_FOLDER / f"{folder.replace('/', '#')}.key"
+def _key_file(batch: Batch, job: Job) -> Path:
+    return batch.out / KEPT_FOLDER / f"{job.name}.key"
 
 
-def _key(batch: Batch, work: Work) -> str:
-    """A digest of everything that a report depends on."""
-    digest = hashlib.sha256()
-    told = replace(work, pages=())
-    pages = [(place.name, place.page) for place in work.pages]
-    authored = (batch.assignment.file, batch.assignment.mechanism_file, batch.rubric)
-    for part in (__version__, told, pages, batch.level, *(model.model_dump_json() for model in authored)):
-        digest.update(repr(part).encode())
-    for place in work.pages:
-        digest.update(hashlib.sha256(place.path.read_bytes()).digest() if place.path.is_file() else b"-")
-    return digest.hexdigest()
-
-
-def _known(batch: Batch, work: Work, folder: str) -> ReportDocument | None:
+def _known(batch: Batch, job: Job) -> ReportDocument | None:
     """The report of an earlier run over the same inputs, with all its files still there."""
-    report, key = batch.out / folder / "report.json", _key_file(batch, folder)
+    where = batch.out / job.folder
     try:
-        if key.read_text(encoding="utf-8") != _key(batch, work):
+        if _key_file(batch, job).read_text(encoding="utf-8") != job.key:
             return None
-        if not (batch.out / folder / "feedback.html").is_file():
+        if not (where / "feedback.html").is_file():
             return None
-        return ReportDocument.model_validate_json(report.read_bytes())
+        return ReportDocument.model_validate_json((where / "report.json").read_bytes())
     except (OSError, UnicodeDecodeError, ValidationError):
         return None
-
-
-# Processes ----------------------------------------------------------------------------------------
-
-
-def _in_parallel(
-    function: Callable[..., Result], calls: Sequence[tuple[object, ...]], jobs: int
-) -> Iterator[tuple[int, Result | Problem]]:
-    """Results as they come, each with its index; a failure is a Problem in the place of its result."""
-    if jobs <= 1 or len(calls) <= 1:
-        for index, call in enumerate(calls):
-            yield index, _guarded(function, *call)
-        return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(jobs, len(calls)), mp_context=context, initializer=_one_thread) as pool:
-        futures = {pool.submit(_guarded, function, *call): index for index, call in enumerate(calls)}
-        for future in as_completed(futures):
-            yield futures[future], _outcome(future)
-
-
-def _outcome(future: Future[Result | Problem]) -> Result | Problem:
-    try:
-        return future.result()
-    except BrokenProcessPool:
-        told = "the process that worked on it was ended by the system, most likely for want of memory"
-        return Problem("process_ended", f"{told}; grade again with fewer --jobs")
-
-
-def _guarded(function: Callable[..., Result], *call: object) -> Result | Problem:
-    """The function's result, or the Problem that stopped it: one bad file never stops the rest."""
-    try:
-        return function(*call)
-    except PlanmarkError as error:
-        return Problem(error.code, error.message)
-    except Exception as error:  # noqa: BLE001 - whatever a hostile file brings about stays with that file
-        return Problem("internal_error", f"could not be processed ({type(error).__name__}: {error})")
-
-
-def _one_thread() -> None:
-    """The processes share the machine: OpenCV must not start threads of its own in each."""
-    import cv2  # noqa: PLC0415 - only in worker processes
-
-    cv2.setNumThreads(1)

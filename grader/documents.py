@@ -226,13 +226,31 @@ class UnmatchedDocument(Document):
     message: str
 
 
+class StandingDocument(Document):
+    """How a submission stands: its status and points, or between what they lie."""
+
+    status: Status
+    score: float | None
+    score_range: tuple[float, float] | None
+
+
+class MovedDocument(Document):
+    """A submission that stands elsewhere than after the run before; null before (new) or after (gone)."""
+
+    student_id: str
+    position: int | None = None
+    before: StandingDocument | None
+    after: StandingDocument | None
+
+
 class ResultsDocument(Document):
-    """A class's results."""
+    """A class's results; `moved` against the run before, empty after the first."""
 
     schema_version: Version = 1
     assignment: str
     reports: list[ReportDocument]
     unmatched: list[UnmatchedDocument] = []
+    moved: list[MovedDocument] = []
 
 
 # Plan: the exact plan of a variant ----------------------------------------------------------------

@@ -7,6 +7,7 @@ top left pixel, s = width / paper's width.
 import itertools
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -56,40 +57,71 @@ JPEG_QUALITY = 78
 PNG_COMPRESSION = 1
 
 
-def overlay(  # noqa: PLR0913 - a page and all that is known of it
-    page: Page,
-    sheet: Sheet | None,
+@dataclass(frozen=True, slots=True)
+class Backdrop:
+    """A page cleaned to draw on: upright where it could be registered, else turned as its file asks.
+
+    Attributes
+    ----------
+    scan : (h, w) uint8
+    page_mm : what its whole width and height are on paper
+    registered : whether sheet millimetres are known on it
+    """
+
+    source: str
+    page: int
+    scan: GreyImage
+    page_mm: XY
+    registered: bool
+
+
+def backdrop(page: Page, sheet: Sheet | None, *, width_px: int = WIDTH_PX) -> Backdrop:
+    """The scan to draw on; `sheet` is None where the page could not be registered."""
+    if sheet is None:
+        scan = _clean(_turned(page, width_px))
+        height, width = scan.shape
+        return Backdrop(page.source, page.page, scan, (420.0, 420.0 * height / width), registered=False)
+    scan = _clean(_upright(page.grey, sheet, width_px))
+    return Backdrop(page.source, page.page, scan, sheet.page_mm, registered=True)
+
+
+def overlay(
+    behind: Backdrop,
     reading: Reading | None,
     vectors: Mapping[str, Vector],
     outcomes: Mapping[str, Outcome],
     *,
     show_expected: bool = False,
-    width_px: int = WIDTH_PX,
 ) -> Picture:
     """A page with what was read on it.
 
     Arguments
     ---------
-    sheet, reading : None where the page could not be registered or read: the scan alone is shown,
-        turned as its file asks
+    reading : None where the page could not be read: the scan alone is shown
     vectors : the construction's vectors, which say from what node to what node each goes
     outcomes : by vector name; read vectors without an outcome are shown as not judged
     show_expected : whether wrong vectors have the expected one ghosted in
     """
-    if sheet is None:
-        scan = _clean(_turned(page, width_px))
-        height, width = scan.shape
-        scene = Scene((420.0, 420.0 * height / width))
-    else:
-        scan = _clean(_upright(page.grey, sheet, width_px))
-        height, width = scan.shape
-        scene = Scene(sheet.page_mm)
-        if reading is not None:
-            scene = scene_of(sheet.page_mm, reading, vectors, outcomes, show_expected=show_expected)
+    scan = behind.scan
+    height, width = scan.shape
+    scene = Scene(behind.page_mm)
+    if behind.registered and reading is not None:
+        scene = scene_of(behind.page_mm, reading, vectors, outcomes, show_expected=show_expected)
     painted = paint(scan, scene)
     png = _encode(".png", painted, [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION])
     jpeg = _encode(".jpg", scan, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return Picture(page.source, page.page, png, jpeg, width, height, scene)
+    return Picture(behind.source, behind.page, png, jpeg, width, height, scene)
+
+
+def stored(behind: Backdrop) -> bytes:
+    """A backdrop's scan as a PNG file, without loss."""
+    return _encode(".png", behind.scan, [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION])
+
+
+def restored(data: bytes) -> GreyImage | None:
+    """The scan of a backdrop from its PNG file; None where the file is damaged."""
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
+    return None if image is None else _grey(image)
 
 
 def _encode(kind: str, image: NDArray[np.uint8], options: list[int]) -> bytes:

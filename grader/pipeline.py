@@ -19,18 +19,22 @@ from grader.intake import is_blank, page_of
 from grader.judging import Submission, Task, judge, report_of, task_of, unjudged_report
 from grader.measurements import Measurements
 from grader.outcomes import Judgement
-from grader.picture import overlay
+from grader.picture import Backdrop, backdrop, overlay
 from grader.quantities import ByRule, Declared, parse_scale
 from grader.reading import read_figures
 from grader.reading_document import reading_document
-from grader.records import Ink, Page, Problem, Reading, Sheet
+from grader.records import MECHANISM, Box, Ink, Page, Problem, Reading, Sheet
 from grader.rubric import RubricFile
 from grader.scene import Picture
 from grader.sheet import rectify, straighten
 from reference.assignment import Assignment, Scales, Variant
 from reference.construction import Vector
+from reference.derivation import construction_of
 from reference.errors import InputFileError, MechanismError
 from reference.mechanism import Crank
+
+ZONE_SLACK_MM = 2.0
+"""Half of the gap between the zones of a printed sheet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +72,8 @@ class Work:
 class Seen:
     """A page and what is on it, before names are given.
 
-    `page`, `sheet` and `ink` are None from where the way ended; `problems` says why.
+    `page`, `sheet` and `ink` are None from where the way ended; `problems` says why. `narrowed` where
+    zones of the printed sheet were passed over because nothing in them is asked for.
     """
 
     place: Place
@@ -77,6 +82,23 @@ class Seen:
     ink: Ink | None = None
     problems: tuple[Problem, ...] = ()
     timing_ms: dict[str, float] = field(default_factory=dict)
+    narrowed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """One page as read, without its pixels: all that marking needs, and what a later run may keep.
+
+    Attributes
+    ----------
+    document : the reading as it is reported
+    backdrop : the cleaned scan to draw on; None where the page could not be decoded
+    """
+
+    document: ReadingDocument
+    reading: Reading
+    problems: tuple[Problem, ...] = ()
+    backdrop: Backdrop | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,17 +112,57 @@ class Marked:
 
 def mark(work: Work, assignment: Assignment, rubric: RubricFile, level: Level = "full") -> Marked:
     """Mark one submission. A bad file or drawing becomes a problem of its report, never an error."""
-    seen = [see(place) for place in work.pages]
-    readings = read(seen, assignment, work.variant, work.declared, rubric.vectors)
+    return mark_looked(work, assignment, rubric, look(work, assignment, rubric), level)
+
+
+def look(work: Work, assignment: Assignment, rubric: RubricFile) -> tuple[Looked, ...]:
+    """All pages of a submission as read: every vector of the figures that the rubric asks anything of."""
+    figures, wanted = asked_of(assignment, rubric)
+    seen = [see(place, figures) for place in work.pages]
+    readings = read(seen, assignment, work.variant, work.declared, wanted)
+    found = {figure for reading in readings for figure in reading.figures}
+    if any(one.narrowed for one in seen) and not figures <= found:
+        # Not in its zone: people draw where they like.
+        seen = [see(one.place) if one.narrowed else one for one in seen]
+        readings = read(seen, assignment, work.variant, work.declared, wanted)
     documents = documents_of(seen, readings, work.student_id)
+    return tuple(
+        Looked(document, reading, one.problems, None if one.page is None else backdrop(one.page, one.sheet))
+        for document, reading, one in zip(documents, readings, seen, strict=True)
+    )
+
+
+def asked_of(assignment: Assignment, rubric: RubricFile) -> tuple[frozenset[str], tuple[str, ...]]:
+    """The figures that a rubric asks anything of, with the sketch, and all their vectors.
+
+    Both are empty where it asks for no vector: then everything is read.
+    """
+    construction = construction_of(
+        assignment.mechanism(assignment.variants()[:1]),
+        accelerations=rubric.needs_accelerations,
+        plate_by_similarity=assignment.file.plate_images == "similarity",
+    )
+    known = [construction.vectors[name] for name in rubric.vectors if name in construction.vectors]
+    plans = dict.fromkeys(construction.figure_of(vector.head) for vector in known)
+    names = tuple(vector.name for plan in plans for vector in construction.vectors_of(plan))
+    return (frozenset({MECHANISM, *plans}), names) if plans else (frozenset(), ())
+
+
+def mark_looked(
+    work: Work, assignment: Assignment, rubric: RubricFile, looked: Sequence[Looked], level: Level = "full"
+) -> Marked:
+    """Mark a submission whose pages were read, now or in an earlier run."""
+    looked = [_only(one, rubric.vectors) for one in looked]
+    readings = [one.reading for one in looked]
+    documents = [one.document for one in looked]
     judged = _judged(work, assignment, rubric, readings)
     if isinstance(judged, Problem):
-        problems = (*work.problems, *_problems_of(seen), judged)
+        problems = (*work.problems, *_problems_of(looked), judged)
         report = unjudged_report(
             assignment, rubric, work.variant or Variant(), work.student_id,
             "unreadable" if work.pages or work.measured else "missing", problems=problems, sheets=documents,
         )  # fmt: skip
-        return Marked(work, report, _pictures(seen, readings, {}, None, level))
+        return Marked(work, report, _pictures(looked, {}, None, level))
     task, judgement = judged
     names = assignment.file.names
     report = report_of(
@@ -112,14 +174,27 @@ def mark(work: Work, assignment: Assignment, rubric: RubricFile, level: Level = 
             outcome.criterion: criterion_feedback(outcome, work.lang, level, names)
             for outcome in judgement.outcomes
         },
-        problems=(*work.problems, *_problems_of(seen), *_measuring_problems(work)),
+        problems=(*work.problems, *_problems_of(looked), *_measuring_problems(work)),
         sheets=documents,
     )
-    return Marked(work, report, _pictures(seen, readings, task.construction.vectors, judgement, level))
+    return Marked(work, report, _pictures(looked, task.construction.vectors, judgement, level))
 
 
-def see(place: Place) -> Seen:
-    """A page to millimetres and strokes."""
+def _only(one: Looked, names: Collection[str]) -> Looked:
+    """What could not be read of a page, as far as it is asked for."""
+    if not names:
+        return one
+    unread = tuple(gap for gap in one.reading.unread if gap.name in names)
+    told = [gap for gap in one.document.unread if gap.name in names]
+    document = one.document.model_copy(update={"unread": told})
+    return replace(one, document=document, reading=replace(one.reading, unread=unread))
+
+
+def see(place: Place, figures: Collection[str] = ()) -> Seen:
+    """A page to millimetres and strokes.
+
+    Arguments: of a printed sheet, only the zones of these `figures` are looked at; all of it by default.
+    """
     timing: dict[str, float] = {}
     try:
         with _timed(timing, "decode"):
@@ -136,10 +211,27 @@ def see(place: Place) -> Seen:
     if not isinstance(sheet, Sheet):
         problem = Problem("sheet_refused", f"{place.name}: page {place.page}: {sheet.reason}", place.name)
         return Seen(place, page, problems=(problem,), timing_ms=timing)
+    boxes = _asked_zones(sheet, figures)
+    ink = None
     with _timed(timing, "ink"):
-        ink = find_ink(page, sheet)
+        if boxes is None or boxes:
+            ink = find_ink(page, sheet, boxes)
     problems = tuple(replace(problem, file=place.name) for problem in sheet.problems)
-    return Seen(place, page, sheet, ink, problems, timing)
+    return Seen(place, page, sheet, ink, problems, timing, narrowed=boxes is not None)
+
+
+def _asked_zones(sheet: Sheet, figures: Collection[str]) -> list[Box] | None:
+    """The zones to look at, none where only the sketch would be left; None for the whole sheet."""
+    if not figures or sheet.zones.keys() <= set(figures):
+        return None
+    asked = [figure for figure in sheet.zones if figure in figures]
+    return [] if set(asked) <= {MECHANISM} else [_grown(sheet.zones[figure]) for figure in asked]
+
+
+def _grown(zone: Box) -> Box:
+    """A zone with the gap around it: a line may run a little past its edge."""
+    x, y, wide, high = zone
+    return (x - ZONE_SLACK_MM, y - ZONE_SLACK_MM, wide + 2 * ZONE_SLACK_MM, high + 2 * ZONE_SLACK_MM)
 
 
 def read(
@@ -226,8 +318,8 @@ def _judged(
     return task, judge(task, submission)
 
 
-def _problems_of(seen: Sequence[Seen]) -> list[Problem]:
-    return [problem for one in seen for problem in one.problems]
+def _problems_of(looked: Sequence[Looked]) -> list[Problem]:
+    return [problem for one in looked for problem in one.problems]
 
 
 def _measuring_problems(work: Work) -> tuple[Problem, ...]:
@@ -235,17 +327,13 @@ def _measuring_problems(work: Work) -> tuple[Problem, ...]:
 
 
 def _pictures(
-    seen: Sequence[Seen],
-    readings: Sequence[Reading],
-    vectors: Mapping[str, Vector],
-    judgement: Judgement | None,
-    level: Level,
+    looked: Sequence[Looked], vectors: Mapping[str, Vector], judgement: Judgement | None, level: Level
 ) -> tuple[Picture, ...]:
     outcomes = {} if judgement is None else {outcome.name: outcome for outcome in judgement.outcomes}
     return tuple(
-        overlay(one.page, one.sheet, reading, vectors, outcomes, show_expected=level == "full")
-        for one, reading in zip(seen, readings, strict=True)
-        if one.page is not None
+        overlay(one.backdrop, one.reading, vectors, outcomes, show_expected=level == "full")
+        for one in looked
+        if one.backdrop is not None
     )
 
 

@@ -24,12 +24,14 @@ class Survey:
     measurements : of a measurement file
     broken : why a page cannot be decoded, by its source
     refused : a measurement file that cannot be used at all
+    digest : of the content of a file with pages
     """
 
     pages: tuple[PageSource, ...] = ()
     measurements: tuple[Measurements, ...] = ()
     broken: Mapping[PageSource, str] = field(default_factory=dict)
     refused: UnmatchedDocument | None = None
+    digest: str = ""
 
 
 def survey(path: Path, name: str, names: Names) -> Survey:

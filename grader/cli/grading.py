@@ -16,6 +16,7 @@ from grader.batch import Progress as Tell
 from grader.documents import ReadingDocument, ResultsDocument
 from grader.i18n import LANGUAGES
 from grader.intake import count_pages
+from grader.moved import told_standing
 from grader.pipeline import Place, Seen, documents_of, read, see
 from grader.rubric import rubric_of
 from grader.samples_folder import samples_folder
@@ -75,6 +76,7 @@ def _tell(results: ResultsDocument, out: Path) -> None:
     states = Counter(report.status for report in results.reports)
     told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
     typer.echo(f"{len(results.reports)} submissions: {told or 'none'}")
+    _tell_moved(results, out)
     lines = [
         f"  {one.file}{'' if one.page is None else f'#{one.page}'}: {one.message}"
         for one in results.unmatched
@@ -92,6 +94,18 @@ def _tell(results: ResultsDocument, out: Path) -> None:
         if len(lines) > SHOWN:
             typer.echo(f"  ... and {len(lines) - SHOWN} more, all in {out / 'index.html'}")
     typer.echo(f"Look at {out / 'index.html'}; for programs there is {out / 'results.json'}")
+
+
+def _tell_moved(results: ResultsDocument, out: Path) -> None:
+    """Whose marks are others than after the run before."""
+    if not results.moved:
+        return
+    typer.echo(f"Moved since the last run: {len(results.moved)}")
+    for one in results.moved[:SHOWN]:
+        position = "" if one.position is None else f", position {one.position}"
+        typer.echo(f"  {one.student_id}{position}: {told_standing(one.before)} -> {told_standing(one.after)}")
+    if len(results.moved) > SHOWN:
+        typer.echo(f"  ... and {len(results.moved) - SHOWN} more, all in {out / 'results.json'}")
 
 
 def demo(out: Path, lang: str, jobs: int | None) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from grader.labels import labels_of
 from grader.outcomes import Outcome, Quantity, Tolerance
-from grader.picture import overlay, paint
+from grader.picture import backdrop, overlay, paint, restored, stored
 from grader.records import Figure, Page, Reading, ReadNode, ReadVector, Sheet
 from grader.scene import COLOURS, MARKS, Arrow, Ghost, Scene, scene_of
 from reference.construction import Vector
@@ -83,7 +83,7 @@ def bgr(verdict):
 @pytest.mark.parametrize("px_per_mm", [4.0, 11.8])
 def test_the_scan_is_shown_upright_with_every_point_in_its_place(rotation_deg, px_per_mm):
     registered = sheet(rotation_deg, px_per_mm)
-    picture = overlay(drawn_page(registered), registered, None, {}, {}, width_px=1680)
+    picture = overlay(backdrop(drawn_page(registered), registered, width_px=1680), None, {}, {})
     scan = cv2.cvtColor(decoded(picture.jpeg), cv2.COLOR_BGR2GRAY)
     assert scan.shape == (1188, 1680)
     for at in NODES_MM.values():
@@ -94,13 +94,21 @@ def test_the_scan_is_shown_upright_with_every_point_in_its_place(rotation_deg, p
         assert (columns * ink).sum() / ink.sum() == pytest.approx(19.5, abs=0.6)
 
 
+def test_a_stored_backdrop_comes_back_to_the_last_pixel_and_a_damaged_one_not_at_all():
+    registered = sheet()
+    behind = backdrop(drawn_page(registered), registered)
+    data = stored(behind)
+    assert np.array_equal(restored(data), behind.scan)
+    assert restored(data[:40]) is None
+    assert restored(b"") is None
+
+
 def test_paper_becomes_white_in_a_shadow():
     registered = sheet()
     page = drawn_page(registered)
     shadow = np.linspace(0.55, 1.0, page.grey.shape[1])
-    picture = overlay(
-        Page("s.png", 1, (page.grey * shadow).astype(np.uint8)), registered, None, {}, {}, width_px=1680
-    )
+    shaded = Page("s.png", 1, (page.grey * shadow).astype(np.uint8))
+    picture = overlay(backdrop(shaded, registered, width_px=1680), None, {}, {})
     scan = cv2.cvtColor(decoded(picture.jpeg), cv2.COLOR_BGR2GRAY)
     assert np.median(scan[:, :100]) > 250
     assert scan.min() < 120
@@ -109,7 +117,9 @@ def test_paper_becomes_white_in_a_shadow():
 def test_arrows_lie_on_what_was_read_in_the_colour_of_their_verdict():
     registered = sheet()
     verdicts = {"v_A": outcome("v_A", "none"), "v_BA": outcome("v_BA", "full")}
-    picture = overlay(drawn_page(registered), registered, reading(), VECTORS, verdicts, width_px=1680)
+    picture = overlay(
+        backdrop(drawn_page(registered), registered, width_px=1680), reading(), VECTORS, verdicts
+    )
     image = decoded(picture.png)
     assert np.abs(colour_at(image, (120.0, 200.0), 4.0) - bgr("none")).max() < 70
     assert np.abs(colour_at(image, (160.0, 180.0), 4.0) - bgr("full")).max() < 70
@@ -185,7 +195,7 @@ def test_right_and_wrong_look_different_to_the_colour_blind(seen):
 def test_a_page_that_could_not_be_registered_is_shown_as_its_file_asks():
     grey = np.full((300, 200), 240, np.uint8)
     grey[:20, :20] = 0
-    picture = overlay(Page("x.jpg", 1, grey, turn_deg=90), None, None, {}, {})
+    picture = overlay(backdrop(Page("x.jpg", 1, grey, turn_deg=90), None), None, {}, {})
     scan = cv2.cvtColor(decoded(picture.jpeg), cv2.COLOR_BGR2GRAY)
     assert scan.shape == (200, 300)
     assert scan[190, 10] < 128 < scan[10, 10]

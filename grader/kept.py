@@ -1,0 +1,192 @@
+"""What an earlier run found out and a later one need not: surveys of files, and readings of pages.
+
+Everything is kept beside the results, in small files that are written whole, each with a digest of
+all that it depends on: the file's content, the assignment, the code that reads. What does not
+match, or cannot be understood, is found out again.
+"""
+
+import hashlib
+import json
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grader.documents import ReadingDocument
+from grader.files import write_whole
+from grader.measurements import Names
+from grader.ownership import PageSource
+from grader.picture import Backdrop, restored, stored
+from grader.pipeline import Looked
+from grader.records import Figure, Identity, Problem, Reading, ReadNode, ReadVector, Unread
+from grader.survey import MEASUREMENT_TYPES, Survey, survey
+
+RECORDS: Mapping[str, type] = {
+    one.__name__: one for one in (Figure, Identity, Problem, Reading, ReadNode, ReadVector, Unread)
+}
+_PACKAGES = ("grader", "reference")
+_SOURCES = (".py", ".npz")
+
+
+@cache
+def code_version() -> str:
+    """A digest of the program itself: another version may find something else."""
+    digest = hashlib.sha256()
+    top = Path(__file__).parent.parent
+    for package in _PACKAGES:
+        for path in sorted((top / package).rglob("*")):
+            if path.suffix in _SOURCES:
+                digest.update(path.relative_to(top).as_posix().encode())
+                digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def digest_of(parts: Iterable[object]) -> str:
+    """A digest of what is told; the program's own version goes into it."""
+    digest = hashlib.sha256(code_version().encode())
+    for part in parts:
+        digest.update(repr(part).encode())
+        digest.update(b"\0")
+    return digest.hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """A digest of a file's content; of a file that is not there or cannot be read, an empty one."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return ""
+
+
+# Records as JSON ----------------------------------------------------------------------------------
+
+
+def packed(value: Any) -> Any:  # noqa: ANN401 - any of the records, down to their numbers
+    """A record as JSON-like data, numbers to the last digit."""
+    if is_dataclass(value) and not isinstance(value, type):
+        told = {one.name: packed(getattr(value, one.name)) for one in fields(value)}
+        return {"record": type(value).__name__, **told}
+    if isinstance(value, complex):
+        return {"record": "complex", "parts": [value.real, value.imag]}
+    if isinstance(value, np.ndarray):
+        return {"record": "array", "values": value.tolist()}
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Mapping):
+        return {"record": "mapping", "items": [[key, packed(one)] for key, one in value.items()]}
+    if isinstance(value, list | tuple):
+        return [packed(one) for one in value]
+    return value
+
+
+def unpacked(data: Any) -> Any:  # noqa: ANN401 - as above
+    """The record again; lists come back as tuples.
+
+    Raises KeyError, TypeError or ValueError for what is no packed record.
+    """
+    if isinstance(data, list):
+        return tuple(unpacked(one) for one in data)
+    if not isinstance(data, dict):
+        return data
+    kind = data["record"]
+    if kind == "complex":
+        return complex(*data["parts"])
+    if kind == "array":
+        return np.array(data["values"], dtype=np.float64)
+    if kind == "mapping":
+        return {key: unpacked(one) for key, one in data["items"]}
+    return RECORDS[kind](**{name: unpacked(one) for name, one in data.items() if name != "record"})
+
+
+# Surveys ------------------------------------------------------------------------------------------
+
+
+def survey_kept(path: Path, name: str, names: Names, folder: Path) -> Survey:
+    """What a file holds, as noted in a folder by an earlier run that saw the same content, else seen now."""
+    if path.suffix.lower() in MEASUREMENT_TYPES:
+        return survey(path, name, names)
+    digest = file_digest(path)
+    note = folder / f"{digest}.json"
+    try:
+        told = json.loads(note.read_bytes()) if digest else {}
+        if told.get("code") == code_version():
+            pages = [(bool(blank), unpacked(identity)) for blank, identity in told["pages"]]
+            return Survey(
+                tuple(
+                    PageSource(name, number, len(pages), identity=identity, blank=blank)
+                    for number, (blank, identity) in enumerate(pages, start=1)
+                ),
+                digest=digest,
+            )
+    except (OSError, KeyError, TypeError, ValueError, AttributeError):
+        pass
+    found = replace(survey(path, name, names), digest=digest)
+    if digest and found.pages and not found.broken:
+        told = [[source.blank, packed(source.identity)] for source in found.pages]
+        write_whole(note, json.dumps({"code": code_version(), "pages": told}))
+    return found
+
+
+def forget_surveys(folder: Path, digests: Collection[str]) -> None:
+    """Drop the notes on files that are not handed in any more."""
+    for note in folder.glob("*.json"):
+        if note.stem not in digests:
+            note.unlink(missing_ok=True)
+
+
+# Readings -----------------------------------------------------------------------------------------
+
+
+def keep_looked(folder: Path, name: str, key: str, looked: Sequence[Looked]) -> None:
+    """Keep a submission's pages as read, in place of what was kept of it before."""
+    note = folder / f"{name}.json"
+    # Pictures of one reading must never be found beside another's.
+    note.unlink(missing_ok=True)
+    pages = []
+    for index, one in enumerate(looked):
+        behind = one.backdrop
+        if behind is not None:
+            write_whole(folder / f"{name}.{index}.png", stored(behind))
+        about = None if behind is None else [behind.source, behind.page, behind.page_mm, behind.registered]
+        pages.append(
+            {
+                "document": one.document.model_dump(mode="json"),
+                "reading": packed(one.reading),
+                "problems": packed(one.problems),
+                "backdrop": about,
+            }
+        )
+    write_whole(note, json.dumps({"key": key, "pages": pages}))
+
+
+def kept_looked(folder: Path, name: str, key: str) -> tuple[Looked, ...] | None:
+    """A submission's pages as an earlier run read them; None where anything has changed since."""
+    try:
+        told = json.loads((folder / f"{name}.json").read_bytes())
+        if told["key"] != key:
+            return None
+        return tuple(
+            Looked(
+                ReadingDocument.model_validate_json(json.dumps(page["document"])),
+                unpacked(page["reading"]),
+                unpacked(page["problems"]),
+                _backdrop(folder / f"{name}.{index}.png", page["backdrop"]),
+            )
+            for index, page in enumerate(told["pages"])
+        )
+    except (OSError, KeyError, TypeError, ValueError):
+        return None
+
+
+def _backdrop(path: Path, about: Sequence[Any] | None) -> Backdrop | None:
+    if about is None:
+        return None
+    scan = restored(path.read_bytes())
+    if scan is None:
+        raise ValueError(f"{path} is damaged")
+    source, page, (wide, high), registered = about
+    return Backdrop(source, page, scan, (wide, high), registered=registered)
