@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 GreyImage = NDArray[np.uint8]
 Box = tuple[float, float, float, float]
 """x, y, width, height in sheet millimetres."""
@@ -145,6 +146,34 @@ class Strokes:
         return len(self.width)
 
 
+HEAD_AHEAD, HEAD_BACK, TAIL_AHEAD, TAIL_BACK = range(4)
+"""What `Tips.kind` tells: a vector's head or tail, of one that points along its stroke or against it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tips:
+    """Where vectors end along strokes, by arrowheads, dots, circles and lines that meet there.
+
+    Attributes
+    ----------
+    stroke : (k,) row of the stroke, from 0
+    along : (k,) mm from the stroke's first end
+    kind : (k,) ``HEAD_AHEAD``, ``HEAD_BACK``, ``TAIL_AHEAD`` or ``TAIL_BACK``
+    sure : (k,) probability, 0..1
+    """
+
+    stroke: IntArray
+    along: FloatArray
+    kind: IntArray
+    sure: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.stroke)
+
+
+NO_TIPS = Tips(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
+
+
 @dataclass(frozen=True, slots=True)
 class InkMap:
     """Where there is ink: a coarse map for asking whether something is drawn.
@@ -208,6 +237,7 @@ class Ink:
     marks : (j, 4) boxes x, y, w, h of what is neither: letters, digits, hatching, blobs
     where : the ink map
     letters : what can be written signs, None where they were not looked for
+    tips : where vectors end along the strokes
     """
 
     strokes: Strokes
@@ -216,6 +246,7 @@ class Ink:
     marks: FloatArray
     where: InkMap
     letters: Letters | None = None
+    tips: Tips = NO_TIPS
 
 
 @dataclass(frozen=True, slots=True)

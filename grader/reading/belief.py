@@ -12,6 +12,9 @@ REDRAW_MM = 0.3
 """How far a stroke misses the nodes that it joins, one standard error."""
 SHARED_MM = 0.4
 """And further where it serves two edges, that lie this near to each other."""
+TIP_MM = 0.2
+"""Standard error of an arrowhead's tip, or of what else marks a node, along its vector."""
+END_MM, END_SHARE = 0.3, 0.4
 RUN_ON_FAR = 4e-4
 """Density per mm of ends anywhere: the stroke goes on as another edge, or as a line drawn through."""
 
@@ -83,20 +86,57 @@ def ends_at(
         block = expected.cov[2 * node : 2 * node + 2, 2 * node : 2 * node + 2]
         variance = np.einsum("si,ij,sj->s", direction, block, direction)
         variance += errors[:, slot] ** 2 + ends.at_mm**2
-        score, ended[:, slot] = _end_score(gaps[:, slot], variance, ends)
+        ahead = (lines.along[kept] * np.conj(along)).real > 0
+        if slot == 0:
+            ahead = ~ahead
+        tips, sure = lines.tips_towards(kept, ahead, head=slot == 1)
+        at = lines.start[kept, None] + tips * lines.along[kept, None]
+        off = ((at - expected.at[node]) * np.conj(along)[:, None]).real
+        marked = _marked(off, sure, variance)
+        score, ended[:, slot] = _end_score(gaps[:, slot], variance, ends, marked)
         total += score
     return total, ended, kept
 
 
-def _end_score(gap: FloatArray, variance: FloatArray, ends: Ends) -> tuple[FloatArray, BoolArray]:
-    """Log density per mm of an end `gap` mm beyond its node."""
+def _marked(off: FloatArray, sure: FloatArray, variance: FloatArray) -> FloatArray:
+    """Density per mm of tips `off` (n, t) mm from a node, with their probabilities."""
+    spread = (variance + TIP_MM**2)[:, None]
+    each = sure * np.exp(-0.5 * off**2 / spread) / np.sqrt(2.0 * np.pi * spread)
+    return np.asarray(each.sum(axis=1))
+
+
+def _end_score(
+    gap: FloatArray, variance: FloatArray, ends: Ends, marked: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Log density per mm of an end `gap` mm beyond its node, with that of tips there."""
     sigma = np.sqrt(variance)
     at = ends.at_share * np.exp(-0.5 * gap**2 / variance) / (sigma * np.sqrt(2 * np.pi))
     # Beyond and short, smeared by what is not known of the node.
     reach = np.where(gap > 0, ends.beyond_mm, ends.short_mm)
     share = np.where(gap > 0, ends.beyond_share, ends.short_share)
     off = share * np.exp(-np.maximum(np.abs(gap) - sigma, 0.0) / reach) / (reach + sigma)
-    return np.asarray(np.log(at + off + RUN_ON_FAR)), np.asarray(at > 2.0 * off)
+    return np.asarray(np.log(at + off + marked + RUN_ON_FAR)), np.asarray(at + marked > 2.0 * off)
+
+
+def _end_of(expected: Expected, edge: int, slot: int, lines: Lines, row: int) -> tuple[complex, float]:
+    """Where a vector ends on its stroke, with the standard error: the likelier of ink's end and tips."""
+    ends = (expected.edges[edge].tail, expected.edges[edge].head)
+    node, other = complex(expected.at[ends[slot]]), complex(expected.at[ends[1 - slot]])
+    along = complex(lines.along[row])
+    forward = np.array([((node - other) * np.conj(along)).real > 0])
+    tips, sure = lines.tips_towards(np.array([row]), forward, head=slot == 1)
+    end, error = lines.nearer_end(row, node)
+    if not sure.any():
+        return end, error
+    at = lines.start[row] + tips[0] * along
+    block = expected.cov[2 * ends[slot] : 2 * ends[slot] + 2, 2 * ends[slot] : 2 * ends[slot] + 2]
+    direction = np.array([along.real, along.imag])
+    variance = float(direction @ block @ direction)
+    off = np.append(((at - node) * np.conj(along)).real, ((end - node) * np.conj(along)).real)
+    spread = np.append(np.full(len(at), variance + TIP_MM**2), variance + error**2 + END_MM**2)
+    density = np.append(sure[0], END_SHARE) * np.exp(-0.5 * off**2 / spread) / np.sqrt(spread)
+    best = int(np.argmax(density))
+    return (end, error) if best == len(at) else (complex(at[best]), TIP_MM)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +180,7 @@ def updated(expected: Expected, edge: int, taken: Taken, lines: Lines, ends: End
     for slot, node in enumerate((tail, head)):
         if not taken.ended[slot]:
             continue
-        end, error = lines.nearer_end(row, complex(expected.at[node]))
+        end, error = _end_of(expected, edge, slot, lines, row)
         h = np.zeros(count)
         h[2 * node : 2 * node + 2] = (along.real, along.imag)
         noise[len(rows), len(rows)] = error**2 + ends.at_mm**2

@@ -25,6 +25,12 @@ HIDDEN_MM = 0.5
 END_REACH_MM = 5.0
 CENTRE_MM = 0.2
 """How far a circle drawn around a node is off it."""
+TIP_MM = 0.2
+"""Standard error of an arrowhead's tip, or of what else marks a node, along its vector."""
+SUREST = 0.97
+TIP_REACH_MM = 3.5
+THROUGH = 0.02
+"""Per mm: how likely a stroke runs on past a node, beyond reach."""
 TIED_MM = 0.02
 """Nodes that lie in one place are one place."""
 BUNDLE_COSINE = 0.87
@@ -111,11 +117,17 @@ class _Lines:
 
 @dataclass(frozen=True, slots=True)
 class _Ends:
-    """Rows: a stroke ends about a node: along its outward direction, `design`, it ends at `end`."""
+    """Rows: a stroke ends about a node: along its outward direction, `design`, it ends at `end`.
+
+    `end` is nan where the stroke runs on beyond reach. `tip` and `sure` (rows, t): where the vector
+    itself seems to end, by an arrowhead or what else marks the node.
+    """
 
     design: FloatArray
     end: FloatArray
     se: FloatArray
+    tip: FloatArray
+    sure: FloatArray
 
 
 def fit_nodes(
@@ -184,7 +196,7 @@ def _renewed(sites: _Sites, about: _Ends, state: FloatArray, cov: FloatArray, en
     rest_mean = (mean / variance - sites.pull) / rest
     grid = np.linspace(-4.0, 4.0, 241)
     place = rest_mean[:, None] + grid / np.sqrt(rest)[:, None]
-    weight = np.exp(-0.5 * grid**2) * ends.density(about.end[:, None] - place, about.se[:, None])
+    weight = np.exp(-0.5 * grid**2) * _density(about, place, ends)
     weight /= weight.sum(axis=1, keepdims=True)
     new_mean = (weight * place).sum(axis=1)
     spread = np.sqrt((weight * (place - new_mean[:, None]) ** 2).sum(axis=1))
@@ -195,6 +207,16 @@ def _renewed(sites: _Sites, about: _Ends, state: FloatArray, cov: FloatArray, en
     fresh = np.maximum(1.0 / new_variance - rest, 0.0)
     fresh_pull = np.where(fresh > 0.0, new_mean / new_variance - rest_mean * rest, 0.0)
     return _Sites(0.5 * (sites.precision + fresh), 0.5 * (sites.pull + fresh_pull))
+
+
+def _density(about: _Ends, place: FloatArray, ends: EndModel) -> FloatArray:
+    """Per mm, (rows, n): how likely what is seen along each stroke is for nodes at `place` (rows, n)."""
+    gap = about.end[:, None] - place
+    inked = np.where(np.isnan(gap), THROUGH, ends.density(np.nan_to_num(gap), about.se[:, None]))
+    off = about.tip[:, None, :] - place[:, :, None]
+    sure = about.sure[:, None, :]
+    marked = (sure * np.exp(-0.5 * (off / TIP_MM) ** 2) / (TIP_MM * np.sqrt(2.0 * np.pi))).sum(axis=2)
+    return np.asarray(marked + (1.0 - about.sure.sum(axis=1))[:, None] * inked)
 
 
 def _pairs(values: ComplexArray) -> FloatArray:
@@ -235,24 +257,40 @@ def _line_rows(found: Explanation, lines: Lines, at: ComplexArray, centres: Mapp
 
 
 def _end_rows(found: Explanation, lines: Lines, at: ComplexArray) -> _Ends:
-    """The ends of strokes of their own that lie within reach of a node, each outward."""
-    design, goal, errors = [], [], []
+    """The ends of strokes of their own, and the tips on any, that lie within reach of a node."""
+    design, goal, errors, tips, sures = [], [], [], [], []
     for index, edge in enumerate(found.expected.edges):
         row = int(found.stroke[index])
-        if row < 0 or found.shared[index]:
+        if row < 0:
             continue
-        for node, other in ((edge.tail, edge.head), (edge.head, edge.tail)):
+        for node, other, head in ((edge.tail, edge.head, False), (edge.head, edge.tail, True)):
             along = complex(lines.along[row])
-            if ((at[node] - at[other]) * np.conj(along)).real < 0:
-                along = -along
+            forward = ((at[node] - at[other]) * np.conj(along)).real > 0
+            along = along if forward else -along
             end, error = lines.nearer_end(row, complex(at[node]))
-            if abs(((end - at[node]) * np.conj(along)).real) < END_REACH_MM:
+            tip, sure = _near_tips(lines, row, complex(at[node]), along, head=head)
+            here = abs(((end - at[node]) * np.conj(along)).real) < END_REACH_MM and not found.shared[index]
+            if here or sure.any():
                 design.append(_row(len(at), node, along))
-                goal.append(float((end * np.conj(along)).real))
+                goal.append(float((end * np.conj(along)).real) if here else np.nan)
                 errors.append(error)
+                tips.append(tip)
+                sures.append(sure)
     if not design:
-        return _Ends(np.zeros((0, 2 * len(at))), np.zeros(0), np.zeros(0))
-    return _Ends(np.array(design), np.array(goal), np.array(errors))
+        return _Ends(np.zeros((0, 2 * len(at))), np.zeros(0), np.zeros(0), *np.zeros((2, 0, 0)))
+    return _Ends(np.array(design), np.array(goal), np.array(errors), np.array(tips), np.array(sures))
+
+
+def _near_tips(
+    lines: Lines, row: int, node: complex, along: complex, *, head: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Places along the outward direction, and probabilities, of one stroke's tips near a node."""
+    forward = np.array([(along * np.conj(lines.along[row])).real > 0])
+    place, sure = lines.tips_towards(np.array([row]), forward, head=head)
+    tip = ((lines.start[row] + place[0] * lines.along[row]) * np.conj(along)).real
+    near = np.abs(tip - (node * np.conj(along)).real) < TIP_REACH_MM
+    sure = np.where(near, sure[0], 0.0)
+    return tip, sure * min(1.0, SUREST / max(float(sure.sum()), 1e-9))
 
 
 def _row(count: int, node: int, along: complex) -> FloatArray:

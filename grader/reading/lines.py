@@ -5,11 +5,21 @@ they are one vector or two in a row is for the figure to say.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.records import FloatArray, Ink
+from grader.records import (
+    HEAD_AHEAD,
+    HEAD_BACK,
+    TAIL_AHEAD,
+    TAIL_BACK,
+    FloatArray,
+    Ink,
+    IntArray,
+    Tips,
+)
 from reference.geometry import ComplexArray
 
 LEAST_MM = 1.2
@@ -29,8 +39,9 @@ JOIN_OFF_MM = 0.45
 JOIN_GAP_MM = 14.0
 JOIN_TURN_RAD = 0.03
 
+OTHER_SORT = 0.5
+
 BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +58,8 @@ class Lines:
     darkness, width : means over the stroke
     thin : much thinner or fainter than the long strokes of its sheet
     members : (n, k) the strokes it is made of, by their number, repeated to fill the row
+    tip_along, tip_kind, tip_sure : (n, t) ends of vectors seen along it, as in `records.Tips`, from
+        `start`; a probability of 0 fills the row
     """
 
     start: ComplexArray
@@ -60,6 +73,9 @@ class Lines:
     width: FloatArray
     thin: BoolArray
     members: IntArray
+    tip_along: FloatArray
+    tip_kind: IntArray
+    tip_sure: FloatArray
 
     def __len__(self) -> int:
         return len(self.length)
@@ -68,6 +84,24 @@ class Lines:
     def middle(self) -> ComplexArray:
         """Midpoints."""
         return np.asarray((self.start + self.end) / 2.0)
+
+    def tips_towards(
+        self, rows: IntArray, forward: BoolArray, *, head: bool
+    ) -> tuple[FloatArray, FloatArray]:
+        """(place along from `start` (r, t), probability (r, t)) of tips of vectors that come from behind.
+
+        Arguments
+        ---------
+        rows, forward : lines (r,), and whether the vector's end in question is its farther one along it
+        head : whether that end is the vector's head. A drawing without arrowheads tells ends, but not
+            which: a tip of the other sort counts for less
+        """
+        kind = self.tip_kind[rows]
+        ahead = forward[:, None]
+        same = np.where(ahead, HEAD_AHEAD, HEAD_BACK) if head else np.where(ahead, TAIL_BACK, TAIL_AHEAD)
+        other = np.where(ahead, TAIL_BACK, TAIL_AHEAD) if head else np.where(ahead, HEAD_AHEAD, HEAD_BACK)
+        share = np.where(kind == same, 1.0, np.where(kind == other, OTHER_SORT, 0.0))
+        return self.tip_along[rows], self.tip_sure[rows] * share
 
     def nearer_end(self, row: int, to: complex) -> tuple[complex, float]:
         """The end of one line that is nearer to a point, and its standard error along the line."""
@@ -100,8 +134,26 @@ def lines_of(ink: Ink) -> Lines:
         width=strokes.width[kept],
         thin=_thin(strokes.width[kept] * strokes.darkness[kept], length),
         members=np.repeat(number[:, None], MOST_PIECES, axis=1),
+        **_tips(ink.tips, number, strokes.ends, ends),
     )
     return _with_joined(single)
+
+
+def _tips(
+    tips: Tips, number: IntArray, as_found: FloatArray, ends: ComplexArray
+) -> dict[str, FloatArray | IntArray]:
+    """The tips of each stroke kept, side by side; measured from its end without the cap."""
+    full = np.hypot(*(as_found[:, 1] - as_found[:, 0]).T)
+    cap = (full - np.abs(ends[:, 1] - ends[:, 0])) / 2.0
+    found = [np.flatnonzero(tips.stroke == one) for one in number]
+    most = max((len(one) for one in found), default=0)
+    shape = (len(number), most)
+    along, kind, sure = np.zeros(shape), np.zeros(shape, np.int64), np.zeros(shape)
+    for row, chosen in enumerate(found):
+        part = slice(0, len(chosen))
+        along[row, part] = tips.along[chosen] - cap[number[row]]
+        kind[row, part], sure[row, part] = tips.kind[chosen], tips.sure[chosen]
+    return {"tip_along": along, "tip_kind": kind, "tip_sure": sure}
 
 
 def _seen(stated: FloatArray) -> FloatArray:
@@ -134,12 +186,25 @@ def _with_joined(single: Lines) -> Lines:
     if not chains:
         return single
     joined = [_joined(single, chain) for chain in chains]
+    wide = max(single.tip_along.shape[1], *(len(one["tip_along"]) for one in joined))
     return Lines(
         *(
-            np.concatenate([getattr(single, name), np.array([one[name] for one in joined])])
+            np.concatenate(
+                [_padded(getattr(single, name), wide), [_filled(one[name], wide) for one in joined]]
+            )
+            if name.startswith("tip_")
+            else np.concatenate([getattr(single, name), np.array([one[name] for one in joined])])
             for name in Lines.__slots__
         )
     )
+
+
+def _padded(rows: NDArray[Any], wide: int) -> NDArray[Any]:
+    return np.pad(rows, ((0, 0), (0, wide - rows.shape[1])))
+
+
+def _filled(row: NDArray[Any], wide: int) -> NDArray[Any]:
+    return np.pad(row, (0, wide - len(row)))
 
 
 def _longest_chains(pairs: list[list[int]]) -> list[list[int]]:
@@ -153,7 +218,7 @@ def _longest_chains(pairs: list[list[int]]) -> list[list[int]]:
     return [list(pieces) for pieces in sorted(longest)]
 
 
-def _joined(single: Lines, chain: list[int]) -> dict[str, object]:
+def _joined(single: Lines, chain: list[int]) -> dict[str, Any]:
     """One stroke from the one far end of its pieces to the other."""
     pieces = np.array(chain)
     along = single.along[pieces[np.argmax(single.length[pieces])]]
@@ -165,6 +230,7 @@ def _joined(single: Lines, chain: list[int]) -> dict[str, object]:
     offset = float(single.se_offset[pieces].max())
     members = np.resize(single.members[pieces, 0], MOST_PIECES)
     return {
+        **_joined_tips(single, pieces, complex(ends[low]), complex(along)),
         "start": ends[low],
         "end": ends[high],
         "along": (ends[high] - ends[low]) / length,
@@ -176,6 +242,19 @@ def _joined(single: Lines, chain: list[int]) -> dict[str, object]:
         "width": single.width[pieces].min(),
         "thin": bool(single.thin[pieces].any()),
         "members": members,
+    }
+
+
+def _joined_tips(single: Lines, pieces: IntArray, start: complex, along: complex) -> dict[str, Any]:
+    """The tips of all pieces along the stroke that they make."""
+    same_way = (single.along[pieces] * np.conj(along)).real > 0
+    at = single.start[pieces, None] + single.tip_along[pieces] * single.along[pieces, None]
+    kind = np.where(same_way[:, None], single.tip_kind[pieces], single.tip_kind[pieces] ^ 1)
+    known = single.tip_sure[pieces] > 0.0
+    return {
+        "tip_along": ((at - start) * np.conj(along)).real[known],
+        "tip_kind": kind[known],
+        "tip_sure": single.tip_sure[pieces][known],
     }
 
 
