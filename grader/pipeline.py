@@ -17,6 +17,7 @@ from grader.feedback import Level, criterion_feedback
 from grader.ink import find_ink
 from grader.intake import is_blank, page_of
 from grader.judging import Submission, Task, judge, report_of, task_of, unjudged_report
+from grader.letters import find_letters
 from grader.measurements import Measurements
 from grader.outcomes import Judgement
 from grader.picture import Backdrop, backdrop, overlay
@@ -216,6 +217,7 @@ def see(place: Place, figures: Collection[str] = ()) -> Seen:
     with _timed(timing, "ink"):
         if boxes is None or boxes:
             ink = find_ink(page, sheet, boxes)
+            ink = replace(ink, letters=find_letters(ink, boxes))
     problems = tuple(replace(problem, file=place.name) for problem in sheet.problems)
     return Seen(place, page, sheet, ink, problems, timing, narrowed=boxes is not None)
 

@@ -1,0 +1,5 @@
+"""Single handwritten signs: which there may be on a drawing, and what is written in a box."""
+
+from grader.letters.sheet_letters import find_letters
+
+__all__ = ["find_letters"]

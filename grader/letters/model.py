@@ -1,0 +1,75 @@
+"""The recogniser's network: two layers and a softmax, tempered so that its probabilities hold."""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grader.letters.alphabet import SIGNS
+from grader.letters.features import Float32Array, features
+from grader.records import FloatArray, GreyImage
+
+MODEL = Path(__file__).resolve().parents[1] / "data" / "letters.npz"
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """Layers from features to scores of the signs.
+
+    Attributes
+    ----------
+    weights, biases : a matrix (inputs, outputs) and a row for each layer
+    cooling : what scores are multiplied by before they become probabilities
+    """
+
+    weights: tuple[Float32Array, ...]
+    biases: tuple[Float32Array, ...]
+    cooling: float
+
+    def scores(self, told: Float32Array) -> FloatArray:
+        """(n, signs) scores of features (n, m)."""
+        layer = told
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            layer = np.maximum(layer @ weight + bias, np.float32(0.0))
+        return np.asarray(layer @ self.weights[-1] + self.biases[-1], dtype=np.float64)
+
+    def probability(self, told: Float32Array) -> FloatArray:
+        """(n, signs) probabilities, each row's sum 1."""
+        scores = self.cooling * self.scores(told)
+        grown = np.exp(scores - scores.max(axis=1, keepdims=True))
+        return np.asarray(grown / grown.sum(axis=1, keepdims=True))
+
+    def save(self, path: Path) -> None:
+        """Write the layers, at half precision."""
+        layers = {f"weight_{n}": layer.astype(np.float16) for n, layer in enumerate(self.weights)}
+        layers |= {f"bias_{n}": layer.astype(np.float16) for n, layer in enumerate(self.biases)}
+        np.savez_compressed(path, cooling=np.float64(self.cooling), signs=np.array(SIGNS), **layers)  # type: ignore[arg-type]
+
+    @classmethod
+    def load(cls, path: Path) -> "Model":
+        """Read the layers. Raises ValueError where they were trained for other signs."""
+        with np.load(path) as stored:
+            if tuple(str(sign) for sign in stored["signs"]) != SIGNS:
+                raise ValueError(f"{path} was trained for other signs than {''.join(SIGNS)}")
+            count = sum(name.startswith("weight_") for name in stored.files)
+            weights = tuple(stored[f"weight_{n}"].astype(np.float32) for n in range(count))
+            biases = tuple(stored[f"bias_{n}"].astype(np.float32) for n in range(count))
+            return cls(weights, biases, float(stored["cooling"]))
+
+
+@cache
+def shipped() -> Model:
+    """The model that comes with the program, read once."""
+    return Model.load(MODEL)
+
+
+def recognise(pictures: NDArray[np.uint8] | list[GreyImage], sizes_px: FloatArray) -> FloatArray:
+    """(n, signs) probability of each sign of `SIGNS` for (n, 28, 28) normalised pictures.
+
+    Arguments: `sizes_px` (n, 2) holds the width and height of what was cut out.
+    """
+    if len(pictures) == 0:
+        return np.zeros((0, len(SIGNS)))
+    return shipped().probability(features(pictures, sizes_px))
