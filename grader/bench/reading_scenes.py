@@ -98,17 +98,18 @@ def works(scene: Scene, students: int, first_seed: int = 1) -> Iterator[Work]:
 
 def work(scene: Scene, seed: int) -> Work:
     """One student of a scene."""
-    assignment, rubric = _task(scene.assignment)
+    assignment, rubric = task_named(scene.assignment)
     variants = assignment.variants()
     variant = variants[seed % len(variants)]
     settings = _settings(scene, assignment, variant, seed)
-    printed = _printed(assignment, variant) if scene.printed else None
+    printed = answer_sheets(assignment, variant) if scene.printed else None
     sheets = simulate(assignment, variant, seed, settings, printed=printed)
     return Work(scene, seed, assignment, variant, rubric, sheets)
 
 
 @cache
-def _task(name: str) -> tuple[Assignment, RubricFile]:
+def task_named(name: str) -> tuple[Assignment, RubricFile]:
+    """A built-in assignment and its rubric."""
     assignment = load_assignment(name)
     return assignment, load_rubric(assignment.file.rubric, beside=assignment.path)
 
@@ -127,7 +128,7 @@ def _settings(scene: Scene, assignment: Assignment, variant: Variant, seed: int)
     return replace(settings, hand=hand)
 
 
-def _printed(assignment: Assignment, variant: Variant) -> Mapping[str, PrintedSheet]:
+def answer_sheets(assignment: Assignment, variant: Variant) -> Mapping[str, PrintedSheet]:
     """The answer sheet that this student is given."""
     row = RosterRow("s01", "", n=variant.n, position=variant.position)
     sheets = make_sheets(assignment, [row])

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, FloatArray, ReadVector
+from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Figure, ReadVector
 from reference.construction import Construction
 
 RIGHT_MM, RIGHT_DEG = 0.3, 0.3
@@ -210,22 +210,8 @@ def _is_right(read: complex, way: complex) -> bool:
     return turn <= np.radians(RIGHT_DEG) or (turn < 1.0 and abs(read) * np.sin(turn) <= RIGHT_MM)
 
 
-def true_places(truth: Mapping[str, Any], px: FloatArray) -> FloatArray:
-    """Stored pixels (n, 2) to the sheet's true millimetres (n, 2), y down, by the truth's own map."""
-    lens = truth.get("lens")
-    if lens:
-        centre = np.array(lens.get("centre") or (lens["cx"], lens["cy"]))
-        arm = px - centre
-        px = centre + arm * (1.0 + lens["k1"] * (arm**2).sum(axis=1, keepdims=True) / lens["r"] ** 2)
-    lifted = np.column_stack([px, np.ones(len(px))]) @ np.linalg.inv(np.array(truth["homography"])).T
-    flat = lifted[:, :2] / lifted[:, 2:]
-    bow = truth.get("curl_mm") or 0.0
-    lift = bow * np.sin(np.pi * np.clip(flat[:, 0] / 420.0, 0.0, 1.0))
-    return np.asarray(flat + np.column_stack([np.zeros_like(lift), lift]))
-
-
 def each_vector(
-    figures: Mapping[str, TrueFigure], wanted: Sequence[str], read: Mapping[str, Any]
+    figures: Mapping[str, TrueFigure], wanted: Sequence[str], read: Mapping[str, Figure]
 ) -> Iterator[Judged]:
     """Every vector asked for on a sheet; `read` has the figures of a reading by name."""
     for name, figure in figures.items():

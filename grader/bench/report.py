@@ -7,19 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from grader.bench.reading import STAGES, ReadingRow
+from grader.bench.lines import LinesFigures
+from grader.bench.lines_tables import lines_tables
+from grader.bench.reading_foreign import ForeignRow, foreign_tables
+from grader.bench.reading_tables import reading_tables
+from grader.bench.reading_tally import ReadingRow
 from grader.bench.solver import SolverFigures
 from grader.bench.tables import Table, solver_tables
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """All that was measured, and where."""
+    """All that was measured, and where; None or nothing for what was not asked for."""
 
-    solver: SolverFigures
+    solver: SolverFigures | None = None
     reading: tuple[ReadingRow, ...] = ()
+    foreign: tuple[ForeignRow, ...] = ()
+    lines: LinesFigures | None = None
 
     def as_json(self) -> dict[str, Any]:
         """One JSON object."""
@@ -30,26 +36,30 @@ class Report:
                 "python": platform.python_version(),
                 "numpy": np.__version__,
             },
-            "solver": self.solver.as_json(),
+            "solver": None if self.solver is None else self.solver.as_json(),
             "reading": [row.as_json() for row in self.reading],
+            "foreign": [row.as_json() for row in self.foreign],
+            "lines": None if self.lines is None else self.lines.as_json(),
         }
 
     def as_text(self) -> str:
         """Tables that read well in a terminal and in Markdown."""
-        return as_text([*solver_tables(self.solver), *reading_tables(self.reading)])
+        solver = [] if self.solver is None else solver_tables(self.solver)
+        return as_text([*solver, *all_reading_tables(self.reading, self.foreign, self.lines)])
+
+
+def all_reading_tables(
+    reading: Sequence[ReadingRow], foreign: Sequence[ForeignRow], lines: LinesFigures | None
+) -> Iterator[Table]:
+    """Scenes, foreign pages, line detectors."""
+    yield from reading_tables(reading)
+    yield from foreign_tables(foreign)
+    yield from lines_tables(lines)
 
 
 def as_text(tables: Iterable[Table]) -> str:
     """Tables one after another."""
     return "\n".join(line for table in tables for line in _table(*table))
-
-
-def reading_tables(reading: Sequence[ReadingRow]) -> Iterator[Table]:
-    """Both tables of the reading, where it was measured."""
-    if reading:
-        told = "Reading: median milliseconds per page, and pages not registered rightly"
-        yield told, *_stages(reading)
-        yield "Reading: error of nodes, and what became of the vectors drawn", *_vectors(reading)
 
 
 def _table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
@@ -58,47 +68,3 @@ def _table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> I
     for row in (heads, ["-" * width for width in widths], *rows):
         yield "| " + " | ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) + " |"
     yield ""
-
-
-def _stages(reading: Sequence[ReadingRow]) -> tuple[list[str], list[list[str]]]:
-    rows = [
-        [
-            f"{row.dpi:g}",
-            str(row.sheets),
-            *(f"{row.times_ms[stage]:.0f}" for stage in STAGES),
-            f"{sum(row.times_ms.values()):.0f}",
-            str(row.turned),
-            str(row.off_scale),
-        ]
-        for row in reading
-    ]
-    return ["dpi", "pages", *STAGES, "sum", "turned wrongly", "scale off by > 1 %"], rows
-
-
-def _vectors(reading: Sequence[ReadingRow]) -> tuple[list[str], list[list[str]]]:
-    heads = [
-        "dpi",
-        "node error: median mm",
-        "p95 mm",
-        "worst mm",
-        "vectors",
-        "read",
-        "doubtful",
-        "unread",
-        "misread",
-    ]
-    rows = [
-        [
-            f"{row.dpi:g}",
-            *(_mm(value) for value in (row.node_median_mm, row.node_p95_mm, row.node_worst_mm)),
-            str(row.vectors),
-            *(f"{100 * share:.0f} %" for share in (row.read, row.doubtful, row.unread)),
-            str(row.misreads),
-        ]
-        for row in reading
-    ]
-    return heads, rows
-
-
-def _mm(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"

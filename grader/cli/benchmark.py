@@ -7,21 +7,30 @@ from rich.console import Console
 from rich.progress import Progress
 
 
-def show_benchmark(*, quick: bool, as_json: bool, solver_only: bool) -> None:
-    """Measure the solver and, unless it alone is asked for, the reading; print the figures."""
-    from grader.bench.reading import RESOLUTIONS_DPI, measure_reading
+def show_benchmark(
+    *, quick: bool, as_json: bool, only: str | None = None, students: int | None = None
+) -> None:
+    """Measure the solver and the reading, or the one of them that is asked for; print the figures.
+
+    Arguments: `only` is ``solver`` or ``reading``; `students` per scene of the reading.
+    """
+    from grader.bench.reading import ReadingBench
     from grader.bench.report import Report
     from grader.bench.solver import SolverBench
 
-    bench, rows = SolverBench(quick), []
+    solver = None if only == "reading" else SolverBench(quick)
+    reading = None if only == "solver" else ReadingBench(quick=quick, students=students)
     with Progress(console=Console(stderr=True), transient=True) as progress:
-        bar = progress.add_task("the solver", total=bench.steps)
-        for measured in bench.run():
-            progress.update(bar, advance=1, description=measured)
-        if not solver_only:
-            reading = progress.add_task("reading sheets", total=len(RESOLUTIONS_DPI))
-            for row in measure_reading(quick=quick):
-                rows.append(row)
-                progress.advance(reading)
-    report = Report(bench.figures, tuple(rows))
+        for bench in (solver, reading):
+            if bench is None:
+                continue
+            bar = progress.add_task("", total=bench.steps)
+            for told in bench.run():
+                progress.update(bar, advance=1, description=told)
+    report = Report(
+        None if solver is None else solver.figures,
+        () if reading is None else tuple(reading.rows),
+        () if reading is None else tuple(reading.foreign),
+        None if reading is None else reading.lines,
+    )
     typer.echo(json.dumps(report.as_json(), indent=2) if as_json else report.as_text())

@@ -288,8 +288,15 @@ def bench(
     solver: Annotated[
         bool, typer.Option("--solver", help="The solver only: speed, errors, stability beside its peers.")
     ] = False,
+    reading: Annotated[
+        bool, typer.Option("--reading", help="The reading only: scenes, foreign pages, line detectors.")
+    ] = False,
+    students: Annotated[
+        int | None, typer.Option("--students", min=1, help="Simulated students per scene of the reading.")
+    ] = None,
 ) -> None:
     """Run time against error, on generated sheets with known truth."""
     from grader.cli.benchmark import show_benchmark
 
-    show_benchmark(quick=quick, as_json=as_json, solver_only=solver)
+    only = None if solver == reading else "solver" if solver else "reading"
+    show_benchmark(quick=quick, as_json=as_json, only=only, students=students)

@@ -223,11 +223,9 @@ def _construction_lines(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -
             along = reach / abs(reach)
             past = sketch.rng.exponential(sketch.style.overrun_mm + 0.5, 2)
             before = past[0] if sketch.chance(0.4) else 0.0
-            sketch.line(
-                sketch.pen("thin", plan=True),
-                nodes[line.through] - before * along,
-                nodes[step.node] + past[1] * along,
-            )
+            ends = nodes[line.through] - before * along, nodes[step.node] + past[1] * along
+            sketch.line(sketch.pen("thin", plan=True), *ends)
+            sketch.construction.setdefault(figure, []).append(ends)
 
 
 def _unnamed_sides(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:

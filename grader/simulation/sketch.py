@@ -34,6 +34,7 @@ class Sketch:
     strokes : in the order of drawing
     labels : letters and texts
     lines : the strokes of named vectors and links, as ruled, by figure and name
+    construction : thin construction lines, as ruled, by figure
     """
 
     rng: Rng
@@ -44,6 +45,7 @@ class Sketch:
     strokes: list[Stroke] = field(default_factory=list)
     labels: list[Label] = field(default_factory=list)
     lines: dict[tuple[str, str], Segment] = field(default_factory=dict)
+    construction: dict[str, list[Segment]] = field(default_factory=dict)
 
     def pen(self, kind: str, *, plan: bool = False) -> Pen:
         """The student's pen for a kind of line: line, thin, text or print."""

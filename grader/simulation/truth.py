@@ -97,7 +97,8 @@ def _figure(
             "intended": {"length_mm": round(abs(meant), 4), "direction_deg": direction(meant)},
         }
     sides = {name: line for name, line in lines.items() if name.startswith("side ")}
-    return {**truth, "vectors": vectors, "missing": dict(missing), "sides": sides}
+    thin = [[xy(p), xy(q)] for p, q in sketch.construction.get(figure.name, [])]
+    return {**truth, "vectors": vectors, "missing": dict(missing), "sides": sides, "construction": thin}
 
 
 def scan_truth(view: View, frame: Frame | None, settings: Settings) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from grader.bench.reading_places import OnPaper
 from grader.bench.reading_scenes import SCENES, scene_named, works
 from grader.bench.reading_truth import (
     RIGHT_MM,
@@ -36,7 +37,6 @@ from grader.bench.reading_truth import (
     TrueFigure,
     figures_of,
     judged,
-    true_places,
 )
 from grader.pipeline import Place, Seen, read, see
 from grader.records import Figure, Reading
@@ -89,56 +89,6 @@ def from_folder(folder: Path, students: int | None) -> Iterator[Student]:
         places = [Place(folder / t["class_file"], t["page"], t["class_file"]) for t in own]
         variant = assignment.variant(row.n, row.position)
         yield Student(f"{folder.name}-{student}", assignment, variant, dict(row.scales), wanted, own, places)
-
-
-# Where things lie on the paper ----------------------------------------------------------------------
-
-
-class OnPaper:
-    """Sheet millimetres as read, to the true millimetres of the paper, by way of the picture's pixels."""
-
-    def __init__(self, truth: dict[str, Any], seen: Seen):
-        assert seen.sheet is not None
-        assert seen.page is not None
-        self.truth, self.sheet, self.page = truth, seen.sheet, seen.page
-
-    def __call__(self, at: np.ndarray) -> np.ndarray:
-        """Complex (n,) as read to complex (n,) in truth."""
-        px = self.pixels(at)
-        lens = self.sheet.lens
-        if lens is not None and self.sheet.mm_to_px is lens.straight:
-            height, width = self.page.grey.shape
-            centre = np.array([(width - 1) / 2.0, (height - 1) / 2.0])
-            arm = (px - centre) / np.hypot(width / 2.0, height / 2.0)
-            bent = 1.0 + lens.bend * (arm**2).sum(axis=1, keepdims=True)
-            px = centre + (px - centre) * bent
-        true = true_places(self.truth, px)
-        return true[:, 0] - 1j * true[:, 1]
-
-    def pixels(self, at: np.ndarray) -> np.ndarray:
-        """Pixels (n, 2) of the page as it was read."""
-        lifted = np.column_stack([at.real, -at.imag, np.ones(len(at))]) @ self.sheet.mm_to_px.T
-        return lifted[:, :2] / lifted[:, 2:]
-
-    def back(self, true: np.ndarray) -> np.ndarray:
-        """Places in truth as they would be read: the affine map that undoes this one best."""
-        grid = np.array([complex(x, -y) for x in (20, 150, 280, 400) for y in (20, 110, 200, 280)])
-        there = self(grid)
-        columns = np.column_stack([there, np.conj(there), np.ones(len(there))])
-        weights = np.linalg.lstsq(columns, grid, rcond=None)[0]
-        return np.column_stack([true, np.conj(true), np.ones(len(true))]) @ weights
-
-    def fault(self) -> str:
-        """What is wrong with scale or turn, by long lines across the sheet; empty where they are good."""
-        ends = self(np.array([60 - 60j, 360 - 60j, 60 - 240j]))
-        spans = np.array([(ends[1] - ends[0]) / 300.0, (ends[2] - ends[0]) / -180j])
-        scale, turn = np.abs(spans) - 1.0, np.degrees(np.angle(spans))
-        if np.all(np.abs(scale) <= OFF_SCALE) and np.all(np.abs(turn) <= OFF_TURN_DEG):
-            return ""
-        return (
-            f"scale off by {100 * scale[0]:.2f} % along, {100 * scale[1]:.2f} % across,"
-            f" turned by {turn[0]:.2f} and {turn[1]:.2f} deg"
-        )
 
 
 def found_along(true: Segment, strokes: np.ndarray) -> float:
@@ -200,18 +150,35 @@ def is_off(figure: TrueFigure, found: Figure | None, on_paper: OnPaper) -> bool:
     return bool((np.abs(read - true) > NEAR_NODE_MM).mean() > 0.5)
 
 
+def paper_of(truth: dict[str, Any], seen: Seen) -> OnPaper | None:
+    """Where things lie on the paper; None where the page was refused."""
+    if seen.sheet is None or seen.page is None or seen.ink is None:
+        return None
+    return OnPaper(truth, seen.sheet, seen.page.grey.shape)
+
+
+def fault_of(on_paper: OnPaper) -> str:
+    """What is wrong with scale or turn; empty where they are good."""
+    scale, turn = on_paper.scale_and_turn()
+    if np.all(np.abs(scale) <= OFF_SCALE) and np.all(np.abs(turn) <= OFF_TURN_DEG):
+        return ""
+    return (
+        f"scale off by {100 * scale[0]:.2f} % along, {100 * scale[1]:.2f} % across,"
+        f" turned by {turn[0]:.2f} and {turn[1]:.2f} deg"
+    )
+
+
 def sheet_fault(seen: Seen, on_paper: OnPaper | None) -> str:
     """Why the page's millimetres cannot be used; empty where they can."""
     if on_paper is not None:
-        return on_paper.fault()
+        return fault_of(on_paper)
     return "; ".join(problem.message for problem in seen.problems) or "no sheet"
 
 
 def misses_of(student: Student, seen: Seen, reading: Reading, truth: dict[str, Any]) -> Iterator[tuple]:
     """Every asked vector of a page: how it fared, and the miss, if it is one."""
     construction = construction_of(student.assignment.mechanism([student.variant]))
-    registered = seen.sheet is not None and seen.ink is not None
-    on_paper = OnPaper(truth, seen) if registered else None
+    on_paper = paper_of(truth, seen)
     strokes = np.empty((0, 2), complex)
     if on_paper is not None:
         ends = seen.ink.strokes.ends.reshape(-1, 2)
@@ -240,7 +207,7 @@ def misses_of(student: Student, seen: Seen, reading: Reading, truth: dict[str, A
 
 def close_up(miss: Miss, seen: Seen, truth: dict[str, Any], path: Path) -> None:
     """The miss as a whole, and below it the surroundings of its two ends."""
-    on_paper = OnPaper(truth, seen)
+    on_paper = OnPaper(truth, seen.sheet, seen.page.grey.shape)
     segments = [*filter(None, (miss.judged.true.ends, miss.judged.true.stroke, miss.read))]
     places = on_paper.back(np.array(segments).ravel())
     low = complex(places.real.min(), places.imag.min()) - complex(CLOSE_UP_MM, CLOSE_UP_MM)
@@ -293,8 +260,7 @@ def look_at(title: str, students: Iterator[Student], pictures: Path | None, *, t
         readings = read(seen, student.assignment, student.variant, student.declared, student.wanted)
         for page, reading, truth in zip(seen, readings, student.truths, strict=True):
             right = True
-            on_paper = OnPaper(truth, page) if page.sheet is not None and page.ink is not None else None
-            fault = sheet_fault(page, on_paper)
+            fault = sheet_fault(page, paper_of(truth, page))
             if fault:
                 print(f"  page not registered: {student.name} page {truth.get('page', 1)}: {fault}")
             for one, miss in misses_of(student, page, reading, truth):

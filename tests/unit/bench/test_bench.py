@@ -8,54 +8,19 @@ import pytest
 from grader.bench import branches, solver, speed, stability
 from grader.bench.branches import BranchRow
 from grader.bench.peers import PEERS, Package
-from grader.bench.reading import MISREAD_MM, ReadingRow, _kind
+from grader.bench.reading_tally import Tally, row_of
 from grader.bench.report import Report
 from grader.bench.singular import KINDS
 from grader.bench.solver import SolverBench, measure_errors
 from grader.bench.speed import NOT_INSTALLED, SpeedRow, measure_speed, speed_rows
 from grader.bench.stability import DISTANCES_QUICK, measure_stability
 from grader.cli.benchmark import show_benchmark
-from grader.records import ReadVector
 
-SURE, UNSURE = 0.95, 0.5
-LEAST = 0.9
 SHARE_OF_PLAN = 1e-12
 """Error allowed, relative to the plan's size."""
-DRAWN = {"length_mm": 50.0, "direction_deg": 90.0, "line_mm": [[10.0, 100.0], [10.0, 52.0]]}
 ABSENT = Package("no such solver", "no-such-solver", "no_such_solver", "Solver")
 
-READING = ReadingRow(
-    dpi=300.0, sheets=2, turned=0, off_scale=1, vectors=40,
-    times_ms={"decode": 20.0, "sheet": 100.0, "ink": 700.0, "reading": 300.0},
-    node_median_mm=0.1, node_p95_mm=0.4, node_worst_mm=None,
-    read=0.75, doubtful=0.2, unread=0.05, misreads=0,
-)  # fmt: skip
-
-
-def found(length_mm=50.0, direction_deg=90.0, confidence=SURE):
-    return ReadVector(length_mm, 0.1, direction_deg, 0.1, confidence)
-
-
-@pytest.mark.parametrize(
-    ("truth", "read_as", "kind"),
-    [
-        (DRAWN, found(), "read"),
-        (DRAWN, found(50.0 + 0.9 * MISREAD_MM), "read"),
-        (DRAWN, found(48.2), "read"),  # 1.8 mm off its nodes, 0.2 mm off its stroke
-        (DRAWN, found(50.0 + 1.1 * MISREAD_MM), "misread"),
-        (DRAWN, found(direction_deg=270.0), "misread"),
-        (DRAWN, found(direction_deg=92.0), "misread"),
-        (DRAWN, found(60.0, confidence=UNSURE), "doubtful"),
-        (DRAWN, None, "unread"),
-        (DRAWN, ReadVector(None, 0.1, 90.0, 0.1, SURE), "unread"),
-        ({**DRAWN, "length_mm": 2.0}, found(40.0), "beside"),
-        (None, found(), "misread"),
-        (None, found(confidence=UNSURE), "beside"),
-        (None, None, "beside"),
-    ],
-)
-def test_a_vector_is_counted_for_what_became_of_it(truth, read_as, kind):
-    assert _kind(truth, read_as, LEAST) == kind
+READING = row_of("plain", "a plain sheet", Tally(refused=7), 123.0)
 
 
 def test_every_built_in_assignment_is_held_against_fifty_digits():
@@ -124,10 +89,10 @@ def test_the_report_shows_time_and_error_and_is_json_too():
     figures = solver.SolverFigures(speed=(ours, theirs), branches=(BranchRow("peer", 100, 3, 2, 1),))
     report = Report(figures, (READING,))
     text = report.as_text()
-    assert "1120" in text
-    assert "75 %" in text
+    assert "a plain sheet" in text
+    assert "123" in text
     assert "7123 (1425)" in text
-    assert json.loads(json.dumps(report.as_json()))["reading"][0]["misreads"] == 0
+    assert json.loads(json.dumps(report.as_json()))["reading"][0]["refused"] == 7
 
 
 @pytest.mark.parametrize("peer", PEERS, ids=lambda peer: peer.name)
@@ -135,25 +100,25 @@ def test_a_peers_version_is_known_where_it_is_installed(peer):
     assert (peer.version is not None) == (importlib.util.find_spec(peer.module) is not None)
 
 
-@pytest.mark.parametrize("solver_only", [True, False])
-def test_the_command_prints_the_solvers_figures_and_the_readings_unless_told_otherwise(
-    solver_only, monkeypatch, capsys
-):
+@pytest.mark.parametrize(("only", "solved", "read"), [(None, 1, 1), ("solver", 1, 0), ("reading", 0, 1)])
+def test_the_command_prints_the_figures_of_the_part_asked_for(only, solved, read, monkeypatch, capsys):
     branch = BranchRow("closed form", 100, 0, 0, 0)
 
     class Bench:
         steps = 1
         figures = solver.SolverFigures(branches=(branch,))
+        rows, foreign, lines = (READING,), (), None
 
-        def __init__(self, quick):
+        def __init__(self, quick, students=None):
             assert quick
+            assert students is None
 
         def run(self):
             yield "branches"
 
     monkeypatch.setattr("grader.bench.solver.SolverBench", Bench)
-    monkeypatch.setattr("grader.bench.reading.measure_reading", lambda *, quick: iter([READING] * quick))
-    show_benchmark(quick=True, as_json=True, solver_only=solver_only)
+    monkeypatch.setattr("grader.bench.reading.ReadingBench", Bench)
+    show_benchmark(quick=True, as_json=True, only=only)
     told = json.loads(capsys.readouterr().out)
-    assert told["solver"]["branches"][0]["cases"] == 100
-    assert len(told["reading"]) == (0 if solver_only else 1)
+    assert (told["solver"] is not None) == bool(solved)
+    assert len(told["reading"]) == read
