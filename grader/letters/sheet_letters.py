@@ -26,6 +26,8 @@ _SHARE = 0.2
 _PEAK_MM = 0.9
 _GROWN_MM = 0.16
 """Strokes are taken out with so much more than their width: the hand's wobble and the blur."""
+_LONG_MM = 6.0
+"""Shorter strokes may be the letters' own."""
 _STUB_MM = 0.9
 """Smaller pieces that strokes leave are their frayed borders."""
 _TOUCHED = 0.08
@@ -118,7 +120,7 @@ def _usual_px(ink: Ink) -> float:
 
 
 def _drawn(ink: Ink, corner: tuple[int, int], shape: Sequence[int]) -> GreyImage:
-    """1 where a fitted stroke or ring runs."""
+    """1 where a long fitted stroke or a ring runs."""
     unit, shift = ink.where.px_per_mm, 4
     fine = 1 << shift
     drawn = np.zeros(tuple(shape), dtype=np.uint8)
@@ -126,7 +128,9 @@ def _drawn(ink: Ink, corner: tuple[int, int], shape: Sequence[int]) -> GreyImage
     def px(points: FloatArray) -> NDArray[np.int32]:
         return np.rint((points * unit - corner) * fine).astype(np.int32)
 
-    for ends, width in zip(px(ink.strokes.ends), ink.strokes.width, strict=True):
+    span = ink.strokes.ends[:, 1] - ink.strokes.ends[:, 0]
+    long = np.hypot(span[:, 0], span[:, 1]) >= _LONG_MM
+    for ends, width in zip(px(ink.strokes.ends[long]), ink.strokes.width[long], strict=True):
         pen = max(1, round((width + _GROWN_MM) * unit))
         cv2.line(drawn, ends[0].tolist(), ends[1].tolist(), 1, pen, cv2.LINE_8, shift)
     pen = max(1, round(_usual_px(ink)))
