@@ -6,11 +6,13 @@ from PIL import Image
 
 from grader.records import GreyImage
 
-_HIGH_BYTE = 8
+_BYTE = 8
 
 
 def to_grey(image: np.ndarray) -> GreyImage:
-    """Grey of a decoded image: (h, w), (h, w, 2..4) with blue, green, red[, alpha]; bool, uint8 or uint16.
+    """Grey of a decoded image: (h, w), or (h, w, 2..4) with blue, green, red[, alpha].
+
+    The pixels are bool, uint8, uint16 or float of 0..1.
 
     Transparent pixels become paper. Colour becomes luma: its weights keep blue (0.11) and red (0.30)
     ink at over half of full contrast, and, unlike the least channel, it does not carry the coarser
@@ -32,11 +34,22 @@ def _eight_bit(image: np.ndarray) -> GreyImage:
     if image.dtype == np.bool_:
         return image.astype(np.uint8) * 255
     if image.dtype == np.uint16:
-        return (image >> _HIGH_BYTE).astype(np.uint8)
+        # Sensors of 10 to 14 bits are stored in 16 without being stretched.
+        used = max(int(image.max()).bit_length(), _BYTE)
+        return (image >> (used - _BYTE)).astype(np.uint8)
+    if image.dtype in (np.float32, np.float64):
+        return np.asarray(np.clip(np.nan_to_num(image), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
     if image.dtype != np.uint8:
-        message = f"expected bool, uint8 or uint16 pixels, got {image.dtype}"
+        message = f"pixels of the type {image.dtype} are not read"
         raise ValueError(message)
     return image
+
+
+def of_four_inks(image: np.ndarray) -> GreyImage:
+    """Grey of cyan, magenta, yellow and black, (h, w, 4..) with 0 for no ink: light passes through all."""
+    inks = 255.0 - _eight_bit(image)[..., :4].astype(np.float32)
+    light = inks[..., :3].min(axis=2) * inks[..., 3] / np.float32(255.0)
+    return np.asarray(light + 0.5, dtype=np.uint8)
 
 
 def _on_white(grey: np.ndarray, alpha: np.ndarray) -> GreyImage:

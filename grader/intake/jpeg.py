@@ -8,7 +8,7 @@ import simplejpeg
 from PIL import Image
 
 from grader.intake.grey import from_pillow
-from grader.intake.limits import Door, damaged, truncated
+from grader.intake.limits import Door, check_size, damaged, truncated
 from grader.intake.tags import of_image, opened
 from grader.records import GreyImage, Page
 
@@ -27,10 +27,10 @@ def _pages(path: Path, first: int) -> Iterator[Page]:
     if not data.rstrip(b"\0").endswith(_END) and len(data) < _LEAST_BYTES:
         raise truncated(path, 1)
     with opened(path, data) as image:
-        dpi, turn_deg = of_image(image)
+        tags = of_image(image)
         four_inks = image.mode == "CMYK"
     grey = _four_inks(path, data) if four_inks else decode(path, 1, data)
-    yield Page(path.name, 1, grey, dpi, turn_deg)
+    yield Page(path.name, 1, tags.unmirrored(grey), tags.dpi, tags.turn_deg)
 
 
 def decode(path: Path, page: int, data: bytes) -> GreyImage:
@@ -38,6 +38,11 @@ def decode(path: Path, page: int, data: bytes) -> GreyImage:
 
     libjpeg fills what is missing with grey and only warns: the warning is an error here.
     """
+    try:
+        high, wide, _, _ = simplejpeg.decode_jpeg_header(data, strict=False)
+    except ValueError as error:
+        raise damaged(path, page, str(error)) from error
+    check_size(path, page, wide, high)
     try:
         return _plane(simplejpeg.decode_jpeg(data, colorspace="GRAY", strict=True))
     except ValueError as error:

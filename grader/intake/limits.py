@@ -12,6 +12,7 @@ Codes of `InputFileError` raised in this package:
 | image_too_large | more pixels than a sheet can need |
 | pdf_encrypted | a PDF that asks for a password |
 | pdf_damaged | a PDF that cannot be opened |
+| pdf_too_heavy | a page whose drawing commands are more than a drawing can have |
 | pages_none | a document without pages |
 | pages_too_many | more pages than one class can need |
 """

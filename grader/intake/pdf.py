@@ -1,5 +1,6 @@
 """PDF files: a page's embedded scan taken out directly where it is the whole page, else rendered."""
 
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -7,18 +8,22 @@ from pathlib import Path
 import numpy as np
 import pikepdf
 import pypdfium2
+from PIL import Image
 
 from grader.intake import jpeg
-from grader.intake.grey import from_pillow
-from grader.intake.limits import Door, check_pages, check_size
+from grader.intake.grey import from_pillow, to_grey
+from grader.intake.limits import Door, check_pages, check_size, damaged, too_large
 from grader.intake.placement import Placement, only_image
 from grader.intake.tags import plausible
+from grader.intake.unpacking import check_content, plain_pixels
 from grader.records import GreyImage, Page
 from reference.errors import InputFileError
 
 RENDER_DPI = 300.0
 _POINTS_PER_INCH = 72.0
 _MM_PER_INCH = 25.4
+_END, _END_WITHIN = (b"%%EOF", b"startxref"), 1 << 16
+_MOST_CHANNELS = 4
 
 
 def _pages(path: Path, first: int) -> Iterator[Page]:
@@ -26,6 +31,7 @@ def _pages(path: Path, first: int) -> Iterator[Page]:
         check_pages(path, len(document.pages))
         for number in range(first, len(document.pages) + 1):
             page = document.pages[number - 1]
+            check_content(path, number, page)
             placement = only_image(page)
             taken = None if placement is None else _taken_out(path, number, placement)
             yield _rendered(path, number) if taken is None else taken
@@ -33,6 +39,7 @@ def _pages(path: Path, first: int) -> Iterator[Page]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[pikepdf.Pdf]:
+    _check_whole(path)
     try:
         document = pikepdf.open(path)
     except pikepdf.PasswordError as error:
@@ -41,10 +48,27 @@ def _opened(path: Path) -> Iterator[pikepdf.Pdf]:
         ) from error
     except (pikepdf.PdfError, OSError, ValueError) as error:
         raise InputFileError(
-            "pdf_damaged", f"{path.name}: the PDF cannot be opened ({error}); export it again"
+            "pdf_damaged", f"{path.name}: the PDF cannot be opened ({_reason(path, error)}); export it again"
         ) from error
     with document:
         yield document
+
+
+def _check_whole(path: Path) -> None:
+    """Raise InputFileError for a file without its end: what could be saved of it silently lacks pages."""
+    with path.open("rb") as file:
+        file.seek(0, 2)
+        file.seek(max(0, file.tell() - _END_WITHIN))
+        tail = file.read()
+    if not any(sign in tail for sign in _END):
+        raise InputFileError(
+            "pdf_damaged", f"{path.name}: the PDF is cut off before its end; copy or upload the file again"
+        )
+
+
+def _reason(path: Path, error: Exception) -> str:
+    """What a library says of a file, without where the file lies."""
+    return str(error).replace(str(path), path.name).removeprefix(f"{path.name}: ")
 
 
 def _taken_out(path: Path, number: int, placement: Placement) -> Page | None:
@@ -67,10 +91,31 @@ def _decoded(path: Path, number: int, image: pikepdf.PdfImage) -> GreyImage | No
         return jpeg.decode(path, number, image.obj.read_raw_bytes())
     if not plain or four_inks:
         return None
+    pixels = plain_pixels(path, number, image)
+    if pixels is not None:
+        return to_grey(pixels[..., ::-1] if pixels.ndim == 3 else pixels)
+    if not _within(image):
+        raise damaged(path, number, "its data are more than its size asks for")
     try:
-        return from_pillow(image.as_pil_image())
+        picture = image.as_pil_image()
+        check_size(path, number, *picture.size)
+        return from_pillow(picture)
+    except Image.DecompressionBombError as error:
+        raise too_large(path, number) from error
     except (pikepdf.PdfError, pikepdf.UnsupportedImageTypeError, OSError, ValueError, NotImplementedError):
         return None
+
+
+def _within(image: pikepdf.PdfImage) -> bool:
+    """Whether deflated data unpack to no more than an image of its size can need; true for other packing."""
+    stream = image.obj
+    if [str(name) for name in image.filters] != ["/FlateDecode"]:
+        return True
+    most = image.height * (image.width * _MOST_CHANNELS * 2 + 1)
+    try:
+        return len(zlib.decompressobj().decompress(stream.read_raw_bytes(), most + 1)) <= most
+    except zlib.error:
+        return True
 
 
 def _rendered(path: Path, number: int) -> Page:
@@ -83,7 +128,8 @@ def _rendered(path: Path, number: int) -> Page:
             grey = page.render(scale=scale, grayscale=True).to_numpy()
     except pypdfium2.PdfiumError as error:
         raise InputFileError(
-            "pdf_damaged", f"{path.name}, page {number}: cannot be rendered ({error}); export it again"
+            "pdf_damaged",
+            f"{path.name}, page {number}: cannot be rendered ({_reason(path, error)}); export it again",
         ) from error
     plane = np.ascontiguousarray(grey.reshape(grey.shape[0], grey.shape[1], -1)[..., 0])
     dpi = (plane.shape[1] / width_pt * _POINTS_PER_INCH, plane.shape[0] / height_pt * _POINTS_PER_INCH)

@@ -4,10 +4,15 @@ import math
 from dataclasses import dataclass
 from typing import cast
 
+import numpy as np
 import pikepdf
+
+from grader.records import FloatArray
 
 _COVERS = 0.9
 """An image over this share of the page, alone on it, is the page."""
+_SHOWN = 0.94
+"""Of an image; where the page hides more, what a viewer shows is another picture."""
 _SQUARE = 1e-3
 _PAINTS = frozenset(("S", "s", "f", "F", "f*", "B", "B*", "b", "b*", "sh", "BI", "INLINE IMAGE"))
 _SHOWS_TEXT = frozenset(("Tj", "TJ", "'", '"'))
@@ -54,7 +59,7 @@ def only_image(page: pikepdf.Page) -> Placement | None:
 
 
 def _placed(page: pikepdf.Page, image: pikepdf.Stream, matrix: Matrix) -> Placement | None:
-    a, b, c, d, _, _ = matrix
+    a, b, c, d, e, f = matrix
     width, height = math.hypot(a, b), math.hypot(c, d)
     box = [float(value) for value in page.mediabox]
     area = abs((box[2] - box[0]) * (box[3] - box[1]))
@@ -62,11 +67,22 @@ def _placed(page: pikepdf.Page, image: pikepdf.Stream, matrix: Matrix) -> Placem
     square = min(abs(a), abs(b)) <= _SQUARE * width and abs(a * c + b * d) <= _SQUARE * width * height
     if not upright or not square or width * height < _COVERS * area:
         return None
+    corners = np.array([(e, f), (e + a + c, f + b + d)])
+    shown = _overlap(corners, [float(value) for value in page.cropbox])
+    if shown < _SHOWN * width * height:
+        return None
     drawn_turn = round(math.degrees(math.atan2(b, a)) / 90.0) * 90
     page_turn = int(page.obj.get("/Rotate", 0))
     unit = float(page.obj.get("/UserUnit", 1.0))
     turn_deg = (drawn_turn - page_turn) % 360
     return Placement(pikepdf.PdfImage(image), width * unit, height * unit, turn_deg)
+
+
+def _overlap(corners: FloatArray, box: list[float]) -> float:
+    """Area that a rectangle, by opposite corners, shares with a box."""
+    low = np.maximum(corners.min(axis=0), np.minimum(box[:2], box[2:]))
+    high = np.minimum(corners.max(axis=0), np.maximum(box[:2], box[2:]))
+    return float(np.prod(np.maximum(high - low, 0.0)))
 
 
 def _times(first: tuple[float, ...], second: Matrix) -> Matrix:

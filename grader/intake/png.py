@@ -23,11 +23,11 @@ def _pages(path: Path, first: int) -> Iterator[Page]:
         # The decoder would fill the missing rows with black or nothing.
         raise truncated(path, 1)
     with opened(path, data) as image:
-        dpi, turn_deg = of_image(image)
+        tags = of_image(image)
     pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None:
         raise damaged(path, 1, "it cannot be decoded")
-    yield Page(path.name, 1, to_grey(pixels), dpi, turn_deg)
+    yield Page(path.name, 1, tags.unmirrored(to_grey(pixels)), tags.dpi, tags.turn_deg)
 
 
 def _count(path: Path) -> int:

@@ -1,21 +1,25 @@
 """Resolution and orientation as files state them."""
 
 import io
+import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 from grader.intake.limits import check_size, damaged, too_large
+from grader.records import GreyImage
 
 _ORIENTATION_TAG = 274
 _INCH, _CENTIMETRE = 2, 3
 _CM_PER_INCH = 2.54
-_TURN_CCW = {1: 0, 3: 180, 6: 270, 8: 90}
-"""EXIF/TIFF orientation to the counter-clockwise turn that a viewer applies; mirrored ones are not
-made by cameras or scanners and count as unturned."""
+_TURN_CCW = {1: 0, 2: 0, 3: 180, 4: 180, 5: 90, 6: 270, 7: 270, 8: 90}
+"""EXIF/TIFF orientation to the counter-clockwise turn that a viewer applies, after undoing the mirror."""
+_MIRRORED = frozenset({2, 4, 5, 7})
 _PLAUSIBLE_DPI = (30.0, 4800.0)
 
 Dpi = tuple[float, float]
@@ -25,7 +29,10 @@ def plausible(dpi: tuple[float, float] | None) -> Dpi | None:
     """The resolution, or None where it is absent or cannot be one."""
     if dpi is None:
         return None
-    horizontal, vertical = float(dpi[0]), float(dpi[1])
+    try:
+        horizontal, vertical = float(dpi[0]), float(dpi[1])
+    except (ArithmeticError, TypeError, ValueError):
+        return None
     low, high = _PLAUSIBLE_DPI
     good = low <= horizontal <= high and low <= vertical <= high
     return (horizontal, vertical) if good else None
@@ -40,9 +47,26 @@ def from_unit(x: float, y: float, unit: int) -> Dpi | None:
     return None
 
 
-def turn_of(orientation: int) -> int:
-    """Counter-clockwise turn in degrees for an EXIF orientation."""
-    return _TURN_CCW.get(orientation, 0)
+@dataclass(frozen=True, slots=True)
+class Tags:
+    """What a file says of its picture: its resolution, and how a viewer shows it.
+
+    `mirrored` pictures (a selfie's camera, a scan through film) are mirrored left to right first, then
+    turned by `turn_deg` counter-clockwise.
+    """
+
+    dpi: Dpi | None
+    turn_deg: int
+    mirrored: bool = False
+
+    def unmirrored(self, grey: GreyImage) -> GreyImage:
+        """The pixels as drawn: a mirrored drawing is another drawing."""
+        return np.ascontiguousarray(grey[:, ::-1]) if self.mirrored else grey
+
+
+def tags_of(dpi: Dpi | None, orientation: int) -> Tags:
+    """From a resolution and an EXIF orientation; an unknown one counts as upright."""
+    return Tags(dpi, _TURN_CCW.get(orientation, 0), orientation in _MIRRORED)
 
 
 @contextmanager
@@ -60,8 +84,14 @@ def opened(path: Path, data: bytes) -> Iterator[Image.Image]:
         raise damaged(path, 1, "its header cannot be read") from error
 
 
-def of_image(image: Image.Image) -> tuple[Dpi | None, int]:
-    """(dpi, turn_deg) from JFIF, EXIF or pHYs of an opened image."""
-    dpi = image.info.get("dpi")
-    orientation = int(image.getexif().get(_ORIENTATION_TAG, 1) or 1)
-    return plausible(dpi), turn_of(orientation)
+def of_image(image: Image.Image) -> Tags:
+    """From JFIF, EXIF or pHYs of an opened image."""
+    return tags_of(plausible(image.info.get("dpi")), _orientation(image))
+
+
+def _orientation(image: Image.Image) -> int:
+    """As the EXIF says; 1 where there is none, or none that can be read."""
+    try:
+        return int(image.getexif().get(_ORIENTATION_TAG, 1) or 1)
+    except (OSError, SyntaxError, ValueError, TypeError, KeyError, struct.error):
+        return 1

@@ -1,5 +1,6 @@
 """TIFF files: one page or many; G4, LZW, deflate, JPEG; 1-bit, grey, colour."""
 
+import logging
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -7,10 +8,13 @@ from typing import Any
 import numpy as np
 import tifffile
 
-from grader.intake.grey import to_grey
-from grader.intake.limits import Door, check_pages, check_size, damaged
-from grader.intake.tags import Dpi, from_unit, turn_of
+from grader.intake.grey import of_four_inks, to_grey
+from grader.intake.limits import Door, check_pages, check_size, damaged, truncated
+from grader.intake.tags import Dpi, from_unit, tags_of
 from grader.records import GreyImage, Page
+
+logging.getLogger("tifffile").setLevel(logging.CRITICAL)
+"""What is wrong with a file is told by an error; the library's own words on it would be in the way."""
 
 _DECODING = (ValueError, RuntimeError, OSError, KeyError, IndexError, TypeError, tifffile.TiffFileError)
 """What the decoders raise for bad data (imagecodecs' own errors are RuntimeErrors)."""
@@ -23,8 +27,9 @@ def _pages(path: Path, first: int) -> Iterator[Page]:
             if not isinstance(page, tifffile.TiffPage):
                 raise damaged(path, number, "its directory cannot be read")
             check_size(path, number, page.imagewidth, page.imagelength)
-            orientation = int(_value(page, "Orientation", 1))
-            yield Page(path.name, number, _grey(path, number, page), _dpi(page), turn_of(orientation))
+            tags = tags_of(_dpi(page), int(_value(page, "Orientation", 1)))
+            grey = tags.unmirrored(_grey(path, number, page))
+            yield Page(path.name, number, grey, tags.dpi, tags.turn_deg)
 
 
 def _opened(path: Path) -> tifffile.TiffFile:
@@ -36,9 +41,13 @@ def _opened(path: Path) -> tifffile.TiffFile:
 
 def _length(path: Path, file: tifffile.TiffFile) -> int:
     try:
-        return len(file.pages)
+        pages = len(file.pages)
     except _DECODING as error:
         raise damaged(path, 1, "its list of pages cannot be read") from error
+    if pages == 0:
+        # The list of pages stands at the end of most files, behind the pixels.
+        raise truncated(path, 1)
+    return pages
 
 
 def _grey(path: Path, number: int, page: tifffile.TiffPage) -> GreyImage:
@@ -46,6 +55,10 @@ def _grey(path: Path, number: int, page: tifffile.TiffPage) -> GreyImage:
         pixels = np.squeeze(page.asarray())
     except _DECODING as error:
         raise damaged(path, number, str(error) or type(error).__name__) from error
+    if page.planarconfig == tifffile.PLANARCONFIG.SEPARATE and pixels.ndim == 3:
+        pixels = np.moveaxis(pixels, 0, -1)
+    if page.photometric == tifffile.PHOTOMETRIC.SEPARATED and pixels.ndim == 3 and pixels.shape[2] >= 4:
+        return of_four_inks(pixels)
     if page.photometric == tifffile.PHOTOMETRIC.PALETTE and page.colormap is not None:
         pixels = (np.moveaxis(page.colormap[:, pixels], 0, -1) >> 8).astype(np.uint8)
     if page.photometric == tifffile.PHOTOMETRIC.MINISWHITE:

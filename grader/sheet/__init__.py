@@ -7,6 +7,7 @@ is missing is told as `Problem`, and what cannot be settled is refused with the 
 
 from grader.records import Identity, Page, Sheet, Unread
 from grader.sheet import markers
+from grader.sheet.halves import half_hint, whole
 from grader.sheet.identity import identify
 from grader.sheet.lens import straighten
 from grader.sheet.plain import register_plain
@@ -16,8 +17,10 @@ __all__ = ["rectify", "straighten", "whose"]
 
 def rectify(page: Page) -> Sheet | Unread:
     """The page's map from millimetres to pixels, or, false in a condition, why there is none."""
-    sheet = markers.register(page)
-    return register_plain(page) if sheet is None else sheet
+    sheet = markers.register(page) or register_plain(page)
+    if isinstance(sheet, Unread):
+        return Unread(sheet.name, f"{sheet.reason}{half_hint(page)}")
+    return whole(page, sheet)
 
 
 def whose(page: Page) -> Identity | None:

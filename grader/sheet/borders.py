@@ -34,7 +34,7 @@ def borders(small: GreyImage, steepest: float) -> FloatArray:
     Level borders only: for upright ones give the transposed image. `steepest` is the largest slope;
     the bright side is +1 where it is below, -1 where it is above.
     """
-    soft = cv2.blur(small, (_ALONG_PX, 1))
+    soft = np.asarray(cv2.blur(small, (_ALONG_PX, 1)), dtype=np.uint8)
     found = [_one_sided(soft, sign, steepest) for sign in (1, -1)]
     return np.concatenate(found)
 

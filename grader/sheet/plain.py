@@ -9,6 +9,7 @@ from grader.records import FloatArray, Page, Problem, Sheet, Unread
 from grader.sheet.bend import find_lens
 from grader.sheet.fitting import Fit, affine_of, apply, fit_sides, inverted
 from grader.sheet.grid import find_grid
+from grader.sheet.halves import looks_a4
 from grader.sheet.hypotheses import Hypothesis, Resolution, hypotheses, on_sides
 from grader.sheet.longlines import LongLine, long_lines
 from grader.sheet.models import PAGE_MM, PAPER, Model, drawable
@@ -210,9 +211,9 @@ def _from_resolution(
         matrix = affine_of(params)
         tried.append((title_block_mm(matrix, drawn), matrix))
     block, matrix = max(tried, key=lambda one: one[0])
-    if block == 0.0 and not resolution.stated:
+    if not resolution.stated and (block == 0.0 or looks_a4(page)):
         return Unread(
-            "sheet", "no drawing frame, no title block and no stated resolution: not known to be A3"
+            "sheet", "no whole drawing frame, no title block or no stated resolution: not known to be A3"
         )
     if block == 0.0:
         problems.append(_unsure_upright(page))

@@ -185,7 +185,7 @@ def test_a_page_with_more_than_its_scan_is_rendered(tmp_path):
         ("text.png", b"not a picture at all", "file_type_unsupported"),
         ("notes.docx", b"PK\x03\x04 and so on", "file_type_unsupported"),
         ("broken.pdf", b"%PDF-1.7\nnothing more", "pdf_damaged"),
-        ("broken.tif", b"II*\x00\xff\xff\xff\x7f", "pages_none"),
+        ("broken.tif", b"II*\x00\xff\xff\xff\x7f", "image_truncated"),
         ("broken.png", b"\x89PNG\r\n\x1a\n IEND", "image_damaged"),
         ("broken.jpg", b"\xff\xd8\xff\xe0 nothing", "image_truncated"),
     ],
@@ -251,6 +251,162 @@ def test_a_decompression_bomb_is_not_decoded(tmp_path):
     with pytest.raises(InputFileError) as caught:
         list(pages_of(path))
     assert caught.value.code == "image_too_large"
+
+
+MIRRORS = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    7: Image.Transpose.TRANSVERSE,
+}
+
+
+@pytest.mark.parametrize("orientation", sorted(MIRRORS))
+@pytest.mark.parametrize("suffix", ["png", "tif"])
+def test_a_mirrored_picture_is_given_as_it_was_drawn(tmp_path, orientation, suffix):
+    path = tmp_path / f"selfie.{suffix}"
+    stored = Image.fromarray(drawing()).transpose(MIRRORS[orientation])
+    if suffix == "png":
+        exif = Image.Exif()
+        exif[274] = orientation
+        stored.save(path, exif=exif)
+    else:
+        stored.save(path, tiffinfo={274: orientation})
+    page = only_page(path)
+    assert np.array_equal(np.rot90(page.grey, page.turn_deg // 90), drawing())
+
+
+def test_a_resolution_in_centimetres_is_understood(tmp_path):
+    path = tmp_path / "cm.jpg"
+    data = bytearray(jpeg_bytes(drawing(), dpi=(118, 118)))
+    data[data.find(b"JFIF\0") + 7] = 2
+    path.write_bytes(data)
+    assert only_page(path).dpi == pytest.approx((118 * 2.54, 118 * 2.54), rel=1e-3)
+
+
+def inked(grey, ink):
+    """Four inks of a grey drawing: all of it in one of them, 0 for none."""
+    planes = np.zeros((*grey.shape, 4), np.uint8)
+    planes[..., ink] = 255 - grey
+    return planes
+
+
+@pytest.mark.parametrize("ink", [0, 1, 3])
+def test_strokes_of_every_printing_ink_are_dark(tmp_path, ink):
+    path = tmp_path / "inks.tif"
+    tifffile.imwrite(path, inked(drawing(), ink), photometric="separated")
+    assert np.array_equal(only_page(path).grey, drawing())
+
+
+@pytest.mark.parametrize("kind", ["planes", "sixteen", "twelve", "real"])
+def test_pixels_of_unusual_depth_or_order_come_through(tmp_path, kind):
+    path, grey = tmp_path / "odd.tif", drawing()
+    match kind:
+        case "planes":
+            tifffile.imwrite(path, np.stack([grey] * 3), photometric="rgb", planarconfig="separate")
+        case "sixteen":
+            tifffile.imwrite(path, grey.astype(np.uint16) * 257)
+        case "twelve":
+            tifffile.imwrite(path, grey.astype(np.uint16) << 4)
+        case _:
+            tifffile.imwrite(path, grey.astype(np.float32) / 255)
+    assert np.array_equal(only_page(path).grey, grey)
+
+
+def raw_pdf(data, **entries):
+    """A PDF of one page, its image's stream as given; and the page."""
+    pdf = pikepdf.new()
+    stream = pikepdf.Stream(pdf, data)
+    stream.stream_dict = pikepdf.Dictionary(
+        Type=pikepdf.Name.XObject,
+        Subtype=pikepdf.Name.Image,
+        Width=SHAPE[1],
+        Height=SHAPE[0],
+        Filter=pikepdf.Name.FlateDecode,
+        **entries,
+    )
+    page = pdf.add_blank_page(page_size=(840, 600))
+    page.Resources = pikepdf.Dictionary(XObject=pikepdf.Dictionary(Scan=pdf.make_indirect(stream)))
+    page.Contents = pdf.make_stream(b"q 840 0 0 600 0 0 cm /Scan Do Q")
+    return pdf, page
+
+
+GREY8 = {"ColorSpace": pikepdf.Name.DeviceGray, "BitsPerComponent": 8}
+GREY1 = {"ColorSpace": pikepdf.Name.DeviceGray, "BitsPerComponent": 1}
+
+
+def test_deflated_pixels_of_a_pdf_are_taken_out_as_stored(tmp_path):
+    path = tmp_path / "grey.pdf"
+    raw_pdf(zlib.compress(drawing().tobytes()), **GREY8)[0].save(path)
+    assert np.array_equal(only_page(path).grey, drawing())
+    bits = drawing() >= 128
+    raw_pdf(zlib.compress(np.packbits(bits, axis=1).tobytes()), **GREY1)[0].save(path)
+    assert np.array_equal(only_page(path).grey, bits * np.uint8(255))
+
+
+@pytest.mark.parametrize("share", [0.5, 900.0])
+def test_an_image_with_data_of_another_size_is_told_and_not_unpacked(tmp_path, share):
+    path = tmp_path / "bomb.pdf"
+    raw_pdf(zlib.compress(bytes(int(share * drawing().size))), **GREY8)[0].save(path)
+    with pytest.raises(InputFileError) as caught:
+        list(pages_of(path))
+    assert caught.value.code == "image_damaged"
+
+
+@pytest.mark.parametrize("in_form", [False, True])
+def test_a_page_of_endless_drawing_commands_is_refused_before_they_are_carried_out(tmp_path, in_form):
+    path = tmp_path / "endless.pdf"
+    pdf, page = raw_pdf(zlib.compress(drawing().tobytes()), **GREY8)
+    packer = zlib.compressobj(9)
+    data = b"".join(packer.compress(b"0 0 m 1 1 l S " * 70_000) for _ in range(40)) + packer.flush()
+    bomb = pikepdf.Stream(pdf, data)
+    bomb["/Filter"] = pikepdf.Name.FlateDecode
+    if in_form:
+        bomb["/Subtype"] = pikepdf.Name.Form
+        page.Resources.XObject.F = pdf.make_indirect(bomb)
+        page.Contents = pdf.make_stream(b"/F Do")
+    else:
+        page.Contents = pdf.make_indirect(bomb)
+    pdf.save(path, compress_streams=False)
+    with pytest.raises(InputFileError) as caught:
+        list(pages_of(path))
+    assert caught.value.code == "pdf_too_heavy"
+
+
+def test_a_jpeg_in_a_pdf_that_claims_too_many_pixels_is_not_decoded(tmp_path):
+    data = bytearray(jpeg_bytes(drawing()))
+    size = data.find(b"\xff\xc0") + 5
+    data[size : size + 4] = struct.pack(">HH", 60_000, 60_000)
+    path = tmp_path / "claims.pdf"
+    pdf, page = raw_pdf(bytes(data), **GREY8)
+    page.Resources.XObject.Scan.Filter = pikepdf.Name.DCTDecode
+    pdf.save(path)
+    with pytest.raises(InputFileError) as caught:
+        list(pages_of(path))
+    assert caught.value.code == "image_too_large"
+
+
+@pytest.mark.parametrize("share", [0.5, 0.97])
+def test_a_pdf_that_is_cut_off_is_refused_rather_than_read_without_its_last_pages(tmp_path, share):
+    path = tmp_path / "class.pdf"
+    noisy = np.random.default_rng(0).integers(0, 255, SHAPE, dtype=np.uint8)
+    pdf_of(path, *[jpeg_bytes(noisy)] * 6)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    with pytest.raises(InputFileError) as caught:
+        count_pages(path)
+    assert caught.value.code == "pdf_damaged"
+    assert str(tmp_path) not in caught.value.message
+
+
+def test_of_a_cropped_page_what_a_viewer_shows_is_taken(tmp_path):
+    path = tmp_path / "cropped.pdf"
+    pdf_of(path, jpeg_bytes(drawing()))
+    with pikepdf.open(path, allow_overwriting_input=True) as pdf:
+        pdf.pages[0].CropBox = [0, 0, 420, 600]
+        pdf.save(path)
+    page = only_page(path)
+    assert page.paper_mm == pytest.approx((420 / 72 * MM_PER_INCH, 600 / 72 * MM_PER_INCH))
 
 
 A3_AT_100_DPI = (1169, 1654)
