@@ -23,14 +23,14 @@ from reference.derivation import construction_of
 
 __all__ = ["SCENES", "STAGES", "STUDENTS", "ReadingBench", "ReadingRow", "measure_reading"]
 
-STUDENTS, STUDENTS_QUICK = 10, 1
+STUDENTS, STUDENTS_QUICK = 6, 1
 SCENES_QUICK = ("plain", "printed")
 
 
 class ReadingBench:
     """The whole benchmark of reading; `run` tells what was measured, step by step.
 
-    Arguments: `students` per scene, by default 10, in a quick run 1 of two scenes only.
+    Arguments: `students` per scene, by default 6, in a quick run 1 of two scenes only.
     """
 
     def __init__(self, *, quick: bool = False, students: int | None = None) -> None:

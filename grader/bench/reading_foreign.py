@@ -20,8 +20,8 @@ from grader.simulation.sketch import Sketch
 from grader.simulation.view import view_of
 from grader.simulation.wording import CAPTIONS, WORDS
 
-PAGES, PAGES_QUICK = 3, 1
-READ_AS = ("pump", "press", "engine")
+PAGES, PAGES_QUICK = 2, 1
+READ_AS = ("pump", "press")
 OTHERS = ("press", "engine", "shaper", "piston")
 BREAKDOWNS = (ArithmeticError, LookupError, ValueError)
 """What the reader must never raise; where it does, the page counts as one on which it broke down."""

@@ -38,6 +38,7 @@ class Scene:
     mistakes : mean number of mistakes; with `wrong` one at least
     dpi : None as it comes
     printed : drawn on the printed answer sheet
+    hardship : how much more often than usual sheets are hard to read
     """
 
     name: str
@@ -49,6 +50,7 @@ class Scene:
     device: Device = "flatbed"
     dpi: float | None = 300.0
     printed: bool = False
+    hardship: float = 1.0
 
 
 ALL_HANDS = (CAREFUL, TYPICAL, SLOPPY)
@@ -57,6 +59,7 @@ SCENES = (
     Scene("printed", "flatbed 300 dpi, answer sheet", printed=True),
     Scene("sloppy", "sloppy hands", hands=(SLOPPY,)),
     Scene("wrong", "wrong drawings", mistakes=1.0, wrong=True),
+    Scene("hard", "hard sheets", hardship=4.0),
     Scene("150", "flatbed 150 dpi", dpi=150.0),
     Scene("copies", "1-bit copies", device="copier"),
     Scene("phone", "phone photos, answer sheet", device="phone", dpi=None, printed=True),
@@ -121,7 +124,7 @@ def _settings(scene: Scene, assignment: Assignment, variant: Variant, seed: int)
     for again in range(_TRIES):
         settings = any_settings(
             seed + 100_000 * again, device=scene.device, dpi=scene.dpi, mistakes=scene.mistakes,
-            work=(assignment, variant),
+            work=(assignment, variant), hardship=scene.hardship,
         )  # fmt: skip
         if settings.student.mistakes or not scene.wrong:
             break

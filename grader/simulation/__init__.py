@@ -6,7 +6,7 @@ drawing whatever the scanner: hand, page, pen and scanner have random streams of
 """
 
 from grader.simulation.desk import PrintedSheet
-from grader.simulation.mixture import PENS, any_settings
+from grader.simulation.mixture import HARDSHIPS, PENS, any_settings, with_hardships
 from grader.simulation.settings import (
     CAREFUL,
     CLEAN_SCAN,
@@ -26,6 +26,7 @@ from grader.simulation.student import SimulatedSheet, measured_by, simulate
 __all__ = [
     "CAREFUL",
     "CLEAN_SCAN",
+    "HARDSHIPS",
     "PENS",
     "PERFECT",
     "SLOPPY",
@@ -43,6 +44,7 @@ __all__ = [
     "encoded",
     "measured_by",
     "simulate",
+    "with_hardships",
     "write_pdf",
     "write_truth",
 ]

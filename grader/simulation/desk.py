@@ -134,10 +134,13 @@ class Desk:
             return None
         taken.append((*place, w, h))
         origin = complex(place[0] + 6, -place[1] - 6) - complex(low.real, high.imag)
-        for vector in self.task.wrong.construction.vectors_of(plan.name)[:3]:
+        whole = self.settings.student.abandoned_whole
+        for vector in self.task.wrong.construction.vectors_of(plan.name)[: None if whole else 3]:
             p, q = (origin + plan.nodes[node] for node in (vector.tail, vector.head))
-            slip = complex(*sketch.rng.normal(0.0, 2.0, 2))
+            slip = complex(*sketch.rng.normal(0.0, 0.5 if whole else 2.0, 2))
             sketch.line(sketch.pen("line"), p, q + slip)
+            if whole:
+                symbols.arrowhead(sketch, sketch.pen("line"), p, q + slip, sketch.style.arrow_mm)
         symbols.cross_out(sketch, origin + low, origin + high)
         return [round(v, 3) for v in (*place, w, h)]
 
@@ -157,6 +160,7 @@ class Desk:
     ) -> dict[str, dict[str, str]]:
         """Draw the figures; the vectors that are not drawn, with the reason, by plan."""
         missing = {}
+        joints = {f.name: figures.at_origin(f, origins[f.name]) for f in sheet.figures}.get(MECHANISM)
         for figure in sheet.figures:
             nodes = figures.at_origin(figure, origins[figure.name])
             if figure.name == MECHANISM:
@@ -164,6 +168,8 @@ class Desk:
             else:
                 student = self.settings.student
                 missing[figure.name] = figures.draw_plan(sketch, self.task, figure.name, nodes, student)
+                if student.helpers and joints is not None:
+                    figures.draw_helpers(sketch, self.task, joints, nodes, student.helpers)
         return missing
 
     def _fill_fields(self, sketch: Sketch, sheet: DrawnSheet, paper: PrintedSheet) -> dict[str, str]:

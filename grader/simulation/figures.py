@@ -9,8 +9,8 @@ from grader.simulation import symbols
 from grader.simulation.hand import MECHANISM, DrawnFigure, Nodes, Task
 from grader.simulation.links import blocks_of, coincident, fixed_guides, lines_of, links_of
 from grader.simulation.settings import Student
-from grader.simulation.sketch import DASHES, Sketch
-from grader.simulation.strokes import arc
+from grader.simulation.sketch import CHAIN, DASHES, Sketch
+from grader.simulation.strokes import Dash, arc
 from reference.construction import Vector, evaluate
 from reference.mechanism import Crank, Dyad, Plate
 from reference.steps import Divide, Given, Similar, TwoArcs, TwoLines
@@ -224,8 +224,35 @@ def _construction_lines(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -
             past = sketch.rng.exponential(sketch.style.overrun_mm + 0.5, 2)
             before = past[0] if sketch.chance(0.4) else 0.0
             ends = nodes[line.through] - before * along, nodes[step.node] + past[1] * along
-            sketch.line(sketch.pen("thin", plan=True), *ends)
+            sketch.line(sketch.pen("thin", plan=True), *ends, _construction_dash(sketch))
             sketch.construction.setdefault(figure, []).append(ends)
+
+
+def _construction_dash(sketch: Sketch) -> Dash | None:
+    """None for a line drawn through."""
+    share = sketch.style.construction_dashed
+    if not share or not sketch.chance(share):
+        return None
+    return DASHES if sketch.chance(0.6) else CHAIN
+
+
+def draw_helpers(sketch: Sketch, task: Task, mechanism: Nodes, plan: Nodes, count: int) -> None:
+    """Thin lines of no meaning: a link's direction carried over to the plan, a ruler set wrongly."""
+    links = list(links_of(task))
+    points = list(plan.values())
+    low, high = extent(plan)
+    for _ in range(count):
+        _, tail, head = links[sketch.rng.integers(len(links))]
+        along = mechanism[head] - mechanism[tail]
+        along *= complex(np.exp(1j * sketch.rng.choice([0.0, np.pi / 2]))) / abs(along)
+        if sketch.chance(0.5):
+            foot = points[sketch.rng.integers(len(points))]
+            foot += complex(*sketch.rng.normal(0.0, 2.0, 2))
+        else:
+            share = sketch.rng.uniform(-0.1, 1.1, 2)
+            foot = low + complex(share[0] * (high - low).real, share[1] * (high - low).imag)
+        before, past = sketch.rng.uniform(2.0, 25.0, 2)
+        sketch.line(sketch.pen("thin", plan=True), foot - before * along, foot + past * along)
 
 
 def _unnamed_sides(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:

@@ -1,6 +1,6 @@
 """A mixed class: hands, habits, pens, pages and scanners drawn by lot."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -33,6 +33,7 @@ def any_settings(
     dpi: float | None = None,
     mistakes: float = 0.5,
     work: tuple[Assignment, Variant] | None = None,
+    hardship: float = 1.0,
 ) -> Settings:
     """Somebody of a mixed class: hand, habits, pen, page and scanner drawn by lot from the seed.
 
@@ -42,6 +43,7 @@ def any_settings(
     mistakes : mean number of mistakes
     work : what is to be drawn; only mistakes are made then for which it offers a place. Without it any
         code may come, and `simulate` refuses one that cannot be made
+    hardship : multiplies the chances of what makes a sheet hard to read (`HARDSHIPS`), 0 for none
     """
     rng = np.random.default_rng([seed, 7])
     hand = (CAREFUL, TYPICAL, SLOPPY)[rng.choice(3, p=[0.35, 0.45, 0.2])]
@@ -52,7 +54,75 @@ def any_settings(
         # At this student's own scales a mistake may lead off the paper.
         able = possible_mistakes(*work, student, student.mistakes)
         student = replace(student, mistakes=able)
-    return Settings(hand, student, any_pen(rng, hand), page, any_scan(rng, device, dpi))
+    settings = Settings(hand, student, any_pen(rng, hand), page, any_scan(rng, device, dpi))
+    return with_hardships(settings, np.random.default_rng([seed, 8]), hardship)
+
+
+HARDSHIPS: Mapping[str, float] = {
+    "faint pencil": 0.06, "soft and smeared": 0.08, "blue ink": 0.05, "outlined arrowheads": 0.08,
+    "dashed construction": 0.1, "badly erased": 0.1, "whole plan crossed out": 0.05, "stray lines": 0.15,
+    "letters on lines": 0.2, "stains": 0.06, "sharp folds": 0.08, "strong show-through": 0.05,
+    "squared paper": 0.03,
+}  # fmt: skip
+"""What makes a sheet hard to read, each with its share of students; several may meet."""
+
+
+def with_hardships(settings: Settings, rng: Rng, times: float = 1.0) -> Settings:
+    """Settings with hardships by lot, at `times` their usual chances."""
+    student, pen, page, scan = settings.student, settings.pen, settings.page, settings.scan
+    met = {name for name, share in HARDSHIPS.items() if rng.random() < times * share}
+    # The lots below are always drawn, so that one hardship does not change another's.
+    size = dict(zip(sorted(HARDSHIPS), rng.uniform(0.0, 1.0, len(HARDSHIPS)).tolist(), strict=True))
+    return Settings(
+        settings.hand, _harder_student(student, met, size), _harder_pen(pen, met, size),
+        _harder_page(page, met, size), _harder_scan(scan, met, size),
+    )  # fmt: skip
+
+
+def _harder_student(student: Student, met: set[str], size: Mapping[str, float]) -> Student:
+    if "whole plan crossed out" in met:
+        student = replace(student, abandoned=True, abandoned_whole=True)
+    if "stray lines" in met:
+        student = replace(student, helpers=1 + int(5 * size["stray lines"]))
+    return student
+
+
+def _harder_pen(pen: PenStyle, met: set[str], size: Mapping[str, float]) -> PenStyle:
+    if "faint pencil" in met:
+        pale = 0.26 + 0.12 * size["faint pencil"]
+        pen = replace(pen, line_mm=0.3, thin_mm=0.2, dark=pale, thin_dark=0.5 * pale, colour=_GRAPHITE)
+    if "soft and smeared" in met:
+        smear = 0.06 + 0.12 * size["soft and smeared"]
+        pen = replace(pen, line_mm=0.65, thin_mm=0.35, grain=0.6, smear=smear, colour=_GRAPHITE, smudges=4)
+    if "blue ink" in met:
+        pen = replace(pen, plan_colour=_BLUE, dark=0.9, grain=0.05)
+    if "outlined arrowheads" in met:
+        pen = replace(pen, arrow="closed")
+    if "dashed construction" in met:
+        pen = replace(pen, construction_dashed=0.3 + 0.7 * size["dashed construction"])
+    if "badly erased" in met:
+        pen = replace(pen, ghost_dark=0.14 + 0.1 * size["badly erased"], erased=0.6)
+    return pen
+
+
+def _harder_page(page: PageStyle, met: set[str], size: Mapping[str, float]) -> PageStyle:
+    if "letters on lines" in met:
+        page = replace(page, letters_touch=0.2 + 0.8 * size["letters on lines"])
+    return replace(page, squared_mm=5.0) if "squared paper" in met else page
+
+
+def _harder_scan(scan: Scan, met: set[str], size: Mapping[str, float]) -> Scan:
+    if "stains" in met:
+        scan = replace(scan, stains=1 + int(3 * size["stains"]))
+    if "sharp folds" in met:
+        scan = replace(scan, fold=True, crease=1.5 + 2.5 * size["sharp folds"])
+    if "strong show-through" in met:
+        scan = replace(scan, show_through=0.1 + 0.1 * size["strong show-through"])
+    return scan
+
+
+_GRAPHITE: Colour = (78, 78, 82)
+_BLUE: Colour = (30, 50, 140)
 
 
 def any_student(rng: Rng, mistakes: float, possible: Sequence[str] = CODES) -> Student:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.records import FloatArray, GreyImage
+from grader.simulation.paper import hand_shadow, smudge, stain
 from grader.simulation.raster import render
 from grader.simulation.settings import Colour, PenStyle, Scan
 from grader.simulation.sketch import MAIN_LAYER, PLAN_LAYER, PRINT_LAYER, SQUARES_LAYER
@@ -94,6 +95,8 @@ def _inks(
             cover = render(own, view.to_px, view.size).astype(np.float32) / np.float32(255.0)
             if layer in {MAIN_LAYER, PLAN_LAYER} and pens.grain > 0:
                 _grain(cover, pens.grain, view.px_per_mm, rng)
+            if layer in {MAIN_LAYER, PLAN_LAYER} and pens.smear > 0:
+                _smear(cover, pens.smear, view.px_per_mm, rng)
             inks.append((cover, colour))
     return inks
 
@@ -110,6 +113,21 @@ def _grain(cover: Float32Array, amount: float, px_per_mm: float, rng: Rng) -> No
     flat = cover.reshape(-1)
     speckle = 1.0 + tile[rows % side, columns % side]
     flat[where] = np.clip(flat[where] * speckle, 0.0, 1.0)
+
+
+def _smear(cover: Float32Array, amount: float, px_per_mm: float, rng: Rng) -> None:
+    """Soft lead carried along by the side of the hand: a faint trail to one side of every stroke."""
+    small = np.asarray(cv2.resize(cover, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA))
+    reach = max(2, round(rng.uniform(1.5, 4.0) * px_per_mm / 4.0))
+    trail = np.zeros((2 * reach + 1, 2 * reach + 1), np.float32)
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    tip = (round(reach + reach * np.cos(angle)), round(reach + reach * np.sin(angle)))
+    cv2.line(trail, (reach, reach), tip, 1.0, 1)
+    trail = np.asarray(cv2.GaussianBlur(trail, (0, 0), max(0.5, 0.08 * reach)), dtype=np.float32)
+    spread = cv2.filter2D(small, -1, trail / trail.sum() * 2.0, borderType=cv2.BORDER_REPLICATE)
+    size = (cover.shape[1], cover.shape[0])
+    full = np.asarray(cv2.resize(spread, size, interpolation=cv2.INTER_LINEAR), dtype=np.float32)
+    np.maximum(cover, np.clip(full, 0.0, 1.0) * np.float32(amount), out=cover)
 
 
 def _printed(background: Background, view: View) -> Float32Array:
@@ -196,35 +214,23 @@ def _light(scan: Scan, view: View, rng: Rng, smudges: int) -> Float32Array:
     light += tilt[3] * np.sin(3 * u + 6 * tilt[4])
     light *= min(1.0, 1.02 / float(light.max()))  # a camera exposes for the brightest part
     if scan.shadow > 0:
-        light *= _hand_shadow(u, v, scan.shadow, rng)
+        light *= hand_shadow(u, v, scan.shadow, rng)
     xy_mm = view.to_mm(np.column_stack([x.ravel(), y.ravel()]).astype(float) * _COARSE).astype(np.float32)
     mx, my = xy_mm[:, 0].reshape(x.shape), xy_mm[:, 1].reshape(x.shape)
     if scan.fold:
         for at, along in ((rng.normal(210, 4), mx), (rng.normal(148.5, 4), my)):
             distance = (along - np.float32(at)) / 1.6
-            light *= 1.0 - 0.07 * distance * np.exp(-0.5 * distance**2) - 0.03 * np.exp(-2 * distance**2)
+            soft, sharp = 0.07 * distance * np.exp(-0.5 * distance**2), 0.03 * np.exp(-2 * distance**2)
+            light *= 1.0 - np.float32(scan.crease) * (soft + sharp)
+    for _ in range(scan.stains):
+        light *= stain(mx, my, rng)
     for _ in range(smudges):
-        light *= _smudge(mx, my, rng)
+        light *= smudge(mx, my, rng)
     if scan.device != "phone":
         inside = np.minimum.reduce([mx, 420 - mx, my, 297 - my])
         light *= 1.0 - 0.25 * np.exp(-(((inside + 1.2) / 0.9) ** 2))
     full = cv2.resize(light.astype(np.float32), (view.size[1], view.size[0]), interpolation=cv2.INTER_LINEAR)
     return np.asarray(full, dtype=np.float32)
-
-
-def _hand_shadow(u: Float32Array, v: Float32Array, depth: float, rng: Rng) -> Float32Array:
-    """The soft-edged shadow of a phone and an arm over part of the sheet."""
-    angle, at = rng.uniform(0, 2 * np.pi), rng.uniform(-0.15, 0.35)
-    distance = u * np.cos(angle) + v * np.sin(angle) - at + 0.08 * np.sin(5 * (u - v) + rng.uniform(0, 6))
-    return np.asarray(1.0 - depth / (1.0 + np.exp(-distance / rng.uniform(0.01, 0.06))), dtype=np.float32)
-
-
-def _smudge(mx: Float32Array, my: Float32Array, rng: Rng) -> Float32Array:
-    x, y, angle = rng.uniform(40, 380), rng.uniform(30, 260), rng.uniform(0, np.pi)
-    along = (mx - x) * np.cos(angle) + (my - y) * np.sin(angle)
-    across = -(mx - x) * np.sin(angle) + (my - y) * np.cos(angle)
-    blob = np.exp(-0.5 * ((along / rng.uniform(6, 25)) ** 2 + (across / rng.uniform(2, 7)) ** 2))
-    return np.asarray(1.0 - rng.uniform(0.01, 0.06) * blob, dtype=np.float32)
 
 
 # Sensor -------------------------------------------------------------------------------------------

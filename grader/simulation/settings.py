@@ -46,7 +46,8 @@ class Student:
     vectors_on_mechanism : v_A and a_A drawn at the crank's pin as well
     altitude : right-triangle construction of a normal component on the mechanism
     omitted : share of the pole-to-point vectors that are not drawn out
-    abandoned : a figure begun and crossed out
+    abandoned : a figure begun and crossed out; with `abandoned_whole` drawn to its end before
+    helpers : thin lines of no meaning: directions carried over from the sketch, rulers set wrongly
     """
 
     crank_mm: float | None = None
@@ -61,6 +62,8 @@ class Student:
     altitude: bool = False
     omitted: float = 0.0
     abandoned: bool = False
+    abandoned_whole: bool = False
+    helpers: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +80,9 @@ class PenStyle:
     arrow_half_deg : mean angle between an arrowhead's barb and the vector
     construction_lines, node_circles, node_dots, erased, doubled, arcs : shares of the chances to draw
         such a thing
+    construction_dashed : share of construction lines that are dashed or chain lines
+    ghost_dark : share of light that a badly erased line still takes
+    smear : soft lead rubbed along by the hand: share of light beside strokes, 0 for none
     dashed_absolutes : vectors that only join two known points are dashed
     """
 
@@ -89,7 +95,7 @@ class PenStyle:
     grain: float = 0.35
     colour: Colour = (70, 70, 74)
     plan_colour: Colour | None = None
-    arrow: Literal["open", "filled", "half", "none"] = "open"
+    arrow: Literal["open", "filled", "half", "closed", "none"] = "open"
     arrow_mm: float = 3.5
     arrow_half_deg: float = 13.0
     overrun_mm: float = 8.0
@@ -105,13 +111,17 @@ class PenStyle:
     smudges: int = 1
     doubled: float = 0.0
     arcs: float = 0.4
+    construction_dashed: float = 0.0
+    ghost_dark: float = 0.1
+    smear: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class PageStyle:
     """The page: frame, title block, language, what is written.
 
-    `squared_mm` is the pitch of paper with printed squares, 0 for plain paper.
+    `squared_mm` is the pitch of paper with printed squares, 0 for plain paper; `letters_touch` the share
+    of letters set down without a look at what is there, on lines and other letters.
     """
 
     frame: Literal["iso", "gost", "none"] = "iso"
@@ -127,6 +137,7 @@ class PageStyle:
     end_labels: float = 0.3
     bar_over_vectors: bool = False
     squared_mm: float = 0.0
+    letters_touch: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +154,8 @@ class Scan:
     copy_scale : a copier's enlargement of the drawing
     dpi_tag : what the file says; None for nothing
     streaks : faint lines along the whole image from dirt on the glass
+    crease : how sharp a fold is, 1 for a usual one
+    stains : rings and drops of coffee
     curl_mm : how far a photographed sheet's bow moves its middle against a flat one
     """
 
@@ -166,6 +179,8 @@ class Scan:
     dust: int = 12
     streaks: int = 0
     fold: bool = False
+    crease: float = 1.0
+    stains: int = 0
     show_through: float = 0.0
     punched: bool = False
     lens_k1: float = 0.0

@@ -57,7 +57,7 @@ class Sketch:
             case "thin":
                 return Pen(layer, style.thin_mm, style.thin_dark, style.pressure, style.wobble_mm)
             case "ghost":
-                return Pen(layer, style.line_mm * 1.2, 0.1, 0.4, 0.08)
+                return Pen(layer, style.line_mm * 1.2, style.ghost_dark, 0.4, 0.08)
             case "print":
                 return Pen(PRINT_LAYER, 0.35, 0.95, 0.0, 0.0)
             case _:
@@ -100,6 +100,8 @@ class Sketch:
         written = write(self.rng, self.pen("text"), text, height_mm, self.writing)
         middle = (written.low + written.high) / 2.0
         reach = distance_mm + abs(written.high - written.low) / 2.0
+        if self.page.letters_touch and self.chance(self.page.letters_touch):
+            reach *= float(self.rng.uniform(0.35, 0.8))
         angles = self.rng.uniform(0, 2 * np.pi) + np.arange(8) * (2 * np.pi / 8)
         tried = [near + reach * self.rng.uniform(0.75, 1.15) * complex(np.exp(1j * a)) for a in angles]
         centre = max(tried, key=self._room())

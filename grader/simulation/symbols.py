@@ -26,6 +26,9 @@ def arrowhead(sketch: Sketch, pen: Pen, tail: complex, tip: complex, size_mm: fl
         sketch.line(fine, left, right)
     elif kind == "half":
         sketch.line(fine, tip, left)
+    elif kind == "closed":
+        for p, q in ((tip, left), (left, right), (right, tip)):
+            sketch.line(fine, p, q)
     else:
         sketch.line(fine, tip, left)
         sketch.line(fine, tip, right)

@@ -1,0 +1,78 @@
+"""What makes a simulated sheet hard to read, and that its truth stays what it was."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grader.simulation import HARDSHIPS, PERFECT, Scan, Settings, any_settings, simulate, with_hardships
+from grader.simulation.hand import draw, task_of
+from reference.assignment import load_assignment
+
+SMALL = Scan(dpi=45.0, noise=0.0, tint_grain=0.0, dust=0)
+
+
+class Only:
+    """A lot that gives one hardship and no other."""
+
+    def __init__(self, name):
+        self.drawn = iter([0.0 if one == name else 1.0 for one in HARDSHIPS])
+
+    def random(self):
+        return next(self.drawn)
+
+    def uniform(self, _low, _high, count):
+        return np.full(count, 0.7)
+
+
+def drawn(name, seed=3):
+    settings = with_hardships(Settings(PERFECT, scan=SMALL), Only(name))
+    assignment = load_assignment("pump")
+    return simulate(assignment, assignment.variant(9), seed, settings)
+
+
+@pytest.mark.parametrize("name", HARDSHIPS)
+def test_a_hardship_is_seen_on_the_sheet_and_leaves_the_true_vectors(name):
+    hard, plain = drawn(name)[0], drawn("none")[0]
+    assert hard.image.shape == plain.image.shape
+    assert np.any(hard.image != plain.image)
+    for figure in ("velocity_plan", "acceleration_plan"):
+        vectors, usual = (one.truth["figures"][figure]["vectors"] for one in (hard, plain))
+        for vector in usual:
+            assert vectors[vector]["length_mm"] == usual[vector]["length_mm"]
+            assert vectors[vector]["direction_deg"] == usual[vector]["direction_deg"]
+
+
+def test_hardships_come_as_often_as_they_say():
+    plain = [any_settings(seed, hardship=0.0) for seed in range(400)]
+    usual = [any_settings(seed) for seed in range(400)]
+    stray = sum(one.student.helpers > 0 for one in usual) / len(usual)
+    assert stray == pytest.approx(HARDSHIPS["stray lines"], abs=0.06)
+    assert all(one.student.helpers == 0 and one.scan.stains == 0 for one in plain)
+
+
+@pytest.mark.parametrize("name", ["pump", "press", "engine", "shaper", "piston"])
+def test_a_mixed_class_makes_only_mistakes_that_its_mechanism_offers(name):
+    assignment = load_assignment(name)
+    variants = assignment.variants()
+    made = 0
+    for seed in range(15):
+        variant = variants[seed % len(variants)]
+        settings = any_settings(seed, mistakes=2.0, work=(assignment, variant))
+        task = task_of(assignment, variant, settings.student, np.random.default_rng([seed, 0]))
+        draw(task, settings.hand, settings.student, np.random.default_rng([seed, 1]))
+        made += len(task.mistakes)
+    assert made > 0
+
+
+def test_thin_construction_lines_stand_in_the_truth():
+    assignment = load_assignment("engine")
+    settings = Settings(PERFECT, scan=SMALL)
+    with_lines = replace(settings, pen=replace(settings.pen, construction_lines=1.0))
+    without = replace(settings, pen=replace(settings.pen, construction_lines=0.0))
+    counts = [
+        len(simulate(assignment, assignment.variants()[1], 2, one)[0].truth["figures"]["velocity_plan"]
+            ["construction"])
+        for one in (with_lines, without)
+    ]  # fmt: skip
+    assert counts[0] > counts[1] == 0
