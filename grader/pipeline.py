@@ -18,6 +18,7 @@ from grader.ink import find_ink
 from grader.intake import is_blank, page_of
 from grader.judging import Submission, Task, judge, report_of, task_of, unjudged_report
 from grader.letters import find_letters
+from grader.letters.lengths import written_lengths
 from grader.measurements import Measurements
 from grader.outcomes import Judgement
 from grader.picture import Backdrop, backdrop, overlay
@@ -126,11 +127,24 @@ def look(work: Work, assignment: Assignment, rubric: RubricFile) -> tuple[Looked
         # Not in its zone: people draw where they like.
         seen = [see(one.place) if one.narrowed else one for one in seen]
         readings = read(seen, assignment, work.variant, work.declared, wanted)
+    readings = [
+        replace(reading, lengths=_lengths(one, assignment, rubric))
+        for one, reading in zip(seen, readings, strict=True)
+    ]
     documents = documents_of(seen, readings, work.student_id)
     return tuple(
         Looked(document, reading, one.problems, None if one.page is None else backdrop(one.page, one.sheet))
         for document, reading, one in zip(documents, readings, seen, strict=True)
     )
+
+
+def _lengths(one: Seen, assignment: Assignment, rubric: RubricFile) -> dict[str, tuple[float, float]]:
+    """The measured lengths that stand in a printed sheet's cells."""
+    if one.page is None or one.sheet is None or not one.sheet.zones:
+        return {}
+    from grader.answer_sheet import cells_of  # noqa: PLC0415 - brings the PDF writer; plain sheets do without
+
+    return written_lengths(one.page, one.sheet, cells_of(assignment, tuple(one.sheet.zones), rubric.vectors))
 
 
 def asked_of(assignment: Assignment, rubric: RubricFile) -> tuple[frozenset[str], tuple[str, ...]]:

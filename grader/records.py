@@ -316,8 +316,10 @@ class Reading:
     figures : by `mechanism`, `velocity_plan`, `acceleration_plan`; absent where not on the sheet
     unread : what was asked for and not read
     problems : what a person should know
+    lengths : measured lengths that stand in the printed cells, mm, and the probability of it, by vector
     """
 
     figures: Mapping[str, Figure]
     unread: tuple[Unread, ...] = ()
     problems: tuple[Problem, ...] = ()
+    lengths: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -128,6 +128,18 @@ def _plans(
     return plans, tuple(problems)
 
 
+def cells_of(
+    assignment: Assignment, figures: Sequence[str], asked: Collection[str] | None = None
+) -> dict[str, tuple[Box, ...]]:
+    """The cells for measured lengths on a page with these figures, in the order of its zones; by vector."""
+    table = next((page for page in assignment.file.page if set(page.figures) == set(figures)), None)
+    if table is None:
+        return {}
+    construction = construction_for(assignment, table.figures)
+    figures = dict.fromkeys(table.figures)
+    return combs_of(_boxes([v.name for figure in figures for v in construction.vectors_of(figure)], asked))
+
+
 def _boxes(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:
     """The boxes for the lengths asked for.
 

@@ -11,6 +11,7 @@ from grader.comparison.limits import Mark
 from grader.comparison.marking import length_tolerance, mark_value, mark_vector, tolerances
 from grader.comparison.scales import Scale, settle
 from grader.comparison.task import Task, unit_of
+from grader.comparison.written import held_against_written
 from grader.outcomes import Outcome, Quantity, Reason, Tolerance, UsedScale
 from grader.rubric import CriterionTable
 
@@ -104,6 +105,9 @@ class _Marking:
 
         def against(expected: complex) -> Mark:
             found = mark_vector(drawn, expected, tolerance, with_direction=criterion.direction)
+            if drawn is self.evidence.drawn.get(name):
+                written = self.evidence.written.get(name)
+                found = held_against_written(found, drawn, written, tolerance, least)
             return verdicts.with_confidence(found, drawn.confidence, least)
 
         mark, expected, followed = self.ledger.best(name, against)

@@ -67,6 +67,7 @@ class Evidence:
     yardstick_mm : drawn length of the task's yardstick (the crank) and its standard error, or None
     unread : why something asked for was not read, by name
     has_sheets : whether any sheet was handed in
+    written : lengths that stand in the sheets' cells, mm, and the probability that they do, by vector
     """
 
     drawn: Mapping[str, DrawnVector]
@@ -76,6 +77,7 @@ class Evidence:
     unread: Mapping[str, str]
     has_sheets: bool
     values: Mapping[str, float]
+    written: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def vector(self, name: str) -> DrawnVector | None:
         """The vector as read, else as measured."""
@@ -108,7 +110,10 @@ def gather(task: Task, submission: Submission) -> Evidence:
     own = nodes if submission.readings else _nodes_from(task, measured)
     length = min(lengths, key=lambda one: one[1], default=None)
     unread = {gap.name: gap.reason for reading in submission.readings for gap in reading.unread}
-    return Evidence(drawn, measured, own, length, unread, bool(submission.readings), submission.values)
+    written = {name: one for reading in submission.readings for name, one in reading.lengths.items()}
+    return Evidence(
+        drawn, measured, own, length, unread, bool(submission.readings), submission.values, written
+    )
 
 
 # The turn of a sketch -----------------------------------------------------------------------------

@@ -38,6 +38,7 @@ HINTS: dict[str, str] = {
     "doubtful": N_("It was read with too little certainty."),
     "near_limit": N_("It lies so near the limit of the tolerance that the scan cannot decide."),
     "readings_disagree": N_("The drawing and the entered measurement differ."),
+    "written_disagrees": N_("The drawing and the length written on the sheet differ: a person must look."),
     "follows": N_(
         "It follows rightly from your own earlier work; the earlier mistake is charged once, there."
     ),
@@ -72,6 +73,7 @@ FULL: dict[str, str] = {
         "It lies so near the limit of the tolerance that the scan cannot decide (standard error %(se)s)."
     ),
     "readings_disagree": N_("The drawing gives %(first)s, the entered measurement %(second)s."),
+    "written_disagrees": N_("Drawn are %(drawn)s, written on the sheet %(written)s: a person must look."),
     "scale_refused": N_("The declared scale “%(text)s” could not be understood: %(why)s."),
     "scale_off": N_("Declared is %(declared)s; the drawing and the data give %(expected)s."),
     "scale_assumed": N_("The scale was not declared; %(used)s was assumed."),

@@ -17,8 +17,13 @@ _BORDER_MM = 0.4
 _LEAST_PEAK = 40
 """Of 255: a cell whose darkest ink is fainter is empty."""
 _INK = 0.4
-_DUST_MM = 0.8
+_LEAST_MM = 1.0
 """Ink no higher than this is no digit: dust, a dot, the border of the next cell."""
+_DUST_MM = 0.35
+"""Nor is it a part of one."""
+_SOFTEN_MM = 0.11
+_FULL = 0.97
+"""Share of a cell that is less inked than the middle of a stroke."""
 _NO_TENTHS = 0.5
 """Confidence in whole millimetres where the cell of the tenths is left empty: a shifted number looks so."""
 
@@ -68,13 +73,16 @@ def _sign(grey: GreyImage) -> GreyImage | None:
     """What is written in a cell, cut out; None where it is empty."""
     if grey.size == 0 or grey.max() < _LEAST_PEAK:
         return None
-    mask = (grey > _INK * float(np.quantile(grey, 0.99))).astype(np.uint8)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    large = [n for n in range(1, count) if stats[n, cv2.CC_STAT_HEIGHT] >= _DUST_MM * _PX_PER_MM]
-    if not large:
+    # A pencil's grain breaks strokes: they are closed before pieces are told from dust.
+    soft = cv2.GaussianBlur(grey, (0, 0), _SOFTEN_MM * _PX_PER_MM)
+    full = max(float(np.quantile(soft, _FULL)), 1.0)
+    even = np.asarray(np.clip(soft * (255.0 / full), 0.0, 255.0), dtype=np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats((even > _INK * 255.0).astype(np.uint8))
+    heights = stats[1:, cv2.CC_STAT_HEIGHT] / _PX_PER_MM
+    if count == 1 or heights.max() < _LEAST_MM:
         return None
-    rows, columns = np.nonzero(np.isin(labels, large))
-    part = grey[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+    rows, columns = np.nonzero(np.isin(labels, 1 + np.flatnonzero(heights >= _DUST_MM)))
+    part = even[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
     return np.ascontiguousarray(part)
 
 
