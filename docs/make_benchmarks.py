@@ -1,6 +1,7 @@
-"""Measure and put the figures into benchmarks.md: `python docs/make_benchmarks.py`, some ten minutes.
+"""Measure and put the figures into benchmarks.md: `python docs/make_benchmarks.py`, some twenty minutes.
 
-With `solver` or `reading` only that part is measured and replaced.
+With `solver`, `reading` or `lines` only that part is measured and replaced; `reading 20` takes 20 students
+per scene.
 """
 
 import re
@@ -8,26 +9,57 @@ import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from grader.bench.reading import measure_reading
-from grader.bench.report import as_text, reading_tables
+import cv2
+
+from grader.bench.lines import measure_lines
+from grader.bench.lines_figure import lines_svg
+from grader.bench.lines_tables import lines_tables
+from grader.bench.reading import STUDENTS, measure_reading
+from grader.bench.reading_foreign import foreign_tables, measure_foreign
+from grader.bench.reading_tables import reading_tables
+from grader.bench.report import as_text
 from grader.bench.solver import measure_solver
 from grader.bench.tables import Table, solver_tables
 
 PAGE = Path(__file__).resolve().parent / "benchmarks.md"
-PARTS: dict[str, Callable[[], Iterable[Table]]] = {
-    "solver": lambda: solver_tables(measure_solver()),
-    "reading": lambda: reading_tables(tuple(measure_reading())),
+FIGURE = PAGE.with_name("lines.svg")
+
+
+def _reading(students: int) -> Iterable[Table]:
+    cv2.setNumThreads(1)
+    rows = tuple(measure_reading(students=students))
+    return [*reading_tables(rows), *foreign_tables(tuple(measure_foreign()))]
+
+
+def _lines(_: int) -> Iterable[Table]:
+    cv2.setNumThreads(1)
+    lines = measure_lines()
+    FIGURE.write_text(lines_svg(lines), encoding="utf-8")
+    return lines_tables(lines)
+
+
+PARTS: dict[str, Callable[[int], Iterable[Table]]] = {
+    "solver": lambda _: solver_tables(measure_solver()),
+    "reading": _reading,
+    "lines": _lines,
 }
 
 
 def main(wanted: list[str]) -> None:
     """Measure, and replace what stands between the marks of each part."""
-    for part in wanted or list(PARTS):
-        figures = re.sub(r"(?m)^(Solver|Stability|Reading): (.*)$", r"### \1: \2", as_text(PARTS[part]()))
-        first, last = f"<!-- {part}: written by make_benchmarks.py -->\n", f"<!-- {part}: end -->"
-        before, _, rest = PAGE.read_text(encoding="utf-8").partition(first)
-        _, _, after = rest.partition(last)
-        PAGE.write_text(f"{before}{first}\n{figures.rstrip()}\n\n{last}{after}", encoding="utf-8")
+    students = next((int(told) for told in wanted if told.isdigit()), STUDENTS)
+    parts = [told for told in wanted if not told.isdigit()]
+    for part in parts or list(PARTS):
+        write(part, as_text(PARTS[part](students)))
+
+
+def write(part: str, tables: str) -> None:
+    """Put a part's tables between its marks."""
+    figures = re.sub(r"(?m)^(Solver|Stability|Reading|Lines): (.*)$", r"### \1: \2", tables)
+    first, last = f"<!-- {part}: written by make_benchmarks.py -->\n", f"<!-- {part}: end -->"
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(first)
+    _, _, after = rest.partition(last)
+    PAGE.write_text(f"{before}{first}\n{figures.rstrip()}\n\n{last}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

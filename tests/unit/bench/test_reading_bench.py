@@ -1,11 +1,14 @@
 """The benchmark of reading: its rules of right and misread, its spreads, its line detectors."""
 
+from xml.etree import ElementTree as ET
+
 import numpy as np
 import pytest
 
 from grader.bench.honesty import NORMAL_SHARES, Spread, calibration, whitened
-from grader.bench.lines import measure_detector, measure_noiseless
+from grader.bench.lines import LinesFigures, LinesRow, Noiseless, measure_detector, measure_noiseless
 from grader.bench.lines_detectors import DETECTORS, OURS
+from grader.bench.lines_figure import lines_svg
 from grader.bench.lines_sheets import pencil_sheet
 from grader.bench.reading_places import OnPaper
 from grader.bench.reading_tally import Tally, row_of
@@ -23,6 +26,7 @@ DRAWN = TrueVector("v_B", VELOCITY_PLAN, ENDS, STROKE)
 VERTEX_MM = 0.003
 """What the intersections of ideal strokes are to keep."""
 PLACE_MM = 1e-3
+IDEAL = Noiseless(4, 0, 0.001, 0.002, 0.003)
 
 
 def found(length_mm=50.0, direction_deg=90.0, confidence=SURE):
@@ -163,3 +167,17 @@ def test_a_centre_line_lies_nearer_to_the_stroke_than_an_edge():
     assert ours.recall_solid > 0.9
     assert ours.offset_mm[0] < 0.1 * edges.offset_mm[0]
     assert ours.fragments < edges.fragments
+
+
+def test_the_figure_of_line_detectors_has_a_mark_for_each_in_both_panels():
+    rows = [
+        LinesRow(name, dpi, dpi * factor, 1.0, 1.0, 1.0, 0, None, (0.1 * factor, 0.2), (0.5, 1.0))
+        for name, factor in (("ours", 1.0), ("theirs", 3.0))
+        for dpi in (150.0, 300.0)
+    ]
+    figure = lines_svg(LinesFigures(rows, IDEAL))
+    tree = ET.fromstring(figure)
+    told = [text.text for text in tree.iter("{http://www.w3.org/2000/svg}text")]
+    assert told.count("ours") == told.count("theirs") == 1
+    assert told.count("300") == 2 * 2
+    assert any("length" in text for text in told)
