@@ -188,6 +188,8 @@ class ScaleDocument(Document):
     """As the student wrote it."""
     refused: str | None = None
     """Why a declared scale was not accepted."""
+    source: Literal["roster", "measurements", "box"] | None = None
+    """Where it was declared: ``box`` is the printed sheet's; None where it was not."""
 
 
 class ReadSheets(Document):
@@ -370,6 +372,51 @@ class LintDocument(Document):
     worst: LintWorst | None
 
 
+class CalibrationPoint(Document):
+    """How far a point of the calibration page came out from its place, sheet mm, y down."""
+
+    kind: Literal["marker", "segment"]
+    at_mm: tuple[float, float]
+    off_mm: tuple[float, float]
+
+
+class CalibrationSegments(Document):
+    """Errors of the calibration page's segments, null where none was read."""
+
+    printed: int
+    read: int
+    length_mean_mm: float | None = None
+    length_rms_mm: float | None = None
+    length_worst_mm: float | None = None
+    direction_rms_deg: float | None = None
+    place_rms_mm: float | None = None
+    place_worst_mm: float | None = None
+
+
+class CalibrationDocument(Document):
+    """What `planmark calibrate` measured. Scales are seen over true lengths, along the upright sheet's axes.
+
+    `scale_x` and `scale_y` are null without a stated resolution, they and the rest of a scanner's map
+    for a photo (`camera`). `skew_deg` is by how much the sheet's right angle comes out wider.
+    """
+
+    schema_version: Version = 1
+    source: str
+    page: int
+    camera: bool
+    px_per_mm: float
+    scale_x: float | None = None
+    scale_y: float | None = None
+    unequal: float | None = None
+    scale_se: float | None = None
+    skew_deg: float | None = None
+    turn_deg: float | None = None
+    residual_mm: float
+    segments: CalibrationSegments
+    points: list[CalibrationPoint]
+    advice: list[str]
+
+
 # Schemas ------------------------------------------------------------------------------------------
 
 
@@ -383,6 +430,7 @@ def _models() -> dict[str, tuple[type[BaseModel], Literal["validation", "seriali
         "results": (ResultsDocument, "serialization"),
         "plan": (PlanDocument, "serialization"),
         "lint": (LintDocument, "serialization"),
+        "calibration": (CalibrationDocument, "serialization"),
         "mechanism": (MechanismFile, "validation"),
         "assignment": (AssignmentFile, "validation"),
         "rubric": (RubricFile, "validation"),

@@ -232,6 +232,20 @@ def sheet(
 
 
 @app.command()
+def calibrate(
+    scans: Annotated[list[Path], typer.Argument(help="Scans of the calibration page.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was measured as JSON.")] = False,
+    svg: Annotated[
+        Path | None, typer.Option("--svg", help="Draw where the first scan's page is off, 200 times.")
+    ] = None,
+) -> None:
+    """What printer and scanner do to millimetres, by scans of the page `sheet --calibration` prints."""
+    from grader.cli.calibrating import calibrate_scans
+
+    raise typer.Exit(1 if calibrate_scans(scans, svg, as_json=as_json) else 0)
+
+
+@app.command()
 def match(
     folder: FolderArgument,
     assignment: Annotated[str, typer.Option("--assignment", help="A built-in name or a .toml file.")],

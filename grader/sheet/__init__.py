@@ -10,9 +10,10 @@ from grader.sheet import markers
 from grader.sheet.halves import half_hint, whole
 from grader.sheet.identity import identify
 from grader.sheet.lens import straighten
+from grader.sheet.markers import middles as marker_middles
 from grader.sheet.plain import register_plain
 
-__all__ = ["rectify", "straighten", "whose"]
+__all__ = ["marker_middles", "rectify", "straighten", "whose"]
 
 
 def rectify(page: Page) -> Sheet | Unread:

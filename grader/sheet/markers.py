@@ -85,6 +85,29 @@ def register(page: Page) -> Sheet | None:
     return None
 
 
+def middles(page: Page) -> tuple[FloatArray, FloatArray]:
+    """Middles of the markers that are whole: (n, 2) on the sheet, mm, and (n, 2) as seen, px.
+
+    Ink that spreads moves opposite sides alike and leaves the middle where it is.
+    """
+    quads = _quads(page.grey, _DETECTION_PX) or _quads(page.grey, _CLOSER_PX)
+    seen = _seen(page.grey, quads) if quads else None
+    if seen is None:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    whole = [seen.marker == number for number in sorted(set(seen.marker)) if sum(seen.marker == number) == 4]
+    return (
+        np.array([_crossing(seen.marked.mm[own]) for own in whole]).reshape(-1, 2),
+        np.array([_crossing(seen.marked.px[own]) for own in whole]).reshape(-1, 2),
+    )
+
+
+def _crossing(corners: FloatArray) -> FloatArray:
+    """Where the diagonals of four corners in a row meet."""
+    a, b, c, d = corners
+    share = np.linalg.solve(np.column_stack([c - a, b - d]), b - a)
+    return np.asarray(a + share[0] * (c - a))
+
+
 def _quads(grey: GreyImage, long_side: int) -> dict[int, FloatArray]:
     """Rough corners (4, 2) in full pixels of the markers whose ids are in use and seen once."""
     small = shrink(grey, min(1.0, long_side / max(grey.shape)))
