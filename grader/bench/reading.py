@@ -80,15 +80,15 @@ def measure_scene(scene: Scene, students: int, first_seed: int = 1, *, memory: b
 
 
 def _read_one(tally: Tally, work: Work, paths: Sequence[Path]) -> None:
-    start = time.process_time()
+    start, clock = time.process_time(), time.perf_counter()
     seen = [see(Place(path, 1, path.name)) for path in paths]
     readings, failed = read_all(seen, work)
-    spent = 1000.0 * (time.process_time() - start)
+    spent, passed = time.process_time() - start, time.perf_counter() - clock
     construction = construction_of(work.assignment.mechanism([work.variant]))
     tally.students += 1
     tally.failed += failed
     for sheet, page, reading in zip(work.sheets, seen, readings, strict=True):
-        tally.processor_ms.append(spent / len(seen))
+        tally.add_times(page.timing_ms, spent / passed, 1000.0 * spent / len(seen))
         figures = figures_of(sheet.truth, construction)
         tally.add_sheet(sheet.truth, figures, work.rubric.vectors, page, reading)
 

@@ -18,7 +18,7 @@ def reading_tables(reading: Sequence[ReadingRow]) -> Iterator[Table]:
         title = "Reading: errors over their standard errors: shares below 1 and 1.96, robust rms"
         yield _table(f"{title} (honest: {shares}, 1)", reading, _SPREADS)
         yield _confidence(reading)
-        yield _table("Reading: milliseconds per page and peak memory", reading, _TIMES)
+        yield _table("Reading: processor milliseconds per page, and peak memory", reading, _TIMES)
 
 
 def _table(title: str, rows: Sequence[ReadingRow], columns: Sequence[Column]) -> Table:
@@ -74,7 +74,7 @@ def _stage(name: str) -> Column:
 _TIMES: Sequence[Column] = (
     _SCENE,
     *(_stage(name) for name in STAGES),
-    ("processor, in all", lambda row: f"{row.processor_ms:.0f}"),
+    ("in all", lambda row: f"{row.processor_ms:.0f}"),
     ("peak MB", lambda row: NOTHING if row.peak_mb is None else f"{row.peak_mb:.0f}"),
     ("refused, broken down", lambda row: f"{row.refused}, {row.failed}"),
     ("turned wrongly", lambda row: str(row.turned)),

@@ -44,14 +44,18 @@ class Tally:
     times_ms: dict[str, list[float]] = field(default_factory=lambda: {stage: [] for stage in STAGES})
     processor_ms: list[float] = field(default_factory=list)
 
+    def add_times(self, timing_ms: Mapping[str, float], share: float, spent_ms: float) -> None:
+        """One page's times: stages by the clock, of which this share was the processor's own."""
+        for stage in STAGES:
+            self.times_ms[stage].append(share * timing_ms.get(stage, 0.0))
+        self.processor_ms.append(spent_ms)
+
     def add_sheet(
         self, truth: Mapping[str, Any], figures: Mapping[str, TrueFigure], wanted: Sequence[str],
         seen: Seen, reading: Reading,
     ) -> None:  # fmt: skip
         """One page with what was read on it."""
         self.judged.append(list(each_vector(figures, wanted, reading.figures)))
-        for stage in STAGES:
-            self.times_ms[stage].append(seen.timing_ms.get(stage, 0.0))
         if seen.sheet is None or seen.page is None:
             self.refused += 1
             return
@@ -107,7 +111,7 @@ class ReadingRow:
     short, short_right : the shorter ones
     misreads, confidently : silent misreads, out of how many reported with confidence
     node_mm, near_mm, joint_mm : median and p95 of confidently read nodes, see `Tally`
-    times_ms, processor_ms : medians per page; by stage by the clock, in all by the processor's
+    times_ms, processor_ms : medians per page of processor time, by stage and in all
     peak_mb : of a process of its own that reads one student's sheets
     """
 
