@@ -21,11 +21,11 @@ from grader.measurements import Names
 from grader.ownership import PageSource
 from grader.picture import Backdrop, restored, stored
 from grader.pipeline import Looked
-from grader.records import Figure, Identity, Problem, Reading, ReadNode, ReadVector, Unread
+from grader.records import Figure, Identity, Problem, Reading, ReadNode, ReadVector, Unread, Written
 from grader.survey import MEASUREMENT_TYPES, Survey, survey
 
 RECORDS: Mapping[str, type] = {
-    one.__name__: one for one in (Figure, Identity, Problem, Reading, ReadNode, ReadVector, Unread)
+    one.__name__: one for one in (Figure, Identity, Problem, Reading, ReadNode, ReadVector, Unread, Written)
 }
 _PACKAGES = ("grader", "reference")
 _SOURCES = (".py", ".npz")

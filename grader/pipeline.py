@@ -12,12 +12,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from grader.declaring import Declarations, Source, declarations, sure_texts
 from grader.documents import ReadingDocument, ReportDocument
 from grader.feedback import Level, criterion_feedback
 from grader.ink import find_ink
 from grader.intake import is_blank, page_of
 from grader.judging import Submission, Task, judge, report_of, task_of, unjudged_report
-from grader.letters import find_letters
+from grader.letters import find_letters, written_scales
 from grader.letters.lengths import written_lengths
 from grader.measurements import Measurements
 from grader.outcomes import Judgement
@@ -25,7 +26,7 @@ from grader.picture import Backdrop, backdrop, overlay
 from grader.quantities import ByRule, Declared, parse_scale
 from grader.reading import read_figures
 from grader.reading_document import reading_document
-from grader.records import MECHANISM, Box, Ink, Page, Problem, Reading, Sheet
+from grader.records import MECHANISM, Box, Ink, Page, Problem, Reading, Sheet, Written
 from grader.rubric import RubricFile
 from grader.scene import Picture
 from grader.sheet import rectify, straighten
@@ -75,7 +76,8 @@ class Seen:
     """A page and what is on it, before names are given.
 
     `page`, `sheet` and `ink` are None from where the way ended; `problems` says why. `narrowed` where
-    zones of the printed sheet were passed over because nothing in them is asked for.
+    zones of the printed sheet were passed over because nothing in them is asked for. `written` holds
+    what stands in the printed boxes for scales.
     """
 
     place: Place
@@ -85,6 +87,7 @@ class Seen:
     problems: tuple[Problem, ...] = ()
     timing_ms: dict[str, float] = field(default_factory=dict)
     narrowed: bool = False
+    written: Mapping[str, Written] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +181,7 @@ def mark_looked(
             "unreadable" if work.pages or work.measured else "missing", problems=problems, sheets=documents,
         )  # fmt: skip
         return Marked(work, report, _pictures(looked, {}, None, level))
-    task, judgement = judged
+    task, judgement, declared = judged
     names = assignment.file.names
     report = report_of(
         task,
@@ -189,9 +192,10 @@ def mark_looked(
             outcome.criterion: criterion_feedback(outcome, work.lang, level, names)
             for outcome in judgement.outcomes
         },
-        problems=(*work.problems, *_problems_of(looked), *_measuring_problems(work)),
+        problems=(*work.problems, *_problems_of(looked), *_measuring_problems(work), *declared.problems),
         sheets=documents,
     )
+    report = _with_sources(report, declared.sources)
     return Marked(work, report, _pictures(looked, task.construction.vectors, judgement, level))
 
 
@@ -232,8 +236,9 @@ def see(place: Place, figures: Collection[str] = ()) -> Seen:
         if boxes is None or boxes:
             ink = find_ink(page, sheet, boxes)
             ink = replace(ink, letters=find_letters(ink, boxes))
+        written = written_scales(page, sheet)
     problems = tuple(replace(problem, file=place.name) for problem in sheet.problems)
-    return Seen(place, page, sheet, ink, problems, timing, narrowed=boxes is not None)
+    return Seen(place, page, sheet, ink, problems, timing, narrowed=boxes is not None, written=written)
 
 
 def _asked_zones(sheet: Sheet, figures: Collection[str]) -> list[Box] | None:
@@ -261,14 +266,16 @@ def read(
     usable = [one for one in seen if one.sheet is not None and one.ink is not None]
     timing: dict[str, float] = {}
     with _timed(timing, "reading"):
-        scales = None if variant is None else _declared_scales(assignment, variant, declared)
+        known = {**sure_texts([one.written for one in usable]), **declared}
+        scales = None if variant is None else _declared_scales(assignment, variant, known)
         inks = [one.ink for one in usable if one.ink is not None]
         sheets = [one.sheet for one in usable if one.sheet is not None]
         found = iter(read_figures(inks, sheets, assignment, variant, scales, wanted) if usable else ())
     readings = []
     for one in seen:
         is_read = one.sheet is not None and one.ink is not None
-        readings.append(next(found) if is_read else Reading({}))
+        reading = next(found) if is_read else Reading({})
+        readings.append(replace(reading, written=one.written))
         one.timing_ms["reading"] = timing["reading"] / len(usable) if is_read else 0.0
     return readings
 
@@ -309,8 +316,8 @@ def documents_of(
 
 def _judged(
     work: Work, assignment: Assignment, rubric: RubricFile, readings: Sequence[Reading]
-) -> tuple[Task, Judgement] | Problem:
-    """The judgement, or why there is none."""
+) -> tuple[Task, Judgement, Declarations] | Problem:
+    """The judgement and the scales that counted as declared, or why there is none."""
     drawn = tuple(reading for reading in readings if reading.figures)
     if work.variant is None:
         return Problem(
@@ -320,18 +327,30 @@ def _judged(
         if not work.pages:
             return Problem("nothing_handed_in", "nothing was handed in")
         return Problem("nothing_read", "no figure of this assignment could be read on the pages handed in")
-    measured = work.measured
-    submission = Submission(
-        readings=drawn,
-        measured=None if measured is None else measured.reading,
-        values={} if measured is None else measured.values,
-        declared={**work.declared, **({} if measured is None else measured.scales)},
-    )
     try:
         task = task_of(assignment, rubric, work.variant)
     except MechanismError as error:
         return Problem(error.code, error.message)
-    return task, judge(task, submission)
+    measured = work.measured
+    entered: dict[Source, Mapping[str, str]] = {"roster": work.declared}
+    if measured is not None:
+        entered["measurements"] = measured.scales
+    declared = declarations(task, entered, readings)
+    submission = Submission(
+        readings=drawn,
+        measured=None if measured is None else measured.reading,
+        values={} if measured is None else measured.values,
+        declared=declared.texts,
+    )
+    return task, judge(task, submission), declared
+
+
+def _with_sources(report: ReportDocument, sources: Mapping[str, Source]) -> ReportDocument:
+    """The report, telling where each scale was declared."""
+    scales = {
+        name: scale.model_copy(update={"source": sources.get(name)}) for name, scale in report.scales.items()
+    }
+    return report.model_copy(update={"scales": scales})
 
 
 def _problems_of(looked: Sequence[Looked]) -> list[Problem]:

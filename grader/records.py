@@ -233,7 +233,6 @@ class Ink:
     ----------
     strokes : straight strokes
     circles : (m, 3) small circles (joints, pivots) and arcs closed enough to have a centre: x, y, r
-    arrowheads : (k, 3) x, y of the tip and direction in radians counter-clockwise (y up) it points to
     marks : (j, 4) boxes x, y, w, h of what is neither: letters, digits, hatching, blobs
     where : the ink map
     letters : what can be written signs, None where they were not looked for
@@ -242,7 +241,6 @@ class Ink:
 
     strokes: Strokes
     circles: FloatArray
-    arrowheads: FloatArray
     marks: FloatArray
     where: InkMap
     letters: Letters | None = None
@@ -297,6 +295,22 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
+class Written:
+    """What was written into a printed box for a scale.
+
+    Attributes
+    ----------
+    text : the likeliest text; empty where nothing could be read
+    confidence : probability that this is the scale written, whatever its spelling
+    others : texts of other meaning with their probabilities, likeliest first
+    """
+
+    text: str
+    confidence: float
+    others: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Unread:
     """A node or vector that was asked for and not read, and why. False in a condition."""
 
@@ -316,10 +330,12 @@ class Reading:
     figures : by `mechanism`, `velocity_plan`, `acceleration_plan`; absent where not on the sheet
     unread : what was asked for and not read
     problems : what a person should know
+    written : what stands in the printed boxes, by scale; empty boxes are left out
     lengths : measured lengths that stand in the printed cells, mm, and the probability of it, by vector
     """
 
     figures: Mapping[str, Figure]
     unread: tuple[Unread, ...] = ()
     problems: tuple[Problem, ...] = ()
+    written: Mapping[str, Written] = field(default_factory=dict)
     lengths: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -272,6 +272,7 @@ def _scales(
             "used": written(scale.used, _SCALE_UNITS[name]),
             "assumed": scale.assumed,
             "refused": scale.refused,
+            "source": speaker.gettext(words.SOURCES[scale.source]) if scale.source else "",
         }
         for name, scale in report.scales.items()
     ]

@@ -24,6 +24,11 @@ METHODS = {
     "markers": N_("placed by its markers"),
     "combined": N_("placed by frame, paper and resolution together"),
 }
+SOURCES = {
+    "roster": N_("from the roster"),
+    "measurements": N_("from the measurements"),
+    "box": N_("read in the sheet's box"),
+}
 STATE_MARKS = {"graded": "✓", "needs_review": "?", "unreadable": "✗", "missing": "–"}
 
 _GREEK = {"omega": "ω", "epsilon": "ε"}

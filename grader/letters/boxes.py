@@ -1,7 +1,6 @@
 """What is written in the printed boxes for the scales: the text, its meaning, and how sure that is."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -10,7 +9,7 @@ from grader.layout import SCALE_BOXES
 from grader.letters.decode import Text, texts_of
 from grader.letters.line import Lattice, lattice_of
 from grader.quantities import ByRule, Declared, ParsedScale, parse_scale
-from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, GreyImage, Page, Sheet
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, GreyImage, Page, Sheet, Written
 
 PX_PER_MM = 12.0
 _BORDER_MM = 0.55
@@ -19,22 +18,6 @@ _FOREIGN = 0.25
 """Log likelihood by sign that a text may lack against signs at will, before it is doubted."""
 _MOST_TEXTS = 200
 _SCALE_OF: Mapping[str, str] = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
-
-
-@dataclass(frozen=True, slots=True)
-class Written:
-    """What a box holds.
-
-    Attributes
-    ----------
-    text : the likeliest text; empty where nothing could be read
-    confidence : probability that this is the scale written, whatever the spelling
-    others : further texts of other meaning with their probabilities, likeliest first
-    """
-
-    text: str
-    confidence: float
-    others: tuple[tuple[str, float], ...] = ()
 
 
 def written_scales(page: Page, sheet: Sheet, units: Mapping[str, str] | None = None) -> dict[str, Written]:

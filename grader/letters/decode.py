@@ -10,7 +10,7 @@ from grader.letters.grammar import State, moves, start
 from grader.letters.line import Lattice, Segment
 from grader.records import FloatArray
 
-_BEAM = 120
+_BEAM = 60
 _SKIPPED = -2.0
 """A piece of ink taken for no sign: beside its own probability of being none."""
 _MISPLACED = -4.0

@@ -7,7 +7,7 @@ Units are those that `grader.quantities` understands; the machine spells them as
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import product
 
@@ -57,6 +57,14 @@ class State:
     bare_mark: bool = False
     is_nought: bool = False
     after: tuple[str, ...] = ()
+    known_hash: int = field(init=False, repr=False, compare=False, default=0)
+
+    def __post_init__(self) -> None:
+        told = (self.kind, self.digits, self.marked, self.bare_mark, self.is_nought, self.after)
+        object.__setattr__(self, "known_hash", hash(told))
+
+    def __hash__(self) -> int:
+        return self.known_hash
 
     @property
     def is_end(self) -> bool:
@@ -102,8 +110,13 @@ def start(name: str) -> State:
     return State("tail", after=tuple(dict.fromkeys(texts)))
 
 
-def moves(name: str, state: State) -> Iterable[Move]:
+@cache
+def moves(name: str, state: State) -> tuple[Move, ...]:
     """Every sign that may come next. `#` in `after` stands for a number and its unit."""
+    return tuple(_moves(name, state))
+
+
+def _moves(name: str, state: State) -> Iterable[Move]:
     if state.kind == "number":
         yield from _digits(state)
         if state.digits and not state.bare_mark and not state.is_nought:

@@ -13,7 +13,9 @@ from grader.records import FloatArray, GreyImage
 
 _LEAST_PEAK = 40
 """Of 255: a line whose darkest ink is fainter is empty."""
-_INK = 0.42
+_INK = 0.3
+"""Of the darkest: pencil's grain leaves gaps at half."""
+_SOFT_MM = 0.06
 _DUST_MM = 0.22
 _WIDE = 0.95
 """Wider than so many heights of the line: probably two signs that touch."""
@@ -95,7 +97,7 @@ def _pieces(grey: GreyImage, unit: float) -> list[_Piece]:
     """Pieces of ink from left to right, wide ones cut where they are thinnest."""
     if grey.size == 0:
         return []
-    soft = cv2.GaussianBlur(grey, (0, 0), 0.06 * unit)
+    soft = cv2.GaussianBlur(grey, (0, 0), _SOFT_MM * unit)
     peak = float(np.quantile(soft, 0.997))
     if peak < _LEAST_PEAK:
         return []
@@ -151,7 +153,10 @@ def _may_be_one(pieces: list[_Piece]) -> bool:
 
 def _over(one: _Box, other: _Box) -> bool:
     shared = min(one[0] + one[2], other[0] + other[2]) - max(one[0], other[0])
-    return shared >= _SHARED * min(one[2], other[2])
+    small, tall = sorted((one, other), key=lambda box: box[3])
+    # A small piece at the foot of a tall one is a point or a comma of its own.
+    at_foot = small[3] < 0.5 * tall[3] and small[1] + small[3] / 2.0 > tall[1] + 0.75 * tall[3]
+    return shared >= _SHARED * min(one[2], other[2]) and not at_foot
 
 
 def _beside(one: _Box, other: _Box) -> bool:

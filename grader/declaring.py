@@ -1,0 +1,158 @@
+"""Which scales count as declared: entered ones, else what stands in the printed sheet's boxes.
+
+What a box holds counts where it is surely read and the drawing or the assignment's rule bears it out,
+or where it is read beyond doubt. Otherwise it is told and not used: nothing is marked by a guess.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from grader.comparison import Submission, Task
+from grader.comparison.evidence import Evidence, gather
+from grader.quantities import ByRule, Declared, ParsedScale, parse_scale
+from grader.records import Problem, Reading, Written
+
+SURE, BEYOND_DOUBT = 0.9, 0.985
+"""Confidence at which a box is believed where the drawing agrees, and where it does not."""
+SAME = 0.005
+"""Relative: two scales that differ less are one, rounded."""
+BORNE_OUT = 0.02
+"""Relative: as near as that the drawing or the rule bears a scale out."""
+SCALE_NAMES = ("kL", "kv", "ka")
+Source = Literal["roster", "measurements", "box"]
+
+
+@dataclass(frozen=True, slots=True)
+class Declarations:
+    """The scales that count as declared.
+
+    Attributes
+    ----------
+    texts : as written, by scale
+    sources : where each is from
+    problems : boxes that were not believed, or that contradict what was entered
+    """
+
+    texts: Mapping[str, str]
+    sources: Mapping[str, Source]
+    problems: tuple[Problem, ...] = ()
+
+
+def sure_texts(readings: Sequence[Mapping[str, Written]]) -> dict[str, str]:
+    """What is surely read in the boxes of some pages, by scale; before anything else was read there."""
+    found: dict[str, str] = {}
+    for name in SCALE_NAMES:
+        boxes = [written[name] for written in readings if name in written]
+        if boxes and all(box.confidence >= SURE for box in boxes):
+            found[name] = max(boxes, key=lambda box: box.confidence).text
+    return found
+
+
+def declarations(
+    task: Task, entered: Mapping[Source, Mapping[str, str]], readings: Sequence[Reading]
+) -> Declarations:
+    """What counts, from what was entered (later sources before earlier ones) and from the boxes."""
+    evidence = gather(task, Submission(readings=tuple(readings)))
+    texts: dict[str, str] = {}
+    sources: dict[str, Source] = {}
+    problems: list[Problem] = []
+    known: dict[str, float] = {}
+    for name in SCALE_NAMES:
+        for source, declared in entered.items():
+            if declared.get(name, "").strip():
+                texts[name], sources[name] = declared[name], source
+        boxes = [reading.written[name] for reading in readings if name in reading.written]
+        box, told = _believed(task, evidence, name, boxes, known)
+        if name not in texts:
+            problems.extend(told)
+            if box is not None:
+                texts[name], sources[name] = box.text, "box"
+        elif box is not None and not _is_same(task, name, box.text, texts[name], known):
+            problems.append(_contradicts(name, box, texts[name], sources[name]))
+        if name in texts:
+            known.update(_value(task, name, texts[name], known))
+    return Declarations(texts, sources, tuple(problems))
+
+
+def _believed(
+    task: Task, evidence: Evidence, name: str, boxes: Sequence[Written], known: Mapping[str, float]
+) -> tuple[Written | None, list[Problem]]:
+    """The box that counts, or why none does."""
+    if not boxes:
+        return None, []
+    best = max(boxes, key=lambda box: box.confidence)
+    if not best.text:
+        told = f"{name}'s box could not be read; enter {name} in the roster or with the measurements"
+        return None, [Problem("scale_box_unread", told)]
+    told = f"{name}'s box seems to read '{best.text}' ({100 * best.confidence:.0f} %)"
+    if best.confidence < SURE:
+        return None, [Problem("scale_box_doubtful", f"{told}, too unsure to be used; look, and enter {name}")]
+    sure = [box for box in boxes if box.confidence >= SURE]
+    if any(not _is_same(task, name, box.text, best.text, known) for box in sure):
+        each = " and ".join(f"'{box.text}'" for box in sure)
+        return None, [Problem("scale_box_disagrees", f"{name}'s boxes read {each}: none is used; look")]
+    if _is_borne_out(task, evidence, name, best.text, known):
+        return best, []
+    if best.confidence < BEYOND_DOUBT:
+        why = "which neither the drawing nor the assignment's rule bears out"
+        return None, [Problem("scale_box_doubtful", f"{told}, {why}; look, and enter {name}")]
+    return best, []
+
+
+def _contradicts(name: str, box: Written, text: str, source: Source) -> Problem:
+    where = {"roster": "the roster", "measurements": "the measurements", "box": "the box"}[source]
+    told = f"{name}'s box reads '{box.text}' ({100 * box.confidence:.0f} %), {where} '{text}', which is used"
+    return Problem("scale_box_disagrees", told)
+
+
+# Values -------------------------------------------------------------------------------------------
+
+
+def _parsed(task: Task, name: str, text: str) -> ParsedScale:
+    units = task.assignment.file.scales.bare_units
+    return parse_scale(name, text, bare_unit=next((unit for one, unit in units.items() if one == name), None))
+
+
+def _value(task: Task, name: str, text: str, known: Mapping[str, float]) -> dict[str, float]:
+    """The scale in real units per millimetre, by its name; empty where it cannot be told."""
+    match _parsed(task, name, text):
+        case Declared(per_mm=value):
+            return {name: value}
+        case ByRule() as rule:
+            values = {**({} if task.omega is None else {"omega": task.omega}), **known}
+            return {name: rule.per_mm(values)} if rule.powers.keys() <= values.keys() else {}
+        case _:
+            return {}
+
+
+def _is_same(task: Task, name: str, one: str, other: str, known: Mapping[str, float]) -> bool:
+    """Whether two texts mean one scale; what cannot be understood contradicts nothing."""
+    first, second = (_value(task, name, text, known).get(name) for text in (one, other))
+    return first is None or second is None or abs(first / second - 1.0) <= SAME
+
+
+def _is_borne_out(task: Task, evidence: Evidence, name: str, text: str, known: Mapping[str, float]) -> bool:
+    """Whether the drawn crank, v_A or a_A, or the assignment's rule, has nearly this scale.
+
+    A rule of the student's own, such as omega kL, needs nothing else to bear it out.
+    """
+    value = _value(task, name, text, known).get(name)
+    if value is None:
+        return isinstance(_parsed(task, name, text), ByRule)
+    ruled = float(getattr(task.assignment.scales([task.variant], **known), name)[0])
+    tried = [ruled, *_drawn(task, evidence, name)]
+    return any(abs(value / one - 1.0) <= BORNE_OUT for one in tried if one > 0.0)
+
+
+def _drawn(task: Task, evidence: Evidence, name: str) -> list[float]:
+    """The scale that the drawing shows, where it can be told."""
+    if name == "kL":
+        if task.yardstick is None or evidence.yardstick_mm is None or evidence.yardstick_mm[0] <= 0.0:
+            return []
+        return [task.yardstick.length_m / evidence.yardstick_mm[0]]
+    vector = f"{name[1]}_{task.pin}"
+    drawn = evidence.vector(vector)
+    if drawn is None or drawn.length_mm <= 0.0 or not task.real.get(vector):
+        return []
+    return [abs(task.real[vector]) / drawn.length_mm]

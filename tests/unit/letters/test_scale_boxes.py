@@ -1,0 +1,107 @@
+"""Scales read in the answer sheet's boxes, written by the simulated hand, which nothing was trained on."""
+
+import numpy as np
+import pytest
+
+from grader.answer_sheet import make_sheets
+from grader.letters import written_scales
+from grader.letters.boxes import read_scale
+from grader.letters.grammar import moves, start
+from grader.letters.line import lattice_of
+from grader.quantities import Refused, parse_scale
+from grader.records import Page, Sheet, Written
+from grader.roster import RosterRow
+from grader.sheet import rectify
+from grader.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate
+from grader.simulation.printing import printed_sheets
+from reference.assignment import load_assignment
+
+SURE = 0.9
+
+
+def walked(name: str, text: str) -> set[bool]:
+    """Whether the texts that the machine can spell this way may end there; empty where it cannot."""
+    states = {(start(name), "")}
+    while any(told != text for _, told in states):
+        states = {
+            (move.state, told + move.text)
+            for state, told in states
+            for move in moves(name, state)
+            if text.startswith(told + move.text)
+        }
+        if not states:
+            return set()
+    return {state.is_end for state, _ in states}
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("kL", "1:5"),
+        ("kL", "0.005m/mm"),
+        ("kL", "kL=0,005m/mm"),
+        ("kL", "5cm/cm"),
+        ("kv", "0,036(m/s)/mm"),
+        ("kv", "0.036m/s·mm"),
+        ("kv", "ωkL"),
+        ("ka", "0.108(m/s2)/mm"),
+        ("ka", "ω^2kL"),
+        ("ka", "ω2kL=16,59(m/s2)/mm"),
+    ],
+)
+def test_what_people_write_can_be_walked_through_and_is_understood(name, text):
+    assert True in walked(name, text)
+    assert not isinstance(parse_scale(name, text), Refused)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("kL", "0075m/mm"), ("kL", "0.005m/s"), ("kv", "1:5"), ("kL", "5.m/mm"), ("kL", "ωkL")]
+)
+def test_what_nobody_means_is_not_spelt(name, text):
+    assert True not in walked(name, text)
+
+
+def test_an_empty_line_holds_nothing():
+    assert lattice_of(np.zeros((80, 600), dtype=np.uint8), 12.0).count == 0
+
+
+def test_a_line_of_scribble_is_not_believed():
+    rng = np.random.default_rng(3)
+    grey = np.zeros((80, 600), dtype=np.uint8)
+    for left in range(20, 560, 45):
+        for _ in range(30):
+            y, x = rng.integers(8, 70), left + rng.integers(0, 30)
+            grey[y - 2 : y + 3, x - 2 : x + 3] = 255
+    assert read_scale(lattice_of(grey, 12.0), "kv").confidence < SURE
+
+
+@pytest.fixture(scope="module")
+def sheets():
+    assignment = load_assignment("pump")
+    document = make_sheets(assignment, [RosterRow("s1", "Student 1", n=6)], "en")
+    printed = printed_sheets(document.pdf, document.layout)
+    settings = Settings(hand=CAREFUL, scan=CLEAN_SCAN, page=PageStyle(language="en", decimal_comma=True))
+    found = []
+    for drawn in simulate(assignment, assignment.variant(6), 3, settings, printed=printed):
+        page = Page("s.png", 1, np.ascontiguousarray(drawn.image), (300.0, 300.0))
+        placed = rectify(page)
+        assert isinstance(placed, Sheet)
+        found.append((written_scales(page, placed), drawn.truth["scales"]["written"]))
+    return found
+
+
+def test_what_is_surely_read_is_what_was_written(sheets):
+    told = 0
+    for read, written in sheets:
+        for name, text in written.items():
+            assert name in read
+            if read[name].confidence >= SURE:
+                told += 1
+                assert parse_scale(name, read[name].text) == parse_scale(name, text)
+    assert told >= 1
+
+
+def test_boxes_that_the_page_does_not_have_are_not_looked_at(sheets):
+    for read, written in sheets:
+        assert read.keys() <= written.keys()
+        assert all(isinstance(one, Written) for one in read.values())

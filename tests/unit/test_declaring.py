@@ -1,0 +1,93 @@
+"""Which scale counts as declared, where boxes, roster and drawing agree or do not."""
+
+import pytest
+
+from grader.comparison import task_of
+from grader.declaring import BEYOND_DOUBT, SURE, declarations, sure_texts
+from grader.records import Reading, Written
+from grader.rubric import load_rubric
+from reference.assignment import load_assignment
+
+FIRM, LIKELY, DOUBTFUL = (BEYOND_DOUBT + 1.0) / 2.0, (SURE + BEYOND_DOUBT) / 2.0, SURE / 2.0
+RULED, OTHER = "0.005 m/mm", "0.0061 m/mm"
+"""The kL that the assignment's rule proposes, and another that nothing bears out."""
+
+
+@pytest.fixture(scope="module")
+def task():
+    assignment = load_assignment("pump")
+    variant = assignment.variant(7)
+    assert float(assignment.scales([variant]).kL[0]) == pytest.approx(0.005)
+    return task_of(assignment, load_rubric(assignment.file.rubric, beside=assignment.path), variant)
+
+
+def reading(text: str, confidence: float, name: str = "kL") -> Reading:
+    return Reading({}, written={name: Written(text, confidence)})
+
+
+def codes(found) -> list[str]:
+    return [problem.code for problem in found.problems]
+
+
+def test_a_box_read_surely_and_borne_out_counts(task):
+    found = declarations(task, {"roster": {}}, [reading(RULED, LIKELY)])
+    assert found.texts == {"kL": RULED}
+    assert found.sources == {"kL": "box"}
+    assert not found.problems
+
+
+def test_a_box_that_nothing_bears_out_needs_to_be_read_beyond_doubt(task):
+    likely = declarations(task, {}, [reading(OTHER, LIKELY)])
+    firm = declarations(task, {}, [reading(OTHER, FIRM)])
+    assert (likely.texts, codes(likely)) == ({}, ["scale_box_doubtful"])
+    assert (firm.texts, codes(firm)) == ({"kL": OTHER}, [])
+
+
+def test_a_doubtful_box_is_told_with_what_it_seems_to_read_and_not_used(task):
+    found = declarations(task, {}, [reading(RULED, DOUBTFUL)])
+    assert found.texts == {}
+    assert codes(found) == ["scale_box_doubtful"]
+    assert RULED in found.problems[0].message
+
+
+def test_an_unreadable_box_is_told(task):
+    found = declarations(task, {}, [reading("", 0.0)])
+    assert found.texts == {}
+    assert codes(found) == ["scale_box_unread"]
+
+
+def test_the_roster_counts_before_the_box_and_a_contradiction_is_told(task):
+    agreeing = declarations(task, {"roster": {"kL": "1:5"}}, [reading(RULED, LIKELY)])
+    contrary = declarations(task, {"roster": {"kL": OTHER}}, [reading(RULED, LIKELY)])
+    assert (agreeing.texts, codes(agreeing)) == ({"kL": "1:5"}, [])
+    assert (contrary.texts, codes(contrary)) == ({"kL": OTHER}, ["scale_box_disagrees"])
+    assert contrary.sources == {"kL": "roster"}
+
+
+def test_an_unreadable_box_does_not_matter_where_the_roster_says_the_scale(task):
+    found = declarations(task, {"roster": {"kL": RULED}}, [reading("", 0.0)])
+    assert not found.problems
+
+
+def test_measurements_count_before_the_roster(task):
+    found = declarations(task, {"roster": {"kL": OTHER}, "measurements": {"kL": RULED}}, [])
+    assert found.sources == {"kL": "measurements"}
+    assert found.texts == {"kL": RULED}
+
+
+def test_two_sheets_whose_boxes_contradict_each_other_give_nothing(task):
+    found = declarations(task, {}, [reading(RULED, FIRM), reading(OTHER, FIRM)])
+    assert found.texts == {}
+    assert codes(found) == ["scale_box_disagrees"]
+
+
+def test_a_rule_written_in_the_box_counts(task):
+    found = declarations(task, {}, [reading("ωkL", LIKELY, "kv")])
+    assert found.texts == {"kv": "ωkL"}
+
+
+def test_before_the_drawing_is_read_only_sure_boxes_are_taken():
+    sure, unsure = {"kL": Written(RULED, LIKELY)}, {"kL": Written(OTHER, DOUBTFUL)}
+    assert sure_texts([sure]) == {"kL": RULED}
+    assert sure_texts([sure, unsure]) == {}
+    assert sure_texts([]) == {}
