@@ -113,8 +113,6 @@ def _divisions() -> list[dict[str, Box]]:
         left, right = _cut(DRAWING_MM, (share, 1.0 - share), across=True)
         found.extend(_zones((m, v), left, (top, 1.0 - top), rows) | {a: right} for top in (0.4, 0.55))
         found.append({m: left} | _zones((v, a), right, (0.45, 0.55), rows))
-    # A plan nearly as wide as the sheet, and a small sketch beside it.
-    found.extend(_zones((m, plan), DRAWING_MM, (0.22, 0.78), columns) for plan in (v, a))
     return found
 
 

@@ -136,8 +136,8 @@ def cells_of(
     if table is None:
         return {}
     construction = construction_for(assignment, table.figures)
-    figures = dict.fromkeys(table.figures)
-    return combs_of(_boxes([v.name for figure in figures for v in construction.vectors_of(figure)], asked))
+    ordered = dict.fromkeys(table.figures)
+    return combs_of(_boxes([v.name for figure in ordered for v in construction.vectors_of(figure)], asked))
 
 
 def _boxes(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:

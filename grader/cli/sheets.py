@@ -12,6 +12,7 @@ from grader.contact_sheet import contact_sheet, thumbnail
 from grader.files import write_whole
 from grader.folder import submissions
 from grader.intake import page_of
+from grader.lint import lint, suggestions
 from grader.matching import SURE, draft_csv, suggest
 from grader.measurements import names_of
 from grader.ownership import PageSource
@@ -20,8 +21,10 @@ from grader.records import FloatArray
 from grader.roster import read_roster
 from grader.rubric import rubric_of
 from grader.survey import survey
-from reference.assignment import load_assignment
+from reference.assignment import Variant, load_assignment
 from reference.errors import CallError, InputFileError
+
+SHOWN_VARIANTS = 12
 
 
 def print_sheets(
@@ -45,6 +48,35 @@ def print_sheets(
         typer.echo(f"{layout}: where markers, zones and boxes are")
     for problem in sheets.problems:
         typer.echo(f"note: {problem.message}", err=True)
+    if not calibration and roster is not None:
+        _suggest_scales(name, roster)
+
+
+def _suggest_scales(name: str, roster: Path) -> None:
+    """Tell the instructor whose drawing would be easier to read at other scales, and at which."""
+    assignment = load_assignment(name)
+    found = lint(assignment, rubric_of(assignment))
+    if found.plan is None:
+        return
+    drawn = {figure for page in assignment.file.page for figure in page.figures}
+    told = suggestions(found.scales, found.plan, drawn)
+    lines: dict[Variant, str] = {}
+    for row in read_roster(roster).rows:
+        variant = assignment.variant(row.n, row.position)
+        if variant in told:
+            lines.setdefault(variant, told[variant])
+    if not lines:
+        return
+    typer.echo(
+        "note: easier to read than at the assignment's scales, and fitting the zones, would be", err=True
+    )
+    for variant, line in list(lines.items())[:SHOWN_VARIANTS]:
+        typer.echo(f"  {variant}: {line}", err=True)
+    if len(lines) > SHOWN_VARIANTS:
+        typer.echo(f"  ... and {len(lines) - SHOWN_VARIANTS} more variants", err=True)
+    typer.echo(
+        "  to be written into the scale boxes by the student, or into the roster (kL, kv, ka)", err=True
+    )
 
 
 def draft_matches(

@@ -4,7 +4,7 @@ from grader.lint.broken import broken_findings, broken_variants
 from grader.lint.document import lint_document
 from grader.lint.findings import LintFinding, Severity, named
 from grader.lint.inspection import Least, Lint, Row, Worst, lint
-from grader.lint.scales import Proposal
+from grader.lint.scales import Proposal, suggestions
 
 __all__ = [
     "Least",
@@ -19,4 +19,5 @@ __all__ = [
     "lint",
     "lint_document",
     "named",
+    "suggestions",
 ]

@@ -1,19 +1,21 @@
 """Round scales, as a drawing teacher writes them: the largest drawing that fits every variant."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grader.layout import TEMPLATES, Template
-from grader.lint.findings import LintFinding
+from grader.lint.findings import NAMED, LintFinding, chosen
 from grader.lint.lengths import WELL_READ_MM, Asked
 from grader.lint.room import Extents, PageRoom, growth, pages_of
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN
-from reference.assignment import Assignment, Scales
+from reference.assignment import Assignment, Scales, Variant
 from reference.geometry import FloatArray
 from reference.plan import ZERO_SHARE, Plan
 
+IntArray = NDArray[np.intp]
 LENGTH_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 """Of 1 : 10^k. ISO 5455 has 1, 2, 5; GOST 2.302 and SR EN practice add 2.5."""
 RATE_STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 10.0)
@@ -35,6 +37,8 @@ class Proposal:
     shortest_mm : the shortest asked vector that is not zero, with its name; None where none is asked
     under_8_mm, asked : how many asked vectors are shorter than 8 mm, of how many
     link_mm : the shortest link of the sketch
+    short : (N,) how many asked vectors of each variant are shorter than 8 mm
+    still_short : names of the vectors that are, the most frequent first
     """
 
     name: str
@@ -45,6 +49,8 @@ class Proposal:
     under_8_mm: int
     asked: int
     link_mm: float
+    short: IntArray
+    still_short: tuple[str, ...]
 
 
 def round_up(values: FloatArray, steps: Sequence[float]) -> FloatArray:
@@ -160,15 +166,19 @@ def _judged(name: str, scales: Scales, plan: Plan, asked: Asked, room: float) ->
     real = np.where(asked.is_zero, np.inf, lengths)
     place = np.unravel_index(int(np.argmin(real)), real.shape) if real.size else None
     known = place is not None and np.isfinite(real[place])
+    short = real < WELL_READ_MM
+    often = sorted(zip(asked.names, short.sum(axis=1).tolist(), strict=True), key=lambda one: -one[1])
     return Proposal(
         name=name,
         scales=scales,
         room=room,
         shortest_mm=float(real[place]) if place is not None and known else None,
         shortest=asked.names[place[0]] if place is not None and known else "",
-        under_8_mm=int(np.sum(real < WELL_READ_MM)),
+        under_8_mm=int(np.sum(short)),
         asked=int(real.size - asked.is_zero.sum()),
         link_mm=float(np.min(_shortest_link_m(plan) / scales.kL)),
+        short=np.asarray(short.sum(axis=0), dtype=np.intp).reshape(len(plan.variants)),
+        still_short=tuple(name for name, count in often if count),
     )
 
 
@@ -187,6 +197,7 @@ def scale_findings(assignment: Assignment, plan: Plan, told: Sequence[Proposal])
             f" instead of {own.under_8_mm}; with round scales of each variant's own {each.under_8_mm}"
         )
         yield LintFinding("hint", "round_scales", "assignment", "$.scales", message)
+    yield from _short_findings(plan, own, each)
     if "acceleration_plan" in plan.nodes_mm and any("_n" in name for name in plan.vectors_si):
         ratio = plan.scales.kL * plan.scales.ka / plan.scales.kv**2
         if not np.allclose(ratio, 1.0, rtol=1e-6):
@@ -194,6 +205,41 @@ def scale_findings(assignment: Assignment, plan: Plan, told: Sequence[Proposal])
                 "kL ka is not kv^2: normal components cannot be built by the right triangle (altitude) method"
             )
             yield LintFinding("hint", "no_altitude_method", "assignment", "$.scales", message)
+
+
+def _short_findings(plan: Plan, own: Proposal, each: Proposal) -> Iterator[LintFinding]:
+    """Whether scales of each variant's own make every asked vector long enough, and what no scale does."""
+    if own.under_8_mm == 0:
+        return
+    if each.under_8_mm == 0:
+        told = f"with round scales of each variant's own no asked vector is under {WELL_READ_MM:g} mm"
+        yield LintFinding("hint", "scales_of_its_own", "assignment", "$.scales", told)
+        return
+    left = each.short > 0
+    names = ", ".join(each.still_short[:NAMED]) + (" and more" if len(each.still_short) > NAMED else "")
+    told = (
+        f"even at the largest round scales that fit the sheet, {each.under_8_mm} of {each.asked} asked"
+        f" vectors stay under {WELL_READ_MM:g} mm ({names}): no scale makes them easy to read; a page for"
+        " each plan, or a criterion that is optional, would help"
+    )
+    yield LintFinding(
+        "hint", "short_at_any_scale", "assignment", "$.scales", told, chosen(plan.variants, left)
+    )
+
+
+def suggestions(found: Sequence[Proposal], plan: Plan, figures: Collection[str]) -> dict[Variant, str]:
+    """The round scales of each variant's own, where they leave fewer asked vectors under 8 mm; as text."""
+    own, _, each = found
+    names = [name for figure, name in SCALE_OF.items() if figure in figures]
+    told = {}
+    for index, variant in enumerate(plan.variants):
+        if each.short[index] < own.short[index] or own.room < 1.0:
+            one = Scales(*(getattr(each.scales, name)[index : index + 1] for name in ("kL", "kv", "ka")))
+            told[variant] = (
+                f"{written(one, names)}: {each.short[index]} instead of {own.short[index]} asked vectors"
+                f" under {WELL_READ_MM:g} mm"
+            )
+    return told
 
 
 def written(scales: Scales, names: Sequence[str]) -> str:

@@ -7,7 +7,7 @@ Everybody draws on a flatbed at 300 dpi, without mistakes, on
 - plain paper at the assignment's scales, letters where people put them;
 - the printed answer sheet;
 - the same with letters 3 mm clear of all lines, arrowheads up to 4 mm, lines through the joints;
-- the same at the round scales that `planmark lint` proposes (on plain paper too).
+- the same at the round scales that `planmark sheet` and `lint` propose for each variant of its own.
 
 Counted are all vectors that the rubric asks for, of whatever length, but for those of length zero.
 Right: length within 0.3 mm of what was drawn, and direction within 0.3 degrees or 0.3 mm across,
@@ -35,7 +35,7 @@ from grader.simulation.desk import Desk
 from grader.simulation.lettering import write
 from grader.simulation.printing import printed_sheets
 from grader.simulation.sketch import Label, Sketch
-from reference.assignment import Assignment, load_assignment
+from reference.assignment import Assignment, Variant, load_assignment
 from reference.formula import parse
 
 RIGHT_MM, RIGHT_DEG, WRONG_MM, SURE, ZERO_MM = 0.3, 0.3, 1.0, 0.9, 0.4
@@ -91,19 +91,25 @@ def write_clear(sketch: Sketch, near: complex, text: str, height_mm: float, name
     sketch.labels.append(Label(text, names, placed.low, placed.high))
 
 
-def at_round_scales(assignment: Assignment) -> Assignment:
-    """The assignment with the round scales that lint proposes for all variants."""
+def at_own_scales(assignment: Assignment, variant: Variant) -> Assignment:
+    """The assignment with the round scales that lint proposes for one variant."""
     found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
-    (proposal,) = [one for one in found.scales if one.name == "round"]
-    values = {name: parse(repr(float(np.ravel(getattr(proposal.scales, name))[0]))) for name in UNITS}
+    assert found.plan is not None
+    (proposal,) = [one for one in found.scales if one.name == "round_each"]
+    index = found.plan.variants.index(variant)
+    values = {name: parse(repr(float(getattr(proposal.scales, name)[index]))) for name in UNITS}
     scales = assignment.file.scales.model_copy(update=values)
     return replace(assignment, file=assignment.file.model_copy(update={"scales": scales}))
 
 
-def count(assignment: Assignment, seed: int, tally: Counter, *, printed: bool, clear: bool) -> None:
+def count(
+    assignment: Assignment, seed: int, tally: Counter, *, printed: bool, clear: bool, own: bool
+) -> None:
     """One student's sheets drawn, scanned, read, and held against the truth."""
     variants = assignment.variants()
     variant = variants[seed * 7 % len(variants)]
+    if own:
+        assignment = at_own_scales(assignment, variant)
     settings = any_settings(seed, device="flatbed", dpi=300.0, mistakes=0.0)
     # The assignment's scales are what is compared: nobody chooses others.
     student = replace(settings.student, crank_mm=None, kv_ratio=1.0, ka_ratio=1.0, abandoned=False)
@@ -181,10 +187,11 @@ def is_right(way: complex, found) -> bool:
 
 CASES = {
     "plain paper": (False, False, False),
-    "plain paper, round scales": (False, False, True),
+    "plain paper, own round scales": (False, False, True),
     "printed sheet": (True, False, False),
     "printed, letters clear": (True, True, False),
-    "printed, clear, round scales": (True, True, True),
+    "printed, own round scales": (True, False, True),
+    "printed, clear, own round scales": (True, True, True),
 }
 
 
@@ -194,17 +201,19 @@ def main() -> None:
     parser.add_argument("--students", type=int, default=10)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--assignments", default="pump,press,engine")
+    parser.add_argument("--cases", default="", help="those whose names hold this")
     told = parser.parse_args()
     cv2.setNumThreads(1)
     print("| sheet | students | vectors | under 8 mm | right | right and sure | misread | all right |")
     print("|---|---|---|---|---|---|---|---|", flush=True)
-    for case, (printed, clear, rounded) in CASES.items():
+    for case, (printed, clear, own) in CASES.items():
+        if told.cases not in case:
+            continue
         tally: Counter = Counter()
         for name in told.assignments.split(","):
             assignment = load_assignment(name)
-            drawn = at_round_scales(assignment) if rounded else assignment
             for seed in range(told.seed, told.seed + told.students):
-                count(drawn, seed, tally, printed=printed, clear=clear)
+                count(assignment, seed, tally, printed=printed, clear=clear, own=own)
         many = tally["vectors"]
         shares = [f"{100.0 * tally[key] / many:.1f} %" for key in ("short", "right", "sure")]
         print(

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grader.lint import lint
+from grader.lint import lint, suggestions
 from grader.lint.scales import LENGTH_STEPS, RATE_STEPS, ratio_text, round_up
 from grader.rubric import load_rubric
 from reference.assignment import built_in, library, load_assignment
@@ -86,3 +86,19 @@ def test_round_scales_that_do_not_fit_are_told_with_those_that_do(tmp_path):
     assert "do not fit" in told.message
     assert f"kv = {float(found.scales[1].scales.kv[0]):g} (m/s)/mm" in told.message
     assert any(one.code == "does_not_fit" and "velocity plan" in one.message for one in found.findings)
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_scales_of_a_variants_own_are_suggested_where_fewer_vectors_are_short_and_they_fit(name):
+    assignment = load_assignment(name)
+    found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
+    own, _, each = found.scales
+    told = suggestions(found.scales, found.plan, ("mechanism", "velocity_plan", "acceleration_plan"))
+    assert each.room >= 1.0
+    for index, variant in enumerate(found.plan.variants):
+        better = each.short[index] < own.short[index] or own.room < 1.0
+        assert (variant in told) == bool(better)
+    assert own.short.sum() == own.under_8_mm
+    codes = {finding.code for finding in found.findings}
+    assert ("short_at_any_scale" in codes) == bool(own.under_8_mm and each.under_8_mm)
+    assert ("scales_of_its_own" in codes) == bool(own.under_8_mm and not each.under_8_mm)

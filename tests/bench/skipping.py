@@ -1,0 +1,126 @@
+"""What is not done twice, or not at all: the same verdicts in less time.
+
+    python tests/bench/skipping.py [--students N] [--seed S]
+
+A class on printed sheets of `pump`, a page for the velocities and one for the accelerations, is
+graded; then again after each kind of change, and by a rubric that asks for velocities alone.
+Processor seconds of the whole run; every row says whether its reports are those of a run that
+skips nothing.
+"""
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from grader import pipeline
+from grader.answer_sheet import make_sheets
+from grader.batch import Batch, grade
+from grader.roster import RosterRow
+from grader.rubric import load_rubric
+from grader.simulation import any_settings, simulate
+from grader.simulation.printing import printed_sheets
+from reference.assignment import load_assignment
+
+PUMP = load_assignment("pump")
+HEAD = "student_id,name,n,kL,kv,ka"
+
+
+def draw(folder: Path, student: str, n: int, seed: int) -> str:
+    """One student's scans; the line of the roster."""
+    made = make_sheets(PUMP, [RosterRow(student, "", n)])
+    settings = any_settings(seed, device="flatbed", dpi=300.0, mistakes=0.3)
+    sheets = simulate(
+        PUMP, PUMP.variant(n), seed, settings, student_id=student,
+        printed=printed_sheets(made.pdf, made.layout),
+    )  # fmt: skip
+    for sheet in sheets:
+        sheet.save(folder / f"{student}_{sheet.truth['kind']}")
+    scales = sheets[0].truth["scales"]["declared"]
+    told = (f"{scales['kL']!r} m/mm", f"{scales['kv']!r} (m/s)/mm", f"{scales['ka']!r} (m/s^2)/mm")
+    return f"{student},{student},{n},{','.join(told)}"
+
+
+def timed(folder: Path, out: Path, rubric, lines) -> tuple[list, float]:
+    """The reports, without what the clock says, and the processor's seconds."""
+    (folder / "roster.csv").write_text("\n".join([HEAD, *lines]) + "\n")
+    start = time.process_time()
+    results = grade(Batch(PUMP, rubric, folder, out), lambda *_: None)
+    return [_verdicts(report) for report in results.reports], time.process_time() - start
+
+
+def _verdicts(report) -> tuple:
+    told = [(one.id, one.verdict, one.points, one.measured.length_mm) for one in report.criteria]
+    return report.student_id, report.status, report.score, report.score_range, told
+
+
+def with_wider_tolerance(rubric):
+    """The rubric of a teacher who thought again."""
+    table = rubric.tolerance.model_copy(update={"length_mm": 1.5, "direction_deg": 2.0})
+    return rubric.model_copy(update={"tolerance": table})
+
+
+def shares(one: list, other: list) -> str:
+    """Whether the verdicts are the same; of numbers, how far apart at most."""
+    if one == other:
+        return "yes"
+    verdicts = [[[c[:3] for c in told] for *_, told in reports] for reports in (one, other)]
+    lengths = [[c[3] or 0.0 for *_, told in reports for c in told] for reports in (one, other)]
+    apart = float(np.max(np.abs(np.subtract(*lengths)))) if len(lengths[0]) == len(lengths[1]) else np.nan
+    return f"{'yes' if verdicts[0] == verdicts[1] else 'NO'}, lengths within {apart:.2g} mm"
+
+
+def without_narrowing(run):
+    """Run with every zone looked at and everything read, whatever the rubric asks for."""
+    usual = pipeline.asked_of
+    pipeline.asked_of = lambda *_: (frozenset(), ())
+    try:
+        return run()
+    finally:
+        pipeline.asked_of = usual
+
+
+def main() -> None:
+    """Measure and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--students", type=int, default=4)
+    parser.add_argument("--seed", type=int, default=1)
+    told = parser.parse_args()
+    cv2.setNumThreads(1)
+    rubric = load_rubric("pump")
+    wider, velocities = with_wider_tolerance(rubric), load_rubric("pump-velocity")
+    with tempfile.TemporaryDirectory() as place:
+        top = Path(place)
+        folder = top / "in"
+        folder.mkdir()
+        lines = [draw(folder, f"s{k}", 3 + 2 * k, told.seed + k) for k in range(told.students)]
+
+        def fresh(name, by, roster):
+            return timed(folder, top / name, by, roster)
+
+        print("| run | s | of a run that skips nothing | same verdicts |\n|---|---|---|---|", flush=True)
+
+        def row(name, found, whole):
+            share = f"{100.0 * found[1] / whole[1]:.1f} %"
+            print(f"| {name} | {found[1]:.2f} | {share} | {shares(found[0], whole[0])} |", flush=True)
+
+        first = fresh("out", rubric, lines)
+        row("first, all that the rubric asks", first, first)
+        row("nothing changed", fresh("out", rubric, lines), first)
+        again, whole = fresh("out", wider, lines), fresh("other", wider, lines)
+        row("another tolerance in the rubric", again, whole)
+        changed = [lines[0].replace("s0,s0", "s0,Ana"), *lines[1:]]
+        row("a name in the roster corrected", fresh("out", wider, changed), whole)
+        part = fresh("velocity", velocities, lines)
+        all_of_it = without_narrowing(lambda: fresh("everything", velocities, lines))
+        row("a rubric of velocities alone", part, all_of_it)
+        lines.append(draw(folder, "s9", 20, told.seed + 90))
+        added = fresh("out", wider, lines)
+        row("one student's scans added", (added[0][:-1], added[1]), whole)
+
+
+if __name__ == "__main__":
+    main()
