@@ -1,4 +1,4 @@
-"""Pixels to strokes in millimetres: straight strokes, circles, arrowheads, marks and an ink map.
+"""Pixels to strokes in millimetres: straight strokes, their tips, circles, marks and an ink map.
 
 Ink is looked for at about 6 px/mm and strokes are fitted at full resolution. The frame and the title
 block are told apart and left out.
@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from grader.ink.arrowheads import find_arrowheads
 from grader.ink.circles import arcs, find_circles, led_to
 from grader.ink.components import find_components, mark_boxes
 from grader.ink.hatching import boxes_around, hatching
@@ -16,6 +15,7 @@ from grader.ink.inkmap import ink_map
 from grader.ink.regions import field_of
 from grader.ink.seeds import PX_PER_MM, find_seeds
 from grader.ink.strokes import find_strokes, take
+from grader.ink.tips import find_tips
 from grader.pixels import flatten
 from grader.records import Box, Ink, Page, Sheet
 
@@ -41,5 +41,5 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     hatched = hatching(strokes)
     marks = np.concatenate([mark_boxes(components, field), boxes_around(strokes, hatched)])
     strokes = take(strokes, ~hatched)
-    arrowheads = find_arrowheads(flat, strokes, sheet.mm_to_px)
-    return Ink(strokes, circles, arrowheads, marks, ink_map(flat, sheet))
+    tips = find_tips(flat, strokes, sheet.mm_to_px)
+    return Ink(strokes, circles, marks, ink_map(flat, sheet), tips=tips)

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grader.reading.expected import Expected
-from grader.reading.lines import BoolArray, IntArray, Lines
-from grader.records import FloatArray
+from grader.reading.lines import BoolArray, Lines
+from grader.records import FloatArray, IntArray
 
 REDRAW_MM = 0.3
 """How far a stroke misses the nodes that it joins, one standard error."""

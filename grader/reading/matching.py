@@ -13,7 +13,8 @@ import numpy as np
 
 from grader.reading.belief import NOTHING, Ends, Taken, ends_at, mahalanobis, offsets, updated
 from grader.reading.expected import Expected
-from grader.reading.lines import BoolArray, IntArray, Lines
+from grader.reading.lines import BoolArray, Lines
+from grader.records import IntArray
 
 BEAM = 10
 GATE = 18.0
