@@ -29,6 +29,10 @@ _NO_FIT_MM = 1.5
 _VAGUE_SE = 0.02
 _MOST_SIDES = 3
 _SOME_SIDES = 2
+_ALL_SIDES = 4
+_COPY_SE = 0.012
+"""Copiers enlarge or reduce by a per cent or two unless told not to."""
+_SAMPLED, _WHITE = 7, 255
 _FAR_OFF_MM = 1.5
 _EDGE_WITHIN_MM = 6.0
 _ASSUMED_PAPER_SE = 0.004
@@ -131,8 +135,9 @@ def _from_lines(
     dpi: tuple[float, float] | None,
     problems: list[Problem],
 ) -> Sheet | Unread:
+    copied = _is_copy(page)
     try:
-        fit, frame = _settled(best, dpi), best.frame
+        fit, frame = _settled(_of_the_drawing(best) if copied else best, dpi, copied=copied), best.frame
     except np.linalg.LinAlgError:
         return Unread("sheet", "the long lines found do not make one sheet")
     block_mm = title_block_mm(fit.mm_to_px, drawn_ends(lines))
@@ -149,7 +154,21 @@ def _from_lines(
         scale_se = float(np.hypot(scale_se, _ASSUMED_PAPER_SE))
         message = "only the paper's edges give the scale; taken for A3"
         problems.append(Problem("paper_assumed", message, page.source))
+    if frame is None and copied:
+        scale_se = float(np.hypot(scale_se, _COPY_SE))
     return _sheet(fit, frame, scale_se, problems)
+
+
+def _is_copy(page: Page) -> bool:
+    """Whether the page is black and white only, as copiers send it: its drawing may be of any size."""
+    sample = page.grey[::_SAMPLED, ::_SAMPLED]
+    return bool(np.all((sample == 0) | (sample == _WHITE)))
+
+
+def _of_the_drawing(best: Hypothesis) -> Hypothesis:
+    """Without the paper's sides, where the frame has all of its own: a copy's paper is not its drawing's."""
+    drawn = tuple(side for side in best.sides if side.model is not PAPER)
+    return replace(best, sides=drawn) if len(drawn) == _ALL_SIDES else best
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,9 +205,14 @@ def _with_lens(flat: Flat, sheet: Sheet, best: Hypothesis) -> Sheet:
     return sheet if lens is None else replace(sheet, lens=lens)
 
 
-def _settled(best: Hypothesis, dpi: tuple[float, float] | None) -> Fit:
-    """Refit with the sides that agree; a side far off after the fit is dropped, once."""
+def _settled(best: Hypothesis, dpi: tuple[float, float] | None, *, copied: bool = False) -> Fit:
+    """Refit with the sides that agree; a side far off after the fit is dropped, once.
+
+    The scale of a copy is not the scanner's: where its frame has all four sides, they alone tell it.
+    """
     sides = list(best.sides)
+    if copied and len(sides) == _ALL_SIDES and all(side.model is not PAPER for side in sides):
+        dpi = None
     fit = fit_sides(best.mm_to_px, sides, dpi, perspective=best.perspective)
     keep = [side for side, off in zip(sides, fit.side_mm, strict=True) if abs(off) < _FAR_OFF_MM]
     return (
@@ -220,10 +244,12 @@ def _from_resolution(
     if not resolution.stated:
         message = f"no stated resolution: {resolution.dpi[0]:.0f} dpi assumed, by which the page is A3"
         problems.append(Problem("resolution_assumed", message, page.source))
-    problems.append(
-        Problem("frame_missing", "no drawing frame: the place on the sheet is rough", page.source)
-    )
+    message = "no drawing frame: the place on the sheet is rough"
     scale_se = 0.0015 if resolution.stated else _WINDOW_SE
+    if _is_copy(page):
+        scale_se = float(np.hypot(scale_se, _COPY_SE))
+        message += f", and a copy's lengths are known to {100.0 * _COPY_SE:.0f} % only"
+    problems.append(Problem("frame_missing", message, page.source))
     return _sheet(_placed(matrix, resolution, lines, scale_se), None, scale_se, problems)
 
 
