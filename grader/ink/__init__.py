@@ -13,7 +13,7 @@ from grader.ink.components import find_components, mark_boxes
 from grader.ink.hatching import boxes_around, hatching
 from grader.ink.inkmap import ink_map
 from grader.ink.regions import field_of
-from grader.ink.seeds import PX_PER_MM, find_seeds
+from grader.ink.seeds import find_seeds, working_scale
 from grader.ink.strokes import find_strokes, take
 from grader.ink.tips import find_tips
 from grader.pixels import flatten
@@ -30,8 +30,9 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     boxes : where to look, in sheet mm; all of `sheet.drawable_mm` by default
     """
     flat = flatten(page.grey)
-    scale = min(1.0, PX_PER_MM / sheet.px_per_mm)
-    seeds = find_seeds(flat.reduced(scale))
+    scale = working_scale(sheet.px_per_mm)
+    contrast = flat.reduced(scale)
+    seeds = find_seeds(contrast)
     components = find_components(seeds)
     field = field_of(seeds, sheet, scale, boxes)
     strokes = find_strokes(flat, seeds, components, field)
@@ -42,4 +43,4 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     marks = np.concatenate([mark_boxes(components, field), boxes_around(strokes, hatched)])
     strokes = take(strokes, ~hatched)
     tips = find_tips(flat, strokes, sheet.mm_to_px)
-    return Ink(strokes, circles, marks, ink_map(flat, sheet), tips=tips)
+    return Ink(strokes, circles, marks, ink_map(contrast, scale, sheet), tips=tips)

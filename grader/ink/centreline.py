@@ -1,6 +1,6 @@
 """Strokes fitted to the middle of their ink at full resolution, with standard errors."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from grader.pixels import BoolArray, Cuts, Flat, Lines, cut_across, robust_lines
 from grader.records import FloatArray
 
-_REACH_MM = 0.9
+_REACH_MM = 0.8
 _CAPTURE_MM = 0.1
 _SINGLE = 1.5
 _THIN = 0.4
@@ -18,12 +18,13 @@ _WOBBLE_MM = 2.0
 """A hand's wobble along a ruler keeps its sign over about this length."""
 _FLOOR_MM = 0.015
 """Strokes drawn over each other, and a pen that leans, shift the middle of the ink by this much."""
+_GUESS_MM = 0.4
 _LEAST_CUTS = 6
 _SHORT_MM = 8.0
 _SHORT_PENS = 1.35
 _PENS = 2.4
 _USED = 0.05
-_COUNTS = ((20.0, 160), (6.0, 64), (0.0, 24))
+_COUNTS = ((20.0, 64), (6.0, 32), (0.0, 20))
 """Cuts for strokes of more than so many millimetres, the longest first."""
 _SURE = 0.5
 _TAKEN_MM = 0.13
@@ -42,6 +43,7 @@ class Fitted:
     noise : (k,) px, robust standard deviation of the ink's middle about the line
     support : (k,) share of the cuts that agree with the line; 0 where no line was found
     darkness : (k,) contrast to the paper
+    se_across, se_turn : (k,) standard errors of the place across at the middle, px, and of direction, radians
     """
 
     ends: FloatArray
@@ -49,6 +51,8 @@ class Fitted:
     noise: FloatArray
     support: FloatArray
     darkness: FloatArray
+    se_across: FloatArray
+    se_turn: FloatArray
 
     def __len__(self) -> int:
         return len(self.width)
@@ -61,38 +65,49 @@ class Fitted:
 
     def take(self, which: BoolArray | NDArray[np.intp]) -> "Fitted":
         """The chosen rows."""
-        return Fitted(
-            self.ends[which], self.width[which], self.noise[which], self.support[which], self.darkness[which]
-        )
+        return Fitted(*(getattr(self, one.name)[which] for one in fields(Fitted)))
 
     def with_ends(self, ends: FloatArray) -> "Fitted":
         """The same strokes between other ends."""
         return replace(self, ends=ends)
 
 
-def fit_centre(flat: Flat, ends: FloatArray, width: FloatArray, px_per_mm: float, pen_px: float) -> Fitted:
+@dataclass(frozen=True, slots=True)
+class Pen:
+    """Resolution and the usual width of the sheet's strokes, px."""
+
+    px_per_mm: float
+    width: float
+
+
+def fit_centre(flat: Flat, ends: FloatArray, width: FloatArray, pen: Pen) -> Fitted:
     """Lines through the middle of the ink near guesses (k, 2, 2) of width (k,), in pixels.
 
     In a band of several strokes a cut has no middle of its own: then a border, less half of the
     pen's width, stands for it. Long strokes are fitted first; what is theirs is not the shorter
-    ones'. A short stroke is no wider than the sheet's pen, `pen_px`, allows.
+    ones'. A short stroke is no wider than the sheet's pen allows.
     """
     span = ends[:, 1] - ends[:, 0]
-    length_mm = np.hypot(span[:, 0], span[:, 1]) / px_per_mm
-    most = np.where(length_mm < _SHORT_MM, _SHORT_PENS, _PENS) * pen_px
+    length_mm = np.hypot(span[:, 0], span[:, 1]) / pen.px_per_mm
+    most = np.where(length_mm < _SHORT_MM, _SHORT_PENS, _PENS) * pen.width
     width = np.minimum(width, most)
-    fitted = Fitted(ends.copy(), width.copy(), np.zeros(len(ends)), np.zeros(len(ends)), np.zeros(len(ends)))
+    fitted = Fitted(ends.copy(), width.copy(), *np.zeros((5, len(ends))))
     high, taken = np.inf, np.zeros((0, 2, 2))
     for low, count in _COUNTS:
         rows = np.flatnonzero((length_mm > low) & (length_mm <= high))
         high = low
         if len(rows):
-            guess = Guess(ends[rows], width[rows], most[rows], taken, px_per_mm)
+            guess = Guess(ends[rows], width[rows], most[rows], taken, pen.px_per_mm)
             part = _fit_group(flat, guess, count)
-            for name in ("ends", "width", "noise", "support", "darkness"):
-                getattr(fitted, name)[rows] = getattr(part, name)
+            put(fitted, rows, part)
             taken = np.concatenate([taken, part.ends[part.support > _SURE]])
     return fitted
+
+
+def put(fitted: Fitted, rows: NDArray[np.intp], part: Fitted) -> None:
+    """Write the strokes of a part into their rows."""
+    for one in fields(Fitted):
+        getattr(fitted, one.name)[rows] = getattr(part, one.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,14 +129,19 @@ def _fit_group(flat: Flat, guess: Guess, count: int) -> Fitted:
         others = _crossings(ends, cuts.along, guess.taken, unit)
         middle, weight = _middles(cuts, width, others, unit)
         lines = robust_lines(cuts.along, middle, weight, 0.03 * unit)
-        ends = _moved(ends, lines)
-        width = np.minimum(_lone_width(cuts, weight, width), guess.most)
+        ends = moved(ends, lines)
+        width = np.minimum(lone_width(cuts, weight == 1.0, width), guess.most)
     known = weight > 0
     enough = known.sum(axis=1) >= _LEAST_CUTS
     agrees = known & (lines.weight > _USED * weight)
     support = np.where(enough, agrees.mean(axis=1), 0.0)
-    dark = np.where(known, cuts.dark, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    return Fitted(ends, width, lines.scale, support, dark)
+    across, turn = standard_errors(cuts.along, lines, unit)
+    return Fitted(ends, width, lines.scale, support, mean_of(cuts.dark, known), across, turn)
+
+
+def mean_of(values: FloatArray, which: BoolArray) -> FloatArray:
+    """Row means of the values chosen, 0 where none is."""
+    return np.asarray(np.where(which, values, 0.0).sum(axis=1) / np.maximum(which.sum(axis=1), 1))
 
 
 def _crossings(ends: FloatArray, along: FloatArray, taken: FloatArray, px_per_mm: float) -> FloatArray:
@@ -167,7 +187,8 @@ def _is_other(offset: FloatArray, others: FloatArray, px_per_mm: float) -> BoolA
     return np.asarray((np.abs(others - offset[..., None]) < _TAKEN_MM * px_per_mm).any(axis=2))
 
 
-def _moved(ends: FloatArray, lines: Lines) -> FloatArray:
+def moved(ends: FloatArray, lines: Lines) -> FloatArray:
+    """The strokes shifted onto the lines fitted to their cuts."""
     span = ends[:, 1] - ends[:, 0]
     length = np.maximum(np.hypot(span[:, 0], span[:, 1]), 1e-9)
     u = span / length[:, None]
@@ -176,22 +197,29 @@ def _moved(ends: FloatArray, lines: Lines) -> FloatArray:
     return np.asarray(ends + shift[:, :, None] * normal[:, None, :])
 
 
-def _lone_width(cuts: Cuts, weight: FloatArray, width: FloatArray) -> FloatArray:
+def lone_width(cuts: Cuts, lone: BoolArray, width: FloatArray) -> FloatArray:
     """Mean width where the stroke is alone; as guessed where it never is."""
-    lone = weight == 1.0
-    count = lone.sum(axis=1)
-    mean = np.where(lone, cuts.width, 0.0).sum(axis=1) / np.maximum(count, 1)
-    return np.where(count >= _LEAST_CUTS, mean, width)
+    mean = mean_of(cuts.width, lone)
+    return np.where(lone.sum(axis=1) >= _LEAST_CUTS, mean, width)
 
 
-def standard_errors(fitted: Fitted, px_per_mm: float) -> tuple[FloatArray, FloatArray]:
-    """(across at the middle in px, direction in radians), (k,) each.
+def standard_errors(along: FloatArray, lines: Lines, px_per_mm: float) -> tuple[FloatArray, FloatArray]:
+    """(across at the middle in px, direction in radians), (k,) each, of lines through cuts.
 
-    The wobble is averaged only over pieces longer than its own waves, and the pixels' and paper's
-    own error stays.
+    Cuts nearer to each other than the wobble's own waves say nothing new; where a stroke was seen
+    alone only at one end, the other end is known the less. The pixels' and paper's own error stays.
     """
-    length = fitted.length
-    independent = np.maximum(1.0, fitted.support * length / (_WOBBLE_MM * px_per_mm))
-    noise = np.maximum(fitted.noise, _FLOOR_MM * px_per_mm)
-    across = np.hypot(noise / np.sqrt(independent), _FLOOR_MM * px_per_mm)
-    return across, np.sqrt(12.0) * across / np.maximum(length, 1e-9)
+    count = along.shape[1]
+    length = np.maximum(along[:, 0] + along[:, -1], 1e-9)
+    noise = np.maximum(lines.scale, _FLOOR_MM * px_per_mm)
+    news = np.minimum(1.0, length / count / (_WOBBLE_MM * px_per_mm))
+    weight = lines.weight * (news / noise**2)[:, None]
+    t = along - length[:, None] / 2.0
+    # Guesses are no worse than this: keeps lines that are hidden all along finite.
+    guess = (_GUESS_MM * px_per_mm) ** -2.0
+    s0, s1 = weight.sum(axis=1) + guess, (weight * t).sum(axis=1)
+    s2 = (weight * t**2).sum(axis=1) + guess * length**2 / 12.0
+    determinant = s0 * s2 - s1**2
+    across = np.hypot(np.sqrt(s2 / determinant), _FLOOR_MM * px_per_mm)
+    turn = np.hypot(np.sqrt(s0 / determinant), np.sqrt(12.0) * _FLOOR_MM * px_per_mm / length)
+    return across, turn

@@ -62,8 +62,9 @@ def find_components(seeds: Seeds) -> Components:
 
 def _spread(labels: NDArray[np.int32], count: int) -> tuple[FloatArray, FloatArray]:
     """Standard deviations of each piece's pixels along and across it, (count,) each, px."""
-    row, column = np.nonzero(labels)
-    label = labels[row, column] - 1
+    inked = np.flatnonzero(labels > 0)
+    row, column = np.divmod(inked, labels.shape[1])
+    label = labels.reshape(-1)[inked] - 1
     number = np.maximum(np.bincount(label, minlength=count), 1)
 
     def mean(values: FloatArray) -> FloatArray:

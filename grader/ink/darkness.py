@@ -1,6 +1,9 @@
 """A vector drawn over its construction line: the dark part and the light parts are strokes of their own."""
 
+from itertools import pairwise
+
 import numpy as np
+import scipy.ndimage
 from numpy.typing import NDArray
 
 from grader.ink.centreline import Fitted
@@ -24,8 +27,7 @@ def split_by_darkness(flat: Flat, fitted: Fitted, px_per_mm: float) -> tuple[Flo
     """
     parts: list[FloatArray] = []
     owners: list[int] = []
-    for row, length in enumerate(fitted.length):
-        levels = _profile(flat, fitted.ends[row], float(fitted.width[row]), float(length), px_per_mm)
+    for row, levels in enumerate(_profiles(flat, fitted, px_per_mm)):
         for low, high in _runs(levels):
             share = np.array([low, high]) / len(levels)
             span = fitted.ends[row, 1] - fitted.ends[row, 0]
@@ -34,31 +36,36 @@ def split_by_darkness(flat: Flat, fitted: Fitted, px_per_mm: float) -> tuple[Flo
     return np.array(parts).reshape(-1, 2, 2), np.array(owners, dtype=np.intp)
 
 
-def _profile(flat: Flat, ends: FloatArray, width: float, length: float, px_per_mm: float) -> FloatArray:
+def _profiles(flat: Flat, fitted: Fitted, px_per_mm: float) -> list[FloatArray]:
     """Mean contrast over a little more than the pen's width, every 0.15 mm, smoothed by a running median."""
-    count = max(4, round(length / (_STEP_MM * px_per_mm)))
-    share = (np.arange(count) + 0.5) / count
-    u = (ends[1] - ends[0]) / max(length, 1e-9)
-    middle = ends[0] + share[:, None] * (ends[1] - ends[0])
-    across = _ACROSS * width
-    x = middle[:, 0, None] - u[1] * across[None, :]
-    y = middle[:, 1, None] + u[0] * across[None, :]
-    level = flat.contrast(x, y).mean(axis=1).astype(np.float64)
-    window = min(round(_SMOOTH_MM / _STEP_MM) | 1, (count - 1) | 1)
-    padded = np.pad(level, window // 2, mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, window), axis=1)[:count])
+    count = np.maximum(4, np.rint(fitted.length / (_STEP_MM * px_per_mm))).astype(np.intp)
+    if len(count) == 0:
+        return []
+    row = np.repeat(np.arange(len(count)), count)
+    first = np.concatenate([[0], np.cumsum(count)])
+    share = (np.arange(first[-1]) - first[row] + 0.5) / count[row]
+    span = fitted.ends[:, 1] - fitted.ends[:, 0]
+    u = span / np.maximum(fitted.length, 1e-9)[:, None]
+    middle = fitted.ends[row, 0] + share[:, None] * span[row]
+    across = _ACROSS[None, :] * fitted.width[row, None]
+    level = flat.contrast(
+        middle[:, 0, None] - u[row, 1, None] * across, middle[:, 1, None] + u[row, 0, None] * across
+    ).mean(axis=1)
+    smooth = scipy.ndimage.median_filter(level, round(_SMOOTH_MM / _STEP_MM) | 1, mode="nearest")
+    return [smooth[low:high].astype(np.float64) for low, high in pairwise(first)]
 
 
 def _runs(level: FloatArray) -> list[tuple[int, int]]:
     """Index ranges of the dark part and of the light parts worth keeping at its two ends."""
     n = len(level)
-    dark = level >= _LIGHT * np.quantile(level, _DARK_QUANTILE)
+    usual = float(np.partition(level, int(_DARK_QUANTILE * (n - 1)))[int(_DARK_QUANTILE * (n - 1))])
+    dark = level >= _LIGHT * usual
     least = round(_LEAST_LIGHT_MM / _STEP_MM)
     first, last = int(np.argmax(dark)), n - int(np.argmax(dark[::-1]))
     first = first if first >= least else 0
     last = last if n - last >= least else n
     keep = round(_LEAST_PART_MM / _STEP_MM)
-    inked = level > 0.3 * np.quantile(level, _DARK_QUANTILE)
+    inked = level > 0.3 * usual
     runs = [(first, last)]
     if first >= keep and inked[:first].mean() > 0.5:
         runs.append((0, first))

@@ -4,10 +4,11 @@ from dataclasses import fields
 
 import numpy as np
 
-from grader.ink.centreline import Fitted, fit_centre, standard_errors
+from grader.ink.bundles import distances, refined, rejoined
+from grader.ink.centreline import Fitted, Pen, fit_centre
 from grader.ink.components import Components
 from grader.ink.darkness import split_by_darkness
-from grader.ink.ending import coverage, find_ends
+from grader.ink.ending import coverage, find_ends, through_bands
 from grader.ink.joining import Pieces, join
 from grader.ink.regions import Field, to_mm
 from grader.ink.seeds import PX_PER_MM, Seeds
@@ -24,7 +25,6 @@ _LEAST_DASHED_MM = 7.0
 _LEAST_MM = 1.0
 _LEAST_SUPPORT = 0.3
 _SAME_MM = 0.2
-_PROBES = 13
 _SHORT_MM = 6.0
 _LONG_MM = 8.0
 _COVERED = 0.85
@@ -61,16 +61,20 @@ def _lines(full: FloatArray, seeds: Seeds, components: Components, usable: BoolA
 
 def _settled(flat: Flat, pieces: Pieces, unit: float, pen: float) -> tuple[Fitted, BoolArray]:
     """Fit, join what turns out to be one line, find the ends, fit again; no stroke twice."""
-    fitted = _sound(fit_centre(flat, pieces.ends, pieces.width, unit, pen), unit)
-    pen = _pen(fitted, unit, pen)
+    fitted = _sound(fit_centre(flat, pieces.ends, pieces.width, Pen(unit, pen)), unit)
+    usual = Pen(unit, _pen(fitted, unit, pen))
     pieces = join(fitted.ends, fitted.width, _FITTED_OFF_MM * unit, _FITTED_GAP_MM * unit)
-    fitted = _sound(fit_centre(flat, pieces.ends, pieces.width, unit, pen), unit)
+    fitted = _sound(fit_centre(flat, pieces.ends, pieces.width, usual), unit)
     grown, merged = find_ends(flat, fitted, unit)
+    grown = through_bands(flat, fitted, grown, merged, unit)
     parts, owners = split_by_darkness(flat, fitted.with_ends(grown), unit)
     fitted, merged = fitted.take(owners).with_ends(parts), merged[owners]
     once = distinct(fitted, unit)
     fitted, merged = fitted.take(once), merged[once]
-    final = fit_centre(flat, fitted.ends, fitted.width, unit, pen)
+    fitted = refined(flat, fitted, usual)
+    ends, stay = rejoined(fitted, unit)
+    fitted, merged = fitted.with_ends(ends).take(stay), merged[stay]
+    final = refined(flat, fitted, usual)
     # A short guess across a joint or a letter may have slid onto a stroke that is there already.
     good = (
         (final.support >= _LEAST_SUPPORT)
@@ -101,36 +105,26 @@ def distinct(fitted: Fitted, unit: float, covered_share: float = 1.0) -> BoolArr
     a joint, an arrowhead or a letter left over.
     """
     keep = np.zeros(len(fitted), dtype=bool)
-    share = np.linspace(0.04, 0.96, _PROBES)
+    if len(fitted) == 0:
+        return keep
+    off = distances(fitted.ends)
+    along = np.asarray((off < _SAME_MM * unit).all(axis=1))
+    inside = np.asarray(off < 0.6 * fitted.width)
+    short = fitted.length < _SHORT_MM * unit
     for row in np.argsort(-fitted.length):
-        taken = np.flatnonzero(keep)
-        points = fitted.ends[row, 0] + share[:, None] * (fitted.ends[row, 1] - fitted.ends[row, 0])
-        off = _distance(points, fitted.ends[taken])
-        along = (off < _SAME_MM * unit).all(axis=0).any()
-        covered = (off < 0.6 * fitted.width[taken]).any(axis=1).mean()
-        short = fitted.length[row] < _SHORT_MM * unit
-        keep[row] = not along and not (short and covered > covered_share)
+        covered = short[row] and inside[row][:, keep].any(axis=1).mean() > covered_share
+        keep[row] = not covered and not along[row][keep].any()
     return keep
-
-
-def _distance(points: FloatArray, ends: FloatArray) -> FloatArray:
-    """(p, k) distances of points (p, 2) from segments (k, 2, 2)."""
-    span = ends[:, 1] - ends[:, 0]
-    squared = np.maximum((span**2).sum(axis=1), 1e-9)
-    relative = points[:, None, :] - ends[None, :, 0]
-    along = np.clip((relative * span).sum(axis=2) / squared, 0.0, 1.0)
-    return np.asarray(np.hypot(*np.moveaxis(relative - along[..., None] * span, 2, 0)))
 
 
 def _records(flat: Flat, fitted: Fitted, merged: BoolArray, sheet: Sheet) -> Strokes:
     unit = sheet.px_per_mm
-    across, angle = standard_errors(fitted, unit)
     return Strokes(
         ends=to_mm(sheet, fitted.ends),
         width=fitted.width / unit,
-        se_offset=across / unit,
-        se_angle=angle,
+        se_offset=fitted.se_across / unit,
+        se_angle=fitted.se_turn,
         se_end=np.where(merged, _SE_MERGED_MM, _SE_END_MM),
-        coverage=coverage(flat, fitted, unit),
+        coverage=coverage(flat, fitted),
         darkness=fitted.darkness,
     )
