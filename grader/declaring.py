@@ -13,8 +13,9 @@ from grader.comparison.evidence import Evidence, gather
 from grader.quantities import ByRule, Declared, ParsedScale, parse_scale
 from grader.records import Problem, Reading, Written
 
-SURE, BEYOND_DOUBT = 0.9, 0.985
-"""Confidence at which a box is believed where the drawing agrees, and where it does not."""
+LIKELY, SURE, BEYOND_DOUBT = 0.2, 0.9, 0.985
+"""Confidence at which a box is believed where the drawing or the rule has the very scale (a misreading
+would hit it once in hundreds), where they have nearly that scale, and where they have another."""
 SAME = 0.005
 """Relative: two scales that differ less are one, rounded."""
 BORNE_OUT = 0.02
@@ -86,7 +87,8 @@ def _believed(
         told = f"{name}'s box could not be read; enter {name} in the roster or with the measurements"
         return None, [Problem("scale_box_unread", told)]
     told = f"{name}'s box seems to read '{best.text}' ({100 * best.confidence:.0f} %)"
-    if best.confidence < SURE:
+    very = best.confidence >= LIKELY and _is_borne_out(task, evidence, name, best.text, known, SAME)
+    if best.confidence < SURE and not very:
         return None, [Problem("scale_box_doubtful", f"{told}, too unsure to be used; look, and enter {name}")]
     sure = [box for box in boxes if box.confidence >= SURE]
     if any(not _is_same(task, name, box.text, best.text, known) for box in sure):
@@ -132,7 +134,14 @@ def _is_same(task: Task, name: str, one: str, other: str, known: Mapping[str, fl
     return first is None or second is None or abs(first / second - 1.0) <= SAME
 
 
-def _is_borne_out(task: Task, evidence: Evidence, name: str, text: str, known: Mapping[str, float]) -> bool:
+def _is_borne_out(
+    task: Task,
+    evidence: Evidence,
+    name: str,
+    text: str,
+    known: Mapping[str, float],
+    within: float = BORNE_OUT,
+) -> bool:
     """Whether the drawn crank, v_A or a_A, or the assignment's rule, has nearly this scale.
 
     A rule of the student's own, such as omega kL, needs nothing else to bear it out.
@@ -142,7 +151,7 @@ def _is_borne_out(task: Task, evidence: Evidence, name: str, text: str, known: M
         return isinstance(_parsed(task, name, text), ByRule)
     ruled = float(getattr(task.assignment.scales([task.variant], **known), name)[0])
     tried = [ruled, *_drawn(task, evidence, name)]
-    return any(abs(value / one - 1.0) <= BORNE_OUT for one in tried if one > 0.0)
+    return any(abs(value / one - 1.0) <= within for one in tried if one > 0.0)
 
 
 def _drawn(task: Task, evidence: Evidence, name: str) -> list[float]:

@@ -25,15 +25,13 @@ class Glyph:
     ----------
     sign : its class
     picture : uint8, 255 = ink, cut to the ink
-    bones : the same size, the middle lines of its strokes, to be written with any pen; None where
-        the picture is to be taken as it is
-    is_real : written by somebody: it has its own slant and wobble
+    bones : the same size, the middle lines of its strokes, to be written with any pen; None for
+        pictures too small to have any
     """
 
     sign: str
     picture: np.ndarray
     bones: np.ndarray | None
-    is_real: bool = False
 
 
 def texts_of() -> dict[str, str]:
@@ -80,4 +78,4 @@ def digits(folder: Path) -> Iterator[Glyph]:
     for digit in range(10):
         data = np.array(json.loads((folder / "src" / "digits" / f"{digit}.json").read_text())["data"])
         for picture in (255.0 * data.reshape(-1, 28, 28)).astype(np.uint8):
-            yield Glyph("o" if digit == 0 else str(digit), cv2.resize(picture, (84, 84)), None, is_real=True)
+            yield Glyph("o" if digit == 0 else str(digit), cv2.resize(picture, (84, 84)), None)

@@ -69,16 +69,15 @@ def _written(glyph: Glyph, rng: np.random.Generator, most_wobble: float) -> np.n
         pen = round(rng.uniform(3.0, 13.0))
         picture = cv2.dilate(glyph.bones, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (pen, pen)))
     high, wide = picture.shape
-    own = 0.3 if glyph.is_real else 1.0
-    turn = own * np.radians(rng.normal(0.0, 7.0))
-    slant = own * rng.uniform(-0.1, 0.35) if rng.random() < 0.7 else 0.0
-    stretch = np.exp(own * rng.uniform(-0.25, 0.25))
+    turn = np.radians(rng.normal(0.0, 7.0))
+    slant = rng.uniform(-0.1, 0.35) if rng.random() < 0.7 else 0.0
+    stretch = np.exp(rng.uniform(-0.25, 0.25))
     cosine, sine = np.cos(turn), np.sin(turn)
     shape = np.array([[cosine, -sine], [sine, cosine]]) @ np.array([[1.0, -slant], [0.0, 1.0]])
     shape = np.linalg.inv(shape @ np.diag([stretch, 1.0]))
     side = int(1.35 * max(high, wide * stretch)) + 8
     y, x = np.mgrid[0:side, 0:side].astype(np.float32) - side / 2.0
-    wobble = own * rng.normal(0.0, rng.uniform(0.0, most_wobble), (2, 5, 5)) * max(high, wide)
+    wobble = rng.normal(0.0, rng.uniform(0.0, most_wobble), (2, 5, 5)) * max(high, wide)
     dx, dy = (cv2.resize(plane, (side, side), interpolation=cv2.INTER_CUBIC) for plane in wobble)
     u = shape[0, 0] * x + shape[0, 1] * y + wide / 2.0 + dx
     v = shape[1, 0] * x + shape[1, 1] * y + high / 2.0 + dy

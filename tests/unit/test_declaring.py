@@ -4,11 +4,17 @@ import pytest
 
 from grader.comparison import task_of
 from grader.declaring import BEYOND_DOUBT, SURE, declarations, sure_texts
+from grader.declaring import LIKELY as LEAST
 from grader.records import Reading, Written
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
 
-FIRM, LIKELY, DOUBTFUL = (BEYOND_DOUBT + 1.0) / 2.0, (SURE + BEYOND_DOUBT) / 2.0, SURE / 2.0
+FIRM, LIKELY, FAIR, DOUBTFUL = (
+    (BEYOND_DOUBT + 1.0) / 2.0,
+    (SURE + BEYOND_DOUBT) / 2.0,
+    SURE / 2.0,
+    LEAST / 2.0,
+)
 RULED, OTHER = "0.005 m/mm", "0.0061 m/mm"
 """The kL that the assignment's rule proposes, and another that nothing bears out."""
 
@@ -48,6 +54,13 @@ def test_a_doubtful_box_is_told_with_what_it_seems_to_read_and_not_used(task):
     assert found.texts == {}
     assert codes(found) == ["scale_box_doubtful"]
     assert RULED in found.problems[0].message
+
+
+def test_a_fairly_read_box_counts_only_where_it_says_the_very_scale_of_the_rule(task):
+    very = declarations(task, {}, [reading(RULED, FAIR)])
+    near = declarations(task, {}, [reading("0.00505 m/mm", FAIR)])
+    assert (very.texts, codes(very)) == ({"kL": RULED}, [])
+    assert (near.texts, codes(near)) == ({}, ["scale_box_doubtful"])
 
 
 def test_an_unreadable_box_is_told(task):
