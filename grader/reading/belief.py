@@ -1,12 +1,12 @@
-"""A Gaussian belief of where a figure's nodes are, and what a stroke says about it."""
+"""Gaussian beliefs of where a figure's nodes are, and what strokes say about them; many at a time."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from grader.reading.expected import Expected
 from grader.reading.lines import BoolArray, Lines
 from grader.records import FloatArray, IntArray
+from reference.geometry import ComplexArray
 
 REDRAW_MM = 0.3
 """How far a stroke misses the nodes that it joins, one standard error."""
@@ -17,6 +17,8 @@ TIP_MM = 0.2
 END_MM, END_SHARE = 0.3, 0.4
 RUN_ON_FAR = 4e-4
 """Density per mm of ends anywhere: the stroke goes on as another edge, or as a line drawn through."""
+UNTOLD_MM = 1e5
+"""Standard error of what an end tells that is not at its node: nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,71 +33,113 @@ class Ends:
     short_share: float = 0.07
 
 
-def offsets(expected: Expected, tail: int, head: int, lines: Lines) -> tuple[FloatArray, FloatArray]:
-    """(s, 2) distance of both nodes from each line, and their (s, 2, 2) covariance."""
-    across = 1j * lines.along
-    normal = np.column_stack([across.real, across.imag])
-    off = np.column_stack(
-        [((expected.at[node] - lines.start) * np.conj(lines.along)).imag for node in (tail, head)]
-    )
-    arm = np.column_stack(
-        [((expected.at[node] - lines.middle) * np.conj(lines.along)).real for node in (tail, head)]
-    )
-    spread = np.empty((len(lines), 2, 2))
-    for a in (0, 1):
-        for b in (0, 1):
-            first, second = 2 * (tail, head)[a], 2 * (tail, head)[b]
-            block = expected.cov[first : first + 2, second : second + 2]
-            nodes = np.einsum("si,ij,sj->s", normal, block, normal)
-            line = lines.se_offset**2 + lines.se_angle**2 * arm[:, a] * arm[:, b]
-            spread[:, a, b] = nodes + line + (REDRAW_MM**2 if a == b else 0.0)
-    return off, spread
+@dataclass(frozen=True, slots=True)
+class Spans:
+    """Beliefs of the two nodes that an edge joins, a row each.
+
+    Attributes
+    ----------
+    tail, head : (s,) complex mm
+    cov : (3, s, 3) covariances of the tail, of tail with head, of the head; each as xx, xy + yx, yy,
+        so that its product with `_squares` of a direction is the covariance along that direction
+    """
+
+    tail: ComplexArray
+    head: ComplexArray
+    cov: FloatArray
+
+    def take(self, rows: IntArray) -> "Spans":
+        """Some of the rows, also repeated."""
+        return Spans(self.tail[rows], self.head[rows], self.cov[:, rows])
+
+
+@dataclass(frozen=True, slots=True)
+class Beliefs:
+    """Beliefs of a figure's nodes, a row each.
+
+    Attributes
+    ----------
+    at : (s, n) complex mm
+    cov : (s, 2n, 2n) covariance, x and y of each node in turn
+    """
+
+    at: ComplexArray
+    cov: FloatArray
+
+    def take(self, rows: IntArray) -> "Beliefs":
+        """Some of the rows, also repeated."""
+        return Beliefs(self.at[rows], self.cov[rows])
+
+    def spans(self, tail: int | IntArray, head: int | IntArray) -> Spans:
+        """What is believed of an edge's nodes; of many edges' (s,) where there is one belief."""
+        tails, heads = np.atleast_1d(tail), np.atleast_1d(head)
+        first, second = np.stack([tails, tails, heads]), np.stack([tails, heads, heads])
+        x, y = (2 * first, 2 * second), (2 * first + 1, 2 * second + 1)
+        row = np.arange(len(self.cov))
+        mixed = self.cov[row, x[0], y[1]] + self.cov[row, y[0], x[1]]
+        cov = np.stack([self.cov[row, *x], mixed, self.cov[row, *y]], axis=-1)
+        return Spans(self.at[row, tails], self.at[row, heads], cov)
+
+
+def _squares(direction: ComplexArray) -> FloatArray:
+    """(s, 3) of unit vectors: x^2, x y, y^2."""
+    x, y = direction.real, direction.imag
+    return np.stack([x * x, x * y, y * y], axis=-1)
+
+
+def offsets(spans: Spans, lines: Lines) -> tuple[FloatArray, FloatArray]:
+    """Distances of both nodes from each line (2, s, lines), and their covariances (3, s, lines).
+
+    The covariances are those of the tail, of tail with head, and of the head.
+    """
+    nodes = np.stack([spans.tail, spans.head])[:, :, None]
+    from_middle = (nodes - lines.middle) * np.conj(lines.along)
+    spread = spans.cov @ _squares(1j * lines.along).T
+    arm = from_middle.real
+    for pair, (one, other) in enumerate(((0, 0), (0, 1), (1, 1))):
+        spread[pair] += lines.se_offset**2 + lines.se_angle**2 * arm[one] * arm[other]
+    spread[::2] += REDRAW_MM**2
+    return from_middle.imag, spread
 
 
 def mahalanobis(off: FloatArray, spread: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Squared distances (n,) of pairs (n, 2) by their covariances (n, 2, 2), and log determinants."""
-    a, b, c = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
+    """Squared distances of pairs (2, ...) by their covariances (3, ...), and log determinants."""
+    a, b, c = spread
     det = np.maximum(a * c - b * b, 1e-9)
-    distance = (c * off[:, 0] ** 2 - 2 * b * off[:, 0] * off[:, 1] + a * off[:, 1] ** 2) / det
+    distance = (c * off[0] ** 2 - 2 * b * off[0] * off[1] + a * off[1] ** 2) / det
     return distance, np.log(det)
 
 
-def ends_at(
-    expected: Expected, tail: int, head: int, lines: Lines, ends: Ends
-) -> tuple[FloatArray, BoolArray, IntArray]:
-    """How the strokes that cover an edge end about its nodes.
+def ends_at(spans: Spans, lines: Lines, ends: Ends) -> tuple[FloatArray, BoolArray, BoolArray]:
+    """How strokes end about the nodes of an edge, stroke by stroke (n,).
 
-    Returns log densities (n,), whether they end at the nodes (n, 2), and which strokes these are (n,).
+    Returns log densities (n,), whether they end at the nodes (n, 2), and whether they cover the edge (n,).
     """
-    span = expected.at[head] - expected.at[tail]
-    along = np.where((lines.along * np.conj(span)).real > 0, lines.along, -lines.along)
-    place = np.column_stack(
-        [((end - expected.at[tail]) * np.conj(along)).real for end in (lines.start, lines.end)]
-    )
-    first, last = place.min(axis=1), place.max(axis=1)
+    span = spans.head - spans.tail
+    forward = (lines.along * np.conj(span)).real > 0
+    along = np.where(forward, lines.along, -lines.along)
+    ways = np.stack([lines.start, lines.end]) - spans.tail
+    places = (ways * np.conj(along)).real
+    first, last = places.min(axis=0), places.max(axis=0)
     size = (span * np.conj(along)).real
-    kept = np.flatnonzero((last > 0.35 * size) & (first < 0.65 * size) & (last - first > 0.3 * size))
-    along, size, gaps = along[kept], size[kept], np.column_stack([-first, last])[kept]
-    gaps[:, 1] -= size
-    direction = np.column_stack([along.real, along.imag])
-    total, ended = np.zeros(len(kept)), np.zeros((len(kept), 2), dtype=bool)
-    forward = (lines.along[kept] * np.conj(along)).real > 0
-    own = lines.se_end[kept]
-    errors = np.where(forward[:, None], own, own[:, ::-1])
-    for slot, node in enumerate((tail, head)):
-        block = expected.cov[2 * node : 2 * node + 2, 2 * node : 2 * node + 2]
-        variance = np.einsum("si,ij,sj->s", direction, block, direction)
-        variance += errors[:, slot] ** 2 + ends.at_mm**2
-        ahead = (lines.along[kept] * np.conj(along)).real > 0
-        if slot == 0:
-            ahead = ~ahead
-        tips, sure = lines.tips_towards(kept, ahead, head=slot == 1)
-        at = lines.start[kept, None] + tips * lines.along[kept, None]
-        off = ((at - expected.at[node]) * np.conj(along)[:, None]).real
-        marked = _marked(off, sure, variance)
-        score, ended[:, slot] = _end_score(gaps[:, slot], variance, ends, marked)
+    covers = (last > 0.35 * size) & (first < 0.65 * size) & (last - first > 0.3 * size)
+    errors = np.where(forward[:, None], lines.se_end, lines.se_end[:, ::-1])
+    total, ended = np.zeros(len(lines)), np.zeros((len(lines), 2), dtype=bool)
+    for slot, (node, gap) in enumerate(((spans.tail, -first), (spans.head, last - size))):
+        around = (spans.cov[2 * slot] * _squares(along)).sum(axis=1)
+        variance = around + errors[:, slot] ** 2 + ends.at_mm**2
+        off, sure = _tips_off(lines, node, forward == bool(slot), head=slot == 1)
+        score, ended[:, slot] = _end_score(gap, variance, ends, _marked(off, sure, variance))
         total += score
-    return total, ended, kept
+    return total, ended, covers
+
+
+def _tips_off(
+    lines: Lines, node: ComplexArray, ahead: BoolArray, *, head: bool
+) -> tuple[FloatArray, FloatArray]:
+    """How far tips lie off nodes along their strokes (n, t), and their probabilities."""
+    tips, sure = lines.tips_towards(np.arange(len(lines)), ahead, head=head)
+    return tips + ((lines.start - node) * np.conj(lines.along)).real[:, None], sure
 
 
 def _marked(off: FloatArray, sure: FloatArray, variance: FloatArray) -> FloatArray:
@@ -118,79 +162,80 @@ def _end_score(
     return np.asarray(np.log(at + off + marked + RUN_ON_FAR)), np.asarray(at + marked > 2.0 * off)
 
 
-def _end_of(expected: Expected, edge: int, slot: int, lines: Lines, row: int) -> tuple[complex, float]:
-    """Where a vector ends on its stroke, with the standard error: the likelier of ink's end and tips."""
-    ends = (expected.edges[edge].tail, expected.edges[edge].head)
-    node, other = complex(expected.at[ends[slot]]), complex(expected.at[ends[1 - slot]])
-    along = complex(lines.along[row])
-    forward = np.array([((node - other) * np.conj(along)).real > 0])
-    tips, sure = lines.tips_towards(np.array([row]), forward, head=slot == 1)
-    end, error = lines.nearer_end(row, node)
-    if not sure.any():
-        return end, error
-    at = lines.start[row] + tips[0] * along
-    block = expected.cov[2 * ends[slot] : 2 * ends[slot] + 2, 2 * ends[slot] : 2 * ends[slot] + 2]
-    direction = np.array([along.real, along.imag])
-    variance = float(direction @ block @ direction)
-    off = np.append(((at - node) * np.conj(along)).real, ((end - node) * np.conj(along)).real)
-    spread = np.append(np.full(len(at), variance + TIP_MM**2), variance + error**2 + END_MM**2)
-    density = np.append(sure[0], END_SHARE) * np.exp(-0.5 * off**2 / spread) / np.sqrt(spread)
-    best = int(np.argmax(density))
-    return (end, error) if best == len(at) else (complex(at[best]), TIP_MM)
+def _seen_ends(spans: Spans, lines: Lines, slot: int) -> tuple[FloatArray, FloatArray]:
+    """How far off its node a vector ends on its stroke (s,), with the standard error.
+
+    It is the likelier of the ink's end and of tips.
+    """
+    node, other = (spans.head, spans.tail) if slot else (spans.tail, spans.head)
+    back = np.conj(lines.along)
+    ink = np.stack([lines.start, lines.end], axis=1) - node[:, None]
+    nearer = np.abs(ink).argmin(axis=1)
+    rows = np.arange(len(lines))
+    error = lines.se_end[rows, nearer]
+    off, sure = _tips_off(lines, node, ((node - other) * back).real > 0, head=slot == 1)
+    around = (spans.cov[2 * slot] * _squares(lines.along)).sum(axis=1)
+    off = np.column_stack([(ink[rows, nearer] * back).real, off])
+    spread = around[:, None] + np.full(off.shape, TIP_MM**2)
+    spread[:, 0] = around + error**2 + END_MM**2
+    sure = np.column_stack([np.full(len(lines), END_SHARE), sure])
+    best = (sure * np.exp(-0.5 * off**2 / spread) / np.sqrt(spread)).argmax(axis=1)
+    return off[rows, best], np.where(best == 0, error, TIP_MM)
 
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """A stroke taken for an edge.
+    """Strokes taken for one edge, one for each belief.
 
     Attributes
     ----------
-    row : of `Lines`, -1 for none
-    shared : whether it serves another edge already
-    ended : whether it ends at the edge's tail and at its head
+    lines : the strokes, a row each
+    shared : (s,) whether it serves another edge already
+    ended : (s, 2) whether it ends at the edge's tail and at its head
     """
 
-    row: int = -1
-    shared: bool = False
-    ended: tuple[bool, bool] = (False, False)
+    lines: Lines
+    shared: BoolArray
+    ended: BoolArray
 
 
-NOTHING = Taken()
+def updated(beliefs: Beliefs, edge: tuple[int, int], taken: Taken, ends: Ends) -> Beliefs:
+    """The beliefs after a stroke was seen for an edge, given by its nodes (Kalman)."""
+    lines, (tail, head) = taken.lines, edge
+    along = lines.along
+    spans = beliefs.spans(tail, head)
+    nodes = np.column_stack([spans.tail, spans.head])
+    from_middle = (nodes - lines.middle[:, None]) * np.conj(along)[:, None]
+    seen = [_seen_ends(spans, lines, slot) for slot in (0, 1)]
+    innovation = np.column_stack([-from_middle.imag, *(off for off, _ in seen)])
+    noise = np.zeros((len(lines), 4, 4))
+    arms = from_middle.real
+    noise[:, :2, :2] = (lines.se_angle**2)[:, None, None] * arms[:, :, None] * arms[:, None, :]
+    noise[:, :2, :2] += (lines.se_offset**2)[:, None, None]
+    for slot, (_, error) in enumerate(seen):
+        noise[:, slot, slot] += (REDRAW_MM + SHARED_MM * taken.shared) ** 2
+        told = np.sqrt(error**2 + ends.at_mm**2)
+        noise[:, 2 + slot, 2 + slot] = np.where(taken.ended[:, slot], told, UNTOLD_MM) ** 2
+    return _corrected(beliefs, edge, _design(along), innovation, noise)
 
 
-def updated(expected: Expected, edge: int, taken: Taken, lines: Lines, ends: Ends) -> Expected:
-    """The belief after a stroke was seen for an edge (Kalman)."""
-    row, (tail, head) = taken.row, (expected.edges[edge].tail, expected.edges[edge].head)
-    along = lines.along[row]
-    count = 2 * len(expected.at)
-    rows, values = [], []
-    middle = lines.middle[row]
-    arms = [((expected.at[node] - middle) * np.conj(along)).real for node in (tail, head)]
-    noise = np.zeros((4, 4))
-    loose = REDRAW_MM + (SHARED_MM if taken.shared else 0.0)
-    for slot, node in enumerate((tail, head)):
-        h = np.zeros(count)
-        h[2 * node : 2 * node + 2] = (-along.imag, along.real)
-        rows.append(h)
-        values.append(-((expected.at[node] - middle) * np.conj(along)).imag)
-        for other in (0, 1):
-            turned = lines.se_angle[row] ** 2 * arms[slot] * arms[other]
-            noise[slot, other] = lines.se_offset[row] ** 2 + turned
-        noise[slot, slot] += loose**2
-    for slot, node in enumerate((tail, head)):
-        if not taken.ended[slot]:
-            continue
-        end, error = _end_of(expected, edge, slot, lines, row)
-        h = np.zeros(count)
-        h[2 * node : 2 * node + 2] = (along.real, along.imag)
-        noise[len(rows), len(rows)] = error**2 + ends.at_mm**2
-        rows.append(h)
-        values.append(((end - expected.at[node]) * np.conj(along)).real)
-    design, innovation = np.array(rows), np.array(values)
-    used = len(rows)
-    projected = expected.cov @ design.T
-    spread = design @ projected + noise[:used, :used]
-    gain = np.linalg.solve(spread, projected.T).T
-    step = gain @ innovation
-    cov = expected.cov - gain @ projected.T
-    return replace(expected, at=expected.at + step[0::2] + 1j * step[1::2], cov=(cov + cov.T) / 2.0)
+def _design(along: ComplexArray) -> FloatArray:
+    """(s, 4, 4): tail and head (x, y each) across the line, then along it."""
+    design = np.zeros((len(along), 4, 4))
+    for first, way in ((0, 1j * along), (2, along)):
+        for slot in (0, 1):
+            design[:, first + slot, 2 * slot] = way.real
+            design[:, first + slot, 2 * slot + 1] = way.imag
+    return design
+
+
+def _corrected(
+    beliefs: Beliefs, edge: tuple[int, int], design: FloatArray, innovation: FloatArray, noise: FloatArray
+) -> Beliefs:
+    columns = [2 * edge[0], 2 * edge[0] + 1, 2 * edge[1], 2 * edge[1] + 1]
+    projected = design @ beliefs.cov[:, columns]
+    spread = projected[:, :, columns] @ design.transpose(0, 2, 1) + noise
+    gain = np.linalg.solve(spread, projected)
+    step = (innovation[:, None] @ gain)[:, 0]
+    cov = beliefs.cov - projected.transpose(0, 2, 1) @ gain
+    return Beliefs(beliefs.at + step[:, 0::2] + 1j * step[:, 1::2], (cov + cov.transpose(0, 2, 1)) / 2.0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from grader.reading import confidence, fitting
-from grader.reading.belief import Ends, Taken, updated
+from grader.reading.belief import Beliefs, Ends, Taken, updated
 from grader.reading.confidence import Signs, sureness
 from grader.reading.expected import Edge, Expected, Hand, expect, links_of, vectors_of
 from grader.reading.fitting import fit_nodes
@@ -24,9 +24,7 @@ def explanation(at: list[complex], edges: tuple[Edge, ...], rows: list[int]) -> 
     count = len(at)
     names = tuple("oabcde"[:count])
     expected = Expected(names, np.array(at), np.eye(2 * count), edges)
-    return Explanation(
-        expected, np.array(rows), np.zeros(len(edges), dtype=bool), np.ones((len(edges), 2), dtype=bool), 0.0
-    )
+    return Explanation(expected, np.array(rows), np.zeros(len(edges), dtype=bool), 0.0)
 
 
 def fan(*overruns: float) -> tuple[Lines, list[complex]]:
@@ -91,12 +89,28 @@ def test_crossing_lines_place_a_node_whatever_their_ends():
 
 def test_a_stroke_moves_what_is_believed_of_other_nodes():
     cov = np.eye(4) + np.kron(np.ones((2, 2)), 9.0 * np.eye(2))
-    belief = Expected(("o", "a"), np.array([0j, 50 + 0j]), cov, (Edge("v", 0, 1),))
+    belief = Beliefs(np.array([[0j, 50 + 0j]]), cov[None])
     lines = lines_of(ink_of([(3j, 50 + 3j)]))
-    seen = updated(belief, 0, Taken(0), lines, Ends())
-    assert seen.at.imag == pytest.approx([3.0, 3.0], abs=0.2)
-    assert np.linalg.eigvalsh(seen.cov).min() > 0.0
-    assert np.trace(seen.cov) < np.trace(cov)
+    unended = Taken(lines, np.zeros(1, dtype=bool), np.zeros((1, 2), dtype=bool))
+    seen = updated(belief, (0, 1), unended, Ends())
+    assert seen.at[0].imag == pytest.approx([3.0, 3.0], abs=0.2)
+    assert np.linalg.eigvalsh(seen.cov[0]).min() > 0.0
+    assert np.trace(seen.cov[0]) < np.trace(cov)
+
+
+def test_beliefs_side_by_side_are_corrected_as_each_alone():
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(3, 6, 6))
+    many = Beliefs(rng.normal(0.0, 20.0, (3, 3)) + 1j * rng.normal(size=(3, 3)), root @ root.mT + np.eye(6))
+    lines = lines_of(ink_of([(2j * row, 50 + 3j * row) for row in range(3)]))
+    shared, ended = np.array([False, True, False]), rng.random((3, 2)) > 0.5
+    together = updated(many, (0, 2), Taken(lines, shared, ended), Ends())
+    for row in range(3):
+        one = np.array([row])
+        taken = Taken(lines.take(one), shared[one], ended[one])
+        alone = updated(many.take(one), (0, 2), taken, Ends())
+        assert alone.at[0] == pytest.approx(together.at[row])
+        assert alone.cov[0] == pytest.approx(together.cov[row])
 
 
 def test_strokes_are_told_apart_by_where_they_should_lie():
@@ -158,5 +172,5 @@ def test_ends_that_reach_a_node_side_by_side_count_as_one():
         return row
 
     rows = np.array([outward(0, 10), outward(0, 14), outward(0, 18), outward(0, 100), outward(1, 10)])
-    ends = fitting._Ends(rows, np.zeros(5), np.zeros(5))
+    ends = fitting._Ends(rows, np.zeros(5), np.zeros(5), np.zeros((5, 0)), np.zeros((5, 0)))
     assert fitting._repeated(ends) == pytest.approx([2 / 3, 2 / 3, 2 / 3, 0.0, 0.0])
