@@ -70,21 +70,22 @@ class Beliefs:
         """Some of the rows, also repeated."""
         return Beliefs(self.at[rows], self.cov[rows])
 
-    def spans(self, tail: int | IntArray, head: int | IntArray) -> Spans:
-        """What is believed of an edge's nodes; of many edges' (s,) where there is one belief."""
-        tails, heads = np.atleast_1d(tail), np.atleast_1d(head)
-        first, second = np.stack([tails, tails, heads]), np.stack([tails, heads, heads])
-        x, y = (2 * first, 2 * second), (2 * first + 1, 2 * second + 1)
-        row = np.arange(len(self.cov))
-        mixed = self.cov[row, x[0], y[1]] + self.cov[row, y[0], x[1]]
-        cov = np.stack([self.cov[row, *x], mixed, self.cov[row, *y]], axis=-1)
-        return Spans(self.at[row, tails], self.at[row, heads], cov)
+    def spans(self, tail: int, head: int) -> Spans:
+        """What is believed of an edge's nodes."""
+        cov = np.empty((3, len(self.cov), 3))
+        for pair, (one, other) in enumerate(((tail, tail), (tail, head), (head, head))):
+            cov[pair, :, 0] = self.cov[:, 2 * one, 2 * other]
+            cov[pair, :, 1] = self.cov[:, 2 * one, 2 * other + 1] + self.cov[:, 2 * one + 1, 2 * other]
+            cov[pair, :, 2] = self.cov[:, 2 * one + 1, 2 * other + 1]
+        return Spans(self.at[:, tail], self.at[:, head], cov)
 
 
 def _squares(direction: ComplexArray) -> FloatArray:
     """(s, 3) of unit vectors: x^2, x y, y^2."""
     x, y = direction.real, direction.imag
-    return np.stack([x * x, x * y, y * y], axis=-1)
+    squares = np.empty((len(x), 3))
+    squares[:, 0], squares[:, 1], squares[:, 2] = x * x, x * y, y * y
+    return squares
 
 
 def offsets(spans: Spans, lines: Lines) -> tuple[FloatArray, FloatArray]:

@@ -139,9 +139,7 @@ def lines_of(ink: Ink) -> Lines:
     return _with_joined(single)
 
 
-def _tips(
-    tips: Tips, number: IntArray, as_found: FloatArray, ends: ComplexArray
-) -> dict[str, Any]:
+def _tips(tips: Tips, number: IntArray, as_found: FloatArray, ends: ComplexArray) -> dict[str, Any]:
     """The tips of each stroke kept, side by side; measured from its end without the cap."""
     full = np.hypot(*(as_found[:, 1] - as_found[:, 0]).T)
     cap = (full - np.abs(ends[:, 1] - ends[:, 0])) / 2.0

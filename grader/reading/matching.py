@@ -7,7 +7,7 @@ stroke being there by chance, so that explanations with different numbers of str
 Partial explanations are rows of arrays: an edge is held against the strokes for all of them at once.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -28,6 +28,8 @@ PENALTY_OF_THIN = 2.0
 """Nats against a line drawn thinner than vectors are: it is likelier one that they were constructed by."""
 INVISIBLE_MM = 0.8
 COST_OF_SHARING = 0.3
+COST_OF_BARENESS = 1e3
+"""Of leaving an edge without the stroke that is settled to be its own."""
 RUN_ON_EXPLAINED = 3.0
 """Nats given back when a second edge explains why a stroke runs on past the first."""
 LITTLE_COMMON = 0.4
@@ -69,10 +71,14 @@ class Settled:
     barred: tuple[int, int] | None = None
 
 
+OPEN = Settled()
+
+
 @dataclass(frozen=True, slots=True)
 class _States:
-    """Partial explanations, a row each, best first; the fields as in `Explanation`."""
+    """Partial explanations, a row each; `figure` says of which figure, else as in `Explanation`."""
 
+    figure: IntArray
     beliefs: Beliefs
     stroke: IntArray
     shared: BoolArray
@@ -101,47 +107,84 @@ class _Choices:
 
 @dataclass(frozen=True, slots=True)
 class _Scene:
-    """What does not change while edges are matched; `near` has, by edge, the rows that it may be."""
+    """What does not change while edges are matched.
+
+    Attributes
+    ----------
+    edges, lines, ends : common to all figures
+    may_be : (figures, edges, lines) whether a stroke may be an edge at all
+    bare : (figures, edges) whether an edge may be left without a stroke
+    """
 
     edges: tuple[Edge, ...]
     lines: Lines
     ends: Ends
-    near: list[IntArray]
+    may_be: BoolArray
+    bare: BoolArray
 
 
-def explain(
-    expected: Expected, lines: Lines, ends: Ends, beam: int = BEAM, settled: Settled | None = None
-) -> list[Explanation]:
+def explain(expected: Expected, lines: Lines, ends: Ends, beam: int = BEAM) -> list[Explanation]:
     """The best explanations of a placed figure, best first."""
-    told = settled or Settled()
-    count = len(expected.edges)
-    belief = Beliefs(expected.at[None], expected.cov[None])
-    scene = _Scene(expected.edges, lines, ends, _within_reach(belief, expected.edges, lines))
-    states = _States(belief, np.full((1, count), -1), np.zeros((1, count), dtype=bool), np.zeros(1))
-    for edge in sorted(_most_telling_first(expected), key=lambda one: one not in told.kept):
-        choices = _ways_on(states, edge, scene, told)
-        best = np.argsort(-choices.score, kind="stable")[: 2 * beam]
-        states = _after(states, edge, choices.take(best), beam, scene)
-    return [
-        Explanation(replace(expected, at=at, cov=cov), stroke, shared, float(score))
-        for at, cov, stroke, shared, score in zip(
-            states.beliefs.at, states.beliefs.cov, states.stroke, states.shared, states.score, strict=True
+    return explain_each([expected], lines, ends, beam)[0]
+
+
+def explain_each(
+    figures: Sequence[Expected],
+    lines: Lines,
+    ends: Ends,
+    beam: int = BEAM,
+    settled: Sequence[Settled] | None = None,
+) -> list[list[Explanation]]:
+    """The best explanations of each of several figures of the same edges, best first.
+
+    They are looked for side by side, not against one another: each has `beam` of its own.
+    """
+    told = [OPEN] * len(figures) if settled is None else settled
+    edges = figures[0].edges
+    beliefs = Beliefs(np.array([one.at for one in figures]), np.array([one.cov for one in figures]))
+    scene = _Scene(edges, lines, ends, *_open_ways(beliefs, edges, lines, told))
+    shape = (len(figures), len(edges))
+    states = _States(
+        np.arange(len(figures)), beliefs, np.full(shape, -1), np.zeros(shape, bool), np.zeros(len(figures))
+    )
+    for edge in _most_telling_first(beliefs, edges, told):
+        choices = _nothing_taken(states, edge, scene) + _strokes_taken(states, edge, scene)
+        states = _after(states, edge, choices, beam, scene)
+    found: list[list[Explanation]] = [[] for _ in figures]
+    for row, figure in enumerate(states.figure.tolist()):
+        seen = replace(figures[figure], at=states.beliefs.at[row], cov=states.beliefs.cov[row])
+        found[figure].append(
+            Explanation(seen, states.stroke[row], states.shared[row], float(states.score[row]))
         )
-    ]
+    return found
 
 
-def _most_telling_first(expected: Expected) -> list[int]:
-    """Long edges are mistaken for others least."""
-    size = [abs(expected.at[edge.head] - expected.at[edge.tail]) for edge in expected.edges]
-    return sorted(range(len(size)), key=lambda index: -size[index] if np.isfinite(size[index]) else 0.0)
+def _most_telling_first(beliefs: Beliefs, edges: Sequence[Edge], told: Sequence[Settled]) -> list[int]:
+    """What is settled, then long edges: they are mistaken for others least."""
+    size = [np.nan_to_num(abs(beliefs.at[:, edge.head] - beliefs.at[:, edge.tail])).mean() for edge in edges]
+    kept = [sum(edge in one.kept for one in told) for edge in range(len(edges))]
+    return sorted(range(len(edges)), key=lambda edge: (-kept[edge], -size[edge]))
 
 
-def _within_reach(belief: Beliefs, edges: tuple[Edge, ...], lines: Lines) -> list[IntArray]:
-    """For every edge the strokes that it may turn out to be."""
-    tails, heads = (np.array([getattr(edge, end) for edge in edges], np.int64) for end in ("tail", "head"))
-    off, spread = offsets(belief.spans(tails, heads), lines)
-    fits = _along(belief.spans(tails, heads), lines, FIRST_TURN_SINE)
-    return [np.flatnonzero(row) for row in fits & (mahalanobis(off, spread)[0] < FIRST_GATE)]
+def _open_ways(
+    beliefs: Beliefs, edges: Sequence[Edge], lines: Lines, told: Sequence[Settled]
+) -> tuple[BoolArray, BoolArray]:
+    """`may_be` and `bare` of a scene: strokes within reach, as far as nothing is settled."""
+    may_be = np.zeros((len(told), len(edges), len(lines)), dtype=bool)
+    bare = np.ones((len(told), len(edges)), dtype=bool)
+    for place, edge in enumerate(edges):
+        spans = beliefs.spans(edge.tail, edge.head)
+        distance = mahalanobis(*offsets(spans, lines))[0]
+        may_be[:, place] = _along(spans, lines, FIRST_TURN_SINE) & (distance < FIRST_GATE)
+    for figure, one in enumerate(told):
+        for place, row in one.kept.items():
+            reached = row >= 0 and bool(may_be[figure, place, row])
+            if row < 0 or reached:
+                may_be[figure, place] = np.arange(len(lines)) == row
+                bare[figure, place] = not reached
+        if one.barred is not None:
+            may_be[figure, one.barred[0], one.barred[1]] = False
+    return may_be, bare
 
 
 def _along(spans: Spans, lines: Lines, turn_sine: float) -> BoolArray:
@@ -152,42 +195,32 @@ def _along(spans: Spans, lines: Lines, turn_sine: float) -> BoolArray:
     return np.asarray((turned < turn_sine * size) & (size >= INVISIBLE_MM))
 
 
-def _ways_on(states: _States, edge: int, scene: _Scene, told: Settled) -> _Choices:
-    """What the edge may be, as far as it is not settled."""
-    nothing = _nothing_taken(states, scene.edges[edge])
-    row = told.kept.get(edge)
-    if row is not None:
-        kept = nothing if row < 0 else _strokes_taken(states, edge, np.array([row]), scene)
-        if len(kept.row):
-            return kept
-    strokes = _strokes_taken(states, edge, scene.near[edge], scene)
-    if told.barred is not None and edge == told.barred[0]:
-        strokes = strokes.take(strokes.row != told.barred[1])
-    return nothing + strokes
-
-
-def _nothing_taken(states: _States, edge: Edge) -> _Choices:
+def _nothing_taken(states: _States, edge: int, scene: _Scene) -> _Choices:
     """Every state with no stroke for the edge."""
     count = len(states.score)
-    size = np.abs(states.beliefs.at[:, edge.head] - states.beliefs.at[:, edge.tail])
-    told = size >= INVISIBLE_MM
-    score = states.score + np.where(told, np.log(_missed(size)), 0.0)
+    tail, head = scene.edges[edge].tail, scene.edges[edge].head
+    size = np.abs(states.beliefs.at[:, head] - states.beliefs.at[:, tail])
+    seen = size >= INVISIBLE_MM
+    cost = np.where(seen, -np.log(_missed(size)), 0.0)
+    cost += np.where(scene.bare[states.figure, edge], 0.0, COST_OF_BARENESS)
     free = np.zeros((count, 2), dtype=bool)
-    return _Choices(np.arange(count), np.full(count, -1), free[:, 0], free, score)
+    return _Choices(np.arange(count), np.full(count, -1), free[:, 0], free, states.score - cost)
 
 
-def _strokes_taken(states: _States, edge: int, rows: IntArray, scene: _Scene) -> _Choices:
-    """Every state with each of the strokes `rows` that the edge may be in it."""
+def _strokes_taken(states: _States, edge: int, scene: _Scene) -> _Choices:
+    """Every state with each of the strokes that the edge may be in it."""
+    may_be = scene.may_be[states.figure, edge]
+    rows = np.flatnonzero(may_be.any(axis=0))
     spans = states.beliefs.spans(scene.edges[edge].tail, scene.edges[edge].head)
     chance = _log_chance(spans, scene.lines)
     lines = scene.lines.take(rows)
     off, spread = offsets(spans, lines)
     distance, log_det = mahalanobis(off, spread)
-    state, place = np.nonzero((distance < GATE) & _along(spans, lines, TURN_SINE))
+    state, place = np.nonzero((distance < GATE) & _along(spans, lines, TURN_SINE) & may_be[:, rows])
     lines, spans = lines.take(place), spans.take(state)
     size = np.abs(spans.head - spans.tail)
     gains, ended, covers = ends_at(spans, lines, scene.ends)
-    shared = _in_use(states, scene.lines)[state[:, None], lines.members].any(axis=1)
+    shared = np.asarray(_in_use(states, scene.lines)[state[:, None], lines.members].any(axis=1))
     own = -0.5 * (distance + log_det)[state, place] - np.log(2 * np.pi) + np.log(size) + gains - chance[state]
     own -= PENALTY_OF_THIN * lines.thin
     both = _log_of_sharing(off[:, state, place], spread[:, state, place])
@@ -247,11 +280,16 @@ def _missed(size_mm: FloatArray) -> FloatArray:
 
 
 def _after(states: _States, edge: int, choices: _Choices, beam: int, scene: _Scene) -> _States:
-    """The states after the choices, best first, each set of strokes once."""
+    """The best states of each figure after the choices, best first, each set of strokes once."""
+    figure = states.figure[choices.state]
+    order = np.lexsort((-choices.score, figure))
+    order = order[_first_of_each(figure[order], 2 * beam)]
+    choices, figure = choices.take(order), figure[order]
     stroke, shared = states.stroke[choices.state], states.shared[choices.state]
     stroke[:, edge], shared[:, edge] = choices.row, choices.shared
-    rows = np.sort(np.unique(stroke, axis=0, return_index=True)[1])[:beam]
-    choices, stroke, shared = choices.take(rows), stroke[rows], shared[rows]
+    rows = np.sort(np.unique(np.column_stack([figure, stroke]), axis=0, return_index=True)[1])
+    rows = rows[_first_of_each(figure[rows], beam)]
+    choices = choices.take(rows)
     beliefs = states.beliefs.take(choices.state)
     taken = np.flatnonzero(choices.row >= 0)
     if len(taken):
@@ -259,4 +297,10 @@ def _after(states: _States, edge: int, choices: _Choices, beam: int, scene: _Sce
         joined = (scene.edges[edge].tail, scene.edges[edge].head)
         moved = updated(beliefs.take(taken), joined, seen, scene.ends)
         beliefs.at[taken], beliefs.cov[taken] = moved.at, moved.cov
-    return _States(beliefs, stroke, shared, choices.score)
+    return _States(figure[rows], beliefs, stroke[rows], shared[rows], choices.score)
+
+
+def _first_of_each(sorted_figures: IntArray, count: int) -> BoolArray:
+    """Which rows are among the first so many of their figure."""
+    rank = np.arange(len(sorted_figures)) - np.searchsorted(sorted_figures, sorted_figures)
+    return np.asarray(rank < count)

@@ -1,17 +1,17 @@
 """A velocity or acceleration plan: the hypotheses of how it was drawn, held against the strokes."""
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from grader.reading.belief import Ends
-from grader.reading.expected import Expected, Hand, Slack, expect, vectors_of
+from grader.reading.expected import Edge, Expected, Hand, Slack, expect, vectors_of
 from grader.reading.fitting import Fit, fit_nodes
 from grader.reading.hypotheses import REGULAR, Hypothesis, mistaken, regular, resized, tied
 from grader.reading.lines import BoolArray, Lines
-from grader.reading.matching import Explanation, Settled, explain
+from grader.reading.matching import BEAM, Explanation, Settled, explain_each
 from grader.reading.placing import Place, Search, places
 from reference.construction import ancestors
 from reference.geometry import ComplexArray
@@ -32,6 +32,8 @@ LEAST_FIRST_MM = 15.0
 """Of a plan's longest vector: what fits on a sheet and can be measured."""
 LEAST_LAID_MM = 4.0
 SPECK_MM = 1e-6
+FARTHEST_MM = 2000.0
+"""Nodes farther off are on no sheet, at any scale: with a mistake made, lines may be nearly parallel."""
 WORSE = 0.3
 """Places supported by this much less of the plan's length are not looked at."""
 LEAST_SEEN_MM = 2.5
@@ -103,13 +105,12 @@ def regular_plans(
 def _as_regular(
     bases: list[Hypothesis], lines: Lines, figure: str, given: Mapping[str, ComplexArray]
 ) -> list[Plan]:
-    plans: list[Plan] = []
+    cases: list[_Case] = []
     for hypothesis in bases:
         expected = _expected(hypothesis, figure, given)
         if expected is not None:
-            for place in _laid(expected, lines):
-                plans.extend(_read(hypothesis, expected, place, lines))
-    return sorted(plans, key=lambda plan: -plan.score)
+            cases.extend(_Case(hypothesis, expected, place) for place in _laid(expected, lines))
+    return sorted(_read(cases, lines), key=lambda plan: -plan.score)
 
 
 def best_plan(plans: list[Plan], lines: Lines, figure: str, given: Mapping[str, ComplexArray]) -> Plan | None:
@@ -141,7 +142,7 @@ def _without_each_stroke(plan: Plan) -> list[Plan]:
     edges = plan.found.expected.edges
     size = [abs(plan.found.expected.at[edge.head] - plan.found.expected.at[edge.tail]) for edge in edges]
     cost = plan.found.score - plan.score
-    doubts = []
+    doubted, settled = [], []
     for index, edge in enumerate(edges):
         row = int(plan.found.stroke[index])
         if row < 0:
@@ -152,18 +153,26 @@ def _without_each_stroke(plan: Plan) -> list[Plan]:
             for other, one in enumerate(edges)
             if other != index and (size[other] > SURE_MM or not {one.tail, one.head} & ends)
         }
-        found = explain(plan.placed, plan.lines, PLAN_ENDS, BEAM_OF_DOUBTS, Settled(kept, (index, row)))[0]
-        if found.score > plan.found.score - LEAST_DOUBT:
-            doubts.append(replace(plan, found=found, score=found.score - cost))
-    return doubts
+        doubted.append(plan.placed)
+        settled.append(Settled(kept, (index, row)))
+    if not doubted:
+        return []
+    best = [each[0] for each in explain_each(doubted, plan.lines, PLAN_ENDS, BEAM_OF_DOUBTS, settled)]
+    return [
+        replace(plan, found=found, score=found.score - cost)
+        for found in best
+        if found.score > plan.found.score - LEAST_DOUBT
+    ]
 
 
 def _with_mistakes(
     best: Plan, bases: list[Hypothesis], figure: str, lines: Lines, given: Mapping[str, ComplexArray]
-) -> Iterator[Plan]:
+) -> list[Plan]:
     """The same plan with a mistake made, where it was found; elsewhere too if that is poor."""
     poor = best.place.score < POOR and best.hypothesis.label in REGULAR
     suspect = None if poor else _suspects(best, best.fit)
+    here: list[_Case] = []
+    elsewhere: list[_Case] = []
     for hypothesis, mistake in (one for base in bases for one in mistaken(base, figure)):
         if suspect is not None and mistake.at not in suspect:
             continue
@@ -171,10 +180,11 @@ def _with_mistakes(
         if expected is None:
             continue
         if poor:
-            for place in _better_laid(expected, lines, best.place):
-                yield from _read(hypothesis, expected, place, lines)
+            laid = _better_laid(expected, lines, best.place)
+            elsewhere.extend(_Case(hypothesis, expected, place) for place in laid)
         moved = affected(mistake, hypothesis.drawing.construction)
-        yield from _read(hypothesis, expected, best.refined, lines, _Known(best, moved))
+        here.append(_Case(hypothesis, expected, best.refined, moved))
+    return [*_read(elsewhere, lines), *_read(here, lines, best)]
 
 
 def _suspects(plan: Plan, fit: Fit) -> frozenset[str]:
@@ -192,9 +202,10 @@ def _suspects(plan: Plan, fit: Fit) -> frozenset[str]:
 
 
 def _expected(hypothesis: Hypothesis, figure: str, given: Mapping[str, ComplexArray]) -> Expected | None:
+    """What is expected of the plan about its own pole; None where that cannot be drawn."""
     edges = vectors_of(tied(hypothesis), figure, hypothesis.absent)
     expected = expect(hypothesis.drawing, figure, given, HAND, edges)
-    return expected if np.isfinite(expected.at).all() else None
+    return expected if np.abs(expected.at).max() < FARTHEST_MM else None
 
 
 def _better_laid(expected: Expected, lines: Lines, than: Place) -> list[Place]:
@@ -233,44 +244,70 @@ def _first_length(expected: Expected) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class _Known:
-    """What is settled before a plan is read again with a mistake: the plan, and the nodes that move."""
+class _Case:
+    """A plan to be read at a place: how it was drawn, what is expected then, which nodes a mistake moved."""
 
-    plan: Plan
-    moved: Collection[str]
+    hypothesis: Hypothesis
+    expected: Expected
+    place: Place
+    moved: Collection[str] = ()
 
+    @property
+    def as_expected(self) -> bool:
+        """Whether the place has the size that is expected."""
+        return abs(math.log(self.place.size)) < SAME_SIZE
 
-def _read(
-    hypothesis: Hypothesis, expected: Expected, place: Place, lines: Lines, known_before: _Known | None = None
-) -> list[Plan]:
-    """The best explanations of a plan laid at a place: several, where they are nearly as good."""
-    known = abs(np.log(place.size)) < SAME_SIZE
-    slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03 if known else 0.08)
-    placed = expected.placed(place.at, place.size, place.turn_rad, slack)
-    around = lines.take(_near(lines, placed))
-    if known_before is None:
-        explained = explain(placed, around, PLAN_ENDS)
-    else:
-        settled = Settled(_kept(known_before.plan, known_before.moved, placed, around))
-        explained = explain(placed, around, PLAN_ENDS, BEAM_OF_MISTAKES, settled)
-    cost = hypothesis.cost + (0.0 if known else COST_OF_SIZE)
-    cost += 0.0 if abs(place.turn_rad) < np.pi / 4 else COST_OF_TURN
-    return [
-        Plan(hypothesis, place, placed, found, found.score - cost, around)
-        for found in explained[:ALTERNATIVES]
-        if found.score > explained[0].score - NEARLY
-    ]
+    @property
+    def cost(self) -> float:
+        """Nats, how unlikely it is before looking."""
+        cost = self.hypothesis.cost + (0.0 if self.as_expected else COST_OF_SIZE)
+        return cost + (0.0 if abs(self.place.turn_rad) < np.pi / 4 else COST_OF_TURN)
+
+    def placed(self) -> Expected:
+        """What is expected there, with the freedom left to it."""
+        relative = 0.03 if self.as_expected else 0.08
+        slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=relative)
+        return self.expected.placed(self.place.at, self.place.size, self.place.turn_rad, slack)
 
 
-def _kept(base: Plan, moved: Collection[str], placed: Expected, lines: Lines) -> dict[int, int]:
-    """The strokes of vectors that a mistake does not touch, as rows of `lines`."""
+def _read(cases: Sequence[_Case], lines: Lines, known_before: Plan | None = None) -> list[Plan]:
+    """The best explanations of plans laid at places: several of each, where they are nearly as good.
+
+    Plans of the same vectors are read side by side. `known_before` is the plan that mistakes were made
+    in: what they do not touch is settled.
+    """
+    groups: dict[tuple[Edge, ...], list[_Case]] = {}
+    for case in cases:
+        groups.setdefault(case.expected.edges, []).append(case)
+    plans: list[Plan] = []
+    for group in groups.values():
+        placed = [case.placed() for case in group]
+        around = lines.take(_near(lines, placed))
+        beam, settled = BEAM, None
+        if known_before is not None:
+            beam = BEAM_OF_MISTAKES
+            kept = _kept(known_before, placed[0], around)
+            settled = [
+                Settled(_untouched(kept, one, case.moved)) for one, case in zip(placed, group, strict=True)
+            ]
+        each = explain_each(placed, around, PLAN_ENDS, beam, settled)
+        for case, at, explained in zip(group, placed, each, strict=True):
+            plans.extend(
+                Plan(case.hypothesis, case.place, at, found, found.score - case.cost, around)
+                for found in explained[:ALTERNATIVES]
+                if found.score > explained[0].score - NEARLY
+            )
+    return plans
+
+
+def _kept(base: Plan, placed: Expected, lines: Lines) -> dict[int, int]:
+    """The strokes of vectors as rows of `lines`, by the place of their edge."""
     row_of = {tuple(pair): row for row, pair in enumerate(lines.members.tolist())}
     by_name = {edge.name: index for index, edge in enumerate(base.found.expected.edges)}
     kept = {}
     for index, edge in enumerate(placed.edges):
-        touched = {placed.names[edge.tail], placed.names[edge.head]} & set(moved)
         known = by_name.get(edge.name)
-        if touched or known is None:
+        if known is None:
             continue
         row = int(base.found.stroke[known])
         if row < 0:
@@ -280,17 +317,27 @@ def _kept(base: Plan, moved: Collection[str], placed: Expected, lines: Lines) ->
     return kept
 
 
-def _near(lines: Lines, placed: Expected) -> BoolArray:
+def _untouched(kept: Mapping[int, int], placed: Expected, moved: Collection[str]) -> dict[int, int]:
+    """Those of them that a mistake does not touch."""
+    nodes = {index for index, name in enumerate(placed.names) if name in moved}
+    return {
+        index: row
+        for index, row in kept.items()
+        if not {placed.edges[index].tail, placed.edges[index].head} & nodes
+    }
+
+
+def _near(lines: Lines, placed: Sequence[Expected]) -> BoolArray:
+    """Which lines lie about any of the figures."""
     margin = 12.0
-    low = complex(placed.at.real.min() - margin, placed.at.imag.min() - margin)
-    high = complex(placed.at.real.max() + margin, placed.at.imag.max() + margin)
     middle = lines.middle
-    return np.asarray(
-        (middle.real > low.real)
-        & (middle.imag > low.imag)
-        & (middle.real < high.real)
-        & (middle.imag < high.imag)
-    )
+    near = np.zeros(len(lines), dtype=bool)
+    for one in placed:
+        low = complex(one.at.real.min() - margin, one.at.imag.min() - margin)
+        high = complex(one.at.real.max() + margin, one.at.imag.max() + margin)
+        across = (middle.real > low.real) & (middle.real < high.real)
+        near |= across & (middle.imag > low.imag) & (middle.imag < high.imag)
+    return near
 
 
 __all__ = ["Plan", "best_plan", "regular_plans"]

@@ -1,16 +1,16 @@
 """The mechanism sketch: which strokes are its links, where its joints are, how it is turned."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from grader.reading.belief import Ends
-from grader.reading.expected import Expected, Hand, Slack, expect, links_of
+from grader.reading.expected import Edge, Expected, Hand, Slack, expect, links_of
 from grader.reading.fitting import LINK_ENDS as LINKS_END
 from grader.reading.fitting import Fit, fit_nodes
-from grader.reading.lines import Lines
-from grader.reading.matching import Explanation, explain
+from grader.reading.lines import BoolArray, Lines
+from grader.reading.matching import Explanation, explain_each
 from grader.reading.placing import Place, Search, places
 from grader.records import FloatArray
 from reference.assignment import Assignment, Scales, Variant
@@ -40,6 +40,7 @@ GUIDE_LEAST_MM = 12.0
 GUIDE_TILT_RAD = float(np.radians(2.5))
 LEAST_RADIUS_MM, LARGEST_RADIUS_MM = 0.4, 4.0
 NEAR_CIRCLE_MM = 1.5
+LEAST_SEEN_MM, REACH_MM = 4.0, 30.0
 ANY_TURN = tuple(float(np.radians(angle)) for angle in range(0, 360, 5))
 
 
@@ -93,11 +94,10 @@ def find_sketch(
         laid.extend(_laid(own[0], long, circles, turned, COST_IN_SUPPORT))
     laid.sort(key=lambda one: -one[0])
     regular = {id(drawing.construction) for drawing in own}
-    read = [
-        _read(drawing, place, lines, circles, id(drawing.construction) in regular)
-        for _, drawing, place in laid[:SHORT_LIST]
+    best = [
+        _Case(drawing, place, id(drawing.construction) in regular) for _, drawing, place in laid[:SHORT_LIST]
     ]
-    return max(read, key=lambda one: one.score, default=None)
+    return max(_read(best, lines, circles), key=lambda one: one.score, default=None)
 
 
 def _top(best: list[tuple[float, Drawing, Place]]) -> float:
@@ -132,23 +132,47 @@ def _laid(
     return laid
 
 
-def _read(drawing: Drawing, place: Place, lines: Lines, circles: FloatArray, regular: bool) -> Sketch:
-    slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03)
-    expected = _expected(drawing).placed(place.at, place.size, place.turn_rad, slack)
-    reach = 30.0
-    near = (
-        np.abs(lines.middle - expected.at.mean())
-        < np.ptp(expected.at.real) + np.ptp(expected.at.imag) + reach
-    )
-    around = lines.take(near & (lines.length > 4.0))
-    found = explain(expected, around, LINK_ENDS)[0]
+@dataclass(frozen=True, slots=True)
+class _Case:
+    """A drawing laid at a place; whether it is one that is to be expected."""
+
+    drawing: Drawing
+    place: Place
+    regular: bool
+
+
+def _read(cases: Sequence[_Case], lines: Lines, circles: FloatArray) -> Iterator[Sketch]:
+    """The best explanation of each."""
+    groups: dict[tuple[Edge, ...], list[tuple[_Case, Expected]]] = {}
+    for case in cases:
+        slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03)
+        expected = _expected(case.drawing).placed(case.place.at, case.place.size, case.place.turn_rad, slack)
+        groups.setdefault(expected.edges, []).append((case, expected))
+    for group in groups.values():
+        placed = [expected for _, expected in group]
+        around = lines.take(_near(lines, placed) & (lines.length > LEAST_SEEN_MM))
+        for (case, _), found in zip(group, explain_each(placed, around, LINK_ENDS), strict=True):
+            yield _fitted(case, found[0], around, lines, circles)
+
+
+def _near(lines: Lines, placed: Sequence[Expected]) -> BoolArray:
+    """Which lines lie about any of the figures."""
+    near = np.zeros(len(lines), dtype=bool)
+    for one in placed:
+        reach = np.ptp(one.at.real) + np.ptp(one.at.imag) + REACH_MM
+        near |= np.abs(lines.middle - one.at.mean()) < reach
+    return near
+
+
+def _fitted(case: _Case, found: Explanation, around: Lines, lines: Lines, circles: FloatArray) -> Sketch:
     fit = fit_nodes(found, around, LINKS_END)
     centres = _centres(fit, circles)
     fit = fit_nodes(found, around, LINKS_END, centres)
-    exact = _expected(drawing).at
+    exact = _expected(case.drawing).at
     turn = float(np.angle(np.sum((fit.at - fit.at.mean()) * np.conj(exact - exact.mean()))))
-    score = found.score + WORTH_OF_CIRCLE * len(centres) - (0.0 if regular else COST_OF_OTHER)
-    return Sketch(drawing, found, fit, turn, _guide_turn(drawing, found, fit, lines, turn), place, score)
+    score = found.score + WORTH_OF_CIRCLE * len(centres) - (0.0 if case.regular else COST_OF_OTHER)
+    guide_turn = _guide_turn(case.drawing, found, fit, lines, turn)
+    return Sketch(case.drawing, found, fit, turn, guide_turn, case.place, score)
 
 
 def _guide_turn(drawing: Drawing, found: Explanation, fit: Fit, lines: Lines, turn: float) -> float:

@@ -9,10 +9,10 @@ import pytest
 from grader.reading import confidence, fitting
 from grader.reading.belief import Beliefs, Ends, Taken, updated
 from grader.reading.confidence import Signs, sureness
-from grader.reading.expected import Edge, Expected, Hand, expect, links_of, vectors_of
+from grader.reading.expected import Edge, Expected, Hand, Slack, expect, links_of, vectors_of
 from grader.reading.fitting import fit_nodes
 from grader.reading.lines import Lines, lines_of
-from grader.reading.matching import Explanation, explain
+from grader.reading.matching import Explanation, Settled, explain, explain_each
 from grader.records import VELOCITY_PLAN
 from tests.unit.reading.drawn import ink_of, task
 
@@ -123,6 +123,34 @@ def test_strokes_are_told_apart_by_where_they_should_lie():
     strokes = [(complex(at[names[k][0]]), complex(at[names[k][1]])) for k in order]
     found = explain(expected, lines_of(ink_of(strokes)), Ends())[0]
     assert [int(order[row]) for row in found.stroke] == list(range(len(edges)))
+
+
+def velocity_plan_drawn():
+    """What is expected of a velocity plan, and lines where that lies."""
+    _, _, drawing = task()
+    edges = vectors_of(drawing.construction, VELOCITY_PLAN)
+    expected = expect(drawing, VELOCITY_PLAN, {}, Hand(), edges)
+    return expected, lines_of(ink_of([(expected.at[edge.tail], expected.at[edge.head]) for edge in edges]))
+
+
+def test_figures_explained_side_by_side_are_explained_as_each_alone():
+    expected, lines = velocity_plan_drawn()
+    off = [expected.placed(at, 1.0, 0.0, Slack()) for at in (0.5 + 0.3j, -1.0 + 0.4j, 200 + 0j)]
+    for together, figure in zip(explain_each(off, lines, Ends()), off, strict=True):
+        alone = explain(figure, lines, Ends())
+        assert [one.stroke.tolist() for one in together] == [one.stroke.tolist() for one in alone]
+        assert [one.score for one in together] == pytest.approx([one.score for one in alone])
+        assert together[0].expected.at == pytest.approx(alone[0].expected.at)
+
+
+def test_what_is_settled_is_not_asked_again():
+    expected, lines = velocity_plan_drawn()
+    free = explain(expected, lines, Ends())[0].stroke
+    without = Settled({0: -1, 1: int(free[1])}, barred=(2, int(free[2])))
+    (found,) = (each[0].stroke for each in explain_each([expected], lines, Ends(), settled=[without]))
+    assert found[0] == -1
+    assert found[1] == free[1]
+    assert found[2] != free[2]
 
 
 def test_an_edge_without_a_stroke_is_left_without():
