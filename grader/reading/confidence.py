@@ -19,9 +19,16 @@ TEMPERATURE = 3.0
 FARTHEST = 12.0
 """Nats: rivals worse by more weigh nothing."""
 HIGHEST = 0.995
-WEIGHTS = {"placed": 0.72, "named": 0.34, "off_mm": -2.7, "shared": 0.8, "mistaken": -0.15}
-CONSTANT = -0.39
-"""Of a logistic regression on simulated sheets of five mechanisms, with the constant lowered by 0.3."""
+WEIGHTS = {
+    "placed": 0.56,
+    "named": 0.23,
+    "off_mm": -1.22,
+    "mistaken": -0.71,
+    "marked": 1.98,
+    "elsewhere": -1.56,
+}
+CONSTANT = -0.45
+"""Of a logistic regression on simulated sheets of five mechanisms, with the constant lowered by 0.2."""
 AT_MOST = {"placed": 0.1, "thin": 0.85, "short": 0.88}
 """Ceilings: this much above the geometric probability; of a line thin as a construction line; of a
 vector shorter than `SHORT_MM`, whose stroke may be an arrowhead's side."""
@@ -45,18 +52,20 @@ class Signs:
     placed : geometric probability of lying within half a millimetre, from the fit's covariance
     named : share of the explanations that have it there
     off_mm : largest distance of its nodes from its stroke
-    shared, thin, mistaken : on a stroke shared with another vector; on a line thin as a construction
-        line; in a plan explained by a mistake
+    thin, mistaken : on a line thin as a construction line; in a plan explained by a mistake
     length_mm : of the vector, large for a node
+    marked : probability of the less likely of the tips that mark the vector's two ends on its stroke
+    elsewhere : probability of the likeliest other tip near by that might be meant
     """
 
     placed: float
     named: float
     off_mm: float = 0.1
-    shared: bool = False
     thin: bool = False
     mistaken: bool = False
     length_mm: float = 99.0
+    marked: float = 0.4
+    elsewhere: float = 0.0
 
 
 def sureness(signs: Signs) -> float:
@@ -64,7 +73,8 @@ def sureness(signs: Signs) -> float:
     told = CONSTANT
     told += WEIGHTS["placed"] * _log_odds(signs.placed) + WEIGHTS["named"] * _log_odds(signs.named)
     told += WEIGHTS["off_mm"] * min(signs.off_mm, 1.5)
-    told += WEIGHTS["shared"] * signs.shared + WEIGHTS["mistaken"] * signs.mistaken
+    told += WEIGHTS["marked"] * signs.marked + WEIGHTS["elsewhere"] * signs.elsewhere
+    told += WEIGHTS["mistaken"] * signs.mistaken
     sure = min(1.0 / (1.0 + math.exp(-told)), signs.placed + AT_MOST["placed"], HIGHEST)
     if signs.thin:
         sure = min(sure, AT_MOST["thin"])

@@ -75,10 +75,17 @@ def _node(fit: Fit, index: int, sure: float) -> ReadNode:
 
 def _named(plan: Plan, fit: Fit) -> FloatArray:
     """How many of the explanations, by weight, have each node where it is read."""
+    near = [other for other in plan.rivals if other.score > plan.score - confidence.FARTHEST]
+    # Many hypotheses name the same strokes, and so have their nodes in the same places.
+    places = {plan.strokes: fit.at}
+    for other in near:
+        if other.strokes not in places:
+            places[other.strokes] = other.fit.at
     rivals = [
-        confidence.Rival(dict(zip(other.found.expected.names, other.fit.at, strict=True)), other.score)
-        for other in plan.rivals
-        if other.score > plan.score - confidence.FARTHEST
+        confidence.Rival(
+            dict(zip(other.found.expected.names, places[other.strokes], strict=True)), other.score
+        )
+        for other in near
     ]
     return confidence.of_names(plan.found.expected.names, fit.at, plan.score, rivals)
 

@@ -27,6 +27,7 @@ LEAST_SKETCH = 15.0
 LEAST_PLAN = 12.0
 """Nats: what less is explained by may be chance."""
 
+SURE_PLAN = 40.0
 CLEAR = 0.85
 LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
 """Of the vectors given at the start of a plan."""
@@ -78,6 +79,7 @@ def read_figures(
     known = {} if velocity is None else _nodes(velocity)
     paced = [drawing] if velocity is None else _paced(drawing, known)
     if _asks_accelerations(wanted, drawing):
+        _set_apart(pages, velocity)
         _find(pages, paced, ACCELERATION_PLAN, known)
     return _readings(pages, drawing, wanted)
 
@@ -150,6 +152,16 @@ def _find(
         return None
     best[0].plans[figure] = best[1]
     return best[1]
+
+
+def _set_apart(pages: Sequence[_Page], plan: Plan | None) -> None:
+    """One stroke of ink cannot be in two figures: what surely is this plan's is no other's."""
+    page = next((page for page in pages if plan is not None and plan in page.plans.values()), None)
+    if plan is None or page is None or plan.score < SURE_PLAN:
+        return
+    used = {int(one) for row in plan.found.stroke if row >= 0 for one in plan.lines.members[row]}
+    own = np.isin(page.lines.members, list(used)).any(axis=1)
+    page.lines = page.lines.take(np.flatnonzero(~own))
 
 
 def _nodes(plan: Plan) -> Given:
