@@ -107,7 +107,6 @@ def _vectors(
             placed=confidence.within(cov),
             named=float(min(named[edge.tail], named[edge.head])),
             off_mm=float(np.abs(fit.residual_mm[index]).max()) if row >= 0 else 0.0,
-            shared=bool(plan.found.shared[index]),
             thin=row >= 0 and bool(plan.lines.thin[row]),
             mistaken=plan.hypothesis.label not in REGULAR,
             length_mm=abs(span),
