@@ -278,7 +278,15 @@ def _end_rows(found: Explanation, lines: Lines, at: ComplexArray) -> _Ends:
                 sures.append(sure)
     if not design:
         return _Ends(np.zeros((0, 2 * len(at))), np.zeros(0), np.zeros(0), *np.zeros((2, 0, 0)))
-    return _Ends(np.array(design), np.array(goal), np.array(errors), np.array(tips), np.array(sures))
+    told = _telling(np.array(tips), np.array(sures))
+    return _Ends(np.array(design), np.array(goal), np.array(errors), *told)
+
+
+def _telling(tips: FloatArray, sures: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The same without the columns of tips that tell nothing."""
+    most = int(np.count_nonzero(sures, axis=1).max())
+    first = np.argsort(-sures, axis=1, kind="stable")[:, :most]
+    return np.take_along_axis(tips, first, axis=1), np.take_along_axis(sures, first, axis=1)
 
 
 def _near_tips(

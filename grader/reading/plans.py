@@ -1,7 +1,7 @@
 """A velocity or acceleration plan: the hypotheses of how it was drawn, held against the strokes."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,6 +75,13 @@ class Plan:
     def fit(self) -> Fit:
         """The nodes by the strokes alone."""
         return fit_nodes(self.found, self.lines)
+
+    @property
+    def strokes(self) -> Hashable:
+        """Which stroke it takes for which vector."""
+        found = self.found
+        taken = np.where(found.stroke[:, None] < 0, -1, self.lines.members[found.stroke])
+        return found.expected.edges, taken.tobytes(), found.shared.tobytes()
 
     @property
     def refined(self) -> Place:

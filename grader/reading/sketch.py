@@ -16,6 +16,7 @@ from grader.records import FloatArray
 from reference.assignment import Assignment, Scales, Variant
 from reference.derivation import construction_of
 from reference.elements import FixedLine
+from reference.geometry import ComplexArray
 from reference.mistakes import Drawing, commit, single_mistakes
 from reference.parameters import parameters_of
 from reference.steps import ArcAndLine, OnGuide, Step, TwoLines
@@ -97,7 +98,8 @@ def find_sketch(
     best = [
         _Case(drawing, place, id(drawing.construction) in regular) for _, drawing, place in laid[:SHORT_LIST]
     ]
-    return max(_read(best, lines, circles), key=lambda one: one.score, default=None)
+    read = max(_read(best, lines, circles), key=lambda one: one.score, default=None)
+    return None if read is None else _sketch(read, lines)
 
 
 def _top(best: list[tuple[float, Drawing, Place]]) -> float:
@@ -141,8 +143,18 @@ class _Case:
     regular: bool
 
 
-def _read(cases: Sequence[_Case], lines: Lines, circles: FloatArray) -> Iterator[Sketch]:
-    """The best explanation of each."""
+@dataclass(frozen=True, slots=True)
+class _Read:
+    """The best explanation of a case by `lines`, with the circles that stand for joints, and its score."""
+
+    case: _Case
+    found: Explanation
+    lines: Lines
+    centres: dict[int, complex]
+    score: float
+
+
+def _read(cases: Sequence[_Case], lines: Lines, circles: FloatArray) -> Iterator[_Read]:
     groups: dict[tuple[Edge, ...], list[tuple[_Case, Expected]]] = {}
     for case in cases:
         slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03)
@@ -151,8 +163,10 @@ def _read(cases: Sequence[_Case], lines: Lines, circles: FloatArray) -> Iterator
     for group in groups.values():
         placed = [expected for _, expected in group]
         around = lines.take(_near(lines, placed) & (lines.length > LEAST_SEEN_MM))
-        for (case, _), found in zip(group, explain_each(placed, around, LINK_ENDS), strict=True):
-            yield _fitted(case, found[0], around, lines, circles)
+        for (case, _), (found, *_) in zip(group, explain_each(placed, around, LINK_ENDS), strict=True):
+            centres = _centres(found.expected.at, found.expected.cov, circles)
+            cost = 0.0 if case.regular else COST_OF_OTHER
+            yield _Read(case, found, around, centres, found.score + WORTH_OF_CIRCLE * len(centres) - cost)
 
 
 def _near(lines: Lines, placed: Sequence[Expected]) -> BoolArray:
@@ -164,15 +178,14 @@ def _near(lines: Lines, placed: Sequence[Expected]) -> BoolArray:
     return near
 
 
-def _fitted(case: _Case, found: Explanation, around: Lines, lines: Lines, circles: FloatArray) -> Sketch:
-    fit = fit_nodes(found, around, LINKS_END)
-    centres = _centres(fit, circles)
-    fit = fit_nodes(found, around, LINKS_END, centres)
-    exact = _expected(case.drawing).at
+def _sketch(read: _Read, lines: Lines) -> Sketch:
+    """The sketch with its joints fitted."""
+    drawing, found = read.case.drawing, read.found
+    fit = fit_nodes(found, read.lines, LINKS_END, read.centres)
+    exact = _expected(drawing).at
     turn = float(np.angle(np.sum((fit.at - fit.at.mean()) * np.conj(exact - exact.mean()))))
-    score = found.score + WORTH_OF_CIRCLE * len(centres) - (0.0 if case.regular else COST_OF_OTHER)
-    guide_turn = _guide_turn(case.drawing, found, fit, lines, turn)
-    return Sketch(case.drawing, found, fit, turn, guide_turn, case.place, score)
+    guide_turn = _guide_turn(drawing, found, fit, lines, turn)
+    return Sketch(drawing, found, fit, turn, guide_turn, read.case.place, read.score)
 
 
 def _guide_turn(drawing: Drawing, found: Explanation, fit: Fit, lines: Lines, turn: float) -> float:
@@ -205,16 +218,16 @@ def _fixed_guide(step: Step) -> FixedLine | None:
     return None
 
 
-def _centres(fit: Fit, circles: FloatArray) -> dict[int, complex]:
+def _centres(joints: ComplexArray, cov: FloatArray, circles: FloatArray) -> dict[int, complex]:
     """Circles that stand for joints: the nearest one to each, where it is near enough."""
     centres: dict[int, complex] = {}
     round_ones = circles[(circles[:, 2] > LEAST_RADIUS_MM) & (circles[:, 2] < LARGEST_RADIUS_MM)]
     at = round_ones[:, 0] - 1j * round_ones[:, 1]
-    for node, joint in enumerate(fit.at):
+    for node, joint in enumerate(joints):
         if not len(at):
             break
         nearest = int(np.argmin(np.abs(at - joint)))
-        spread = float(np.sqrt(np.trace(fit.cov[2 * node : 2 * node + 2, 2 * node : 2 * node + 2])))
+        spread = float(np.sqrt(np.trace(cov[2 * node : 2 * node + 2, 2 * node : 2 * node + 2])))
         if abs(at[nearest] - joint) < NEAR_CIRCLE_MM + 2.0 * min(spread, 1.0):
             centres[node] = complex(at[nearest])
     return centres
