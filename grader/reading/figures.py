@@ -18,6 +18,10 @@ from grader.records import Figure, FloatArray, ReadNode, ReadVector, Unread
 
 LEAST_VECTOR_MM = 2.0
 """A shorter vector is known by its nodes, whether or not it has a stroke."""
+MARKED_MM = 0.5
+"""A tip within this of a node marks it."""
+ELSEWHERE_MM = (0.8, 15.0)
+"""A tip as far off as this may be the one that was meant."""
 
 
 def figure_of_sketch(sketch: Sketch) -> Figure:
@@ -111,8 +115,25 @@ def _vectors(
             mistaken=plan.hypothesis.label not in REGULAR,
             length_mm=abs(span),
         )
+        if row >= 0:
+            marked, elsewhere = _marks(plan, fit, edge, row)
+            signs = replace(signs, marked=marked, elsewhere=elsewhere)
         vectors[edge.name] = _vector(span, cov, sureness(signs))
     return vectors, unread
+
+
+def _marks(plan: Plan, fit: Fit, edge: Edge, row: int) -> tuple[float, float]:
+    """How clearly tips mark a vector's two ends on its stroke, and whether others might be meant."""
+    marked, elsewhere = [], []
+    along = complex(plan.lines.along[row])
+    for node, other in ((edge.tail, edge.head), (edge.head, edge.tail)):
+        forward = np.array([((fit.at[node] - fit.at[other]) * np.conj(along)).real > 0])
+        tips, sure = plan.lines.tips_towards(np.array([row]), forward, head=node == edge.head)
+        off = np.abs(tips[0] - ((fit.at[node] - plan.lines.start[row]) * np.conj(along)).real)
+        near, far = off < MARKED_MM, (off >= ELSEWHERE_MM[0]) & (off < ELSEWHERE_MM[1])
+        marked.append(float(sure[0, near].max(initial=0.0)))
+        elsewhere.append(float(sure[0, far].max(initial=0.0)))
+    return min(marked), max(elsewhere)
 
 
 def _difference_cov(fit: Fit, edge: Edge, span: complex, scale_se: float) -> FloatArray:
