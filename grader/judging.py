@@ -34,8 +34,29 @@ def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission)
     mistakes = diagnose(_case(task, comparison))
+    mistakes = (*mistakes, *_swaps_seen(task, submission, mistakes))
     outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
+
+
+def _swaps_seen(task: Task, submission: Submission, known: Sequence[Mistake]) -> list[Mistake]:
+    """Letters seen at each other's node on a sheet: lines tell nothing of them, so diagnosis cannot."""
+    vectors = task.construction.vectors
+    told = {(one.detail["first"], one.detail["second"]) for one in known if one.code == "labels_swapped"}
+    found = []
+    for swap in (swap for reading in submission.readings for swap in reading.swapped):
+        pair = swap.first, swap.second
+        if swap.confidence < task.rubric.least_confidence or {pair, pair[::-1]} & told:
+            continue
+        told.add(pair)
+        explains = tuple(
+            one.id
+            for one in task.rubric.criterion
+            if one.name in vectors and {vectors[one.name].tail, vectors[one.name].head} & set(pair)
+        )
+        detail = {"first": swap.first, "second": swap.second}
+        found.append(Mistake("labels_swapped", swap.first, explains, swap.confidence, detail))
+    return found
 
 
 def _case(task: Task, comparison: Comparison) -> Case:

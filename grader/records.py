@@ -322,6 +322,16 @@ class Unread:
 
 
 @dataclass(frozen=True, slots=True)
+class Swapped:
+    """Two nodes of a plan that have each other's letter beside them, with the probability of it."""
+
+    figure: str
+    first: str
+    second: str
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True)
 class Reading:
     """What was drawn (or measured by hand), with names.
 
@@ -332,6 +342,7 @@ class Reading:
     problems : what a person should know
     written : what stands in the printed boxes, by scale; empty boxes are left out
     lengths : measured lengths that stand in the printed cells, mm, and the probability of it, by vector
+    swapped : letters that stand at each other's node; the figures keep the construction's names
     """
 
     figures: Mapping[str, Figure]
@@ -339,3 +350,4 @@ class Reading:
     problems: tuple[Problem, ...] = ()
     written: Mapping[str, Written] = field(default_factory=dict)
     lengths: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    swapped: tuple[Swapped, ...] = ()

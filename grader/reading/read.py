@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from grader.reading.figures import figure_of_plan, figure_of_sketch
+from grader.reading.lettering import lettered
 from grader.reading.lines import Lines, lines_of
 from grader.reading.plans import Plan, best_plan, regular_plans
 from grader.reading.sketch import Sketch, drawings, find_sketch
@@ -81,7 +82,10 @@ def read_figures(
     if _asks_accelerations(wanted, drawing):
         _set_apart(pages, velocity)
         _find(pages, paced, ACCELERATION_PLAN, known)
-    return _readings(pages, drawing, wanted)
+    return [
+        lettered(reading, page.ink.letters, drawing.construction, assignment.file.names)
+        for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
+    ]
 
 
 def _drawings(

@@ -1,0 +1,217 @@
+"""What the letters beside a figure's nodes say of the names that the construction gave to them.
+
+A letter is written a few millimetres off its node, mostly nearer to it than to any other: each piece of
+writing is, with some probability, the label of each node about it, or of none. How likely the writing is
+under the names as read, under two of them changed over, and under names at random tells whether the
+letters bear a name out. They are evidence beside the strokes: students swap letters, and pieces of
+strokes look like letters.
+"""
+
+import math
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from grader.records import MECHANISM, Figure, FloatArray, IntArray, Letters, Reading, Swapped
+from reference.construction import Construction
+from reference.geometry import ComplexArray
+
+REACH_MM = 8.0
+FALL_MM = 1.4
+"""Letters become fewer by 1/e with so much more of a gap between their box and their node."""
+STRAY = 0.03
+"""How many other letters are within a gap's reach, against a node's own at no gap."""
+LEAST_MM, MOST_MM = 1.0, 7.5
+"""Heights of letters; primes and points are lower, words run together are wider."""
+SHARED = 0.5
+"""Pieces that share so much of the smaller one's box are the same ink."""
+RARE_NATS = 5.0
+"""Two given letters of a plan are swapped in one plan of 150."""
+UNSEEN = 1.0 / (1.0 + math.exp(RARE_NATS))
+"""Probability of a swap before letters are looked at: the confidences hold with it."""
+TOLD = 0.5
+"""Probability from which a swap is told at all; what it is used for is another stage's choice."""
+COMPONENTS = ("n_", "k_")
+"""How names of ends of normal and Coriolis components begin: few write them, and they share a letter."""
+POLE_SIGNS = ("o", "p", "π")
+
+
+@dataclass(frozen=True, slots=True)
+class Lettering:
+    """Pieces of writing about the nodes of a sheet.
+
+    Attributes
+    ----------
+    nodes : (figure, node) of each column below
+    share : (k, n) probability that a piece, if it is a letter, is the label of the node
+    stray : (k,) probability that it is no node's; with `share` a row sums to 1
+    fits : (k, n) how much likelier the piece is as the letter of the node than as a letter at random
+    letter : (k,) probability that the piece is a letter that some node may have
+    """
+
+    nodes: tuple[tuple[str, str], ...]
+    share: FloatArray
+    stray: FloatArray
+    fits: FloatArray
+    letter: FloatArray
+
+    def log(self, named: IntArray | None = None) -> float:
+        """Log likelihood of the writing, nats against writing at random.
+
+        Arguments: `named` (n,) the column whose letter stands at each node; each its own by default.
+        """
+        return float(self._logs(self.fits if named is None else self.fits[:, named]).sum())
+
+    def _logs(self, fits: FloatArray) -> FloatArray:
+        told = self.stray + (self.share * fits).sum(axis=1)
+        return np.asarray(np.log(1.0 - self.letter + self.letter * told))
+
+    def borne_out(self) -> FloatArray:
+        """(n,) nats by which the writing is likelier with a node's own letter than with one at random."""
+        own = self._logs(self.fits)
+        told = np.empty(len(self.nodes))
+        for node in range(len(self.nodes)):
+            fits = self.fits.copy()
+            fits[:, node] = 1.0
+            told[node] = float((own - self._logs(fits)).sum())
+        return told
+
+    def swaps(self) -> Iterator[tuple[int, int, float]]:
+        """Pairs of nodes of one figure, with the nats by which the writing is likelier with them swapped."""
+        own = self.log()
+        usual = np.arange(len(self.nodes))
+        for first, second in combinations(range(len(self.nodes)), 2):
+            if self.nodes[first][0] == self.nodes[second][0]:
+                named = usual.copy()
+                named[[first, second]] = second, first
+                yield first, second, self.log(named) - own
+
+
+def agreement(
+    figures: Mapping[str, Figure],
+    letters: Letters | None,
+    poles: Collection[str] = (),
+    renamed: Mapping[str, str] | None = None,
+) -> dict[str, dict[str, float]]:
+    """How far the letters bear out each node, by figure and name: 1 fully, 0 silent, -1 another's letter.
+
+    Arguments are those of `lettering`.
+    """
+    found = lettering(_nodes(figures), letters, poles, renamed)
+    told = {figure: dict.fromkeys(read.nodes, 0.0) for figure, read in figures.items()}
+    if found is not None:
+        for (figure, node), nats in zip(found.nodes, found.borne_out(), strict=True):
+            told[figure][node] = math.tanh(float(nats) / 2.0)
+    return told
+
+
+def lettered(
+    reading: Reading, letters: Letters | None, construction: Construction, renamed: Mapping[str, str]
+) -> Reading:
+    """A sheet's reading, less sure where letters of a plan seem swapped, with the likely swaps told.
+
+    The names stay those of the construction: which of the two the student meant, a person decides.
+    """
+    poles = frozenset(construction.poles.values())
+    found = lettering(_nodes(reading.figures), letters, poles, renamed)
+    if found is None:
+        return reading
+    figures, told = dict(reading.figures), []
+    for first, second, nats in found.swaps():
+        (figure, one), (_, other) = found.nodes[first], found.nodes[second]
+        if figure == MECHANISM or any(name in poles or name.startswith(COMPONENTS) for name in (one, other)):
+            continue
+        chance = 1.0 / (1.0 + math.exp(RARE_NATS - nats))
+        left = min(1.0, (1.0 - chance) / (1.0 - UNSEEN))
+        figures[figure] = _doubted(figures[figure], {one, other}, construction, left)
+        if chance >= TOLD:
+            told.append(Swapped(figure, one, other, chance))
+    told.sort(key=lambda swap: -swap.confidence)
+    return replace(reading, figures=figures, swapped=tuple(told))
+
+
+def _nodes(figures: Mapping[str, Figure]) -> dict[tuple[str, str], complex]:
+    return {(figure, name): node.at for figure, read in figures.items() for name, node in read.nodes.items()}
+
+
+def _doubted(figure: Figure, names: Collection[str], construction: Construction, share: float) -> Figure:
+    """The figure with that share of the confidence left to some nodes and to the vectors that end there."""
+    nodes = {
+        name: replace(node, confidence=share * node.confidence) if name in names else node
+        for name, node in figure.nodes.items()
+    }
+    vectors = {
+        name: replace(read, confidence=share * read.confidence)
+        if {construction.vectors[name].tail, construction.vectors[name].head} & set(names)
+        else read
+        for name, read in figure.vectors.items()
+    }
+    return Figure(nodes, vectors)
+
+
+def lettering(
+    nodes: Mapping[tuple[str, str], complex],
+    letters: Letters | None,
+    poles: Collection[str] = (),
+    renamed: Mapping[str, str] | None = None,
+) -> Lettering | None:
+    """The writing about named nodes of a sheet; None where there is none.
+
+    Arguments
+    ---------
+    nodes : by figure and name, complex sheet mm, y up
+    poles : names of the plans' poles, whose letter differs from school to school
+    renamed : what students write for a node, by name, where it is not the name
+    """
+    if letters is None or not nodes:
+        return None
+    signs = [_signs(name, poles, renamed or {}, letters) for _, name in nodes]
+    at = np.array(list(nodes.values()))
+    high = letters.height_mm
+    gap = _gaps(letters.box_mm, at)
+    near = (gap.min(axis=1) < REACH_MM) & (high > LEAST_MM) & (high < MOST_MM)
+    columns = sorted({column for of_node in signs for column in of_node})
+    known = letters.probability[:, columns].sum(axis=1)
+    rows = _apart(np.flatnonzero(near), letters.box_mm, known)
+    if not len(rows):
+        return None
+    density = np.exp(-gap[rows] / FALL_MM)
+    total = density.sum(axis=1) + STRAY
+    chance = np.column_stack([letters.probability[rows][:, own].sum(axis=1) for own in signs])
+    fits = chance / np.maximum(known[rows], 1e-6)[:, None] * len(columns) / [len(own) for own in signs]
+    return Lettering(
+        tuple(nodes), density / total[:, None], STRAY / total, fits, np.minimum(known[rows], 1.0)
+    )
+
+
+def _signs(name: str, poles: Collection[str], renamed: Mapping[str, str], letters: Letters) -> list[int]:
+    """The columns of the letters that may be written at a node: its name's first, any school's at a pole."""
+    written = renamed.get(name, name)[:1]
+    told = (written, *POLE_SIGNS) if name in poles else (written,)
+    return sorted({letters.column[sign] for sign in told if sign in letters.column})
+
+
+def _gaps(box_mm: FloatArray, at: ComplexArray) -> FloatArray:
+    """(k, n) distances from boxes to points, 0 inside."""
+    x, y, w, h = (side[:, None] for side in box_mm.T)
+    across = np.maximum(np.maximum(x - at.real, at.real - x - w), 0.0)
+    along = np.maximum(np.maximum(y + at.imag, -at.imag - y - h), 0.0)
+    return np.asarray(np.hypot(across, along))
+
+
+def _apart(rows: IntArray, box_mm: FloatArray, known: FloatArray) -> IntArray:
+    """One row for each piece of ink: the one that is likeliest a letter of those that overlap."""
+    kept: list[int] = []
+    for row in sorted(rows.tolist(), key=lambda one: -known[one]):
+        if all(_overlap(box_mm[row], box_mm[other]) < SHARED for other in kept):
+            kept.append(row)
+    return np.array(kept, dtype=np.int64)
+
+
+def _overlap(one: FloatArray, other: FloatArray) -> float:
+    low = np.maximum(one[:2], other[:2])
+    high = np.minimum(one[:2] + one[2:], other[:2] + other[2:])
+    shared = np.maximum(high - low, 0.0).prod()
+    return float(shared / max(min(one[2:].prod(), other[2:].prod()), 1e-9))

@@ -1,0 +1,91 @@
+"""Letters beside nodes: what they say of the names that the construction gave."""
+
+import numpy as np
+import pytest
+
+from grader.reading.lettering import agreement, lettered
+from grader.records import VELOCITY_PLAN, Figure, Letters, Reading, ReadNode, ReadVector
+from reference.assignment import load_assignment
+from reference.derivation import construction_of
+
+SIGNS = {sign: column for column, sign in enumerate([*"oabcdnpπABCD'"])} | {"": 13}
+PLACES = {"o": 50 - 50j, "a": 90 - 60j, "b": 60 - 100j, "c": 100 - 110j, "d": 55 - 140j}
+OWN = {name: name for name in PLACES}
+SWAPPED = OWN | {"b": "c", "c": "b"}
+SURE, HEIGHT_MM, GAP_MM = 0.97, 3.0, 1.5
+CLEARLY = 0.5
+"""Of agreement, -1 to 1."""
+BORNE_OUT = 0.3
+"""The same for a pole too, whose letter may be one of three."""
+
+
+def letters(written: dict[str, str], sure: float = SURE, gap_mm: float = GAP_MM) -> Letters:
+    """A letter to the right of each node, and nothing else."""
+    boxes, rows = [], []
+    for node, sign in written.items():
+        at = PLACES[node]
+        boxes.append([at.real + gap_mm, -at.imag - HEIGHT_MM / 2.0, 2.0, HEIGHT_MM])
+        row = np.full(len(SIGNS), (1.0 - sure) / (len(SIGNS) - 1))
+        row[SIGNS[sign]] = sure
+        rows.append(row)
+    probability = np.array(rows).reshape(-1, len(SIGNS))
+    return Letters(np.array(boxes).reshape(-1, 4), probability, np.ones(len(boxes), dtype=bool), SIGNS)
+
+
+@pytest.fixture(scope="module")
+def construction():
+    assignment = load_assignment("pump")
+    return construction_of(assignment.mechanism(assignment.variants()[:1]))
+
+
+@pytest.fixture(scope="module")
+def reading(construction) -> Reading:
+    nodes = {name: ReadNode(at, np.eye(2) * 1e-4, 0.99) for name, at in PLACES.items()}
+    vectors = {
+        vector.name: ReadVector(abs(PLACES[vector.head] - PLACES[vector.tail]), 0.05, 0.0, 0.1, 0.99)
+        for vector in construction.vectors_of(VELOCITY_PLAN)
+    }
+    return Reading({VELOCITY_PLAN: Figure(nodes, vectors)})
+
+
+def pairs(reading: Reading) -> list[set[str]]:
+    return [{one.first, one.second} for one in reading.swapped]
+
+
+def test_letters_at_their_own_nodes_bear_them_out_and_change_no_confidence(reading, construction):
+    told = agreement(reading.figures, letters(OWN), ["o"])[VELOCITY_PLAN]
+    assert min(told.values()) > BORNE_OUT
+    found = lettered(reading, letters(OWN), construction, {})
+    assert (found.figures, found.swapped) == (reading.figures, ())
+
+
+def test_two_letters_at_each_others_node_are_told_and_their_vectors_left_to_a_person(reading, construction):
+    found = lettered(reading, letters(SWAPPED), construction, {})
+    assert pairs(found) == [{"b", "c"}]
+    vectors = found.figures[VELOCITY_PLAN].vectors
+    ends = {name: {construction.vectors[name].tail, construction.vectors[name].head} for name in vectors}
+    for name, read in vectors.items():
+        assert (read.confidence < CLEARLY) == bool(ends[name] & {"b", "c"})
+
+
+def test_one_strange_letter_alone_is_no_swap(reading, construction):
+    found = lettered(reading, letters({"b": "c"}), construction, {})
+    assert found.swapped == ()
+    assert agreement(reading.figures, letters({"b": "c"}), ["o"])[VELOCITY_PLAN]["b"] < -CLEARLY
+
+
+@pytest.mark.parametrize(("sure", "gap_mm"), [(0.3, GAP_MM), (SURE, 12.0)])
+def test_letters_hard_to_read_or_far_off_say_little(reading, construction, sure, gap_mm):
+    assert lettered(reading, letters(SWAPPED, sure, gap_mm), construction, {}).swapped == ()
+
+
+@pytest.mark.parametrize("pole", ["o", "p", "π"])
+def test_a_pole_may_have_the_letter_of_any_school(reading, pole):
+    told = agreement(reading.figures, letters(OWN | {"o": pole}), ["o"])[VELOCITY_PLAN]
+    assert told["o"] > BORNE_OUT
+
+
+def test_without_letters_nothing_is_said(reading, construction):
+    assert lettered(reading, None, construction, {}) == reading
+    assert lettered(reading, letters({}), construction, {}) == reading
+    assert set(agreement(reading.figures, None)[VELOCITY_PLAN].values()) == {0.0}
