@@ -12,7 +12,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from reference.construction import Construction, Vector, ancestors
+from reference.construction import Construction, Vector
 from reference.elements import Along, Coriolis, Direction, Fixed, Line, Normal, Parameters, View
 from reference.steps import ArcAndLine, Coincide, Given, Local, Similar, Step, TwoArcs, TwoLines
 
@@ -282,6 +282,8 @@ def affected(mistake: Mistake, construction: Construction) -> frozenset[str]:
         return frozenset(step.node for step in construction.steps)
     if mistake.at in construction.figures:
         return frozenset(step.node for step in construction.figures[mistake.at])
-    return frozenset(
-        step.node for step in construction.steps if mistake.at in ancestors(construction, [step.node])
-    )
+    moved = {mistake.at}
+    for step in construction.steps:
+        if moved.intersection(step.needs):
+            moved.add(step.node)
+    return frozenset(moved)
