@@ -10,7 +10,7 @@ from grader.documents import ReportDocument, ResultsDocument, UnmatchedDocument
 from grader.exports import write_summary
 from grader.feedback import Level, write_feedback, write_index
 from grader.files import make_folder, write_whole
-from grader.folder import submissions
+from grader.folder import submissions, told_name
 from grader.judging import unjudged_report
 from grader.kept import digest_of, forget_surveys, keep_looked, kept_looked, survey_kept
 from grader.measurements import names_of
@@ -109,7 +109,7 @@ def _surveys(batch: Batch, files: Sequence[Path], progress: Progress) -> list[Su
     names = names_of(batch.assignment)
     found: dict[int, Survey] = {}
     notes = batch.out / KEPT_FOLDER / "surveys"
-    calls = [(path, path.relative_to(batch.folder).as_posix(), names, notes) for path in files]
+    calls = [(path, told_name(path, batch.folder), names, notes) for path in files]
     for index, result in in_parallel(survey_kept, calls, batch.jobs):
         if isinstance(result, Problem):
             told = UnmatchedDocument(file=calls[index][1], code=result.code, message=result.message)
@@ -134,7 +134,7 @@ def _works(
         pages_per_student=batch.pages_per_student,
         student_ids=[row.student_id for row in measured if row.student_id],
     )
-    paths = {path.relative_to(batch.folder).as_posix(): path for path in files}
+    paths = {told_name(path, batch.folder): path for path in files}
     works, strangers = works_of(batch.assignment, roster, ownership, measured, paths, batch.lang)
     broken = {source: why for one in surveys for source, why in one.broken.items()}
     unmatched = [_unmatched(one, broken.get(one.source)) for one in ownership.unmatched]

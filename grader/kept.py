@@ -56,6 +56,8 @@ def digest_of(parts: Iterable[object]) -> str:
 def file_digest(path: Path) -> str:
     """A digest of a file's content; of a file that is not there or cannot be read, an empty one."""
     try:
+        if not path.is_file():
+            return ""  # a pipe would be waited for
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:

@@ -109,6 +109,9 @@ def read_measurements(path: Path | str, names: Names) -> tuple[Measurements, ...
 
 
 def _text_of(path: Path) -> str:
+    if path.exists() and not path.is_file():
+        told = f"{path.name}: cannot be read: it is a folder or a pipe, not a file"
+        raise InputFileError("measurements_unreadable", told)
     try:
         size = path.stat().st_size
         content = path.read_bytes() if size <= MAX_BYTES else b""

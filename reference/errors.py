@@ -17,9 +17,10 @@ class PlanmarkError(Exception):
     exit_status = 2
 
     def __init__(self, code: str, message: str) -> None:
-        super().__init__(message)
+        # A file's name may hold bytes that are no text; told as they are, no report could be written.
+        self.message = message.encode("utf-8", "backslashreplace").decode()
+        super().__init__(self.message)
         self.code = code
-        self.message = message
 
     def __reduce__(self) -> tuple[object, ...]:
         return (type(self), (self.code, self.message))

@@ -17,6 +17,7 @@ Codes of `InputFileError` raised in this package:
 | pages_too_many | more pages than one class can need |
 """
 
+import errno
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -53,8 +54,7 @@ class Door:
 def kind_of(path: Path) -> str:
     """`jpeg`, `png`, `tiff` or `pdf`, by content; raises InputFileError for anything else."""
     try:
-        with path.open("rb") as file:
-            head = file.read(_PDF_HEADER_WITHIN)
+        head = _head(path)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputFileError(
@@ -73,6 +73,14 @@ def kind_of(path: Path) -> str:
         "file_type_unsupported",
         f"{path.name}: {what}; scan or export it as JPEG, PNG, TIFF or PDF",
     )
+
+
+def _head(path: Path) -> bytes:
+    """The first bytes. A pipe or device is not opened: it may never say anything, or never end."""
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EISDIR, "it is a folder or a pipe, not a file")
+    with path.open("rb") as file:
+        return file.read(_PDF_HEADER_WITHIN)
 
 
 def check_size(path: Path, page: int, width: int, height: int) -> None:

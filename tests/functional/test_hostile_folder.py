@@ -1,0 +1,108 @@
+"""A folder in which good work lies beside files that no program should trust: each is told, none is lost."""
+
+import json
+import os
+import struct
+import zlib
+from pathlib import Path
+
+import pikepdf
+import pytest
+from typer.testing import CliRunner
+
+from grader.cli import app
+
+REFUSED = {
+    "s10_zero.jpg": "file_empty",
+    "s11.jpg": "file_type_unsupported",
+    "s12.png": "image_too_large",
+    "s13.pdf": "pages_too_many",
+    "s14.pdf": "pdf_encrypted",
+    "s15.gif": "file_type_unsupported",
+    "s16.heic": "file_type_unsupported",
+    "s17.pdf": "file_missing",
+    "s18.jpg": "file_missing",
+    "s19_două pagini 'x' \"y\" ж.jpg": "image_truncated",
+}
+"""What is wrong with each file, under its owner's name."""
+NOBODYS = "bad\udcff\udcfename.jpg"
+"""As an archive from a system with another alphabet unpacks it."""
+
+
+def graded(folder, out):
+    call = ["grade", folder, "--assignment", "pump", "--out", out, "--jobs", "1"]
+    return CliRunner().invoke(app, [str(part) for part in call])
+
+
+def png_of(side):
+    parts = [(b"IHDR", struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)), (b"IDAT", zlib.compress(b"\0")),
+             (b"IEND", b"")]  # fmt: skip
+    chunks = (struct.pack(">I", len(d)) + t + d + struct.pack(">I", zlib.crc32(t + d)) for t, d in parts)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+def pdf_of(path, pages, encryption=False):
+    document = pikepdf.new()
+    first = document.make_indirect(pikepdf.Dictionary(Type=pikepdf.Name.Page, MediaBox=[0, 0, 100, 100]))
+    for _ in range(pages):
+        document.pages.append(pikepdf.Page(first))
+    document.save(path, encryption=encryption)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("hostile")
+    (folder / "s10_zero.jpg").write_bytes(b"")
+    (folder / "s11.jpg").write_text("this is my homework\n", encoding="utf-8")
+    (folder / "s12.png").write_bytes(png_of(100_000))
+    pdf_of(folder / "s13.pdf", 5000)
+    pdf_of(folder / "s14.pdf", 1, pikepdf.Encryption(user="a", owner="b"))
+    (folder / "s15.gif").write_bytes(b"GIF89a" + bytes(30))
+    (folder / "s16.heic").write_bytes(b"\0\0\0\x18ftypheic" + bytes(3000))
+    (folder / "s17.pdf").mkdir()
+    os.mkfifo(folder / "s18.jpg")
+    (folder / "s19_două pagini 'x' \"y\" ж.jpg").write_bytes(b"\xff\xd8\xff\xe0junk")
+    try:
+        (folder / NOBODYS).write_bytes(b"junk")
+    except OSError:  # a file system that takes text only
+        (folder / NOBODYS.encode("utf-8", "backslashreplace").decode()).write_bytes(b"junk")
+    (folder / "s20.json").write_text('{"student_id": "s20", "n": 7, "segments_mm": {"v_A": 60.0}}')
+    rows = "".join(f"s{number},Student {number},7\n" for number in range(10, 21))
+    (folder / "roster.csv").write_text("student_id,name,n\n" + rows, encoding="utf-8")
+    out = folder.parent / (folder.name + "-out")
+    run = graded(folder, out)
+    return run, out, json.loads((out / "results.json").read_text(encoding="utf-8"))
+
+
+def test_the_run_ends_with_work_for_a_person(results):
+    run, out, _ = results
+    assert run.exit_code == 1
+    assert (out / "index.html").stat().st_size > 0
+
+
+@pytest.mark.parametrize(("name", "code"), REFUSED.items())
+def test_what_is_wrong_with_a_file_stands_in_its_owners_report(results, name, code):
+    report = next(one for one in results[2]["reports"] if one["student_id"] == name[:3])
+    assert report["status"] == "unreadable"
+    assert any(problem["code"] == code and name in problem["message"] for problem in report["problems"])
+    assert (results[1] / name[:3] / "feedback.html").is_file()
+
+
+def test_a_file_whose_name_is_no_text_is_told_and_is_nobodys(results):
+    told = [one["file"] for one in results[2]["unmatched"]]
+    assert told == [NOBODYS.encode("utf-8", "backslashreplace").decode()]
+
+
+def test_the_good_work_beside_them_is_graded(results):
+    report = next(one for one in results[2]["reports"] if one["student_id"] == "s20")
+    assert report["status"] in {"graded", "needs_review"}
+    assert report["criteria"]
+
+
+def test_a_pipe_with_the_name_of_measurements_is_told_and_not_waited_for(tmp_path: Path):
+    folder = tmp_path / "in"
+    folder.mkdir()
+    os.mkfifo(folder / "class.csv")
+    run = graded(folder, tmp_path / "out")
+    assert run.exit_code == 1
+    assert "class.csv: cannot be read" in run.output
