@@ -17,8 +17,8 @@ from grader.letters.features import normalised
 from grader.letters.model import recognise
 from grader.records import Box, FloatArray, GreyImage, Ink, Letters
 
-_LEAST_MM, _MOST_MM = 0.4, 9.0
-"""Longer side of what can be a sign: a point, a capital with a swing."""
+_LEAST_MM, _MOST_MM = 1.0, 9.0
+"""Longer side of what can be a letter: less is a point or a prime, more two letters run together."""
 _FAINT = 20
 """Of 255: fainter is paper."""
 _SHARE = 0.2
@@ -32,12 +32,18 @@ _STUB_MM = 0.9
 """Smaller pieces that strokes leave are their frayed borders."""
 _TOUCHED = 0.08
 """A piece is cut free of strokes as well where so much of its ink is theirs."""
+_THIN = 0.13
+"""Of the longer side: thinner is a piece of a line."""
+_GAP, _LEVEL = 0.9, 0.4
+"""Signs of one line of writing: so many heights apart, so much of the lower one's height at one level."""
+_WORDS = 7
+"""More signs in a line are words or a calculation, no letter of a node."""
 _MOST = 1000
 """No drawing has more signs: squared paper has, or a picture."""
 
 
 def find_letters(ink: Ink, boxes: Sequence[Box] | None = None) -> Letters:
-    """Every piece of ink that can be a sign, with its probabilities.
+    """Every piece of ink that can be a letter of a node, with its probabilities; no words or calculations.
 
     A piece that touches strokes is given as it is and as it remains without them.
 
@@ -52,6 +58,7 @@ def find_letters(ink: Ink, boxes: Sequence[Box] | None = None) -> Letters:
     for piece in pieces:
         if drawn[piece.place][piece.own > 0].mean() < _TOUCHED:
             rest[piece.place] &= 1 - piece.own
+    pieces = _but_words(pieces)
     cut = _pieces(_without(rest, drawn, _usual_px(ink)), unit, _STUB_MM)
     whole = np.arange(len(pieces) + len(cut)) < len(pieces)
     pieces = [*pieces, *cut]
@@ -106,12 +113,27 @@ def _pieces(mask: GreyImage, unit: float, least_mm: float) -> list[_Piece]:
         if hierarchy[0, index, 3] >= 0:
             continue
         x, y, w, h = cv2.boundingRect(contour)
-        if not least_mm * unit <= max(w, h) <= _MOST_MM * unit:
+        if not least_mm * unit <= max(w, h) <= _MOST_MM * unit or min(w, h) < _THIN * max(w, h):
             continue
         own = np.zeros((h, w), dtype=np.uint8)
         cv2.drawContours(own, [contour], 0, 1, cv2.FILLED, offset=(-x, -y))
         found.append(_Piece((x, y, w, h), own & mask[y : y + h, x : x + w]))
     return found if len(found) <= _MOST else []
+
+
+def _but_words(pieces: list[_Piece]) -> list[_Piece]:
+    """The pieces without those that stand in a line with many others."""
+    if len(pieces) <= _WORDS:
+        return pieces
+    x, y, w, h = np.array([piece.box for piece in pieces], dtype=np.float32).T[:, :, None]
+    beside = x.T - x - w < _GAP * np.maximum(h, h.T)
+    level = np.minimum(y + h, (y + h).T) - np.maximum(y, y.T) > _LEVEL * np.minimum(h, h.T)
+    line = np.arange(len(pieces))
+    for one, other in np.argwhere(beside & level & (x < x.T)):
+        if line[one] != line[other]:
+            line[line == line[other]] = line[one]
+    many = np.bincount(line)[line] > _WORDS
+    return [piece for piece, is_word in zip(pieces, many, strict=True) if not is_word]
 
 
 def _usual_px(ink: Ink) -> float:
