@@ -16,6 +16,8 @@ _BORDER_MM = 0.55
 """Inside of the printed line, with the print's and the registration's error."""
 _FOREIGN = 0.25
 """Log likelihood by sign that a text may lack against signs at will, before it is doubted."""
+_LARGE, _HARDLY = 1000.0, -4.0
+"""From here on, a number lost its decimal point more likely than that anybody chose the scale."""
 _MOST_TEXTS = 200
 _SCALE_OF: Mapping[str, str] = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
 
@@ -60,8 +62,9 @@ def _by_meaning(texts: list[Text], name: str, bare_unit: str | None) -> dict[obj
         meaning = _meaning(parsed)
         if meaning is None:
             continue
+        unlikely = _HARDLY if isinstance(meaning, float) and meaning >= _LARGE else 0.0
         text, log = found.get(meaning, (one.text, -np.inf))
-        found[meaning] = (text, float(np.logaddexp(log, one.log)))
+        found[meaning] = (text, float(np.logaddexp(log, one.log + unlikely)))
     return found
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from grader.letters.alphabet import COLUMN
 from grader.letters.features import normalised
-from grader.letters.model import recognise
+from grader.letters.model import COOLING, STRANGE, recognise
 from grader.records import Box, FloatArray, GreyImage, Ink, Letters
 
 _LEAST_MM, _MOST_MM = 1.0, 9.0
@@ -63,7 +63,8 @@ def find_letters(ink: Ink, boxes: Sequence[Box] | None = None) -> Letters:
     whole = np.arange(len(pieces) + len(cut)) < len(pieces)
     pieces = [*pieces, *cut]
     box = np.array([piece.box for piece in pieces], dtype=np.float64).reshape(-1, 4)
-    probability = recognise([normalised(grey[piece.place] * piece.own) for piece in pieces], box[:, 2:])
+    pictures = [normalised(grey[piece.place] * piece.own) for piece in pieces]
+    probability = recognise(pictures, box[:, 2:], COOLING, STRANGE)
     # A box's edge lies between pixels; the centre of pixel q is at q / unit mm.
     box[:, :2] += [left - 0.5, top - 0.5]
     return Letters(box / unit, probability, whole, COLUMN)
