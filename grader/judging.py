@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from grader.comparison import Comparison, Submission, Task, compare, task_of
-from grader.diagnosis import Case, Observed, diagnose
+from grader.diagnosis import LEAST_CONFIDENCE, Case, Observed, diagnose
 from grader.documents import (
     CriterionDocument,
     MistakeDocument,
@@ -46,7 +46,7 @@ def _swaps_seen(task: Task, submission: Submission, known: Sequence[Mistake]) ->
     found = []
     for swap in (swap for reading in submission.readings for swap in reading.swapped):
         pair = swap.first, swap.second
-        if swap.confidence < task.rubric.least_confidence or {pair, pair[::-1]} & told:
+        if swap.confidence < LEAST_CONFIDENCE or {pair, pair[::-1]} & told:
             continue
         told.add(pair)
         explains = tuple(
