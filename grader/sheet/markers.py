@@ -45,8 +45,11 @@ _MAX_RMS_MM = 1.5
 _MAX_SE_MM = 0.6
 _MAX_UNEVEN = 2.5
 """Largest over smallest scale on the sheet; a photo any more slanted cannot be measured."""
-_PRINTER_SCALE_SE = 0.001
-"""Of printers and paper; the calibration page measures it."""
+_PRINTER_SE, _SCANNER_SE = 0.002, 0.002
+"""Relative error of a printer's scale, rollers and paper included, and of a scanner's stated resolution.
+
+Markers are printed by the same printer, so that what it does to lengths shows in them only against the
+stated resolution, and there together with what the scanner does."""
 _USUAL_LENGTH_MM = 60.0
 _FLAT_MM = 0.12
 """Misfit from which paper that is not flat is told; printers and flatbeds stay under 0.1."""
@@ -267,15 +270,28 @@ def _against_resolution(page: Page, fit: Projection, px_per_mm: float) -> tuple[
     A camera's resolution means nothing, and it is known by its slanted view.
     """
     if page.dpi is None or fit.is_slanted:
-        return _PRINTER_SCALE_SE, ()
+        return _PRINTER_SE, ()
     stated = float(np.sqrt(page.dpi[0] * page.dpi[1])) / _MM_PER_INCH
     size = px_per_mm / stated
-    if abs(size - 1.0) < _SCALE_TOLD or not 1.0 / _SCALE_FAR < size < _SCALE_FAR:
-        return _PRINTER_SCALE_SE, ()
+    if not 1.0 / _SCALE_FAR < size < _SCALE_FAR:
+        return _PRINTER_SE, ()
+    if abs(size - 1.0) < _SCALE_TOLD:
+        return _printed_se(float(np.log(size))), ()
     told = (
         f"by the file's resolution the printed sheet has {100 * size:.1f} % of its size:"
         " it was printed or copied at another scale, or the resolution is wrong"
     )
     # Another format of paper cannot pass for the right size; a few per cent can.
     unsure = abs(size - 1.0) / 2.0 if abs(size - 1.0) < _SCALE_NEAR else 0.0
-    return float(np.hypot(_PRINTER_SCALE_SE, unsure)), (Problem("print_scaled", told, page.source),)
+    return float(np.hypot(_PRINTER_SE, unsure)), (Problem("print_scaled", told, page.source),)
+
+
+def _printed_se(seen: float) -> float:
+    """Root mean square of the printer's scale error, where printer and scanner together are off by `seen`.
+
+    The printer's likeliest share of it is p = seen P^2 / (P^2 + S^2), with variance P^2 S^2 / (P^2 + S^2);
+    lengths are not corrected by p, so that its square counts as error.
+    """
+    both = _PRINTER_SE**2 + _SCANNER_SE**2
+    share = seen * _PRINTER_SE**2 / both
+    return float(np.hypot(share, _PRINTER_SE * _SCANNER_SE / np.sqrt(both)))

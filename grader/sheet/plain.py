@@ -13,7 +13,7 @@ from grader.sheet.halves import looks_a4
 from grader.sheet.hypotheses import Hypothesis, Resolution, hypotheses, on_sides
 from grader.sheet.longlines import LongLine, long_lines
 from grader.sheet.models import PAGE_MM, PAPER, Model, drawable
-from grader.sheet.upright import drawn_ends, title_block_mm
+from grader.sheet.upright import drawn_ends, off_turn_deg, title_block_mm
 
 _MM_PER_INCH = 25.4
 _LEAST_PX_PER_MM = 3.0
@@ -36,6 +36,7 @@ _SAMPLED, _WHITE = 7, 255
 _FAR_OFF_MM = 1.5
 _EDGE_WITHIN_MM = 6.0
 _ASSUMED_PAPER_SE = 0.004
+_SAME = 1e-6
 _AS_LIKELY = 2.0
 """Scores of readings that differ by less: either may be the right one."""
 _ANOTHER_SCALE = 0.012
@@ -55,15 +56,22 @@ def register_plain(page: Page) -> Sheet | Unread:
     ranked = hypotheses(lines, shape, resolution)
     if ranked:
         rival = None if dpi is not None else _rival_scale(ranked)
-        sheet = _from_lines(page, ranked[0], lines, dpi, problems)
+        best = _as_told(ranked, page.turn_deg)
+        sheet = _from_lines(page, best, lines, dpi, problems)
         if isinstance(sheet, Sheet) and rival is not None:
             sheet = _with_rival(sheet, rival)
-        if isinstance(sheet, Unread) or not ranked[0].perspective:
+        if isinstance(sheet, Unread) or not best.perspective:
             return sheet
-        return _with_lens(flat, sheet, ranked[0])
+        return _with_lens(flat, sheet, best)
     if resolution is None:
         return Unread("sheet", "no drawing frame, no paper edges and no resolution that fits A3 were found")
     return _from_resolution(page, resolution, lines, problems)
+
+
+def _as_told(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
+    """The best reading; of the half turns that the drawing does not tell apart, the one the file asks for."""
+    alike = [one for one in ranked if one.score > ranked[0].score - _SAME]
+    return min(alike, key=lambda one: off_turn_deg(one.mm_to_px, turn_deg))
 
 
 def _rival_scale(ranked: list[Hypothesis]) -> float | None:
@@ -234,7 +242,7 @@ def _from_resolution(
         params = np.array([*np.log(np.array(resolution.dpi) / _MM_PER_INCH), angle, wide / 2.0, high / 2.0])
         matrix = affine_of(params)
         tried.append((title_block_mm(matrix, drawn), matrix))
-    block, matrix = max(tried, key=lambda one: one[0])
+    block, matrix = max(tried, key=lambda one: (one[0], -off_turn_deg(one[1], page.turn_deg)))
     if not resolution.stated and (block == 0.0 or looks_a4(page)):
         return Unread(
             "sheet", "no whole drawing frame, no title block or no stated resolution: not known to be A3"

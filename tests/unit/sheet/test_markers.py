@@ -281,3 +281,58 @@ def test_paper_that_was_not_flat_is_told():
     sheet = register(Page("s.jpg", 1, curled))
     assert [problem.code for problem in sheet.problems] == ["sheet_not_flat"]
     assert sheet.scale_se > 0.002
+
+
+def scribbled(grey, truth, marker):
+    """The page with pen strokes to and fro across a whole marker."""
+    rng = np.random.default_rng(marker)
+    low, high = MARKER_CORNERS[marker].min(axis=0) - 2, MARKER_CORNERS[marker].max(axis=0) + 2
+    written = grey.copy()
+    path = apply(truth, rng.uniform(low, high, (25, 2))).round().astype(np.int32)
+    cv2.polylines(written, [path], isClosed=False, color=50, thickness=4, lineType=cv2.LINE_AA)
+    return written
+
+
+@pytest.mark.parametrize("marker", [0, 2, 5, 7])
+def test_a_marker_written_over_does_not_move_the_sheet(marker):
+    grey, truth = printed(150)
+    sheet = register(Page("s.jpg", 1, scanned(scribbled(grey, truth, marker))))
+    assert off_mm(sheet, truth) < HARD_MM
+    assert sheet.problems == ()
+
+
+@pytest.mark.parametrize("corners", [(0,), (0, 2), (0, 1)])
+def test_corners_cut_off_are_not_missed(corners):
+    grey, truth = printed(150)
+    cut = grey.copy()
+    for corner in corners:
+        x, y = [(0.0, 0.0), (420.0, 0.0), (420.0, 297.0), (0.0, 297.0)][corner]
+        inward = np.array([70.0 if x == 0.0 else -70.0, 70.0 if y == 0.0 else -70.0])
+        triangle = np.array([(x, y), (x + inward[0], y), (x, y + inward[1])])
+        cv2.fillConvexPoly(cut, apply(truth, triangle).round().astype(np.int32), 40)
+    assert off_mm(register(Page("s.jpg", 1, scanned(cut))), truth) < HARD_MM
+
+
+@pytest.mark.parametrize("shift_mm", [0.6, 1.5])
+def test_a_fold_that_hides_a_strip_of_paper_is_told(shift_mm):
+    grey, _ = printed(150)
+    at, hidden = grey.shape[1] // 3, round(shift_mm * 150 / 25.4)
+    folded = np.hstack([grey[:, :at], grey[:, at + hidden :], np.full((len(grey), hidden), 255, np.uint8)])
+    sheet = register(Page("s.jpg", 1, scanned(np.ascontiguousarray(folded))))
+    assert [problem.code for problem in sheet.problems] == ["sheet_not_flat"]
+    assert sheet.scale_se > shift_mm / 420.0
+
+
+@pytest.mark.parametrize("printer", [0.997, 1.003])
+def test_a_printers_own_scale_is_within_what_is_said_of_lengths(printer):
+    """Drawn lengths are true millimetres, markers the printer's: against the resolution it shows."""
+    grey, truth = printed(150)
+    scaled = np.diag([printer, printer, 1.0])
+    sheet = register(Page("s.jpg", 1, warped(grey, scaled), (150.0, 150.0)))
+    length = np.diff(
+        apply(np.linalg.inv(sheet.mm_to_px), apply(truth, [[160.0, 150.0], [260.0, 150.0]])), axis=0
+    )
+    error = np.hypot(*length[0]) / 100.0 - 1.0
+    assert abs(error) == pytest.approx(0.003, abs=3e-4)
+    assert abs(error) < 2.0 * sheet.scale_se
+    assert sheet.scale_se < 0.003

@@ -260,3 +260,19 @@ def test_scans_of_others_are_registered_upright(name):
         pixels = straight(pixels, sheet.lens.bend, page.grey.shape)
     off = np.hypot(*(apply(np.linalg.inv(sheet.mm_to_px), pixels) - known[:, 0]).T)
     assert off.max() < WORST_MM[folder]
+
+
+@pytest.mark.parametrize("told", [0, 180])
+@pytest.mark.parametrize("frame", [ISO, None], ids=["frame", "no frame"])
+def test_where_nothing_drawn_tells_a_half_turn_the_file_does_and_it_is_said_to_be_unsure(frame, told):
+    matrix, shape = scanner()
+    page = Page("s.jpg", 1, painted(matrix, shape, frame=frame, block=False), (150.0, 150.0), told)
+    sheet = rectify(page)
+    assert abs((sheet.rotation_deg - told + 180.0) % 360.0 - 180.0) < 1.0
+    assert "upright_unsure" in [problem.code for problem in sheet.problems]
+
+
+def test_a_title_block_counts_more_than_the_turn_that_the_file_asks_for():
+    matrix, shape = scanner()
+    sheet = rectify(Page("s.jpg", 1, painted(matrix, shape), (150.0, 150.0), 180))
+    assert abs((sheet.rotation_deg + 180.0) % 360.0 - 180.0) < 1.0
