@@ -89,6 +89,15 @@ class Lettering:
                 yield first, second, self.log(named) - own
 
 
+def support(
+    joints: Mapping[str, complex], letters: Letters | None, renamed: Mapping[str, str] | None = None
+) -> float:
+    """What letters say of a mechanism's joints, nats against letters at random; 0 without letters."""
+    nodes = {(MECHANISM, name): at for name, at in joints.items()}
+    found = lettering(nodes, letters, renamed=renamed)
+    return 0.0 if found is None else found.log()
+
+
 def agreement(
     figures: Mapping[str, Figure],
     letters: Letters | None,

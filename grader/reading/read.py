@@ -2,11 +2,12 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from grader.reading.figures import figure_of_plan, figure_of_sketch
-from grader.reading.lettering import lettered
+from grader.reading.lettering import lettered, support
 from grader.reading.lines import Lines, lines_of
 from grader.reading.plans import Plan, best_plan, regular_plans
 from grader.reading.sketch import Sketch, drawings, find_sketch
@@ -71,7 +72,8 @@ def read_figures(
     pages = [_Page(lines_of(ink), ink, sheet) for ink, sheet in zip(inks, sheets, strict=True)]
     own, others = _drawings(assignment, variant, scales)
     for page in pages:
-        sketch = find_sketch(page.lines, page.ink.circles, own, others)
+        told = partial(support, letters=page.ink.letters, renamed=assignment.file.names)
+        sketch = find_sketch(page.lines, page.ink.circles, own, others, told)
         if sketch is not None and sketch.score >= LEAST_SKETCH:
             page.sketch = sketch
     followed = [page.sketch.drawing for page in pages if page.sketch is not None] if variant is None else []

@@ -1,6 +1,6 @@
 """The mechanism sketch: which strokes are its links, where its joints are, how it is turned."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,9 +81,16 @@ def drawings(assignment: Assignment, variants: list[Variant], scales: Scales | N
 
 
 def find_sketch(
-    lines: Lines, circles: FloatArray, own: list[Drawing], others: list[Drawing]
+    lines: Lines,
+    circles: FloatArray,
+    own: list[Drawing],
+    others: list[Drawing],
+    told: Callable[[Mapping[str, complex]], float],
 ) -> Sketch | None:
-    """The sketch that explains most strokes: the student's own variant first, then others."""
+    """The sketch that explains most strokes: the student's own variant first, then others.
+
+    Arguments: `told` gives what letters say of joints by name, nats: it decides among near ties.
+    """
     upright = Search(sizes=(1.0, 0.0), smallest=0.4, largest=2.0)
     long = lines.take(lines.length > LEAST_LINK_MM)
     laid = [one for drawing, cost in _candidates(own) for one in _laid(drawing, long, circles, upright, cost)]
@@ -98,7 +105,7 @@ def find_sketch(
     best = [
         _Case(drawing, place, id(drawing.construction) in regular) for _, drawing, place in laid[:SHORT_LIST]
     ]
-    read = max(_read(best, lines, circles), key=lambda one: one.score, default=None)
+    read = max(_read(best, lines, circles), key=lambda one: one.score + told(one.joints), default=None)
     return None if read is None else _sketch(read, lines)
 
 
@@ -152,6 +159,12 @@ class _Read:
     lines: Lines
     centres: dict[int, complex]
     score: float
+
+    @property
+    def joints(self) -> dict[str, complex]:
+        """Where the joints are to be expected, by name."""
+        names, at = self.found.expected.names, self.found.expected.at
+        return {name: self.centres.get(row, complex(at[row])) for row, name in enumerate(names)}
 
 
 def _read(cases: Sequence[_Case], lines: Lines, circles: FloatArray) -> Iterator[_Read]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from grader.reading.lettering import agreement, lettered
+from grader.reading.lettering import agreement, lettered, support
 from grader.records import VELOCITY_PLAN, Figure, Letters, Reading, ReadNode, ReadVector
 from reference.assignment import load_assignment
 from reference.derivation import construction_of
@@ -89,3 +89,11 @@ def test_without_letters_nothing_is_said(reading, construction):
     assert lettered(reading, None, construction, {}) == reading
     assert lettered(reading, letters({}), construction, {}) == reading
     assert set(agreement(reading.figures, None)[VELOCITY_PLAN].values()) == {0.0}
+
+
+def test_capitals_bear_out_joints_named_rightly_and_not_two_changed_over():
+    written = letters({"a": "A", "b": "B", "d": "D"})
+    joints = {"A": PLACES["a"], "B": PLACES["b"], "D": PLACES["d"]}
+    changed = joints | {"A": PLACES["b"], "B": PLACES["a"]}
+    assert support(joints, written) > 0.0 > support(changed, written)
+    assert support(joints, None) == 0.0
