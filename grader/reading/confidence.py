@@ -24,15 +24,14 @@ WEIGHTS = {
     "named": 0.34,
     "off_mm": -1.73,
     "mistaken": -0.23,
+    "thin": -0.4,
     "marked": 1.47,
     "elsewhere": -1.86,
 }
 CONSTANT = -0.8
 """Of a logistic regression on sheets drawn by two simulations, the constant lowered by 0.1."""
-AT_MOST = {"placed": 0.1, "thin": 0.85, "short": 0.88}
-"""Ceilings: this much above the geometric probability; of a line thin as a construction line; of a
-vector shorter than `SHORT_MM`, whose stroke may be an arrowhead's side."""
-SHORT_MM = 4.0
+PLACED_AND = 0.1
+"""No surer than the geometric probability by more than this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +52,6 @@ class Signs:
     named : share of the explanations that have it there
     off_mm : largest distance of its nodes from its stroke
     thin, mistaken : on a line thin as a construction line; in a plan explained by a mistake
-    length_mm : of the vector, large for a node
     marked : probability of the less likely of the tips that mark the vector's two ends on its stroke
     elsewhere : probability of the likeliest other tip near by that might be meant
     """
@@ -63,7 +61,6 @@ class Signs:
     off_mm: float = 0.1
     thin: bool = False
     mistaken: bool = False
-    length_mm: float = 99.0
     marked: float = 0.4
     elsewhere: float = 0.0
 
@@ -74,11 +71,8 @@ def sureness(signs: Signs) -> float:
     told += WEIGHTS["placed"] * _log_odds(signs.placed) + WEIGHTS["named"] * _log_odds(signs.named)
     told += WEIGHTS["off_mm"] * min(signs.off_mm, 1.5)
     told += WEIGHTS["marked"] * signs.marked + WEIGHTS["elsewhere"] * signs.elsewhere
-    told += WEIGHTS["mistaken"] * signs.mistaken
-    sure = min(1.0 / (1.0 + math.exp(-told)), signs.placed + AT_MOST["placed"], HIGHEST)
-    if signs.thin:
-        sure = min(sure, AT_MOST["thin"])
-    return min(sure, AT_MOST["short"]) if signs.length_mm < SHORT_MM else sure
+    told += WEIGHTS["mistaken"] * signs.mistaken + WEIGHTS["thin"] * signs.thin
+    return min(1.0 / (1.0 + math.exp(-told)), signs.placed + PLACED_AND, HIGHEST)
 
 
 def _log_odds(probability: float) -> float:

@@ -113,7 +113,6 @@ def _vectors(
             off_mm=float(np.abs(fit.residual_mm[index]).max()) if row >= 0 else 0.0,
             thin=row >= 0 and bool(plan.lines.thin[row]),
             mistaken=plan.hypothesis.label not in REGULAR,
-            length_mm=abs(span),
         )
         if row >= 0:
             marked, elsewhere = _marks(plan, fit, edge, row)
