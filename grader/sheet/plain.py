@@ -36,6 +36,7 @@ _SAMPLED, _WHITE = 7, 255
 _FAR_OFF_MM = 1.5
 _EDGE_WITHIN_MM = 6.0
 _ASSUMED_PAPER_SE = 0.004
+_SCALE_DOUBTS = frozenset({"paper_assumed", "registration_disagrees"})
 _SAME = 1e-6
 _AS_LIKELY = 2.0
 """Scores of readings that differ by less: either may be the right one."""
@@ -210,7 +211,12 @@ def _unsure_upright(page: Page) -> Problem:
 def _with_lens(flat: Flat, sheet: Sheet, best: Hypothesis) -> Sheet:
     """A photo's sheet with the lens's bend, where one shows."""
     lens = find_lens(flat, sheet.mm_to_px, list(best.sides))
-    return sheet if lens is None else replace(sheet, lens=lens)
+    if lens is None:
+        return sheet
+    # A straight picture does not settle whether the paper is A3, or which rectangle was seen.
+    doubted = any(problem.code in _SCALE_DOUBTS for problem in sheet.problems)
+    scale_se = max(lens.scale_se, sheet.scale_se) if doubted else lens.scale_se
+    return replace(sheet, lens=replace(lens, scale_se=scale_se))
 
 
 def _settled(best: Hypothesis, dpi: tuple[float, float] | None, *, copied: bool = False) -> Fit:

@@ -276,3 +276,12 @@ def test_a_title_block_counts_more_than_the_turn_that_the_file_asks_for():
     matrix, shape = scanner()
     sheet = rectify(Page("s.jpg", 1, painted(matrix, shape), (150.0, 150.0), 180))
     assert abs((sheet.rotation_deg + 180.0) % 360.0 - 180.0) < 1.0
+
+
+def test_a_bent_photo_of_paper_without_a_frame_keeps_the_doubt_whether_it_is_a3():
+    matrix, shape = photo()
+    page = Page("s.jpg", 1, straightened(painted(matrix, shape, frame=None, bed=60), -0.02))
+    sheet = rectify(page)
+    assert "paper_assumed" in [problem.code for problem in sheet.problems]
+    assert sheet.lens is not None
+    assert straighten(page, sheet)[1].scale_se > 0.003
