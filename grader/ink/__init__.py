@@ -14,6 +14,7 @@ from grader.ink.hatching import boxes_around, hatching
 from grader.ink.inkmap import ink_map
 from grader.ink.regions import field_of
 from grader.ink.seeds import find_seeds, working_scale
+from grader.ink.squares import without_squares
 from grader.ink.strokes import find_strokes, take
 from grader.ink.tips import find_tips
 from grader.pixels import flatten
@@ -31,7 +32,7 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     """
     flat = flatten(page.grey)
     scale = working_scale(sheet.px_per_mm)
-    contrast = flat.reduced(scale)
+    contrast = without_squares(flat.reduced(scale))
     seeds = find_seeds(contrast)
     components = find_components(seeds)
     field = field_of(seeds, sheet, scale, boxes)
