@@ -212,15 +212,18 @@ def _gaps(box_mm: FloatArray, at: ComplexArray) -> FloatArray:
 
 def _apart(rows: IntArray, box_mm: FloatArray, known: FloatArray) -> IntArray:
     """One row for each piece of ink: the one that is likeliest a letter of those that overlap."""
-    kept: list[int] = []
-    for row in sorted(rows.tolist(), key=lambda one: -known[one]):
-        if all(_overlap(box_mm[row], box_mm[other]) < SHARED for other in kept):
-            kept.append(row)
-    return np.array(kept, dtype=np.int64)
+    order = rows[np.argsort(-known[rows], kind="stable")]
+    over = _overlaps(box_mm[order]) >= SHARED
+    kept = np.zeros(len(order), dtype=bool)
+    for place in range(len(order)):
+        kept[place] = not (over[place] & kept).any()
+    return np.asarray(order[kept], dtype=np.int64)
 
 
-def _overlap(one: FloatArray, other: FloatArray) -> float:
-    low = np.maximum(one[:2], other[:2])
-    high = np.minimum(one[:2] + one[2:], other[:2] + other[2:])
-    shared = np.maximum(high - low, 0.0).prod()
-    return float(shared / max(min(one[2:].prod(), other[2:].prod()), 1e-9))
+def _overlaps(box_mm: FloatArray) -> FloatArray:
+    """(k, k) share of the smaller of two boxes that the other covers."""
+    low, size = box_mm[:, :2], box_mm[:, 2:]
+    far = low + size
+    shared = np.maximum(np.minimum(far[:, None], far) - np.maximum(low[:, None], low), 0.0).prod(axis=2)
+    area = size.prod(axis=1)
+    return np.asarray(shared / np.maximum(np.minimum(area[:, None], area), 1e-9))
