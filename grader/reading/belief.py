@@ -175,7 +175,8 @@ def _seen_ends(spans: Spans, lines: Lines, slot: int) -> tuple[FloatArray, Float
     rows = np.arange(len(lines))
     error = lines.se_end[rows, nearer]
     off, sure = _tips_off(lines, node, ((node - other) * back).real > 0, head=slot == 1)
-    around = (spans.cov[2 * slot] * _squares(lines.along)).sum(axis=1)
+    # Rounding may leave a settled node a variance just below zero.
+    around = np.maximum((spans.cov[2 * slot] * _squares(lines.along)).sum(axis=1), 0.0)
     off = np.column_stack([(ink[rows, nearer] * back).real, off])
     spread = around[:, None] + np.full(off.shape, TIP_MM**2)
     spread[:, 0] = around + error**2 + END_MM**2

@@ -33,6 +33,8 @@ LEAST_FIRST_MM = 15.0
 LEAST_LAID_MM = 4.0
 SPECK_MM = 1e-6
 FARTHEST_MM = 2000.0
+VAGUE_MM = 500.0
+"""Nodes that a hand's errors move this far are not to be found: lines meet there at next to no angle."""
 """Nodes farther off are on no sheet, at any scale: with a mistake made, lines may be nearly parallel."""
 WORSE = 0.3
 """Places supported by this much less of the plan's length are not looked at."""
@@ -212,7 +214,8 @@ def _expected(hypothesis: Hypothesis, figure: str, given: Mapping[str, ComplexAr
     """What is expected of the plan about its own pole; None where that cannot be drawn."""
     edges = vectors_of(tied(hypothesis), figure, hypothesis.absent)
     expected = expect(hypothesis.drawing, figure, given, HAND, edges)
-    return expected if np.abs(expected.at).max() < FARTHEST_MM else None
+    known = np.abs(expected.at).max() < FARTHEST_MM and expected.cov.max() < VAGUE_MM**2
+    return expected if known else None
 
 
 def _better_laid(expected: Expected, lines: Lines, than: Place) -> list[Place]:

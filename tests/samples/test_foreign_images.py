@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.pipeline import Place, see
+from grader.bench import reading_foreign
+from grader.pipeline import Place, read, see
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "real"
 IMAGES = sorted(path for path in REAL.rglob("*") if path.suffix in {".jpg", ".png"}) if REAL.is_dir() else []
@@ -16,3 +17,13 @@ def test_a_foreign_image_is_refused_with_a_reason(path):
     seen = see(Place(path, 1, path.name))
     assert seen.sheet is None
     assert seen.problems
+
+
+def test_a_page_of_text_is_read_as_nothing(tmp_path):
+    path = reading_foreign._page(reading_foreign._text, seed=700).save(tmp_path / "text")
+    seen = see(Place(path, 1, path.name))
+    for name in reading_foreign.READ_AS:
+        assignment, rubric = reading_foreign.task_named(name)
+        reading = read([seen], assignment, assignment.variants()[0], {}, rubric.vectors)[0]
+        sure = [one.confidence for figure in reading.figures.values() for one in figure.vectors.values()]
+        assert max(sure, default=0.0) < 0.5
