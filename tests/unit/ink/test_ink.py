@@ -268,7 +268,7 @@ def head(paper, tip, direction_rad, *, filled, length=3.2, half_deg=14):
 TIP_ERROR_MM = 0.4
 
 
-@pytest.mark.parametrize("mark", ["filled", "open"])
+@pytest.mark.parametrize("mark", ["filled", "open", "dot"])
 @pytest.mark.parametrize("direction_deg", [17, 163, 250])
 def test_a_vector_ends_at_its_arrowhead_though_its_line_runs_on(mark, direction_deg):
     paper = Paper()
@@ -278,7 +278,8 @@ def test_a_vector_ends_at_its_arrowhead_though_its_line_runs_on(mark, direction_
     paper.line(tip - 45 * u, tip)
     paper.line(tip, tip + 9 * u, pen=0.2, dark=170)
     if mark == "dot":
-        paper.line(tip, tip + 0.01 * u, pen=0.9)
+        turns = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+        paper.area([tip + 0.5 * np.array([np.cos(turn), np.sin(turn)]) for turn in turns])
     else:
         head(paper, tip, direction, filled=mark == "filled")
     ink = paper.ink()
