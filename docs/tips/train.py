@@ -66,7 +66,12 @@ def draw(folder: Path, seed: int) -> None:
     rng = np.random.default_rng(seed)
     device, dpi = str(rng.choice(DEVICES)), float(rng.choice(RESOLUTIONS_DPI))
     settings = any_settings(seed, device=device, dpi=dpi, work=(assignment, variant))
-    for number, sheet in enumerate(simulate(assignment, variant, seed, settings)):
+    try:
+        sheets = simulate(assignment, variant, seed, settings)
+    except ValueError as cannot:  # a mistake drawn by lot that has no place in this variant
+        print(seed, cannot)  # noqa: T201
+        return
+    for number, sheet in enumerate(sheets):
         with tempfile.TemporaryDirectory() as place:
             seen = see(Place(sheet.save(Path(place) / "sheet"), 1, "sheet"))
         if seen.ink is None or seen.page is None or seen.sheet is None:
@@ -182,7 +187,9 @@ def train(folder: Path, steps: int, out: Path) -> None:
     torch.onnx.export(network, (example,), str(out), opset_version=13, dynamo=False)
 
 
-def _loss(told, near, at, off, known):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _loss(
+    told: torch.Tensor, near: torch.Tensor, at: torch.Tensor, off: torch.Tensor, known: torch.Tensor
+) -> torch.Tensor:
     """Focal loss of the cells' log odds, and the absolute error of the places near a tip."""
     odds = told[:, :KINDS]
     sure = torch.sigmoid(odds)

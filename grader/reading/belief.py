@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grader.reading.lines import BoolArray, Lines
+from grader.reading.lines import TIP_MM, BoolArray, Lines
 from grader.records import FloatArray, IntArray
 from reference.geometry import ComplexArray
 
@@ -12,8 +12,6 @@ REDRAW_MM = 0.3
 """How far a stroke misses the nodes that it joins, one standard error."""
 SHARED_MM = 0.4
 """And further where it serves two edges, that lie this near to each other."""
-TIP_MM = 0.2
-"""Standard error of an arrowhead's tip, or of what else marks a node, along its vector."""
 END_MM, END_SHARE = 0.3, 0.4
 RUN_ON_FAR = 4e-4
 """Density per mm of ends anywhere: the stroke goes on as another edge, or as a line drawn through."""

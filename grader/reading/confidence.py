@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from grader.reading.fitting import Fit
-from grader.reading.matching import Explanation
 from grader.records import FloatArray
 from reference.geometry import ComplexArray
 
@@ -104,13 +103,3 @@ def of_places(fit: Fit) -> FloatArray:
     return np.array(
         [within(fit.cov[2 * node : 2 * node + 2, 2 * node : 2 * node + 2]) for node in range(len(fit.at))]
     )
-
-
-def lines_at(found: Explanation) -> list[int]:
-    """How many strokes of their own meet at each node."""
-    count = [0] * len(found.expected.names)
-    for index, edge in enumerate(found.expected.edges):
-        if found.stroke[index] >= 0 and not found.shared[index]:
-            count[edge.tail] += 1
-            count[edge.head] += 1
-    return count

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grader.reading.lines import BoolArray, Lines
+from grader.reading.lines import TIP_MM, BoolArray, Lines
 from grader.reading.matching import Explanation
 from grader.records import FloatArray
 from reference.geometry import ComplexArray
@@ -25,8 +25,6 @@ HIDDEN_MM = 0.5
 END_REACH_MM = 5.0
 CENTRE_MM = 0.2
 """How far a circle drawn around a node is off it."""
-TIP_MM = 0.2
-"""Standard error of an arrowhead's tip, or of what else marks a node, along its vector."""
 SUREST = 0.97
 TIP_REACH_MM = 3.5
 THROUGH = 0.02

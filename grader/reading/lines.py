@@ -40,6 +40,8 @@ JOIN_GAP_MM = 14.0
 JOIN_TURN_RAD = 0.03
 
 OTHER_SORT = 0.5
+TIP_MM = 0.2
+"""Standard error of an arrowhead's tip, or of what else marks a node, along its vector."""
 
 BoolArray = NDArray[np.bool_]
 
