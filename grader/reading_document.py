@@ -61,9 +61,7 @@ def _figure(figure: Figure) -> FigureDocument:
 
 
 def _node(node: ReadNode) -> NodeDocument:
-    return NodeDocument(
-        x_mm=node.at.real, y_mm=-node.at.imag, se_mm=node.se_mm, confidence=node.confidence
-    )
+    return NodeDocument(x_mm=node.at.real, y_mm=-node.at.imag, se_mm=node.se_mm, confidence=node.confidence)
 
 
 def _vector(vector: ReadVector) -> VectorDocument:

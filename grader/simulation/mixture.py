@@ -213,14 +213,23 @@ def any_scan(rng: Rng, device: Device | None = None, dpi: float | None = None) -
     ]
     tint = rng.uniform(-8, 2, 3) + np.array([244.0, 243.0, 238.0]) - rng.choice([0.0, 14.0], p=[0.8, 0.2])
     common = Scan(
-        device=device, dpi=resolution, quarter_turns=int(rng.choice(4, p=[0.7, 0.08, 0.12, 0.1])),
-        skew_deg=float(rng.choice([0.2, 0.6, 1.8])), shift_mm=float(rng.choice([0.8, 2.5])),
-        stretch=float(rng.choice([0.0003, 0.001])), dpi_tag=tag,
+        device=device,
+        dpi=resolution,
+        quarter_turns=int(rng.choice(4, p=[0.7, 0.08, 0.12, 0.1])),
+        skew_deg=float(rng.choice([0.2, 0.6, 1.8])),
+        shift_mm=float(rng.choice([0.8, 2.5])),
+        stretch=float(rng.choice([0.0003, 0.001])),
+        dpi_tag=tag,
         paper=(int(tint[0]), int(tint[1]), int(tint[2])),
-        bed=bed, jpeg_quality=int(rng.choice([55, 75, 85, 92])), blur_px=float(rng.uniform(0.4, 0.9)),
-        noise=float(rng.uniform(1.0, 4.0)), shading=float(rng.choice([0.0, 0.04, 0.1])),
-        dust=int(rng.integers(0, 40)), fold=bool(rng.random() < 0.12),
-        show_through=float(rng.choice([0.0, 0.06], p=[0.85, 0.15])), punched=bool(rng.random() < 0.15),
+        bed=bed,
+        jpeg_quality=int(rng.choice([55, 75, 85, 92])),
+        blur_px=float(rng.uniform(0.4, 0.9)),
+        noise=float(rng.uniform(1.0, 4.0)),
+        shading=float(rng.choice([0.0, 0.04, 0.1])),
+        dust=int(rng.integers(0, 40)),
+        fold=bool(rng.random() < 0.12),
+        show_through=float(rng.choice([0.0, 0.06], p=[0.85, 0.15])),
+        punched=bool(rng.random() < 0.15),
         mode=rng.choice(["grey", "colour"], p=[0.6, 0.4]),
         container=rng.choice(["jpg", "png", "tif"], p=[0.8, 0.1, 0.1]),
     )
@@ -234,8 +243,12 @@ def any_scan(rng: Rng, device: Device | None = None, dpi: float | None = None) -
 
 def _copier(rng: Rng, scan: Scan) -> Scan:
     return replace(
-        scan, mode="bilevel", container=rng.choice(["tif", "png"]), dpi=max(scan.dpi, 200.0),
-        copy_scale=float(rng.choice([1.0, 0.98, 0.995, 1.01])), dust=scan.dust * 3,
+        scan,
+        mode="bilevel",
+        container=rng.choice(["tif", "png"]),
+        dpi=max(scan.dpi, 200.0),
+        copy_scale=float(rng.choice([1.0, 0.98, 0.995, 1.01])),
+        dust=scan.dust * 3,
         streaks=int(rng.choice([0, 1, 3], p=[0.7, 0.2, 0.1])),
         dpi_tag=max(scan.dpi, 200.0) if scan.dpi_tag == scan.dpi else scan.dpi_tag,
     )
@@ -244,10 +257,19 @@ def _copier(rng: Rng, scan: Scan) -> Scan:
 def _phone(rng: Rng, scan: Scan) -> Scan:
     desk: Colour = ((128, 96, 66), (60, 58, 56), (206, 200, 190), (92, 104, 112))[rng.integers(4)]
     return replace(
-        scan, mode="colour", container="jpg", dpi=float(rng.uniform(190.0, 235.0)), dpi_tag=72.0, bed=desk,
+        scan,
+        mode="colour",
+        container="jpg",
+        dpi=float(rng.uniform(190.0, 235.0)),
+        dpi_tag=72.0,
+        bed=desk,
         curl_mm=float(rng.choice([0.0, rng.uniform(0.2, 1.2)], p=[0.8, 0.2])),
-        tilt_deg=float(rng.uniform(1.0, 11.0)), lens_k1=float(rng.normal(0.0, 0.02)),
-        shading=float(rng.uniform(0.1, 0.3)), shadow=float(rng.uniform(0.0, 0.35)),
-        blur_px=float(rng.uniform(0.6, 1.2)), jpeg_quality=int(rng.integers(75, 94)),
-        noise=float(rng.uniform(2.0, 5.0)), skew_deg=2.0,
+        tilt_deg=float(rng.uniform(1.0, 11.0)),
+        lens_k1=float(rng.normal(0.0, 0.02)),
+        shading=float(rng.uniform(0.1, 0.3)),
+        shadow=float(rng.uniform(0.0, 0.35)),
+        blur_px=float(rng.uniform(0.6, 1.2)),
+        jpeg_quality=int(rng.integers(75, 94)),
+        noise=float(rng.uniform(2.0, 5.0)),
+        skew_deg=2.0,
     )

@@ -165,8 +165,12 @@ def _size(figure: DrawnFigure) -> float:
 
 def overlap(one: Box, other: Box) -> bool:
     """Whether two boxes share area."""
-    return (one[0] < other[0] + other[2] and other[0] < one[0] + one[2]
-            and one[1] < other[1] + other[3] and other[1] < one[1] + one[3])
+    return (
+        one[0] < other[0] + other[2]
+        and other[0] < one[0] + one[2]
+        and one[1] < other[1] + other[3]
+        and other[1] < one[1] + one[3]
+    )
 
 
 def place_in_zones(

@@ -85,7 +85,9 @@ def _inks(
 ) -> list[tuple[Float32Array, Colour]]:
     """Coverage 0..1 and colour of each layer that is on the sheet."""
     colours: Mapping[str, Colour] = {
-        MAIN_LAYER: pens.colour, PLAN_LAYER: pens.plan_colour or pens.colour, PRINT_LAYER: _TONER,
+        MAIN_LAYER: pens.colour,
+        PLAN_LAYER: pens.plan_colour or pens.colour,
+        PRINT_LAYER: _TONER,
         SQUARES_LAYER: _SQUARES,
     }
     inks = []

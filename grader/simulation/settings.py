@@ -200,6 +200,15 @@ class Settings:
     scan: Scan = field(default_factory=Scan)
 
 
-CLEAN_SCAN = Scan(skew_deg=0.0, shift_mm=0.0, stretch=0.0, noise=0.0, shading=0.0, tint_grain=0.0, dust=0,
-                  blur_px=0.0, jpeg_quality=98)
+CLEAN_SCAN = Scan(
+    skew_deg=0.0,
+    shift_mm=0.0,
+    stretch=0.0,
+    noise=0.0,
+    shading=0.0,
+    tint_grain=0.0,
+    dust=0,
+    blur_px=0.0,
+    jpeg_quality=98,
+)
 """A scanner without faults."""

@@ -62,14 +62,20 @@ def write_pdf(path: Path, pages: Iterable[tuple[Pixels, float, int]], quality: i
         scan = Scan(jpeg_quality=quality, dpi_tag=None, mode="colour" if image.ndim == 3 else "grey")
         stream = pikepdf.Stream(document, encoded(image, scan))
         stream.stream_dict = pikepdf.Dictionary(
-            Type=pikepdf.Name.XObject, Subtype=pikepdf.Name.Image, Width=width, Height=height,
+            Type=pikepdf.Name.XObject,
+            Subtype=pikepdf.Name.Image,
+            Width=width,
+            Height=height,
             ColorSpace=pikepdf.Name.DeviceRGB if image.ndim == 3 else pikepdf.Name.DeviceGray,
-            BitsPerComponent=8, Filter=pikepdf.Name.DCTDecode,
+            BitsPerComponent=8,
+            Filter=pikepdf.Name.DCTDecode,
         )
         w, h = width / dpi * 72.0, height / dpi * 72.0
         content = pikepdf.Stream(document, f"q {w:.4f} 0 0 {h:.4f} 0 0 cm /Im0 Do Q".encode())
         page = pikepdf.Dictionary(
-            Type=pikepdf.Name.Page, MediaBox=[0, 0, w, h], Rotate=90 * (turns % 4),
+            Type=pikepdf.Name.Page,
+            MediaBox=[0, 0, w, h],
+            Rotate=90 * (turns % 4),
             Resources=pikepdf.Dictionary(XObject=pikepdf.Dictionary(Im0=document.make_indirect(stream))),
             Contents=document.make_indirect(content),
         )

@@ -125,7 +125,5 @@ def smooth(corners: ComplexArray, per_span: int = 6) -> ComplexArray:
     p = np.concatenate([[before], corners, [after]])
     t = (np.arange(per_span) / per_span)[None, :]
     p0, p1, p2, p3 = (p[k : len(p) - 3 + k, None] for k in range(4))
-    curve = p1 + 0.5 * t * (
-        p2 - p0 + t * (2 * p0 - 5 * p1 + 4 * p2 - p3 + t * (3 * (p1 - p2) + p3 - p0))
-    )
+    curve = p1 + 0.5 * t * (p2 - p0 + t * (2 * p0 - 5 * p1 + 4 * p2 - p3 + t * (3 * (p1 - p2) + p3 - p0)))
     return np.concatenate([curve.reshape(-1), corners[-1:]])

@@ -35,7 +35,10 @@ def direction(vector: complex) -> float | None:
 
 
 def drawing_truth(
-    task: Task, sheet: DrawnSheet, sketch: Sketch, origins: Mapping[str, complex],
+    task: Task,
+    sheet: DrawnSheet,
+    sketch: Sketch,
+    origins: Mapping[str, complex],
     missing: Mapping[str, Mapping[str, str]],
 ) -> dict[str, Any]:
     """What is on the paper, whatever the scanner does to it."""
@@ -80,7 +83,8 @@ def _figure(
     nodes = at_origin(figure, origin)
     lines = {name: [xy(p), xy(q)] for (owner, name), (p, q) in sketch.lines.items() if owner == figure.name}
     truth: dict[str, Any] = {
-        "origin_mm": xy(origin), "nodes": {name: xy(at) for name, at in nodes.items()},
+        "origin_mm": xy(origin),
+        "nodes": {name: xy(at) for name, at in nodes.items()},
     }
     if figure.name == MECHANISM:
         extras = {name: line for name, line in lines.items() if name[1] == "_"}
@@ -92,8 +96,11 @@ def _figure(
         drawn = nodes[vector.head] - nodes[vector.tail]
         meant = figure.intended[vector.head] - figure.intended[vector.tail]
         vectors[vector.name] = {
-            "tail": vector.tail, "head": vector.head, "length_mm": round(abs(drawn), 4),
-            "direction_deg": direction(drawn), "line_mm": lines.get(vector.name),
+            "tail": vector.tail,
+            "head": vector.head,
+            "length_mm": round(abs(drawn), 4),
+            "direction_deg": direction(drawn),
+            "line_mm": lines.get(vector.name),
             "intended": {"length_mm": round(abs(meant), 4), "direction_deg": direction(meant)},
         }
     sides = {name: line for name, line in lines.items() if name.startswith("side ")}
@@ -115,12 +122,24 @@ def scan_truth(view: View, frame: Frame | None, settings: Settings) -> dict[str,
         "image_size": [view.size[1], view.size[0]],
         "px_per_mm": round(view.px_per_mm, 5),
         "rotation_deg": (-90 * view.turns) % 360,
-        "frame": None if frame is None else {
-            "kind": frame.kind, "by": frame.by,
+        "frame": None
+        if frame is None
+        else {
+            "kind": frame.kind,
+            "by": frame.by,
             "corners_mm": None if frame.corners is None else [xy(c) for c in frame.corners],
         },
-        "scan": {"device": scan.device, "dpi": scan.dpi, "mode": scan.mode, "dpi_tag": scan.dpi_tag,
-                 "copy_scale": scan.copy_scale, "quarter_turns": scan.quarter_turns},
-        "hand": {"angle_deg": settings.hand.angle_deg, "place_mm": settings.hand.place_mm,
-                 "redraw_mm": settings.hand.redraw_mm},
+        "scan": {
+            "device": scan.device,
+            "dpi": scan.dpi,
+            "mode": scan.mode,
+            "dpi_tag": scan.dpi_tag,
+            "copy_scale": scan.copy_scale,
+            "quarter_turns": scan.quarter_turns,
+        },
+        "hand": {
+            "angle_deg": settings.hand.angle_deg,
+            "place_mm": settings.hand.place_mm,
+            "redraw_mm": settings.hand.redraw_mm,
+        },
     }

@@ -23,8 +23,14 @@ def assignment():
 
 @pytest.mark.parametrize(
     ("container", "mode", "opened_as"),
-    [("jpg", "grey", "L"), ("jpg", "colour", "RGB"), ("png", "grey", "L"), ("png", "bilevel", "1"),
-     ("tif", "bilevel", "1"), ("tif", "colour", "RGB")],
+    [
+        ("jpg", "grey", "L"),
+        ("jpg", "colour", "RGB"),
+        ("png", "grey", "L"),
+        ("png", "bilevel", "1"),
+        ("tif", "bilevel", "1"),
+        ("tif", "colour", "RGB"),
+    ],
 )
 def test_a_file_keeps_size_kind_and_stated_resolution(tmp_path, assignment, container, mode, opened_as):
     scan = replace(SMALL, container=container, mode=mode)

@@ -50,8 +50,9 @@ def test_a_ruled_stroke_lies_on_its_line(dpi, angle_deg):
     ids=["a skewed sheet on its side", "a phone with a lens"],
 )
 def test_a_scanned_vector_lies_where_truth_says(scan):
-    pen = PenStyle(wobble_mm=0.0, pressure=0.0, grain=0.0, smudges=0, erased=0.0, construction_lines=0.0,
-                   arrow="none")
+    pen = PenStyle(
+        wobble_mm=0.0, pressure=0.0, grain=0.0, smudges=0, erased=0.0, construction_lines=0.0, arrow="none"
+    )
     assignment = load_assignment("pump")
     sheet = simulate(assignment, assignment.variant(12), 3, Settings(hand=CAREFUL, pen=pen, scan=scan))[0]
     image = sheet.image if sheet.image.ndim == 2 else sheet.image[..., 1]
