@@ -106,13 +106,17 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
-    """An explanation of what is off: code of the contract, where, which criteria it explains."""
+    """An explanation of what is off: code of the contract, where, which criteria it explains.
+
+    `rivals` explain it nearly as well: what was handed in (lengths alone, say) does not tell them apart.
+    """
 
     code: str
     at: str
     explains: tuple[str, ...]
     confidence: float
     detail: Mapping[str, Param] = field(default_factory=dict)
+    rivals: "tuple[Mistake, ...]" = ()
 
 
 @dataclass(frozen=True, slots=True)
