@@ -1,31 +1,26 @@
-"""The pages: one per submission, one for the class. Self-contained, readable offline and on paper."""
+"""A submission's page. Self-contained, readable offline and on paper."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from urllib.parse import quote
-
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from grader.documents import (
     CriterionDocument,
     MistakeDocument,
     QuantityDocument,
     ReportDocument,
-    ResultsDocument,
     SheetDocument,
     ToleranceDocument,
 )
-from grader.feedback import statistics, words
-from grader.feedback.mistakes import MISTAKES, Words, words_of
+from grader.feedback import words
+from grader.feedback.mistakes import Words, words_of
 from grader.feedback.overlay import View, views
-from grader.feedback.problems import problem_sentence, unmatched_sentence
+from grader.feedback.problems import problem_sentence
 from grader.feedback.sentences import PLACES, Level, mistake_sentences, place
+from grader.feedback.templating import environment, told_score
 from grader.files import write_whole
 from grader.i18n import N_, Tongue, tongue
-from grader.scene import COLOURS, MARKS, Picture
+from grader.scene import COLOURS, Picture
 
 SHEET = N_("the sheet")
 
@@ -78,7 +73,7 @@ def feedback_page(  # noqa: PLR0913 - all that the file holds
 ) -> str:
     """The page of one submission; arguments as of `write_feedback`."""
     speaker = tongue(lang)
-    return _environment(speaker.lang).get_template("feedback.html").render(
+    return environment(speaker.lang).get_template("feedback.html").render(
         report=report,
         title=title or report.assignment,
         student_name=student_name,
@@ -88,95 +83,9 @@ def feedback_page(  # noqa: PLR0913 - all that the file holds
         problems=[problem_sentence(problem, speaker) for problem in report.problems],
         scales=_scales(report, speaker, names),
         sheets=_sheets(report, pictures, speaker, level),
-        score=_score(report, speaker),
+        score=told_score(report, speaker),
         colours=COLOURS,
     )  # fmt: skip
-
-
-def write_index(
-    results: ResultsDocument,
-    out_dir: Path,
-    lang: str,
-    *,
-    title: str = "",
-    student_names: Mapping[str, str] = _NO_NAMES,
-) -> None:
-    """Write `index.html`, the class at a glance, into a folder; `student_names` by student_id."""
-    write_whole(out_dir / "index.html", index_page(results, lang, title=title, student_names=student_names))
-
-
-def index_page(
-    results: ResultsDocument, lang: str, *, title: str = "", student_names: Mapping[str, str] = _NO_NAMES
-) -> str:
-    """The class's page."""
-    speaker = tongue(lang)
-    folders = folders_of(results.reports)
-    rows = [
-        {
-            "report": report,
-            "name": student_names.get(report.student_id, ""),
-            "link": f"{quote(folder)}/feedback.html",
-            "score": _score(report, speaker),
-            "waiting": sum(criterion.verdict == "review" for criterion in report.criteria),
-            "problems": Counter(
-                problem_sentence(problem, speaker, brief=True) for problem in report.problems
-            ),
-            "best": report.score if report.score is not None else (report.score_range or (-1.0, -1.0))[0],
-        }
-        for report, folder in zip(results.reports, folders, strict=True)
-    ]
-    return _environment(speaker.lang).get_template("index.html").render(
-        results=results,
-        title=title or results.assignment,
-        rows=rows,
-        has_positions=any(report.position is not None for report in results.reports),
-        has_n=any("n" in report.variant for report in results.reports),
-        unmatched=[unmatched_sentence(one, speaker) for one in results.unmatched],
-        states=statistics.states(results),
-        chart=statistics.distribution_svg(results, speaker),
-        hardest=statistics.hardest(results),
-        commonest=[
-            (MISTAKES[code].title, count) for code, count in statistics.commonest(results) if code in MISTAKES
-        ],
-        colours=COLOURS,
-    )  # fmt: skip
-
-
-def folders_of(reports: Sequence[ReportDocument]) -> list[str]:
-    """Each report's folder below the output folder: the student, with several positions also that."""
-    counts: dict[str, int] = {}
-    for report in reports:
-        counts[report.student_id] = counts.get(report.student_id, 0) + 1
-    return [
-        report.student_id
-        if counts[report.student_id] == 1
-        else f"{report.student_id}/{'unknown' if report.position is None else report.position}"
-        for report in reports
-    ]
-
-
-@cache
-def _environment(lang: str) -> Environment:
-    speaker = tongue(lang)
-    environment = Environment(
-        loader=PackageLoader("grader.feedback"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        extensions=["jinja2.ext.i18n"],
-    )
-    environment.install_gettext_callables(  # type: ignore[attr-defined]
-        speaker.gettext, speaker.ngettext, newstyle=True
-    )
-    environment.filters["symbols"] = words.symbols
-    environment.filters["first_up"] = lambda text: text[:1].upper() + text[1:]
-    environment.filters["points"] = lambda value: speaker.trimmed(value, 2)
-    environment.globals.update(
-        speaker=speaker, verdicts=words.VERDICTS, states_words=words.STATES, state_marks=words.STATE_MARKS,
-        marks=MARKS,
-    )  # fmt: skip
-    return environment
 
 
 # What the templates show ---------------------------------------------------------------------------
@@ -217,16 +126,6 @@ def _tolerance(tolerance: ToleranceDocument, speaker: Tongue) -> list[str]:
     if tolerance.direction_deg is not None:
         drawn.append(f"±{speaker.number(tolerance.direction_deg, 1)}°")
     return [" ".join(drawn)] if drawn else []
-
-
-def _score(report: ReportDocument, speaker: Tongue) -> str:
-    """The score, the range it lies in, or a dash."""
-    if report.score is not None:
-        return speaker.trimmed(report.score, 2)
-    if report.score_range is None or report.status in {"missing", "unreadable"}:
-        return "–"
-    low, high = (speaker.trimmed(value, 2) for value in report.score_range)
-    return low if low == high else f"{low}–{high}"
 
 
 def _mistakes(
@@ -301,4 +200,4 @@ def _placed(sheet: SheetDocument | None, speaker: Tongue) -> str:
     return f"{method}, ±{speaker.quantity(sheet.residual_mm, 2, 'mm')}"
 
 
-__all__ = ["feedback_page", "folders_of", "index_page", "write_feedback", "write_index"]
+__all__ = ["feedback_page", "write_feedback"]

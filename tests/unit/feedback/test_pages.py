@@ -1,49 +1,17 @@
 """The pages: self-contained, safe, in the reader's language, and legible without colours."""
 
 import re
-from html.parser import HTMLParser
 
 import pytest
 
 from grader.documents import ProblemDocument, ReadingDocument, ReadSheets, SheetDocument
-from grader.feedback import write_feedback, write_index
-from grader.feedback.pages import feedback_page, folders_of, index_page
+from grader.feedback import write_feedback
+from grader.feedback.class_page import index_page
+from grader.feedback.pages import feedback_page
 from grader.i18n import LANGUAGES
 from grader.scene import MARKS
+from tests.unit.feedback.parsed import Page
 from tests.unit.feedback.works import HOSTILE, criterion, hostile_report, picture, report, results
-
-VOID = {"meta", "input", "br", "img", "link"}
-
-
-class Page(HTMLParser):
-    """Tags that open and close, attributes, and the text outside style and script."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.tags, self.words, self.ids = [], [], [], set()
-        self.feed(text)
-        self.close()
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        self.ids |= {value for name, value in attrs if name == "id"}
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        self.ids |= {value for name, value in attrs if name == "id"}
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if not self.open or self.open[-1] not in {"style", "script"}:
-            self.words.append(data)
-
-    @property
-    def text(self):
-        return " ".join(" ".join(self.words).split())
 
 
 def everything():
@@ -190,47 +158,3 @@ def test_instructors_are_told_how_a_sheet_was_placed_and_students_are_not():
     told = report(reading=ReadSheets(sheets=[read]))
     assert "placed by its markers, ±0.03\u00a0mm" in feedback_page(told, [picture()], "en")
     assert "placed by" not in feedback_page(told, [picture()], "en", "hint")
-
-
-# The class ----------------------------------------------------------------------------------------
-
-
-def test_the_index_links_every_report_where_it_is(tmp_path):
-    reports = [
-        report(), report(student_id="s08", position=1), report(student_id="s08", position=2),
-        report(student_id="s08", position=None),
-    ]  # fmt: skip
-    write_index(results(*reports), tmp_path, "en")
-    text = (tmp_path / "index.html").read_text(encoding="utf-8")
-    for folder in ("s07", "s08/1", "s08/2", "s08/unknown"):
-        assert f'href="{folder}/feedback.html"' in text
-    assert folders_of(reports) == ["s07", "s08/1", "s08/2", "s08/unknown"]
-
-
-def test_the_index_counts_states_and_lists_what_matches_nobody():
-    text = Page(
-        index_page(results(report(), report(student_id="s09", status="missing", score=None)), "en")
-    ).text
-    assert "1 ✓ graded" in text
-    assert "1 – nothing handed in" in text
-    assert HOSTILE in text
-
-
-def test_the_index_names_the_hardest_criteria_and_commonest_mistakes():
-    hard = report(criteria=[criterion("v_D", "none", 0.0), criterion("v_A", "full", 5.0)])
-    text = Page(index_page(results(hard), "en")).text
-    after = text.split("Hardest criteria")[1].split("Students")[0]
-    assert "v D 0 %" in after
-    assert "v A" not in after
-    assert "Normal component reversed" in after
-
-
-def test_the_same_problem_many_times_is_told_once_with_its_number():
-    many = [ProblemDocument(code="measurement_fault", message=f"line {k}", file="m.csv") for k in range(9)]
-    text = Page(index_page(results(report(problems=many)), "en")).text
-    assert text.count("could not be used") == 1
-    assert "×9" in text
-
-
-def test_an_empty_class_has_a_page():
-    assert Page(index_page(results(), "ru")).open == []
