@@ -11,7 +11,7 @@ from grader.feedback.pages import feedback_page
 from grader.i18n import LANGUAGES
 from grader.scene import MARKS
 from tests.unit.feedback.parsed import Page
-from tests.unit.feedback.works import HOSTILE, criterion, hostile_report, picture, report, results
+from tests.unit.feedback.works import HOSTILE, hostile_report, picture, report, results
 
 
 def everything():
