@@ -17,8 +17,6 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from babel.numbers import format_decimal
-
 from reference.errors import CallError
 
 LANGUAGES = ("en", "ro", "ru")
@@ -57,16 +55,19 @@ class Tongue:
 
     def number(self, value: float, decimals: int) -> str:
         """A number with so many decimals and the language's decimal mark; no grouping, no minus zero."""
-        return self._written(value, decimals, "0." + "0" * decimals if decimals else "0")
+        # Adding zero turns minus zero into zero.
+        text = f"{round(value, decimals) + 0.0:.{decimals}f}"
+        return text.replace("-", "−").replace(".", self.decimal_mark)
 
     def trimmed(self, value: float, decimals: int) -> str:
         """A number with at most so many decimals: 2, 2.5, 0.25."""
-        return self._written(value, decimals, "0." + "#" * decimals)
+        text = self.number(value, decimals)
+        return text.rstrip("0").rstrip(self.decimal_mark) if decimals else text
 
-    def _written(self, value: float, decimals: int, pattern: str) -> str:
-        # Adding zero turns minus zero into zero.
-        rounded = round(value, decimals) + 0.0
-        return format_decimal(rounded, format=pattern, locale=self.lang).replace("-", "−")
+    @property
+    def decimal_mark(self) -> str:
+        """What stands before the decimals."""
+        return "." if self.lang == ROOT_LANGUAGE else ","
 
     def significant(self, value: float, digits: int = 3) -> str:
         """A number with so many significant digits; large whole numbers keep all of theirs."""
