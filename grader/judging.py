@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from grader.comparison import Comparison, Submission, Task, compare, task_of
-from grader.diagnosis import LEAST_CONFIDENCE, Case, Observed, diagnose
+from grader.diagnosis import LEAST_CONFIDENCE, Case, diagnose
 from grader.documents import (
     CriterionDocument,
     MistakeDocument,
@@ -26,6 +26,7 @@ from grader.rubric import RubricFile
 from grader.scoring import score
 from reference.assignment import Assignment, Variant
 from reference.mistakes import Drawing
+from reference.replay import Seen
 
 __all__ = ["Submission", "Task", "judge", "report_of", "task_of", "unjudged_report"]
 
@@ -61,50 +62,58 @@ def _swaps_seen(task: Task, submission: Submission, known: Sequence[Mistake]) ->
 
 def _case(task: Task, comparison: Comparison) -> Case:
     """The drawing to explain, at the scales used, with what contradicts them."""
+    scales, followed, vectors = comparison.scales, comparison.followed, task.construction.vectors
     used = {
-        name: np.asarray(comparison.followed[name] if scale.assumed else scale.used)
-        for name, scale in comparison.scales.items()
+        name: np.asarray(followed[name] if scale.assumed else scale.used) for name, scale in scales.items()
     }
-    names = {one.id: one.name for one in task.rubric.criterion}
-    observed = [
-        found
-        for outcome in comparison.outcomes
-        if (found := _observed(outcome, names[outcome.criterion], comparison)) is not None
-    ]
+    lost = [one for one in comparison.outcomes if one.verdict in {"none", "partial", "follow_through"}]
     return Case(
         drawing=Drawing(task.construction, {**task.parameters, **used}),
-        observed=observed,
+        seen=_seen(task, comparison),
+        lost={one.name: one.criterion for one in lost if one.name in vectors},
         assignment=task.assignment,
         variant=task.variant,
         followed={
-            name: followed
-            for name, followed in comparison.followed.items()
-            if followed != comparison.scales[name].used and not comparison.scales[name].assumed
+            name: other
+            for name, other in followed.items()
+            if other != scales[name].used and not scales[name].assumed
         },
         scale_criteria={
-            one.name: one.criterion
-            for one in comparison.outcomes
-            if one.name in comparison.scales and one.verdict in {"none", "partial"}
+            one.name: one.criterion for one in lost if one.name in scales and one.verdict != "follow_through"
         },
-        own=comparison.evidence.nodes,
     )
 
 
-def _observed(outcome: Outcome, name: str, comparison: Comparison) -> Observed | None:
-    """What diagnosis sees of a vector; None for what was not drawn."""
-    drawn = comparison.evidence.vector(name)
-    if drawn is None or outcome.tolerance.length_mm is None:
-        return None
-    turn = outcome.tolerance.direction_deg
-    return Observed(
-        criterion=outcome.criterion,
-        vector=name,
-        length_mm=drawn.length_mm,
-        direction_rad=drawn.direction_rad,
-        allowed_mm=outcome.tolerance.length_mm,
-        allowed_rad=None if turn is None else math.radians(turn),
-        is_lost=outcome.verdict in {"none", "partial", "follow_through"},
-    )
+ERRORS_PER_TOLERANCE = 2.0
+"""A careful hand's standard deviation is taken for half the tolerance."""
+
+
+def _seen(task: Task, comparison: Comparison) -> list[Seen]:
+    """The student's own nodes, and the vectors that lead to none of them."""
+    evidence, construction = comparison.evidence, task.construction
+    allowed = {
+        one.name: one.tolerance.length_mm
+        for one in comparison.outcomes
+        if one.tolerance.length_mm is not None
+    }
+    sigma = {
+        name: allowed.get(name, task.rubric.tolerance.length_mm) / ERRORS_PER_TOLERANCE
+        for name in construction.vectors
+    }
+    usual = task.rubric.tolerance.length_mm / ERRORS_PER_TOLERANCE
+    seen = []
+    for name, place in evidence.nodes.items():
+        if name not in construction.poles.values():
+            ending = [sigma[vector.name] for vector in construction.vectors.values() if vector.head == name]
+            seen.append(Seen(name, None, place, True, min(ending, default=usual)))
+    for name, vector in construction.vectors.items():
+        drawn = evidence.vector(name)
+        if drawn is None or drawn.confidence < task.rubric.least_confidence or vector.head in evidence.nodes:
+            continue
+        value = drawn.as_complex
+        off = math.hypot(sigma[name], drawn.se_mm)
+        seen.append(Seen(vector.head, vector.tail, value or drawn.length_mm, value is not None, off))
+    return seen
 
 
 def _with_mistake(outcome: Outcome, mistakes: Sequence[Mistake]) -> Outcome:

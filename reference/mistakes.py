@@ -97,11 +97,15 @@ def commit(mistake: Mistake, drawing: Drawing) -> Drawing:
         case "figure_rotated":
             return Drawing(_with_figure_turned(construction, mistake.at, mistake.quarters), parameters)
         case _:
-            changed = _changed_step(mistake, construction)
+            changed = changed_step(mistake, construction)
             return Drawing(construction.with_step(changed), parameters)
 
 
-def _changed_step(mistake: Mistake, construction: Construction) -> Step:
+def changed_step(mistake: Mistake, construction: Construction) -> Step:
+    """The step of a node as a mistake makes it.
+
+    Raises ValueError for a mistake that cannot be made at that step.
+    """
     step = construction.step(mistake.at)
     match mistake.code, step:
         case (
@@ -204,23 +208,30 @@ def single_mistakes(drawing: Drawing, figure: str) -> Iterator[Mistake]:
 
     Mistakes of scale are offered at the factors that are met: powers of ten, halves and doubles.
     """
-    construction = drawing.construction
-    for step in construction.figures[figure]:
-        match step:
-            case Given():
-                yield from _mistakes_of_given(step, construction)
-            case TwoLines() if figure != "mechanism":
-                yield from _mistakes_of_lines(step, construction, figure)
-            case TwoArcs() | ArcAndLine():
-                yield Mistake("other_assembly", step.node)
-        if step.node in construction.images and figure != "mechanism" and not _is_in_line(step, drawing):
-            yield Mistake("image_mirrored", step.node)
+    for step in drawing.construction.figures[figure]:
+        for mistake in mistakes_of_step(step, drawing.construction):
+            if mistake.code != "image_mirrored" or not _is_in_line(step, drawing):
+                yield mistake
     if figure != "mechanism":
         scale = "kv" if figure == "velocity_plan" else "ka"
         yield from (Mistake("scale_wrong", scale, factor=f) for f in (0.1, 0.5, 2.0, 10.0))
         yield from (Mistake("figure_rotated", figure, quarters=q) for q in (1, 2, 3))
         if "angle crank" in drawing.parameters:
             yield Mistake("rpm_not_converted", figure, factor=RPM_FACTOR)
+
+
+def mistakes_of_step(step: Step, construction: Construction) -> Iterator[Mistake]:
+    """Every mistake that could be made in one step."""
+    figure = construction.figure_of(step.node)
+    match step:
+        case Given():
+            yield from _mistakes_of_given(step, construction)
+        case TwoLines() if figure != "mechanism":
+            yield from _mistakes_of_lines(step, construction, figure)
+        case TwoArcs() | ArcAndLine():
+            yield Mistake("other_assembly", step.node)
+    if step.node in construction.images and figure != "mechanism":
+        yield Mistake("image_mirrored", step.node)
 
 
 def _is_in_line(step: Step, drawing: Drawing) -> bool:

@@ -1,0 +1,178 @@
+"""From accounts of a drawing to the mistakes that are told: how sure, what they explain, what rivals them."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from grader.outcomes import Mistake
+from reference import mistakes as operators
+from reference.construction import Construction
+from reference.elements import Along, Line
+from reference.mistakes import Drawing
+from reference.replay import Account
+from reference.steps import Step, TwoLines
+
+SURE_TOGETHER = 0.8
+"""A mistake and its rivals are told together when one of them it is, this surely."""
+LEAST_RIVAL = 0.1
+"""A rival less likely than this is not named."""
+MOST_RIVALS = 3
+RPM_WITHIN = 0.03
+"""Relative: a scale off by 30/pi (squared for accelerations) this nearly was made from rev/min."""
+SCALES = frozenset({"kL", "kv", "ka"})
+
+Key = tuple[str, str]
+
+
+class Explained(Protocol):
+    """What is asked of a case."""
+
+    @property
+    def drawing(self) -> Drawing:
+        """The right one."""
+
+    @property
+    def lost(self) -> Mapping[str, str]:
+        """Criteria that lost, by vector."""
+
+    @property
+    def scale_criteria(self) -> Mapping[str, str]:
+        """Criteria of scales that lost."""
+
+
+def told(accounts: Sequence[Account], case: Explained, least: float) -> tuple[Mistake, ...]:
+    """The mistakes of the likeliest account that are sure enough, in the order of construction."""
+    if not accounts:
+        return ()
+    best = accounts[0]
+    shares = _Shares(accounts)
+    explained = _explained(best, case)
+    found = []
+    for mistake in _in_order(best.made, case.drawing.construction):
+        share = shares.of(_key(mistake))
+        rivals = shares.rivals(_key(mistake), {_key(one) for one in best.made})
+        together = share + sum(shares.instead(_key(mistake), _key(one)) for one in rivals)
+        if share < least and (together < SURE_TOGETHER or not rivals):
+            continue
+        others = tuple(_record(one, case, (), shares.instead(_key(mistake), _key(one))) for one in rivals)
+        if explained[mistake]:
+            found.append(_record(mistake, case, tuple(explained[mistake]), share, others))
+    return tuple(found)
+
+
+def _key(mistake: operators.Mistake) -> Key:
+    return mistake.code, mistake.at
+
+
+class _Shares:
+    """What share of the probability accounts with a mistake have."""
+
+    def __init__(self, accounts: Sequence[Account]) -> None:
+        least = accounts[0].cost
+        weights = [math.exp((least - account.cost) / 2.0) for account in accounts]
+        whole = sum(weights)
+        self._accounts = [
+            ({_key(one): one for one in account.made}, weight / whole)
+            for account, weight in zip(accounts, weights, strict=True)
+        ]
+
+    def of(self, key: Key) -> float:
+        """Of a mistake."""
+        return sum(weight for made, weight in self._accounts if key in made)
+
+    def instead(self, key: Key, other: Key) -> float:
+        """Of another mistake without the first."""
+        return sum(weight for made, weight in self._accounts if other in made and key not in made)
+
+    def rivals(self, key: Key, best: set[Key]) -> list[operators.Mistake]:
+        """The mistakes that stand in a mistake's place elsewhere, the likeliest first."""
+        others = {name: one for made, _ in self._accounts if key not in made for name, one in made.items()}
+        likely = [name for name in others if name not in best and self.instead(key, name) >= LEAST_RIVAL]
+        likely.sort(key=lambda name: -self.instead(key, name))
+        return [others[name] for name in likely[:MOST_RIVALS]]
+
+
+def _in_order(made: Sequence[operators.Mistake], construction: Construction) -> list[operators.Mistake]:
+    """Mistakes of the whole first, then step by step."""
+    order = [step.node for step in construction.steps]
+    return sorted(made, key=lambda one: order.index(one.at) if one.at in order else -1)
+
+
+def _explained(account: Account, case: Explained) -> dict[operators.Mistake, list[str]]:
+    """Which of the criteria lost each mistake explains: the nearest one before it in the construction."""
+    construction = case.drawing.construction
+    made = _in_order(account.made, construction)
+    explains: dict[operators.Mistake, list[str]] = {
+        mistake: [name for scale, name in case.scale_criteria.items() if _is_about(mistake, scale)]
+        for mistake in made
+    }
+    reach = {mistake: operators.affected(mistake, construction) for mistake in made}
+    for name, criterion in case.lost.items():
+        vector = construction.vectors[name]
+        if vector.head in account.unexplained:
+            continue
+        touching = [
+            one for one in made if _touches(one, vector.scale, {vector.tail, vector.head}, reach[one])
+        ]
+        own = [one for one in touching if one.at == vector.head]
+        for mistake in (own or touching)[-1:]:
+            explains[mistake].append(criterion)
+    return explains
+
+
+def _touches(mistake: operators.Mistake, scale: str, ends: set[str], reach: frozenset[str]) -> bool:
+    if mistake.at in SCALES:
+        return scale == mistake.at or mistake.at == "kL"
+    if mistake.code == "labels_swapped":
+        return bool(ends & set(mistake.other))
+    return bool(ends & reach)
+
+
+def _is_about(mistake: operators.Mistake, scale: str) -> bool:
+    return mistake.at == scale or mistake.code == "other_variant"
+
+
+# The record ---------------------------------------------------------------------------------------
+
+
+def _record(
+    operator: operators.Mistake,
+    case: Explained,
+    explains: tuple[str, ...],
+    confidence: float,
+    rivals: tuple[Mistake, ...] = (),
+) -> Mistake:
+    detail: dict[str, float | str] = {}
+    code = operator.code
+    match operator:
+        case operators.Mistake(code="scale_wrong", at=scale):
+            detail["factor"] = operator.factor
+            code = _code_of_scale(scale, operator.factor)
+        case operators.Mistake(code="arithmetic", factor=factor):
+            detail["factor"] = factor
+        case operators.Mistake(code="labels_swapped", other=(first, second)):
+            detail |= {"first": first, "second": second}
+        case operators.Mistake(code="other_variant"):
+            detail |= {key: n for key in ("n", "position") if (n := getattr(operator, key)) is not None}
+        case operators.Mistake(code="figure_rotated", quarters=quarters):
+            detail["degrees"] = 90.0 * quarters
+        case operators.Mistake(other=other) if other:
+            detail["other"] = "".join(other)
+    if code in LINE_MISTAKES and _is_along_guide(case.drawing.construction.step(operator.at), operator.slot):
+        detail["line"] = "guide"
+    return Mistake(code, operator.at, explains, min(confidence, 1.0), detail, rivals)
+
+
+LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link"})
+
+
+def _is_along_guide(step: Step, slot: int) -> bool:
+    """Whether a step's line runs along a link instead of across it."""
+    line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None
+    return isinstance(line, Line) and isinstance(line.along, Along) and line.along.quarters % 2 == 0
+
+
+def _code_of_scale(name: str, factor: float) -> str:
+    powers = {"kv": 1, "ka": 2}
+    rpm = operators.RPM_FACTOR ** powers.get(name, 0)
+    return "rpm_not_converted" if name in powers and abs(factor / rpm - 1.0) <= RPM_WITHIN else "scale_wrong"

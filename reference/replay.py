@@ -1,0 +1,423 @@
+"""A finished drawing replayed step by step: at each step the right way first, then the wrong ones.
+
+The same construction once more, with what was drawn beside it. Every branch of the replay is one
+account of the drawing: how each step was made, and where its node came to lie. A step that the right
+way explains is left alone; where it does not, each mistake that `reference.mistakes` knows for that
+step opens a branch, and "something else" one more. Later steps start from what was drawn, as the
+student did, so that one mistake does not hide the next. Branches are arrays: all are drawn at once.
+
+What an account costs is -2 log of its probability, up to a constant: the squared misfit of what was
+seen, and for each mistake how rare it is.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from reference.construction import Construction
+from reference.elements import Coriolis, Normal, Parameters, View
+from reference.geometry import ComplexArray, FloatArray
+from reference.mistakes import Drawing, Mistake, changed_step, mistakes_of_step
+from reference.numbers import dot
+from reference.steps import Given, Step
+
+IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+
+RARITY: Mapping[str, float] = {
+    "parallel_for_perpendicular": 13.0,
+    "wrong_link": 15.0,
+    "sense_reversed": 12.0,
+    "normal_reversed": 12.0,
+    "normal_missing": 12.0,
+    "normal_from_absolute": 12.5,
+    "wrong_intersection": 14.0,
+    "image_mirrored": 12.0,
+    "other_assembly": 12.0,
+    "other_variant": 14.0,
+    "labels_swapped": 16.0,
+    "figure_rotated": 14.0,
+    "scale_wrong": 10.0,
+    "arithmetic": 22.0,
+}
+"""What a mistake costs: one step in a hundred or so goes wrong, in one of ten or so ways, and a slip in
+a computation may give any length."""
+SOMETHING_ELSE = 9.0
+"""What a step costs that went wrong in a way nobody knows, beside what it makes likely: any place."""
+ANYWHERE = 8.8
+"""A length seen anywhere within some 100 mm instead of within its error; a place costs twice that."""
+SUSPECT = 9.0
+"""From this misfit on (three standard errors) wrong ways are tried."""
+WITHIN = 24.0
+"""Accounts dearer than the cheapest by more than this are dropped."""
+AT_MOST = 48
+STIFFNESS = 1e-3
+"""How little a node is held to where its step puts it, against what was seen of it."""
+LEAST_FACTOR, MOST_FACTOR = 0.02, 30.0
+"""A computed length off by more than that is something else than a slip."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A node, or a vector that ends in it, as drawn.
+
+    Attributes
+    ----------
+    node : where it ends
+    tail : the node from which it is seen; None for a place about the figure's origin
+    value : complex millimetres, or a length where it has no direction
+    sigma_mm : standard deviation of a careful hand and its reading
+    """
+
+    node: str
+    tail: str | None
+    value: complex
+    has_direction: bool
+    sigma_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Root:
+    """Where an account begins: mistakes of the whole drawing, and what they change.
+
+    Attributes
+    ----------
+    parameters : those that differ
+    turned : by plan, the factor by which it is turned as a whole
+    cost : of supposing it
+    """
+
+    made: tuple[Mistake, ...] = ()
+    parameters: Parameters = field(default_factory=dict)
+    turned: Mapping[str, complex] = field(default_factory=dict)
+    cost: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """One way in which the drawing may have been made.
+
+    Attributes
+    ----------
+    made : the mistakes, in the order of construction
+    unexplained : nodes whose steps went wrong in no known way
+    misfit : by node seen, root mean square in standard deviations
+    """
+
+    cost: float
+    made: tuple[Mistake, ...]
+    unexplained: tuple[str, ...]
+    misfit: Mapping[str, float]
+
+
+@dataclass(slots=True)
+class _Branches:
+    """All accounts so far, arrays of shape (branches,)."""
+
+    nodes: dict[str, ComplexArray]
+    known: dict[str, FloatArray]
+    turned: dict[str, ComplexArray]
+    cost: FloatArray
+    is_blind: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+    made: list[tuple[Mistake, ...]]
+    unexplained: list[tuple[str, ...]]
+    misfit: dict[str, FloatArray]
+
+    def take(self, index: IntArray) -> None:
+        """Only these branches, in this order; one may be taken several times."""
+        arrays: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]
+        for arrays in (self.nodes, self.known, self.turned, self.misfit):  # type: ignore[assignment]
+            arrays.update({name: array[index] for name, array in arrays.items() if np.ndim(array)})
+        self.cost, self.is_blind = self.cost[index], self.is_blind[index]
+        self.made = [self.made[i] for i in index]
+        self.unexplained = [self.unexplained[i] for i in index]
+
+
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """One way to make a step: where it puts the node in each branch, and what it costs to suppose it.
+
+    Attributes
+    ----------
+    misfit : squared, of what was seen; zero for "something else", that fits anything
+    mistakes : one per branch (a slip has a factor of its own in each), or the same for all; none if right
+    """
+
+    place: ComplexArray
+    cost: FloatArray
+    misfit: FloatArray
+    mistake: Mistake | None = None
+    factors: FloatArray | None = None
+    is_something_else: bool = False
+
+    def made(self, branch: int) -> tuple[Mistake, ...]:
+        """The mistake of a branch, as a tuple of one or none."""
+        if self.mistake is None:
+            return ()
+        if self.factors is None:
+            return (self.mistake,)
+        return (replace(self.mistake, factor=float(self.factors[branch])),)
+
+
+def replay(
+    drawing: Drawing, seen: Iterable[Seen], roots: Sequence[Root], *, blind: bool = False
+) -> list[Account]:
+    """The accounts of a drawing, the likeliest first.
+
+    Arguments: `drawing` is the right one at its scales, parameters scalar; `blind`: mistakes are also
+    tried at steps of which nothing was seen, one to an account.
+    """
+    by_node = _by_node(drawing.construction, seen)
+    branches = _open(drawing, roots)
+    needed = _seen_later(drawing.construction, by_node)
+    with np.errstate(all="ignore"):
+        for figure, steps in drawing.construction.figures.items():
+            for step in steps:
+                if step.node not in needed:
+                    continue
+                sight = _Sight(tuple(by_node.get(step.node, ())), branches.turned.get(figure))
+                ways = _ways(step, drawing.construction, branches, sight, blind=blind)
+                _go_on(step.node, branches, ways, sight)
+    return _accounts(branches)
+
+
+def _by_node(construction: Construction, seen: Iterable[Seen]) -> dict[str, list[Seen]]:
+    """What was seen, by the end that is made later; vectors seen the other way round are turned."""
+    order = {step.node: index for index, step in enumerate(construction.steps)}
+    found: dict[str, list[Seen]] = {}
+    for one in seen:
+        if one.tail is not None and order[one.tail] > order[one.node]:
+            value = -one.value if one.has_direction else one.value
+            one = replace(one, node=one.tail, tail=one.node, value=value)  # noqa: PLW2901 - the same vector
+        found.setdefault(one.node, []).append(one)
+    return found
+
+
+def _open(drawing: Drawing, roots: Sequence[Root]) -> _Branches:
+    count = len(roots)
+    known = {name: np.asarray(value) for name, value in drawing.parameters.items()}
+    for name in {name for root in roots for name in root.parameters}:
+        known[name] = np.array([float(np.ravel(root.parameters.get(name, known[name]))[0]) for root in roots])
+    plans = {plan for root in roots for plan in root.turned}
+    return _Branches(
+        nodes={},
+        known=known,
+        turned={plan: np.array([root.turned.get(plan, 1.0) for root in roots]) for plan in plans},
+        cost=np.array([root.cost for root in roots]),
+        is_blind=np.zeros(count, np.bool_),
+        made=[root.made for root in roots],
+        unexplained=[()] * count,
+        misfit={},
+    )
+
+
+def _seen_later(construction: Construction, seen: Mapping[str, Sequence[Seen]]) -> frozenset[str]:
+    """The nodes that were seen, or that something seen is made from or reckoned from."""
+    wanted = set(seen) | {one.tail for ones in seen.values() for one in ones if one.tail is not None}
+    for step in reversed(construction.steps):
+        if step.node in wanted:
+            wanted.update(step.needs)
+    return frozenset(wanted)
+
+
+# What was seen of one node ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Sight:
+    """What was seen of one node, in a plan that may be turned as a whole in some branches."""
+
+    seen: tuple[Seen, ...]
+    turned: ComplexArray | None
+
+    def __bool__(self) -> bool:
+        return bool(self.seen)
+
+    def value(self, one: Seen) -> ComplexArray:
+        """As it would stand in a plan that is not turned."""
+        if self.turned is None or not one.has_direction:
+            return np.asarray(one.value)
+        return np.asarray(one.value / self.turned)
+
+    def deviations(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> Iterator[ComplexArray]:
+        """Of each thing seen from what a place of the node makes of it, in standard deviations."""
+        for one in self.seen:
+            vector = place if one.tail is None else place - nodes[one.tail]
+            if one.has_direction:
+                yield np.asarray((self.value(one) - vector) / one.sigma_mm)
+            else:
+                yield np.asarray((abs(one.value) - np.abs(vector)) / one.sigma_mm)
+
+    def misfit(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> FloatArray:
+        """The squared misfit of a place, infinite where there is none."""
+        total = sum(np.abs(deviation) ** 2 for deviation in self.deviations(place, nodes))
+        return np.where(np.isfinite(total), total, np.inf)
+
+    @property
+    def freedom(self) -> int:
+        """How many numbers were seen."""
+        return sum(2 if one.has_direction else 1 for one in self.seen)
+
+    @property
+    def anywhere(self) -> float:
+        """What any place at all costs."""
+        return SOMETHING_ELSE + ANYWHERE * min(self.freedom, 2)
+
+    def settled(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> ComplexArray:
+        """The place moved to what was seen, by as little as possible where that leaves it open."""
+        first = self.seen[0]
+        if first.has_direction:
+            tail = 0.0 if first.tail is None else nodes[first.tail]
+            return np.asarray(tail + self.value(first))
+        moved = place
+        for _ in range(2):
+            moved = moved + self._shift(moved, nodes)
+        return np.where(np.isfinite(moved), moved, place)
+
+    def _shift(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> ComplexArray:
+        """A Gauss-Newton step towards the lengths seen."""
+        zero = np.zeros(np.shape(place))
+        xx, yy, xy, rx, ry = zero + STIFFNESS, zero + STIFFNESS, zero, zero, zero
+        for one in self.seen:
+            vector = place if one.tail is None else place - nodes[one.tail]
+            length = np.abs(vector)
+            along = np.where(length > 0.0, vector / length, 0.0)
+            off = (abs(one.value) - length) * (length > 0.0)
+            xx, yy = xx + along.real**2, yy + along.imag**2
+            xy = xy + along.real * along.imag
+            rx, ry = rx + along.real * off, ry + along.imag * off
+        return np.asarray(((yy * rx - xy * ry) + 1j * (xx * ry - xy * rx)) / (xx * yy - xy**2))
+
+
+# One step -----------------------------------------------------------------------------------------
+
+
+def _ways(
+    step: Step, construction: Construction, branches: _Branches, sight: _Sight, *, blind: bool
+) -> list[_Way]:
+    """The right way to make a step, and the wrong ones where that does not explain what was seen."""
+    view = View(branches.nodes, branches.known)
+    count = len(branches.cost)
+
+    def way(changed: Step, mistake: Mistake | None, factors: FloatArray | None = None) -> _Way:
+        place = np.broadcast_to(changed.place(view), (count,))
+        misfit = sight.misfit(place, branches.nodes) if sight else np.where(np.isfinite(place), 0.0, np.inf)
+        rarity = 0.0 if mistake is None else RARITY[mistake.code]
+        if factors is not None:
+            factors = np.broadcast_to(factors, (count,))
+        return _Way(place, branches.cost + rarity + misfit, misfit, mistake, factors)
+
+    right = way(step, None)
+    if sight and not np.any(right.misfit > SUSPECT):
+        return [right]
+    if not sight and not blind:
+        return [right]
+    wrong = [way(changed, mistake) for mistake, changed in _known(construction, step)]
+    if not sight:
+        barred = [replace(one, cost=np.where(branches.is_blind, np.inf, one.cost)) for one in wrong]
+        return [right, *barred]
+    if isinstance(step, Given):
+        wrong.extend(_slips(step, view, sight, way))
+    return [right, *wrong, *_something_else(right, branches, sight)]
+
+
+_WrongSteps = tuple[tuple[Mistake, Step], ...]
+_of_steps: dict[int, tuple[Construction, dict[str, _WrongSteps]]] = {}
+KEPT = 64
+"""Constructions whose mistakes are kept: a class draws one and the same."""
+
+
+def _known(construction: Construction, step: Step) -> _WrongSteps:
+    """The mistakes that can be made in a step, with the step as each makes it."""
+    kept = _of_steps.get(id(construction))
+    if kept is None or kept[0] is not construction:
+        if len(_of_steps) >= KEPT:
+            _of_steps.clear()
+        kept = _of_steps[id(construction)] = (construction, {})
+    if step.node not in kept[1]:
+        kept[1][step.node] = tuple(
+            (mistake, changed_step(mistake, construction)) for mistake in mistakes_of_step(step, construction)
+        )
+    return kept[1][step.node]
+
+
+def _slips(
+    step: Given, view: View, sight: _Sight, way: Callable[[Step, Mistake, FloatArray], _Way]
+) -> Iterator[_Way]:
+    """The right direction with a length that was computed wrongly, as long as it was drawn."""
+    one = next((one for one in sight.seen if one.tail == step.start or one.has_direction), None)
+    right = step.factor * step.length.at(view)
+    if one is None or not isinstance(step.length, Normal | Coriolis):
+        return
+    if one.has_direction:
+        tail = 0.0 if one.tail is None else view.nodes[one.tail]
+        drawn = dot(tail + sight.value(one) - view.nodes[step.start], step.along.at(view))
+    else:
+        drawn = np.abs(one.value) * np.sign(right)
+    factors = np.asarray(drawn / right)
+    within = (factors > LEAST_FACTOR) & (factors < MOST_FACTOR)
+    factors = np.where(within, factors, np.nan)
+    changed = replace(step, factor=step.factor * factors)  # type: ignore[arg-type]
+    yield way(changed, Mistake("arithmetic", step.node), factors)
+
+
+def _something_else(right: _Way, branches: _Branches, sight: _Sight) -> Iterator[_Way]:
+    """The node where it was drawn, whatever made it; from lengths alone on either side."""
+    start = np.where(np.isfinite(right.place), right.place, 0.0)
+    starts = [start]
+    if not sight.seen[0].has_direction and len(sight.seen) > 1:
+        tails = [0.0 if one.tail is None else branches.nodes[one.tail] for one in sight.seen[:2]]
+        base = tails[1] - tails[0]
+        along = np.where(np.abs(base) > 0.0, base / np.abs(base), 1.0)
+        starts.append(np.asarray(tails[0] + along**2 * np.conj(start - tails[0])))
+    zero = np.zeros(len(branches.cost))
+    for place in starts:
+        settled = sight.settled(np.asarray(place), branches.nodes)
+        yield _Way(
+            np.broadcast_to(settled, zero.shape),
+            branches.cost + sight.anywhere,
+            zero,
+            is_something_else=True,
+        )
+
+
+def _go_on(node: str, branches: _Branches, ways: Sequence[_Way], sight: _Sight) -> None:
+    """The branches after a step: each way in each branch, the likeliest of them."""
+    if len(ways) == 1:
+        chosen, index, which = ways[0], np.arange(len(branches.cost)), None
+        place, branches.cost, misfit = chosen.place, chosen.cost, chosen.misfit
+    else:
+        costs = np.array([way.cost for way in ways])
+        flat = np.argsort(costs, axis=None, kind="stable")[:AT_MOST]
+        least = costs.flat[flat[0]]
+        flat = flat[costs.flat[flat] <= least + WITHIN] if np.isfinite(least) else flat[:1]
+        which, index = np.unravel_index(flat, costs.shape)
+        place = np.array([way.place for way in ways])[which, index]
+        misfit = np.array([way.misfit for way in ways])[which, index]
+        branches.take(index)
+        branches.cost = costs[which, index]
+        for row, (one, branch) in enumerate(zip(which.tolist(), index.tolist(), strict=True)):
+            branches.made[row] += ways[one].made(branch)
+            if ways[one].is_something_else:
+                branches.unexplained[row] += (node,)
+        if not sight:
+            branches.is_blind |= which > 0
+        if sight.turned is not None:
+            sight = replace(sight, turned=sight.turned[index] if np.ndim(sight.turned) else sight.turned)
+    branches.nodes[node] = sight.settled(place, branches.nodes) if sight else place
+    if sight:
+        branches.misfit[node] = np.sqrt(misfit / sight.freedom)
+
+
+def _accounts(branches: _Branches) -> list[Account]:
+    order = np.argsort(branches.cost, kind="stable")
+    return [
+        Account(
+            float(branches.cost[i]),
+            branches.made[i],
+            branches.unexplained[i],
+            {node: float(misfit[i]) for node, misfit in branches.misfit.items()},
+        )
+        for i in order
+        if np.isfinite(branches.cost[i])
+    ]
