@@ -166,16 +166,35 @@ class CriterionDocument(Document):
     mistake: str | None = None
     """Code of the mistake that explains a loss."""
     feedback: str = ""
+    reasons: list[str] = []
+    """Codes of what the verdict rests on, most important first."""
+
+
+class RivalDocument(Document):
+    """Another mistake that would explain the same nearly as well."""
+
+    code: Code
+    at: str
+    confidence: Share
+    detail: str = ""
+    feedback: str = ""
 
 
 class MistakeDocument(Document):
-    """A mistake that explains what is off: its code, where it was made, the criteria it explains."""
+    """A mistake that explains what is off: its code, where it was made, the criteria it explains.
+
+    `feedback` says what was done and what to redo, `redo` the steps of the construction from there on,
+    both in the student's language at the level of feedback asked for.
+    """
 
     code: Code
     at: str
     explains: list[str]
     confidence: Share
     detail: str = ""
+    rivals: list[RivalDocument] = []
+    feedback: str = ""
+    redo: list[str] = []
 
 
 class ScaleDocument(Document):

@@ -16,6 +16,7 @@ from grader.documents import (
     ReadingDocument,
     ReadSheets,
     ReportDocument,
+    RivalDocument,
     ScaleDocument,
     Status,
     ToleranceDocument,
@@ -230,6 +231,7 @@ def _criterion(
         confidence=outcome.confidence,
         mistake=outcome.mistake,
         feedback=feedback,
+        reasons=[reason.code for reason in outcome.reasons],
     )
 
 
@@ -240,10 +242,21 @@ def _quantity(one: Quantity) -> QuantityDocument:
 
 
 def _mistake(one: Mistake) -> MistakeDocument:
-    detail = ", ".join(
+    return MistakeDocument(
+        code=one.code,
+        at=one.at,
+        explains=list(one.explains),
+        confidence=one.confidence,
+        detail=_detail(one),
+        rivals=[
+            RivalDocument(code=rival.code, at=rival.at, confidence=rival.confidence, detail=_detail(rival))
+            for rival in one.rivals
+        ],
+    )
+
+
+def _detail(one: Mistake) -> str:
+    return ", ".join(
         f"{key} = {value:.6g}" if isinstance(value, float) else f"{key} = {value}"
         for key, value in one.detail.items()
-    )
-    return MistakeDocument(
-        code=one.code, at=one.at, explains=list(one.explains), confidence=one.confidence, detail=detail
     )
