@@ -158,18 +158,26 @@ def _record(
             detail["degrees"] = 90.0 * quarters
         case operators.Mistake(other=other) if other:
             detail["other"] = "".join(other)
-    if code in LINE_MISTAKES and _is_along_guide(case.drawing.construction.step(operator.at), operator.slot):
-        detail["line"] = "guide"
+    if code in LINE_MISTAKES:
+        detail |= _line_told(case.drawing.construction.step(operator.at), operator.slot)
     return Mistake(code, operator.at, explains, min(confidence, 1.0), detail, rivals)
 
 
-LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link"})
+LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
 
 
-def _is_along_guide(step: Step, slot: int) -> bool:
-    """Whether a step's line runs along a link instead of across it."""
+def _line_told(step: Step, slot: int) -> dict[str, str]:
+    """Which line of a step it is: where it starts, the link that gives its direction, if a guide does."""
     line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None
-    return isinstance(line, Line) and isinstance(line.along, Along) and line.along.quarters % 2 == 0
+    if not isinstance(line, Line):
+        return {}
+    told = {"from": line.through}
+    if line.along.quarters % 2 == 0:
+        # Perpendiculars are of turning links, all else is along what something slides on.
+        told["line"] = "guide"
+    if isinstance(line.along, Along):
+        told["link"] = line.along.tail + line.along.head
+    return told
 
 
 def _code_of_scale(name: str, factor: float) -> str:
