@@ -19,7 +19,7 @@ import numpy as np
 
 from reference.elements import Errors, Nodes, Parameters, View
 from reference.geometry import ComplexArray
-from reference.steps import Similar, Step
+from reference.steps import Coincide, Similar, Step
 
 Part = Literal["", "n", "t", "c", "r"]
 
@@ -84,26 +84,45 @@ class Construction:
     rates: Mapping[str, AngularRate]
     images: Mapping[str, Similar] = field(default_factory=dict)
     centres: Mapping[str, Similar] = field(default_factory=dict)
+    steps: tuple[Step, ...] = field(init=False, repr=False, compare=False)
+    """All steps in order."""
+    _by_node: dict[str, tuple[str, Step]] = field(init=False, repr=False, compare=False)
+    _upstream: dict[str, frozenset[str]] = field(init=False, repr=False, compare=False, default_factory=dict)
 
-    @property
-    def steps(self) -> tuple[Step, ...]:
-        """All steps in order."""
-        return tuple(step for steps in self.figures.values() for step in steps)
+    def __post_init__(self) -> None:
+        pairs = [(figure, step) for figure, steps in self.figures.items() for step in steps]
+        object.__setattr__(self, "steps", tuple(step for _, step in pairs))
+        object.__setattr__(self, "_by_node", {step.node: (figure, step) for figure, step in pairs})
 
     def step(self, node: str) -> Step:
-        """The step that makes a node."""
-        return next(step for step in self.steps if step.node == node)
+        """The step that makes a node. Raises KeyError for a node that there is not."""
+        return self._by_node[node][1]
 
     def figure_of(self, node: str) -> str:
-        """The figure that a node belongs to."""
-        return next(
-            figure for figure, steps in self.figures.items() if any(step.node == node for step in steps)
-        )
+        """The figure that a node belongs to. Raises KeyError for a node that there is not."""
+        return self._by_node[node][0]
 
     def vectors_of(self, figure: str) -> tuple[Vector, ...]:
         """The vectors of one plan."""
-        nodes = {step.node for step in self.figures.get(figure, ())}
-        return tuple(vector for vector in self.vectors.values() if vector.head in nodes)
+        return tuple(v for v in self.vectors.values() if self._by_node[v.head][0] == figure)
+
+    @property
+    def links(self) -> Mapping[str, tuple[str, str]]:
+        """The pairs of joints that are drawn as links of the sketch, by their names run together."""
+        pairs = [one.link for one in self.vectors.values() if one.link and one.part != "r"]
+        apart = {joint.node: joint.other for joint in self.steps if isinstance(joint, Coincide)}
+        return {
+            f"{tail}{head}": (tail, head)
+            for tail, head in pairs
+            if apart.get(tail, tail) != apart.get(head, head)
+        }
+
+    def upstream(self, node: str) -> frozenset[str]:
+        """A node and everything that it is made from."""
+        if node not in self._upstream:
+            further = [self.upstream(need) for need in self.step(node).needs]
+            self._upstream[node] = frozenset({node}).union(*further)
+        return self._upstream[node]
 
     def with_step(self, changed: Step) -> "Construction":
         """The same construction with the step of one node replaced."""
@@ -116,15 +135,7 @@ class Construction:
 
 def ancestors(construction: Construction, wanted: Iterable[str]) -> frozenset[str]:
     """The nodes wanted and everything that they are made from."""
-    needs = {step.node: step.needs for step in construction.steps}
-    found: set[str] = set()
-    waiting = list(wanted)
-    while waiting:
-        node = waiting.pop()
-        if node not in found:
-            found.add(node)
-            waiting.extend(needs[node])
-    return frozenset(found)
+    return frozenset().union(*(construction.upstream(node) for node in wanted))
 
 
 def evaluate(

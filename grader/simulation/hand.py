@@ -16,21 +16,10 @@ from reference.assignment import Assignment, Scales, Variant
 from reference.construction import Construction, evaluate
 from reference.derivation import construction_of
 from reference.geometry import FloatArray
+from reference.hand import Act, Skill, acts
 from reference.mechanism import Mechanism
 from reference.mistakes import CODES, RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
 from reference.parameters import parameters_of
-from reference.steps import (
-    ArcAndLine,
-    Coincide,
-    Divide,
-    Given,
-    Local,
-    OnGuide,
-    Step,
-    Tangent,
-    TwoArcs,
-    TwoLines,
-)
 
 MECHANISM, VELOCITY, ACCELERATION = "mechanism", "velocity_plan", "acceleration_plan"
 PLANS = (VELOCITY, ACCELERATION)
@@ -217,43 +206,14 @@ def _other_variant(assignment: Assignment, chosen: Mistake) -> Mistake:
 # The hand -----------------------------------------------------------------------------------------
 
 
-def slips(construction: Construction, hand: Hand, rng: Rng) -> dict[tuple[str, int, str], FloatArray]:
+def slips(construction: Construction, hand: Hand, rng: Rng) -> dict[Act, FloatArray]:
     """One draw of a hand's errors for every step, as `reference.construction.evaluate` takes them."""
-    errors: dict[tuple[str, int, str], FloatArray] = {}
-    spread = {
-        "angle": np.radians(hand.angle_deg),
-        "shift": 0.5 * hand.place_mm,
-        "length": hand.place_mm,
-        "x": hand.mark_mm,
-        "y": hand.mark_mm,
-    }
-    for step in construction.steps:
-        for slot, kind in _acts(step):
-            tail = 2.0 if rng.random() < _HEAVY_TAIL else 1.0
-            errors[step.node, slot, kind] = np.asarray(tail * spread[kind] * rng.standard_normal())
+    skill = Skill(hand.angle_deg, hand.place_mm, hand.mark_mm)
+    errors: dict[Act, FloatArray] = {}
+    for act in acts(construction):
+        tail = 2.0 if rng.random() < _HEAVY_TAIL else 1.0
+        errors[act] = np.asarray(tail * skill.deviation(act[2]) * rng.standard_normal())
     return errors
-
-
-def _acts(step: Step) -> list[tuple[int, str]]:
-    """The acts of drawing that a step consists of."""
-    mark = [(0, "x"), (0, "y")]
-    match step:
-        case Given():
-            return [(0, "angle"), (0, "shift"), (0, "length"), *mark]
-        case TwoLines():
-            return [(slot, kind) for slot in (0, 1) for kind in ("angle", "shift")] + mark
-        case TwoArcs():
-            return [(0, "length"), (1, "length"), *mark]
-        case ArcAndLine():
-            return [(0, "length"), (1, "angle"), (1, "shift"), *mark]
-        case Divide() | Tangent():
-            return [(0, "length"), *mark]
-        case Local() | OnGuide():
-            return [(0, "angle"), (0, "shift"), (0, "length"), *mark]
-        case Coincide():
-            return []
-        case _:
-            return mark
 
 
 def draw(task: Task, hand: Hand, student: Student, rng: Rng) -> tuple[DrawnSheet, ...]:
