@@ -1,9 +1,10 @@
 """Rubrics: what is asked for, how many points it gives, and how far a drawing may be off.
 
-Everything that judges a student stands here as data: the tolerances of a careful hand on paper,
-the band of half points, what happens with what was not handed in.
+Everything that judges a student stands here as data: the tolerances on paper and the hand that they
+are widened for, the bands of partial points, what happens with what was not handed in.
 """
 
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -20,15 +21,22 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
+class Band(Authored):
+    """Partial points: up to `factor` times the tolerance there is this share of them."""
+
+    factor: Annotated[float, Field(ge=1.0, allow_inf_nan=False)]
+    share: Annotated[float, Field(ge=0.0, le=1.0)]
+
+
 class ToleranceTable(Authored):
     """How far off full marks may be.
 
     Length: the larger of `length_mm` and `length_relative` of the expected length. Direction: the
     larger of `direction_deg` and the angle at which the vector's end is `across_mm` off. Vectors
     shorter than `least_mm` (expected) have no direction that could be judged. Up to
-    `partial_factor` times the tolerance gives half points. A verdict on a scan that is another one
-    within `certain_errors` standard errors of the reading goes to a person: 1.645 leaves one in
-    twenty that lie just at a limit on the wrong side of it.
+    `partial_factor` times the tolerance gives half points; `bands` in its place gives several steps.
+    A verdict on a scan that is another one within `certain_errors` standard errors of the reading
+    goes to a person: 1.645 leaves one in twenty that lie just at a limit on the wrong side of it.
     """
 
     length_mm: Positive = 1.0
@@ -40,13 +48,72 @@ class ToleranceTable(Authored):
     certain_errors: NotNegative = 1.645
     partial_factor: Annotated[float, Field(ge=1.0, allow_inf_nan=False)] = 2.0
     partial_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+    bands: list[Band] | None = None
+
+    @model_validator(mode="after")
+    def _bands_fall(self) -> Self:
+        if self.bands is None:
+            return self
+        if {"partial_factor", "partial_share"} & self.model_fields_set:
+            raise ValueError(
+                "bands stand in place of partial_factor and partial_share: give one or the other"
+            )
+        pairs = zip(self.bands, self.bands[1:], strict=False)
+        if not all(one.factor < other.factor and one.share > other.share for one, other in pairs):
+            raise ValueError("bands must have rising factors and falling shares")
+        return self
+
+    @property
+    def all_bands(self) -> tuple[tuple[float, float], ...]:
+        """Factors and shares, the nearest first."""
+        if self.bands is None:
+            return ((self.partial_factor, self.partial_share),)
+        return tuple((band.factor, band.share) for band in self.bands)
+
+    @property
+    def farthest(self) -> float:
+        """How many times the tolerance still gives points."""
+        return self.all_bands[-1][0] if self.all_bands else 1.0
+
+
+class HandTable(Authored):
+    """A careful hand's errors, standard deviations of one act, for which tolerances are widened.
+
+    `angle_deg`: a line set along or across another; `place_mm`: a length transferred, an arc opened, the
+    foot of a line by half of it; `mark_mm`: a point marked. `ruler_mm` and `protractor_deg`: a length and
+    a direction measured and written down. A right drawing may be off by `sigmas` standard deviations of
+    what these make of it together; 0 leaves the tolerances as they are.
+
+    Careful plotting is good to 0.1-0.4 mm, 0.25 mm usually taken; at both ends of a line of 70 mm that is
+    0.3 degrees. Rulers are read to half a millimetre, protractors to a degree.
+    """
+
+    angle_deg: NotNegative = 0.3
+    place_mm: NotNegative = 0.25
+    mark_mm: NotNegative = 0.1
+    ruler_mm: NotNegative = 0.2
+    protractor_deg: NotNegative = 0.4
+    sigmas: NotNegative = 4.0
+
+
+Section = Literal["mechanism", "scales", "velocity_plan", "acceleration_plan", "angular"]
+
+
+class WeightsTable(Authored):
+    """What a section of the rubric is worth, whatever the points within it add up to."""
+
+    mechanism: Positive | None = None
+    scales: Positive | None = None
+    velocity_plan: Positive | None = None
+    acceleration_plan: Positive | None = None
+    angular: Positive | None = None
 
 
 class CriterionTable(Authored):
-    """One criterion: exactly one of a `vector`, an `angular` quantity or a `scale`, and its points.
+    """One criterion: exactly one of a `vector`, an `angular` quantity, a `scale` or a `link`, and its points.
 
     `optional`: not judged where it was not handed in. `direction = false`: only the length counts.
-    `tolerance` replaces the rubric's for this criterion.
+    `tolerance` replaces the rubric's for this criterion, `follow_through` the rubric's too.
     """
 
     id: Identifier
@@ -55,20 +122,33 @@ class CriterionTable(Authored):
     vector: str | None = None
     angular: str | None = None
     scale: Literal["kL", "kv", "ka"] | None = None
+    link: str | None = None
     optional: bool = False
     direction: bool = True
+    follow_through: bool | None = None
     tolerance: ToleranceTable | None = None
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        if sum(kind is not None for kind in (self.vector, self.angular, self.scale)) != 1:
-            raise ValueError("must have exactly one of vector, angular and scale")
+        if sum(kind is not None for kind in (self.vector, self.angular, self.scale, self.link)) != 1:
+            raise ValueError("must have exactly one of vector, angular, scale and link")
         return self
 
     @property
     def name(self) -> str:
-        """The vector, angular quantity or scale asked for."""
-        return self.vector or self.angular or self.scale or ""
+        """The vector, angular quantity, scale or link asked for."""
+        return self.vector or self.angular or self.scale or self.link or ""
+
+    @property
+    def section(self) -> Section:
+        """The part of the work that it belongs to."""
+        if self.link is not None:
+            return "mechanism"
+        if self.scale is not None:
+            return "scales"
+        if self.angular is not None:
+            return "angular"
+        return "velocity_plan" if self.name.startswith("v_") else "acceleration_plan"
 
 
 class RubricFile(Authored):
@@ -78,6 +158,8 @@ class RubricFile(Authored):
     id: Identifier
     title: Text
     tolerance: ToleranceTable = ToleranceTable()
+    hand: HandTable = HandTable()
+    weights: WeightsTable = WeightsTable()
     missing: Literal["review", "none", "not_judged"] = "review"
     """The verdict on a criterion that is asked for and was not handed in."""
     least_confidence: Annotated[float, Field(ge=0.0, le=1.0)] = 0.9
@@ -91,7 +173,7 @@ class RubricFile(Authored):
     @property
     def max_score(self) -> float:
         """All points."""
-        return sum(criterion.points for criterion in self.criterion)
+        return sum(self.points.values())
 
     @property
     def vectors(self) -> tuple[str, ...]:
@@ -107,10 +189,36 @@ class RubricFile(Authored):
         """The criterion's own tolerance, else the rubric's."""
         return criterion.tolerance or self.tolerance
 
+    def follows_through(self, criterion: CriterionTable) -> bool:
+        """Whether full marks are given for what follows rightly from an earlier wrong value."""
+        return self.follow_through if criterion.follow_through is None else criterion.follow_through
+
+    @property
+    def points(self) -> Mapping[str, float]:
+        """Points by criterion, scaled so that each section has its weight."""
+        weights = {section: getattr(self.weights, section) for section in self.sections}
+        factors = {
+            section: 1.0 if weights[section] is None else weights[section] / whole
+            for section, whole in self.sections.items()
+        }
+        return {one.id: one.points * factors[one.section] for one in self.criterion}
+
+    @property
+    def sections(self) -> Mapping[Section, float]:
+        """The points of each section as authored."""
+        found: dict[Section, float] = {}
+        for criterion in self.criterion:
+            found[criterion.section] = found.get(criterion.section, 0.0) + criterion.points
+        return found
+
 
 def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding]:
     """Names in the rubric that the construction does not know."""
-    known = {"vector": tuple(construction.vectors), "angular": tuple(construction.rates)}
+    known = {
+        "vector": tuple(construction.vectors),
+        "angular": tuple(construction.rates),
+        "link": tuple(construction.links),
+    }
     return [
         Finding(f"$.criterion[{index}].{key}", f"{name} is not in this mechanism: {', '.join(names)}")
         for index, criterion in enumerate(rubric.criterion)
@@ -149,12 +257,28 @@ def load_rubric(name: str | Path, *, beside: Path | None = None) -> RubricFile:
 @cache
 def _load(path: Path, _changed_ns: int) -> RubricFile:
     rubric = load(RubricFile, path)
-    ids = [criterion.id for criterion in rubric.criterion]
-    twice = [
-        Finding(f"$.criterion[{index}].id", f"{name} is there already")
-        for index, name in enumerate(ids)
-        if name in ids[:index]
-    ]
-    if twice:
-        raise AuthoredFileError(str(path), tuple(twice))
+    faults = [*_twice(rubric), *_idle_weights(rubric)]
+    if faults:
+        raise AuthoredFileError(str(path), tuple(faults))
     return rubric
+
+
+def _twice(rubric: RubricFile) -> Iterator[Finding]:
+    ids = [criterion.id for criterion in rubric.criterion]
+    for index, name in enumerate(ids):
+        if name in ids[:index]:
+            yield Finding(f"$.criterion[{index}].id", f"{name} is there already")
+
+
+def _idle_weights(rubric: RubricFile) -> Iterator[Finding]:
+    """Weights of sections without criteria."""
+    kinds = {
+        "mechanism": "link",
+        "scales": "scale",
+        "velocity_plan": "vector",
+        "acceleration_plan": "vector",
+        "angular": "angular",
+    }
+    for section, kind in kinds.items():
+        if getattr(rubric.weights, section) is not None and section not in rubric.sections:
+            yield Finding(f"$.weights.{section}", f"no criterion belongs to it: none has such a {kind}")
