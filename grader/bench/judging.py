@@ -1,0 +1,111 @@
+"""Judging measured on simulated classes whose truth is known: verdicts, mistakes named, time.
+
+Who draws what stands in `judging_students`, what is due in `judging_truth`. One case again, told in full::
+
+    python -m grader.bench.judging --case pump typical single 17
+"""
+
+import argparse
+import time
+from collections.abc import Iterator, Sequence
+
+from grader.bench.judging_assignments import ASSIGNMENTS, assignment_named
+from grader.bench.judging_students import HANDS, KINDS, SOURCES, Key, Kind, Source, Work, student, submission
+from grader.bench.judging_tables import judging_tables
+from grader.bench.judging_tally import Result, Times, result_of, told
+from grader.bench.report import as_text
+from grader.judging import Task, judge, task_of
+
+__all__ = ["ASSIGNMENTS", "JudgingBench", "Key", "Times", "judged"]
+
+RIGHT, SINGLE, PAIR = 96, 48, 48
+"""Students of each kind for an assignment and a hand: 2,016 right drawings in all."""
+QUICK = 5
+"""In a quick run so many of each kind."""
+
+
+def judged(key: Key, sources: Sequence[Source] = SOURCES, times: Times | None = None) -> list[Result]:
+    """One student's work judged from each source, against what was due. Raises ValueError for no such one."""
+    work = student(key)
+    noted = times if times is not None else Times()
+    start = time.process_time()
+    task = task_of(work.assignment, work.rubric, work.variant)
+    noted.task.append(1000.0 * (time.process_time() - start))
+    return [_judged_from(work, task, source, noted) for source in sources]
+
+
+def _judged_from(work: Work, task: Task, source: Source, noted: Times) -> Result:
+    handed_in = submission(work, source)
+    start = time.process_time()
+    judgement = judge(task, handed_in)
+    spent = 1000.0 * (time.process_time() - start)
+    (noted.wrong if work.task.mistakes else noted.right).append(spent)
+    return result_of(work, source, handed_in, judgement)
+
+
+class JudgingBench:
+    """The whole benchmark of judging; `run` tells what was measured, step by step."""
+
+    def __init__(
+        self, *, quick: bool = False, students: int | None = None, assignments: Sequence[str] = ASSIGNMENTS
+    ) -> None:
+        self.results: list[Result] = []
+        self.times = Times()
+        self.refused: list[str] = []
+        counts = (students or QUICK,) * 3 if quick or students else (RIGHT, SINGLE, PAIR)
+        self._counts: dict[Kind, int] = dict(zip(KINDS, counts, strict=True))
+        self._classes = [(name, hand) for name in assignments for hand in HANDS]
+        self.steps = len(self._classes)
+
+    def run(self) -> Iterator[str]:
+        """Measure, naming what was measured."""
+        for name, hand in self._classes:
+            assignment_named(name)
+            for kind, count in self._counts.items():
+                for seed in range(1, count + 1):
+                    self._measure(Key(name, hand, kind, seed))
+            yield f"judging: {name}, {hand} hands"
+
+    def _measure(self, key: Key) -> None:
+        try:
+            self.results.extend(judged(key, times=self.times))
+        except ValueError as error:
+            self.refused.append(str(error))
+
+    @property
+    def failures(self) -> list[Result]:
+        """All that went wrong, to be looked into one by one."""
+        return [result for result in self.results if not result.is_clean]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The benchmark, or one case of it, as text."""
+    parser = argparse.ArgumentParser(description="Judging measured on simulated classes.")
+    parser.add_argument("--case", nargs=4, metavar=("ASSIGNMENT", "HAND", "KIND", "SEED"))
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--students", type=int)
+    parser.add_argument("--assignments", nargs="+", default=list(ASSIGNMENTS))
+    parser.add_argument("--failures", type=int, default=0, metavar="N", help="list the first N failures")
+    chosen = parser.parse_args(arguments)
+    if chosen.case:
+        name, hand, kind, seed = chosen.case
+        print(*_in_full(Key(name, hand, kind, int(seed))), sep="\n")  # noqa: T201 - a script
+        return
+    bench = JudgingBench(quick=chosen.quick, students=chosen.students, assignments=chosen.assignments)
+    for _ in bench.run():
+        pass
+    print(as_text(judging_tables(bench.results, bench.times)))  # noqa: T201
+    print(*bench.failures[: chosen.failures], sep="\n")  # noqa: T201
+
+
+def _in_full(key: Key) -> Iterator[str]:
+    work = student(key)
+    yield f"{key}: {work.variant}, {'scales declared' if work.declares else 'nothing declared'}"
+    yield "made: " + ("; ".join(told(one) for one in work.task.mistakes) or "nothing")
+    for result in judged(key):
+        yield f"-- {result}"
+        yield from (f"   {one.criterion:10} due {one.due:8} {one.verdict}" for one in result.criteria)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,274 @@
+"""Simulated students without pictures: what they drew, and how it reaches the judge.
+
+A student is told by a `Key` and is the same in every run: the variant, the scales, a turned sketch,
+vectors not drawn out, the mistakes and the hand's errors all follow from it. The same drawing is
+handed in three ways: as a perfect reader would read it (`nodes`), as its owner would measure it with
+ruler and protractor (`directions`), and with the ruler alone (`lengths`).
+"""
+
+import cmath
+import math
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from grader.bench.judging_assignments import assignment_named
+from grader.bench.judging_redrawn import relabelled, vectors_of
+from grader.judging import Submission
+from grader.records import (
+    ACCELERATION_PLAN,
+    MECHANISM,
+    VELOCITY_PLAN,
+    Figure,
+    Reading,
+    ReadNode,
+    ReadVector,
+    Swapped,
+    Unread,
+)
+from grader.rubric import RubricFile
+from grader.simulation import CAREFUL, SLOPPY, TYPICAL, Hand
+from grader.simulation.hand import DrawnSheet, Task, draw, task_of
+from grader.simulation.settings import Student
+from reference.assignment import Assignment, Variant
+from reference.construction import Construction
+from reference.mistakes import CODES
+
+Kind = Literal["right", "single", "pair"]
+Source = Literal["nodes", "directions", "lengths"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+SOURCES: tuple[Source, ...] = get_args(Source)
+HANDS: Mapping[str, Hand] = {"careful": CAREFUL, "typical": TYPICAL, "sloppy": SLOPPY}
+UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
+
+SE_MM = (0.05, 0.1)
+"""A perfect reader's standard errors of a node lie between these."""
+SURE = (0.95, 0.99)
+RULER_MM, RULER_STEP_MM, PROTRACTOR_DEG, LEAST_TURN_MM = 0.2, 0.5, 0.4, 5.0
+DRAWN_MM = 0.8
+"""Shorter than this is a dot, not a vector: it is not measured unless it should be that short."""
+PAPER = {MECHANISM: 100 - 90j, VELOCITY_PLAN: 300 - 90j, ACCELERATION_PLAN: 200 - 220j}
+_TRIES = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """Which student: the same key gives the same drawing."""
+
+    assignment: str
+    hand: str
+    kind: Kind
+    seed: int
+
+    def lot(self, purpose: str) -> np.random.Generator:
+        """Chance for one purpose, apart from all others."""
+        told = f"{self.assignment}/{self.hand}/{self.kind}/{purpose}"
+        return np.random.default_rng([self.seed, zlib.crc32(told.encode())])
+
+    def __str__(self) -> str:
+        return f"{self.assignment} {self.hand} {self.kind} {self.seed}"
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What one student drew.
+
+    Attributes
+    ----------
+    task : with the drawing as it should be and as it was understood
+    sheets : what the hand made of it
+    declares : whether the scales are declared
+    letters : whether swapped letters are seen as letters, the nodes read by their lines
+    left_out : vectors that are not drawn, by mistake or as they need not be
+    """
+
+    key: Key
+    assignment: Assignment
+    rubric: RubricFile
+    task: Task
+    sheets: tuple[DrawnSheet, ...]
+    declares: bool
+    letters: bool
+    left_out: frozenset[str]
+
+    @property
+    def variant(self) -> Variant:
+        """The student's."""
+        return self.task.variant
+
+    @property
+    def construction(self) -> Construction:
+        """As the student should have drawn it."""
+        return self.task.right.construction
+
+    def own(self, figure: str) -> dict[str, complex]:
+        """The student's own nodes as they are when a plan is drawn: its sheet's sketch, the velocities."""
+        sheet = self.sheets[-1] if figure == ACCELERATION_PLAN else self.sheets[0]
+        nodes: dict[str, complex] = {}
+        for one in (self.sheets[0], sheet):
+            for drawn in one.figures:
+                nodes.update(drawn.nodes)
+        return nodes
+
+    def swaps(self) -> list[tuple[str, str]]:
+        """Pairs of nodes with each other's letter."""
+        return [(one.other[0], one.other[1]) for one in self.task.mistakes if one.code == "labels_swapped"]
+
+    def named(self, nodes: Mapping[str, complex], source: Source) -> dict[str, complex]:
+        """The nodes under the names by which they are handed in."""
+        return dict(nodes) if self.by_letters(source) else relabelled(nodes, self.swaps())
+
+    def by_letters(self, source: Source) -> bool:
+        """Whether swapped letters are told as such, beside nodes named by their lines."""
+        return source == "nodes" and self.letters
+
+
+def student(key: Key) -> Work:
+    """The student of a key.
+
+    Raises ValueError where no drawing of this kind comes about in many tries.
+    """
+    assignment, rubric = assignment_named(key.assignment)
+    variants = assignment.variants()
+    lot = key.lot("student")
+    variant = variants[int(lot.integers(len(variants)))]
+    for _ in range(_TRIES):
+        habits = _habits(key, assignment, lot)
+        try:
+            task = task_of(assignment, variant, habits, lot)
+            sheets = draw(task, HANDS[key.hand], habits, lot)
+        except ValueError:  # a mistake that cannot be made here, or beside the other one
+            continue
+        if _at_one_place(task):
+            continue
+        optional = {one.name for one in rubric.criterion if one.optional and one.vector}
+        skipped = {name for name in optional if lot.random() < 0.7} if lot.random() < 0.3 else set()
+        own_scales = habits.crank_mm is not None or (habits.kv_ratio, habits.ka_ratio) != (1.0, 1.0)
+        declares = bool(lot.random() < 0.7) or own_scales
+        letters = bool(lot.random() < 0.5)
+        left_out = frozenset(skipped) | task.missing
+        return Work(key, assignment, rubric, task, sheets, declares, letters, left_out)
+    raise ValueError(f"{key}: no such drawing in {_TRIES} tries")
+
+
+def _habits(key: Key, assignment: Assignment, lot: np.random.Generator) -> Student:
+    """Scales, turn, sheets and mistakes."""
+    own = lot.random() < 0.3
+    crank = float(lot.choice([30.0, 40.0, 50.0, 60.0])) if own and lot.random() < 0.5 else None
+    ratios = [float(lot.choice([0.8, 1.25])) if own else 1.0 for _ in range(2)]
+    has_crank = assignment.mechanism_file.crank is not None
+    codes = _codes(key, lot)
+    # A sketch drawn wrongly about a single pivot would not tell how far it is turned.
+    tells = len(assignment.mechanism_file.ground) > 1 or not {"other_variant", "other_assembly"} & set(codes)
+    turn = float(lot.uniform(-25.0, 25.0)) if tells and lot.random() < 0.3 else 0.0
+    pages = {page.kind for page in assignment.file.page}
+    return Student(
+        crank_mm=crank if has_crank else None, kv_ratio=ratios[0], ka_ratio=ratios[1], turn_deg=turn,
+        similarity=True if lot.random() < 0.2 else None, mistakes=codes, sheets=1 if "all" in pages else 2,
+    )  # fmt: skip
+
+
+def _codes(key: Key, lot: np.random.Generator) -> tuple[str, ...]:
+    """Codes of the mistakes to make; another student's data come before what is done with them."""
+    if key.kind == "right":
+        return ()
+    turn = CODES[(key.seed + zlib.crc32(f"{key.assignment} {key.hand}".encode())) % len(CODES)]
+    first = turn if lot.random() < 0.9 else str(lot.choice(list(CODES)))
+    if key.kind == "single":
+        return (first,)
+    second = str(lot.choice([code for code in CODES if code != first]))
+    return tuple(sorted((first, second), key=lambda code: code != "other_variant"))
+
+
+def _at_one_place(task: Task) -> bool:
+    """Whether two mistakes are made at one line of one step: the second then hides the first."""
+    places = [(one.at, one.slot) for one in task.mistakes]
+    return len(set(places)) < len(places)
+
+
+# As a perfect reader reads it -----------------------------------------------------------------------
+
+
+def submission(work: Work, source: Source) -> Submission:
+    """The student's work as it is handed in."""
+    declared = {}
+    if work.declares:
+        declared = {name: f"{value!r} {UNITS[name]}" for name, value in work.task.declared.items()}
+    lot = work.key.lot(source)
+    if source == "nodes":
+        return Submission(readings=_readings(work, lot), declared=declared)
+    return Submission(measured=_measured(work, lot, with_turn=source == "directions"), declared=declared)
+
+
+def _readings(work: Work, lot: np.random.Generator) -> tuple[Reading, ...]:
+    se = float(lot.uniform(*SE_MM))
+    readings = []
+    for sheet in work.sheets:
+        figures, unread, swapped = {}, [], []
+        for drawn in sheet.figures:
+            named = work.named(drawn.nodes, "nodes")
+            places = {
+                name: PAPER[drawn.name] + place + se * complex(*lot.standard_normal(2))
+                for name, place in named.items()
+            }
+            nodes = {
+                name: ReadNode(place, np.eye(2) * se**2, float(lot.uniform(*SURE)))
+                for name, place in places.items()
+            }
+            figures[drawn.name] = Figure(nodes, _vectors(work, drawn.name, nodes, se))
+            unread += [
+                Unread(vector.name, f"no stroke between {vector.tail} and {vector.head} could be told apart")
+                for vector in work.construction.vectors_of(drawn.name)
+                if vector.name in work.left_out
+            ]
+            swapped += [
+                Swapped(drawn.name, first, second, 0.97)
+                for first, second in (work.swaps() if work.by_letters("nodes") else ())
+                if first in nodes
+            ]
+        readings.append(Reading(figures, tuple(unread), swapped=tuple(swapped)))
+    return tuple(readings)
+
+
+def _vectors(work: Work, figure: str, nodes: Mapping[str, ReadNode], se: float) -> dict[str, ReadVector]:
+    vectors = {}
+    for vector in work.construction.vectors_of(figure):
+        if vector.name in work.left_out:
+            continue
+        tail, head = nodes[vector.tail], nodes[vector.head]
+        drawn = head.at - tail.at
+        se_mm = math.sqrt(2.0) * se
+        se_deg = min(math.degrees(se_mm / abs(drawn)), 90.0) if drawn else None
+        turn = math.degrees(cmath.phase(drawn)) % 360.0 if drawn else None
+        sure = min(tail.confidence, head.confidence)
+        vectors[vector.name] = ReadVector(abs(drawn), se_mm, turn, se_deg, sure)
+    return vectors
+
+
+# As its owner measures it ---------------------------------------------------------------------------
+
+
+def _measured(work: Work, lot: np.random.Generator, *, with_turn: bool) -> Reading:
+    figures = {}
+    right = vectors_of(work.task.right, ())
+    for figure in work.construction.poles:
+        vectors = {}
+        named = work.named(work.own(figure), "lengths")
+        for vector in work.construction.vectors_of(figure):
+            drawn = named[vector.head] - named[vector.tail]
+            ruled = abs(drawn) + lot.normal(0.0, RULER_MM)
+            protracted = math.degrees(cmath.phase(drawn)) + lot.normal(0.0, PROTRACTOR_DEG)
+            is_dot = abs(drawn) < DRAWN_MM < abs(right[vector.name])
+            if vector.name in work.left_out or is_dot:
+                continue
+            length = max(0.0, round(ruled / RULER_STEP_MM) * RULER_STEP_MM)
+            turn = None
+            if with_turn and abs(drawn) > LEAST_TURN_MM:
+                sketch = math.degrees(float(work.task.right.parameters["turn"]))
+                turn = round(protracted - sketch) % 360.0
+            vectors[vector.name] = ReadVector(length, 0.0, turn, None if turn is None else 0.0, 1.0)
+        figures[figure] = Figure({}, vectors)
+    return Reading(figures)

@@ -1,0 +1,94 @@
+"""The figures of judging as tables."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from grader.bench.judging_tally import Count, Result, Tally, Times, summed
+from grader.bench.tables import Table
+
+NOTHING = "-"
+
+
+def judging_tables(results: Sequence[Result], times: Times) -> Iterator[Table]:
+    """Verdicts, mistakes named, codes, times."""
+    yield _verdicts(results, ("source", "hand"), "Judging: verdicts")
+    yield _verdicts(results, ("source", "assignment"), "Judging: verdicts by mechanism")
+    yield _names(results, ("source", "hand", "kind"), "Judging: the first mistake named")
+    yield _names(results, ("source", "assignment"), "Judging: the first mistake named, by mechanism")
+    yield _codes(results)
+    yield _instead(results)
+    yield _times(times)
+
+
+def _of(count: Count) -> str:
+    return f"{count.hits} of {count.of}"
+
+
+def _percent(count: Count) -> str:
+    return NOTHING if count.share is None else f"{100.0 * count.share:.1f} %"
+
+
+def _verdicts(results: Sequence[Result], by: Sequence[str], title: str) -> Table:
+    heads = [
+        *by, "students", "charged wrongly", "credited wrongly", "review", "follow-through credited",
+        "hand's own miss charged", "unpunished",
+    ]  # fmt: skip
+    rows = [
+        [
+            *where, str(one.students), _of(one.false_charges), _of(one.false_credits), _percent(one.reviews),
+            f"{_percent(one.followed)} of {one.followed.of}", _of(one.missed), _of(one.unpunished),
+        ]
+        for where, one in summed(results, by).items()
+    ]  # fmt: skip
+    return title, heads, rows
+
+
+def _names(results: Sequence[Result], by: Sequence[str], title: str) -> Table:
+    heads = [*by, "named", "as the surest", "only as a rival", "of", "wrong names", "right drawings accused"]
+    rows = [
+        [
+            *where, _percent(one.named), _percent(one.surest), _percent(one.rivals), str(one.named.of),
+            _of(one.misnamed), _of(one.accused),
+        ]
+        for where, one in summed(results, by).items()
+    ]  # fmt: skip
+    return title, heads, rows
+
+
+def _codes(results: Sequence[Result]) -> Table:
+    """Single mistakes of careful and typical hands, by code."""
+    singles = [one for one in results if one.key.kind == "single" and one.key.hand != "sloppy"]
+    tallies = summed(singles, ("source",))
+    codes = sorted({code for tally in tallies.values() for code in tally.codes})
+    heads = ["code", *(source for (source,) in tallies)]
+    rows = [[code, *(_code(tally, code) for tally in tallies.values())] for code in codes]
+    return "Judging: single mistakes of careful and typical hands named, by code", heads, rows
+
+
+def _code(tally: Tally, code: str) -> str:
+    return _of(tally.codes[code]) if code in tally.codes else NOTHING
+
+
+def _instead(results: Sequence[Result]) -> Table:
+    """What was named and not made, of single mistakes and right drawings."""
+    rows = [
+        [source, made, named, str(count)]
+        for (source, kind), tally in summed(results, ("source", "kind")).items()
+        if kind != "pair"
+        for (made, named), count in tally.instead.most_common(6)
+    ]
+    return "Judging: named and not made", ["source", "made", "named", "times"], rows
+
+
+def _times(times: Times) -> Table:
+    rows = [
+        [name, f"{np.median(spent):.1f}", f"{np.percentile(spent, 95):.1f}", str(len(spent))]
+        for name, spent in (
+            ("right drawings", times.right),
+            ("wrong drawings", times.wrong),
+            ("making the task", times.task),
+        )
+        if spent
+    ]
+    return "Judging: processor time, ms", ["what", "median", "95 % within", "of"], rows

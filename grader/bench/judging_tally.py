@@ -1,0 +1,234 @@
+"""What judging came to, student by student and summed up."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from grader.bench.judging_students import Key, Source, Work
+from grader.bench.judging_truth import Due, Seen, first_of, is_named, mistakes_due, verdicts_due
+from grader.judging import Submission
+from grader.outcomes import Judgement, Mistake
+from reference import mistakes as operators
+
+CHARGED, CREDITED = frozenset({"none", "partial"}), frozenset({"full", "follow_through"})
+
+
+@dataclass(frozen=True, slots=True)
+class Marked:
+    """One criterion: what was due, what the judge said."""
+
+    criterion: str
+    due: Due
+    verdict: str
+
+    @property
+    def counts(self) -> bool:
+        """Whether there was anything to judge."""
+        return self.due != "absent" and self.verdict != "not_judged"
+
+    @property
+    def is_false_charge(self) -> bool:
+        """Charged although right or following."""
+        return self.due in {"right", "follows"} and self.verdict in CHARGED
+
+    @property
+    def is_false_credit(self) -> bool:
+        """Credited although clearly wrong."""
+        return self.due == "wrong" and self.verdict in CREDITED
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """One submission judged, and held against what was due.
+
+    Attributes
+    ----------
+    first : the first mistake that is to be named, None without one
+    named : it was named; `surest` as the surest, `among_rivals` only as a rival of one named
+    not_made : what was named and not made
+    unpunished : something visible was done wrongly, and cost nothing
+    """
+
+    key: Key
+    source: Source
+    criteria: tuple[Marked, ...]
+    made: tuple[operators.Mistake, ...]
+    mistakes: tuple[Mistake, ...]
+    first: operators.Mistake | None
+    named: bool
+    surest: bool
+    among_rivals: bool
+    not_made: tuple[Mistake, ...]
+    unpunished: bool
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether there is nothing to look into."""
+        missed = self.first is not None and not self.named
+        return not (
+            missed or self.not_made or any(m.is_false_charge or m.is_false_credit for m in self.criteria)
+        )
+
+    def __str__(self) -> str:
+        wrong = [m for m in self.criteria if m.is_false_charge or m.is_false_credit]
+        parts = [
+            f"{self.key} {self.source}",
+            "made: " + ("; ".join(told(one) for one in self.made) or "nothing"),
+            "named: " + ("; ".join(_named(one) for one in self.mistakes) or "nothing"),
+        ]
+        if self.first is not None and not self.named:
+            parts.append(f"not named: {told(self.first)}" + (" (a rival)" if self.among_rivals else ""))
+        if wrong:
+            parts.append("verdicts: " + ", ".join(f"{m.criterion} {m.verdict} (due: {m.due})" for m in wrong))
+        return " | ".join(parts)
+
+
+def told(mistake: operators.Mistake) -> str:
+    """A mistake made, in one line."""
+    usual = operators.Mistake(mistake.code, mistake.at)
+    details = ("slot", "other", "factor", "quarters", "n", "position")
+    differ = [
+        (name, getattr(mistake, name)) for name in details if getattr(mistake, name) != getattr(usual, name)
+    ]
+    return " ".join([mistake.code, mistake.at, *(f"{name}={value}" for name, value in differ)])
+
+
+def _named(mistake: Mistake) -> str:
+    detail = " ".join(f"{name}={value}" for name, value in mistake.detail.items())
+    rivals = f" or {len(mistake.rivals)} rivals" if mistake.rivals else ""
+    return f"{mistake.code} {mistake.at} {detail} {mistake.confidence:.2f}{rivals}"
+
+
+def result_of(work: Work, source: Source, handed_in: Submission, judgement: Judgement) -> Result:
+    """A judgement held against the truth."""
+    seen = Seen.of(handed_in)
+    due = verdicts_due(work, source, seen)
+    marked = tuple(Marked(one.criterion, due[one.criterion], one.verdict) for one in judgement.outcomes)
+    made = mistakes_due(work, source, seen)
+    first = first_of(made)
+
+    def names(mistake: Mistake, one: operators.Mistake) -> bool:
+        return is_named(work, source, seen, one, mistake)
+
+    told_first = [first is not None and names(mistake, first) for mistake in judgement.mistakes]
+    rivals = [rival for mistake in judgement.mistakes for rival in mistake.rivals]
+    not_made = [
+        mistake
+        for mistake, is_first in zip(judgement.mistakes, told_first, strict=True)
+        if not is_first and not any(names(mistake, one.mistake) for one in made)
+    ]
+    charged = any(one.verdict in CHARGED for one in judgement.outcomes)
+    return Result(
+        work.key, source, marked, work.task.mistakes, judgement.mistakes, first,
+        named=any(told_first),
+        surest=bool(told_first) and told_first[0],
+        among_rivals=first is not None and not any(told_first) and any(names(one, first) for one in rivals),
+        not_made=tuple(not_made),
+        unpunished=first is not None and not charged,
+    )  # fmt: skip
+
+
+@dataclass(slots=True)
+class Times:
+    """Processor milliseconds of one judgement each; of making the task apart."""
+
+    right: list[float] = field(default_factory=list)
+    wrong: list[float] = field(default_factory=list)
+    task: list[float] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class Count:
+    """So many of so many."""
+
+    hits: int = 0
+    of: int = 0
+
+    def add(self, hit: bool) -> None:
+        """One more."""
+        self.hits += hit
+        self.of += 1
+
+    @property
+    def share(self) -> float | None:
+        """None of nothing."""
+        return self.hits / self.of if self.of else None
+
+
+@dataclass(slots=True)
+class Tally:
+    """All results of one kind of student and source.
+
+    Attributes
+    ----------
+    false_charges, false_credits : of the criteria due to be credited, and due to be charged
+    reviews : of criteria judged
+    followed : credit given for what follows from a mistake
+    missed : criteria off by the hand alone that were charged
+    named, surest, rivals : of drawings with a mistake to be named
+    accused : of right drawings; misnamed : of wrong ones, with a mistake named that was not made
+    """
+
+    students: int = 0
+    false_charges: Count = field(default_factory=Count)
+    false_credits: Count = field(default_factory=Count)
+    reviews: Count = field(default_factory=Count)
+    followed: Count = field(default_factory=Count)
+    missed: Count = field(default_factory=Count)
+    named: Count = field(default_factory=Count)
+    surest: Count = field(default_factory=Count)
+    rivals: Count = field(default_factory=Count)
+    accused: Count = field(default_factory=Count)
+    misnamed: Count = field(default_factory=Count)
+    unpunished: Count = field(default_factory=Count)
+    codes: dict[str, Count] = field(default_factory=dict)
+    instead: Counter[tuple[str, str]] = field(default_factory=Counter)
+
+    def add(self, result: Result) -> None:
+        """One more submission."""
+        self.students += 1
+        for one in result.criteria:
+            self._add_criterion(one)
+        if not result.made:
+            self.accused.add(bool(result.mistakes))
+        else:
+            self.misnamed.add(bool(result.not_made))
+        if result.first is not None:
+            self.named.add(result.named)
+            self.surest.add(result.surest)
+            self.rivals.add(result.among_rivals)
+            self.unpunished.add(result.unpunished)
+            self.codes.setdefault(result.first.code, Count()).add(result.named)
+        made = "+".join(sorted(one.code for one in result.made)) or "nothing"
+        self.instead.update((made, named.code) for named in result.not_made)
+
+    def _add_criterion(self, one: Marked) -> None:
+        if not one.counts:
+            return
+        self.reviews.add(one.verdict == "review")
+        match one.due:
+            case "right" | "follows":
+                self.false_charges.add(one.is_false_charge)
+            case "wrong":
+                self.false_credits.add(one.is_false_credit)
+            case "missed":
+                self.missed.add(one.verdict in CHARGED)
+        if one.due == "follows":
+            self.followed.add(one.verdict in CREDITED)
+
+    def as_json(self) -> dict[str, Any]:
+        """One JSON object."""
+        return {**asdict(self), "instead": [[*key, count] for key, count in self.instead.most_common()]}
+
+
+def summed(results: Iterable[Result], by: Sequence[str]) -> dict[tuple[str, ...], Tally]:
+    """Tallies by assignment, hand, kind or source."""
+    tallies: dict[tuple[str, ...], Tally] = {}
+    for result in results:
+        where: Mapping[str, str] = {
+            "assignment": result.key.assignment, "hand": result.key.hand, "kind": result.key.kind,
+            "source": result.source,
+        }  # fmt: skip
+        tallies.setdefault(tuple(where[name] for name in by), Tally()).add(result)
+    return tallies

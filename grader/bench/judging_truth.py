@@ -1,0 +1,380 @@
+"""What a fair judge should find: the verdict due to each criterion, the mistakes that can be named.
+
+Truth goes by intent, held against the student's own earlier nodes. Of each vector there are three
+forms: as its step rightly makes it from the student's own nodes before it (*due*), as the mistaken
+step makes it from the same nodes (*made*), and as it is in the exact plan at the scales that the
+drawing follows (*exact*). They are compared by the rubric's plain tolerances, without any widening:
+
+- *wrong*: made is off due by more than 2.5 tolerances. It is to be charged: ``none`` or ``partial``.
+- *right*, or *follows* where due is off the exact by more than 2.5 tolerances: made is within one
+  tolerance of due. It is to be credited, as full or as following.
+- *either*: between the two; what was wrongly made and came out right; what follows from a mistake so
+  far that next to nothing is left of it (the rubric's guard against trivial follow-through); the
+  first vectors that show a mistake which no criterion shows where it was made.
+- *missed*: rightly meant, and off by more than the plain tolerance by the hand alone. Either verdict is
+  accepted, and counted apart: a wider tolerance where a construction is ill-conditioned credits it.
+
+By code:
+
+- `sense_reversed`, `normal_reversed`, `normal_missing`, `normal_from_absolute`, `arithmetic`,
+  `parallel_for_perpendicular`, `wrong_link`, `wrong_intersection`, `image_mirrored`: the vectors that
+  end in the node of the changed step, as above; what is drawn from it follows.
+- `other_variant`: the driven link's own vectors, held against the exact plan; all else by the
+  student's own nodes, where only data that differ (lengths, guides) make a step wrong.
+- `other_assembly`: only the sketch is wrong, and no criterion asks for it: either verdict for the
+  vectors of the first node that shows it, the rest follows.
+- `figure_rotated`: the driven link's vector of that plan; the rest is drawn rightly in the turned plan.
+- `scale_wrong`: the criterion of the scale where one was declared; the vectors are right by the scale
+  that they follow. Undeclared, the driven link's vector of that plan is taken for either.
+- `rpm_not_converted`: velocities and scales are both too large, so the drawing is right: the declared
+  kv is wrong, ka either (the same mistake again). Undeclared, nothing shows.
+- `vector_missing`: nothing to judge; to credit it in full is wrong where it is not optional.
+- `labels_swapped`: the vectors that begin or end in the two nodes, as named against as they should be;
+  either where the letters themselves are told beside nodes named by their lines.
+
+A mistake is *visible* where the drawing without it, by a perfect hand, differs in some observed vector by
+more than 2.5 tolerances (or in a declared scale, or in a vector that is not there); below that it need
+not be named, and naming it is no false accusation. In lengths alone only lengths count.
+"""
+
+import cmath
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from grader.bench.judging_redrawn import SCALES, Asked, is_same, meant, vectors_of
+from grader.bench.judging_students import Source, Work
+from grader.judging import Submission
+from grader.outcomes import Mistake as Named
+from grader.rubric import CriterionTable, ToleranceTable
+from reference.construction import Construction, Vector, ancestors, evaluate
+from reference.elements import Scaled
+from reference.geometry import ComplexArray
+from reference.mistakes import Drawing, Mistake, commit
+from reference.steps import Given, Pivot
+
+Due = Literal["right", "follows", "wrong", "either", "missed", "absent"]
+CLEAR, PLAIN = 2.5, 1.0
+"""Multiples of the rubric's tolerance beyond which it is clearly wrong, and up to which it is right."""
+ALIKE_MM = 0.3
+"""Two mistakes whose drawings differ by less in every observed vector count as each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What the judge can see: the vectors, and whether their directions are known."""
+
+    directed: Mapping[str, bool]
+
+    @classmethod
+    def of(cls, handed_in: Submission) -> "Seen":
+        """From what was handed in."""
+        readings = [*handed_in.readings, *([handed_in.measured] if handed_in.measured else [])]
+        return cls(
+            {
+                name: vector.direction_deg is not None
+                for reading in readings
+                for figure in reading.figures.values()
+                for name, vector in figure.vectors.items()
+            }
+        )
+
+
+def off(drawn: complex, due: complex, tolerance: ToleranceTable, *, directed: bool) -> float:
+    """How far a vector is from another, in the rubric's plain tolerances; infinite where there is none."""
+    if not cmath.isfinite(due) or not cmath.isfinite(drawn):
+        return math.inf
+    allowed = max(tolerance.length_mm, tolerance.length_relative * abs(due))
+    far = abs(abs(drawn) - abs(due)) / allowed
+    if directed and min(abs(drawn), abs(due)) >= max(tolerance.least_mm, 1e-9):
+        across = math.degrees(math.atan(tolerance.across_mm / abs(due)))
+        turned = abs(math.degrees(math.remainder(cmath.phase(drawn) - cmath.phase(due), math.tau)))
+        far = max(far, turned / max(tolerance.direction_deg, across))
+    return far
+
+
+# Verdicts due -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Forms:
+    """One vector in all its forms, complex mm; `named` as it is handed in."""
+
+    named: complex
+    drawn: complex
+    due: complex
+    made: complex
+    exact: complex
+    told: complex
+    """The exact one at the scales that the student meant to follow."""
+
+
+def verdicts_due(work: Work, source: Source, seen: Seen) -> dict[str, Due]:
+    """What is due to each criterion of the rubric, by its id."""
+    found: dict[str, Due] = {}
+    forms = _forms(work, source)
+    by_vector = {
+        criterion.name: _due(work, source, criterion, forms[criterion.name], seen)
+        for criterion in work.rubric.criterion
+        if criterion.vector and criterion.name in seen.directed and criterion.name in forms
+    }
+    for mistake in work.task.mistakes:
+        _open_first_shown(work, mistake, by_vector)
+    for criterion in work.rubric.criterion:
+        if criterion.scale:
+            found[criterion.id] = _scale_due(work, criterion.name)
+        else:
+            found[criterion.id] = by_vector.get(criterion.name, "absent")
+    return found
+
+
+def _scale_due(work: Work, name: str) -> Due:
+    if not work.declares:
+        return "absent"
+    codes = {one.code for one in work.task.mistakes}
+    if "rpm_not_converted" in codes and name in {"kv", "ka"}:
+        return "wrong" if name == "kv" else "either"
+    is_wrong = any(one.code == "scale_wrong" and one.at == name for one in work.task.mistakes)
+    return "wrong" if is_wrong else "right"
+
+
+def _due(work: Work, source: Source, criterion: CriterionTable, forms: _Forms, seen: Seen) -> Due:
+    tolerance = work.rubric.tolerance_of(criterion)
+    directed = seen.directed[criterion.name] and criterion.direction
+    vector = work.construction.vectors[criterion.name]
+
+    def apart(one: complex, other: complex) -> float:
+        return off(one, other, tolerance, directed=directed)
+
+    if _touches_swap(work, vector):
+        if work.by_letters(source):
+            return "either"
+        nearest = min(apart(forms.named, forms.due), apart(forms.named, forms.exact))
+        return "wrong" if nearest > CLEAR else "right" if nearest < PLAIN else "either"
+    changed = apart(forms.made, forms.due)
+    by_hand = min(apart(forms.drawn, one) for one in (forms.due, forms.exact, forms.told))
+    if changed > CLEAR:
+        return "either" if by_hand < PLAIN else "wrong"
+    if changed > PLAIN or _is_scale_unknown(work, vector):
+        return "either"
+    if by_hand > PLAIN:
+        return "missed"
+    if apart(forms.due, forms.told) <= CLEAR:
+        return "right"
+    least = max(tolerance.least_mm, work.rubric.least_followed_share * abs(forms.told))
+    return "either" if abs(forms.due) < least else "follows"
+
+
+def _touches_swap(work: Work, vector: Vector) -> bool:
+    return any({vector.tail, vector.head} & set(pair) for pair in work.swaps())
+
+
+def _is_scale_unknown(work: Work, vector: Vector) -> bool:
+    """The driven link's vector, drawn at a scale that nobody declared and the rule does not give."""
+    wrong = {one.at for one in work.task.mistakes if one.code == "scale_wrong"}
+    return not work.declares and vector.scale in wrong and is_driven(work.construction, vector.head)
+
+
+def is_driven(construction: Construction, node: str) -> bool:
+    """Whether a node of a plan is laid off from the data alone: the driven link's."""
+    step = construction.step(node)
+    return isinstance(step, Given) and isinstance(step.length, Scaled)
+
+
+def _forms(work: Work, source: Source) -> dict[str, _Forms]:
+    """Every vector in its forms."""
+    task = work.task
+    right = _at_scales_followed(task.right, task.mistakes)
+    following = right
+    for mistake in task.mistakes:
+        if mistake.code == "figure_rotated":
+            following = commit(mistake, following)
+    exact = evaluate(right.construction, right.parameters)
+    told = evaluate(right.construction, task.right.parameters)
+    of_another = any(one.code == "other_variant" for one in task.mistakes)
+    forms = {}
+    for figure in right.construction.poles:
+        own = work.own(figure)
+        named = work.named(own, source)
+        for vector in right.construction.vectors_of(figure):
+            driven = is_driven(right.construction, vector.head)
+            tail, due_of = own[vector.tail], right if driven else following
+            due = _head(due_of, own, vector.head) - tail
+            if driven and of_another:
+                due = _between(exact, vector)
+            forms[vector.name] = _Forms(
+                named=named[vector.head] - named[vector.tail],
+                drawn=own[vector.head] - tail,
+                due=due,
+                made=_head(task.wrong, own, vector.head) - tail,
+                exact=_between(exact, vector),
+                told=_between(told, vector),
+            )
+    return forms
+
+
+def _at_scales_followed(right: Drawing, mistakes: Sequence[Mistake]) -> Drawing:
+    """The right drawing at the scales that the student's follows.
+
+    Of rev/min taken for rad/s the drawing knows nothing: its speeds and its scales are both too large.
+    """
+    for mistake in mistakes:
+        if mistake.code == "scale_wrong" and mistake.at in SCALES:
+            right = commit(mistake, right)
+    return right
+
+
+def _head(drawing: Drawing, own: Mapping[str, complex], head: str) -> complex:
+    """A node as a drawing makes it from the student's own nodes before it."""
+    given = {name: np.asarray(place) for name, place in own.items() if name != head}
+    return complex(evaluate(drawing.construction, drawing.parameters, given=given, wanted=[head])[head])
+
+
+def _between(nodes: Mapping[str, ComplexArray], vector: Vector) -> complex:
+    return complex(nodes[vector.head]) - complex(nodes[vector.tail])
+
+
+def _open_first_shown(work: Work, mistake: Mistake, due: dict[str, Due]) -> None:
+    """Where a mistake does not show at its own node, either verdict for the first node that shows it."""
+    node = _node_of(work.construction, mistake)
+    if node is None:
+        return
+    vectors = work.construction.vectors
+    if any(one == "wrong" and vectors[name].head == node for name, one in due.items()):
+        return
+    for step in work.construction.steps:
+        if step.node == node or node not in ancestors(work.construction, [step.node]):
+            continue
+        shows = [name for name, one in due.items() if one == "follows" and vectors[name].head == step.node]
+        if shows:
+            due.update(dict.fromkeys(shows, "either"))
+            return
+
+
+def _node_of(construction: Construction, mistake: Mistake) -> str | None:
+    """The node at which a mistake is made; None for scales, letters and what is not drawn."""
+    if mistake.code in {"rpm_not_converted", "labels_swapped", "vector_missing"}:
+        return None
+    if mistake.code == "scale_wrong" and mistake.at in SCALES:
+        return None
+    if mistake.code == "other_variant":
+        return next(s.node for s in construction.figures["mechanism"] if not isinstance(s, Pivot))
+    if mistake.at in construction.poles:
+        return next(s.node for s in construction.figures[mistake.at] if isinstance(s, Given))
+    return mistake.at
+
+
+# Mistakes due -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """One mistake that was made, and whether it can be named from what is seen.
+
+    `shows` is how far the drawing without it is off, in tolerances, at most; infinite where it shows
+    otherwise (a declared scale, a vector that is not there).
+    """
+
+    mistake: Mistake
+    shows: float
+
+    @property
+    def visible(self) -> bool:
+        """Whether it is to be named."""
+        return self.shows > CLEAR
+
+
+def mistakes_due(work: Work, source: Source, seen: Seen) -> list[Made]:
+    """The mistakes made, the first in order of construction first."""
+    order = sorted(work.task.mistakes, key=lambda one: _place(work.construction, one))
+    return [Made(one, _shows(work, source, seen, one)) for one in order]
+
+
+def _place(construction: Construction, mistake: Mistake) -> int:
+    """Where in the construction a mistake is made, as a number that grows along it."""
+    nodes = [step.node for step in construction.steps]
+    match mistake.code, mistake.at:
+        case "other_variant", _:
+            return -1
+        case _, "kL":
+            return -1
+        case "vector_missing", name:
+            return nodes.index(construction.vectors[name].head)
+        case "labels_swapped", _:
+            return min(nodes.index(node) for node in mistake.other)
+        case _, ("kv" | "ka") as scale:
+            return nodes.index(construction.poles["velocity_plan" if scale == "kv" else "acceleration_plan"])
+        case _, at if at in construction.poles:
+            return nodes.index(construction.poles[at])
+    return nodes.index(mistake.at)
+
+
+def _shows(work: Work, source: Source, seen: Seen, mistake: Mistake) -> float:
+    if mistake.code == "vector_missing":
+        needed = {one.name for one in work.rubric.criterion if not one.optional}
+        return math.inf if source == "nodes" and mistake.at in needed else 0.0
+    if mistake.code == "rpm_not_converted":
+        return math.inf if work.declares else 0.0
+    if mistake.code == "labels_swapped" and work.by_letters(source):
+        return math.inf
+    rest = [one for one in work.task.mistakes if one is not mistake]
+    return _most_apart(work, seen, as_handed_in(work, source, work.task.mistakes), _try(work, source, rest))
+
+
+def as_handed_in(work: Work, source: Source, mistakes: Sequence[Mistake]) -> dict[str, complex]:
+    """Vectors by a perfect hand with these mistakes in them, as this source tells them."""
+    if work.by_letters(source):
+        mistakes = [one for one in mistakes if one.code != "labels_swapped"]
+    return vectors_of(work.task.right, mistakes)
+
+
+def _try(work: Work, source: Source, mistakes: Sequence[Mistake]) -> dict[str, complex]:
+    """The same; nothing where they cannot all be made."""
+    try:
+        return as_handed_in(work, source, mistakes)
+    except ValueError:
+        return {}
+
+
+def _most_apart(work: Work, seen: Seen, one: Mapping[str, complex], other: Mapping[str, complex]) -> float:
+    """How far two drawings are apart in what is seen, in tolerances."""
+    return max(
+        (
+            off(one[name], other[name], work.rubric.tolerance, directed=directed)
+            for name, directed in seen.directed.items()
+            if name in other
+        ),
+        default=0.0,
+    )
+
+
+def is_named(work: Work, source: Source, seen: Seen, made: Mistake, named: Named) -> bool:
+    """Whether a report names this mistake, or one that gives the same drawing as seen."""
+    if is_same(made, named):
+        return True
+    if {made.code, named.code} & {"vector_missing", "rpm_not_converted"}:
+        return False
+    asked = Asked(work.assignment, work.variant, work.task.right)
+    really = as_handed_in(work, source, work.task.mistakes)
+    for other in meant(asked, named):
+        instead = [other if one is made else one for one in work.task.mistakes]
+        if _is_alike(seen, really, _try(work, source, instead)):
+            return True
+    return False
+
+
+def _is_alike(seen: Seen, one: Mapping[str, complex], other: Mapping[str, complex]) -> bool:
+    apart = (
+        abs(one[name] - other[name]) if directed else abs(abs(one[name]) - abs(other[name]))
+        for name, directed in seen.directed.items()
+        if name in other
+    )
+    return bool(other) and all(gap <= ALIKE_MM for gap in apart)
+
+
+def first_of(made: Iterable[Made]) -> Mistake | None:
+    """The first mistake that is to be named."""
+    return next((one.mistake for one in made if one.visible), None)
