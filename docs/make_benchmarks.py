@@ -14,10 +14,10 @@ import cv2
 from grader.bench.lines import measure_lines
 from grader.bench.lines_figure import lines_svg
 from grader.bench.lines_tables import lines_tables
+from grader.bench.plain_text import as_text
 from grader.bench.reading import STUDENTS, measure_reading
 from grader.bench.reading_foreign import foreign_tables, measure_foreign
 from grader.bench.reading_tables import reading_tables
-from grader.bench.report import as_text
 from grader.bench.solver import measure_solver
 from grader.bench.tables import Table, solver_tables
 

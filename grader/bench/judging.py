@@ -13,7 +13,7 @@ from grader.bench.judging_assignments import ASSIGNMENTS, assignment_named
 from grader.bench.judging_students import HANDS, KINDS, SOURCES, Key, Kind, Source, Work, student, submission
 from grader.bench.judging_tables import judging_tables
 from grader.bench.judging_tally import Result, Times, result_of, told
-from grader.bench.report import as_text
+from grader.bench.plain_text import as_text
 from grader.judging import Task, judge, task_of
 
 __all__ = ["ASSIGNMENTS", "JudgingBench", "Key", "Times", "judged"]

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from grader.bench.judging_tally import Count, Result, Tally, Times, summed
-from grader.bench.tables import Table
+from grader.bench.plain_text import Table
 
 NOTHING = "-"
 

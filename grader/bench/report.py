@@ -1,7 +1,7 @@
 """The benchmark as one JSON document and as tables of text."""
 
 import platform
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from grader.bench.lines import LinesFigures
 from grader.bench.lines_tables import lines_tables
+from grader.bench.plain_text import as_text
 from grader.bench.reading_foreign import ForeignRow, foreign_tables
 from grader.bench.reading_tables import reading_tables
 from grader.bench.reading_tally import ReadingRow
@@ -55,16 +56,3 @@ def all_reading_tables(
     yield from reading_tables(reading)
     yield from foreign_tables(foreign)
     yield from lines_tables(lines)
-
-
-def as_text(tables: Iterable[Table]) -> str:
-    """Tables one after another."""
-    return "\n".join(line for table in tables for line in _table(*table))
-
-
-def _table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    widths = [max(len(cell) for cell in column) for column in zip(heads, *rows, strict=True)]
-    yield from (title, "")
-    for row in (heads, ["-" * width for width in widths], *rows):
-        yield "| " + " | ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) + " |"
-    yield ""

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
 from grader.bench.branches import BranchRow
+from grader.bench.plain_text import Table
 from grader.bench.solver import ErrorRow, SolverFigures
 from grader.bench.speed import PLANS, SpeedRow
 from grader.bench.stability import OURS, Cell, StabilityRow
 
-Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
 NOTHING = "-"
 OUTCOMES = {"wrong": "wrong", "refused": "refused", "silent": "nan", "beyond": "beyond"}
 """What is counted of each cell, and the word for it in the tables."""
