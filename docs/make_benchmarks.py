@@ -14,12 +14,12 @@ import cv2
 from grader.bench.lines import measure_lines
 from grader.bench.lines_figure import lines_svg
 from grader.bench.lines_tables import lines_tables
-from grader.bench.plain_text import as_text
+from grader.bench.plain_text import Table, as_text
 from grader.bench.reading import STUDENTS, measure_reading
 from grader.bench.reading_foreign import foreign_tables, measure_foreign
 from grader.bench.reading_tables import reading_tables
 from grader.bench.solver import measure_solver
-from grader.bench.tables import Table, solver_tables
+from grader.bench.tables import solver_tables
 
 PAGE = Path(__file__).resolve().parent / "benchmarks.md"
 FIGURE = PAGE.with_name("lines.svg")

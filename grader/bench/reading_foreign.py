@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from grader.bench.plain_text import Table
 from grader.bench.reading_scenes import answer_sheets, task_named
 from grader.bench.reading_truth import SURE
-from grader.bench.tables import Table
 from grader.pipeline import Place, Seen, read, see
 from grader.simulation import Scan, Settings, SimulatedSheet, any_settings, simulate
 from grader.simulation.lettering import any_handwriting

@@ -9,12 +9,12 @@ import numpy as np
 
 from grader.bench.lines import LinesFigures
 from grader.bench.lines_tables import lines_tables
-from grader.bench.plain_text import as_text
+from grader.bench.plain_text import Table, as_text
 from grader.bench.reading_foreign import ForeignRow, foreign_tables
 from grader.bench.reading_tables import reading_tables
 from grader.bench.reading_tally import ReadingRow
 from grader.bench.solver import SolverFigures
-from grader.bench.tables import Table, solver_tables
+from grader.bench.tables import solver_tables
 
 SCHEMA_VERSION = 3
 
