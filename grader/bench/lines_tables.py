@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 
 from grader.bench.lines import LinesFigures, LinesRow, Pair
-from grader.bench.tables import NOTHING, Table
+from grader.bench.plain_text import Table
+from grader.bench.tables import NOTHING
 
 _HEADS = (
     "detector", "dpi", "ms", "recall solid / dashed", "fragments", "spurious", "angle, deg", "offset, mm",

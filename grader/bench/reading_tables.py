@@ -3,8 +3,9 @@
 from collections.abc import Callable, Iterator, Sequence
 
 from grader.bench.honesty import NORMAL_SHARES, Spread
+from grader.bench.plain_text import Table
 from grader.bench.reading_tally import STAGES, ReadingRow
-from grader.bench.tables import NOTHING, Table
+from grader.bench.tables import NOTHING
 
 Column = tuple[str, Callable[[ReadingRow], str]]
 
