@@ -47,7 +47,7 @@ class Result:
     first : the first mistake that is to be named, None without one
     named : it was named; `surest` as the surest, `among_rivals` only as a rival of one named
     not_made : what was named and not made
-    unpunished : something visible was done wrongly, and cost nothing
+    unpunished : something visible was done wrongly, cost nothing and goes to nobody
     """
 
     key: Key
@@ -118,14 +118,15 @@ def result_of(work: Work, source: Source, handed_in: Submission, judgement: Judg
         for mistake, is_first in zip(judgement.mistakes, told_first, strict=True)
         if not is_first and not any(names(mistake, one.mistake) for one in made)
     ]
-    charged = any(one.verdict in CHARGED for one in judgement.outcomes)
+    charged = any(one.verdict in CHARGED | {"review"} for one in judgement.outcomes)
+    by_letters = work.by_letters(source) and first is not None and first.code == "labels_swapped"
     return Result(
         work.key, source, marked, work.task.mistakes, judgement.mistakes, first,
         named=any(told_first),
         surest=bool(told_first) and told_first[0],
         among_rivals=first is not None and not any(told_first) and any(names(one, first) for one in rivals),
         not_made=tuple(not_made),
-        unpunished=first is not None and not charged,
+        unpunished=first is not None and not charged and not by_letters,
     )  # fmt: skip
 
 

@@ -19,13 +19,16 @@ By code:
 - `sense_reversed`, `normal_reversed`, `normal_missing`, `normal_from_absolute`, `arithmetic`,
   `parallel_for_perpendicular`, `wrong_link`, `wrong_intersection`, `image_mirrored`: the vectors that
   end in the node of the changed step, as above; what is drawn from it follows.
-- `other_variant`: the driven link's own vectors, held against the exact plan; all else by the
-  student's own nodes, where only data that differ (lengths, guides) make a step wrong.
+- `other_variant`: the driven link's own vectors, held against the exact plan, the first of them to be
+  charged, the others either (the same mistake again); all else by the student's own nodes, where only
+  data that differ (lengths, guides) make a step wrong. Where the driven link's speed differs too, a
+  declared scale looks wrong instead: then either for scale and vector.
 - `other_assembly`: only the sketch is wrong, and no criterion asks for it: either verdict for the
   vectors of the first node that shows it, the rest follows.
 - `figure_rotated`: the driven link's vector of that plan; the rest is drawn rightly in the turned plan.
 - `scale_wrong`: the criterion of the scale where one was declared; the vectors are right by the scale
-  that they follow. Undeclared, the driven link's vector of that plan is taken for either.
+  that they follow. Undeclared it may be the student's choice: either for the driven link's vector of that
+  plan, and nothing that must be named.
 - `rpm_not_converted`: velocities and scales are both too large, so the drawing is right: the declared
   kv is wrong, ka either (the same mistake again). Undeclared, nothing shows.
 - `vector_missing`: nothing to judge; to credit it in full is wrong where it is not optional.
@@ -116,13 +119,17 @@ def verdicts_due(work: Work, source: Source, seen: Seen) -> dict[str, Due]:
     """What is due to each criterion of the rubric, by its id."""
     found: dict[str, Due] = {}
     forms = _forms(work, source)
-    by_vector = {
-        criterion.name: _due(work, source, criterion, forms[criterion.name], seen)
-        for criterion in work.rubric.criterion
-        if criterion.vector and criterion.name in seen.directed and criterion.name in forms
-    }
+    by_vector: dict[str, Due] = {}
+    moved: dict[str, float] = {}
+    for criterion in work.rubric.criterion:
+        name = criterion.name
+        if criterion.vector and name in seen.directed and name in forms:
+            by_vector[name] = _due(work, source, criterion, forms[name], seen)
+            directed = seen.directed[name] and criterion.direction
+            one, tolerance = forms[name], work.rubric.tolerance_of(criterion)
+            moved[name] = off(one.due, one.told, tolerance, directed=directed)
     for mistake in work.task.mistakes:
-        _open_first_shown(work, mistake, by_vector)
+        _open_first_shown(work, mistake, by_vector, moved)
     for criterion in work.rubric.criterion:
         if criterion.scale:
             found[criterion.id] = _scale_due(work, criterion.name)
@@ -137,8 +144,24 @@ def _scale_due(work: Work, name: str) -> Due:
     codes = {one.code for one in work.task.mistakes}
     if "rpm_not_converted" in codes and name in {"kv", "ka"}:
         return "wrong" if name == "kv" else "either"
-    is_wrong = any(one.code == "scale_wrong" and one.at == name for one in work.task.mistakes)
-    return "wrong" if is_wrong else "right"
+    if any(one.code == "scale_wrong" and one.at == name for one in work.task.mistakes):
+        return "wrong"
+    return "either" if name in _scales_of_another(work) else "right"
+
+
+def _scales_of_another(work: Work) -> set[str]:
+    """Scales at which another student's driven link looks as if only the scale was wrong."""
+    right, tolerance = work.task.right, work.rubric.tolerance
+    exact, meant = (evaluate(one.construction, one.parameters) for one in (right, work.task.wrong))
+    if not any(one.code == "other_variant" for one in work.task.mistakes):
+        return set()
+    return {
+        vector.scale
+        for vector in right.construction.vectors.values()
+        if is_driven(right.construction, vector.head)
+        and off(_between(meant, vector), _between(exact, vector), work.rubric.tolerance, directed=False)
+        > PLAIN
+    }
 
 
 def _due(work: Work, source: Source, criterion: CriterionTable, forms: _Forms, seen: Seen) -> Due:
@@ -157,7 +180,7 @@ def _due(work: Work, source: Source, criterion: CriterionTable, forms: _Forms, s
     changed = apart(forms.made, forms.due)
     by_hand = min(apart(forms.drawn, one) for one in (forms.due, forms.exact, forms.told))
     if changed > CLEAR:
-        return "either" if by_hand < PLAIN else "wrong"
+        return "either" if by_hand < PLAIN or _is_charged_before(work, vector) else "wrong"
     if changed > PLAIN or _is_scale_unknown(work, vector):
         return "either"
     if by_hand > PLAIN:
@@ -170,6 +193,16 @@ def _due(work: Work, source: Source, criterion: CriterionTable, forms: _Forms, s
 
 def _touches_swap(work: Work, vector: Vector) -> bool:
     return any({vector.tail, vector.head} & set(pair) for pair in work.swaps())
+
+
+def _is_charged_before(work: Work, vector: Vector) -> bool:
+    """Of another student's data: charged at the first vector of the driven link, or at its scale."""
+    if not any(one.code == "other_variant" for one in work.task.mistakes):
+        return False
+    vectors = work.construction.vectors.values()
+    first = next(one for one in vectors if is_driven(work.construction, one.head))
+    is_later = is_driven(work.construction, vector.head) and vector.head != first.head
+    return is_later or (work.declares and vector.scale in _scales_of_another(work))
 
 
 def _is_scale_unknown(work: Work, vector: Vector) -> bool:
@@ -237,20 +270,21 @@ def _between(nodes: Mapping[str, ComplexArray], vector: Vector) -> complex:
     return complex(nodes[vector.head]) - complex(nodes[vector.tail])
 
 
-def _open_first_shown(work: Work, mistake: Mistake, due: dict[str, Due]) -> None:
-    """Where a mistake does not show at its own node, either verdict for the first node that shows it."""
+def _open_first_shown(work: Work, mistake: Mistake, due: dict[str, Due], moved: Mapping[str, float]) -> None:
+    """Where a mistake does not show at its own node, either verdict up to the first node that shows it.
+
+    Arguments: `moved` is how far what is due lies from the exact vector, in tolerances.
+    """
     node = _node_of(work.construction, mistake)
-    if node is None:
-        return
     vectors = work.construction.vectors
-    if any(one == "wrong" and vectors[name].head == node for name, one in due.items()):
+    if node is None or any(one == "wrong" and vectors[name].head == node for name, one in due.items()):
         return
     for step in work.construction.steps:
         if step.node == node or node not in ancestors(work.construction, [step.node]):
             continue
-        shows = [name for name, one in due.items() if one == "follows" and vectors[name].head == step.node]
-        if shows:
-            due.update(dict.fromkeys(shows, "either"))
+        here = [name for name in due if vectors[name].head == step.node and moved[name] > PLAIN]
+        due.update(dict.fromkeys((name for name in here if due[name] in {"right", "follows"}), "either"))
+        if any(moved[name] > CLEAR for name in here):
             return
 
 
@@ -318,6 +352,8 @@ def _shows(work: Work, source: Source, seen: Seen, mistake: Mistake) -> float:
         return math.inf if source == "nodes" and mistake.at in needed else 0.0
     if mistake.code == "rpm_not_converted":
         return math.inf if work.declares else 0.0
+    if mistake.code == "scale_wrong" and not work.declares:
+        return 0.0
     if mistake.code == "labels_swapped" and work.by_letters(source):
         return math.inf
     rest = [one for one in work.task.mistakes if one is not mistake]
