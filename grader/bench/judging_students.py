@@ -142,7 +142,7 @@ def student(key: Key) -> Work:
             sheets = draw(task, HANDS[key.hand], habits, lot)
         except ValueError:  # a mistake that cannot be made here, or beside the other one
             continue
-        if _at_one_place(task):
+        if _is_hidden(task):
             continue
         optional = {one.name for one in rubric.criterion if one.optional and one.vector}
         skipped = {name for name in optional if lot.random() < 0.7} if lot.random() < 0.3 else set()
@@ -183,10 +183,11 @@ def _codes(key: Key, lot: np.random.Generator) -> tuple[str, ...]:
     return tuple(sorted((first, second), key=lambda code: code != "other_variant"))
 
 
-def _at_one_place(task: Task) -> bool:
-    """Whether two mistakes are made at one line of one step: the second then hides the first."""
+def _is_hidden(task: Task) -> bool:
+    """Whether one of two mistakes hides the other: at one line of one step, or both in a scale."""
     places = [(one.at, one.slot) for one in task.mistakes]
-    return len(set(places)) < len(places)
+    in_scales = {"scale_wrong", "rpm_not_converted"} <= {one.code for one in task.mistakes}
+    return len(set(places)) < len(places) or in_scales
 
 
 # As a perfect reader reads it -----------------------------------------------------------------------

@@ -159,8 +159,7 @@ def _scales_of_another(work: Work) -> set[str]:
         vector.scale
         for vector in right.construction.vectors.values()
         if is_driven(right.construction, vector.head)
-        and off(_between(meant, vector), _between(exact, vector), work.rubric.tolerance, directed=False)
-        > PLAIN
+        and off(_between(meant, vector), _between(exact, vector), tolerance, directed=False) > PLAIN
     }
 
 
