@@ -7,21 +7,23 @@ Who draws what stands in `judging_students`, what is due in `judging_truth`. One
 
 import argparse
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
-from grader.bench.judging_assignments import ASSIGNMENTS, assignment_named
+from grader.bench.judging_assignments import ASSIGNMENTS
 from grader.bench.judging_students import HANDS, KINDS, SOURCES, Key, Kind, Source, Work, student, submission
 from grader.bench.judging_tables import judging_tables
-from grader.bench.judging_tally import Result, Times, result_of, told
+from grader.bench.judging_tally import ClassTime, JudgingFigures, Result, Times, result_of, told
 from grader.bench.plain_text import as_text
 from grader.judging import Task, judge, task_of
 
-__all__ = ["ASSIGNMENTS", "JudgingBench", "Key", "Times", "judged"]
+__all__ = ["ASSIGNMENTS", "JudgingBench", "Key", "judged"]
 
 RIGHT, SINGLE, PAIR = 96, 48, 48
 """Students of each kind for an assignment and a hand: 2,016 right drawings in all."""
 QUICK = 5
 """In a quick run so many of each kind."""
+ROWS, ROWS_QUICK = 1000, 50
+"""Of a class's measurements."""
 
 
 def judged(key: Key, sources: Sequence[Source] = SOURCES, times: Times | None = None) -> list[Result]:
@@ -44,38 +46,47 @@ def _judged_from(work: Work, task: Task, source: Source, noted: Times) -> Result
 
 
 class JudgingBench:
-    """The whole benchmark of judging; `run` tells what was measured, step by step."""
+    """The whole benchmark of judging; `run` tells what was measured, step by step.
+
+    Arguments: `students` of each kind for an assignment and a hand; `whole_class` measures a class of so
+    many rows through the whole program (`grader.bench.judging_class`), where that is wanted.
+    """
 
     def __init__(
-        self, *, quick: bool = False, students: int | None = None, assignments: Sequence[str] = ASSIGNMENTS
+        self,
+        *,
+        quick: bool = False,
+        students: int | None = None,
+        assignments: Sequence[str] = ASSIGNMENTS,
+        whole_class: Callable[[int], ClassTime] | None = None,
     ) -> None:
-        self.results: list[Result] = []
-        self.times = Times()
-        self.refused: list[str] = []
-        counts = (students or QUICK,) * 3 if quick or students else (RIGHT, SINGLE, PAIR)
+        few = students or (QUICK if quick else None)
+        counts = (few,) * len(KINDS) if few else (RIGHT, SINGLE, PAIR)
         self._counts: dict[Kind, int] = dict(zip(KINDS, counts, strict=True))
         self._classes = [(name, hand) for name in assignments for hand in HANDS]
-        self.steps = len(self._classes)
+        self._whole_class = whole_class
+        self._rows = ROWS_QUICK if quick else ROWS
+        self.figures = JudgingFigures()
+        self.steps = len(self._classes) + (whole_class is not None)
 
     def run(self) -> Iterator[str]:
         """Measure, naming what was measured."""
         for name, hand in self._classes:
-            assignment_named(name)
             for kind, count in self._counts.items():
                 for seed in range(1, count + 1):
                     self._measure(Key(name, hand, kind, seed))
             yield f"judging: {name}, {hand} hands"
+        if self._whole_class is not None:
+            self.figures.classes.append(self._whole_class(self._rows))
+            yield "judging: a class's measurements"
 
     def _measure(self, key: Key) -> None:
         try:
-            self.results.extend(judged(key, times=self.times))
+            results = judged(key, times=self.figures.times)
         except ValueError as error:
-            self.refused.append(str(error))
-
-    @property
-    def failures(self) -> list[Result]:
-        """All that went wrong, to be looked into one by one."""
-        return [result for result in self.results if not result.is_clean]
+            self.figures.refused.append(str(error))
+        else:
+            self.figures.results.extend(results)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -94,8 +105,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     bench = JudgingBench(quick=chosen.quick, students=chosen.students, assignments=chosen.assignments)
     for _ in bench.run():
         pass
-    print(as_text(judging_tables(bench.results, bench.times)))  # noqa: T201
-    print(*bench.failures[: chosen.failures], sep="\n")  # noqa: T201
+    print(as_text(judging_tables(bench.figures)))  # noqa: T201
+    print(*bench.figures.failures[: chosen.failures], sep="\n")  # noqa: T201
 
 
 def _in_full(key: Key) -> Iterator[str]:

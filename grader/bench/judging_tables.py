@@ -4,21 +4,24 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from grader.bench.judging_tally import Count, Result, Tally, Times, summed
+from grader.bench.judging_tally import ClassTime, Count, JudgingFigures, Result, Tally, Times, summed
 from grader.bench.plain_text import Table
 
 NOTHING = "-"
 
 
-def judging_tables(results: Sequence[Result], times: Times) -> Iterator[Table]:
+def judging_tables(figures: JudgingFigures) -> Iterator[Table]:
     """Verdicts, mistakes named, codes, times."""
+    results = figures.results
     yield _verdicts(results, ("source", "hand"), "Judging: verdicts")
     yield _verdicts(results, ("source", "assignment"), "Judging: verdicts by mechanism")
     yield _names(results, ("source", "hand", "kind"), "Judging: the first mistake named")
     yield _names(results, ("source", "assignment"), "Judging: the first mistake named, by mechanism")
     yield _codes(results)
     yield _instead(results)
-    yield _times(times)
+    yield _times(figures.times)
+    if figures.classes:
+        yield _classes(figures.classes)
 
 
 def _of(count: Count) -> str:
@@ -92,3 +95,15 @@ def _times(times: Times) -> Table:
         if spent
     ]
     return "Judging: processor time, ms", ["what", "median", "95 % within", "of"], rows
+
+
+def _classes(classes: Sequence[ClassTime]) -> Table:
+    heads = ["assignment", "rows", "graded", "processor s", "wall s", "ms per row"]
+    rows = [
+        [
+            one.assignment, str(one.rows), str(one.graded), f"{one.processor_s:.1f}", f"{one.wall_s:.1f}",
+            f"{1000.0 * one.processor_s / one.rows:.1f}",
+        ]
+        for one in classes
+    ]  # fmt: skip
+    return "Judging: a class's measurements through the whole program, one process", heads, rows

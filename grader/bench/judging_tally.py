@@ -5,6 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+import numpy as np
+
 from grader.bench.judging_students import Key, Source, Work
 from grader.bench.judging_truth import Due, Seen, first_of, is_named, mistakes_due, verdicts_due
 from grader.judging import Submission
@@ -139,6 +141,17 @@ class Times:
     task: list[float] = field(default_factory=list)
 
 
+@dataclass(frozen=True, slots=True)
+class ClassTime:
+    """Seconds for a class's file of measurements, from reading it to pages and results written."""
+
+    assignment: str
+    rows: int
+    graded: int
+    processor_s: float
+    wall_s: float
+
+
 @dataclass(slots=True)
 class Count:
     """So many of so many."""
@@ -233,3 +246,41 @@ def summed(results: Iterable[Result], by: Sequence[str]) -> dict[tuple[str, ...]
         }  # fmt: skip
         tallies.setdefault(tuple(where[name] for name in by), Tally()).add(result)
     return tallies
+
+
+@dataclass(slots=True)
+class JudgingFigures:
+    """All that was measured; `refused` are students of whom no drawing came about."""
+
+    results: list[Result] = field(default_factory=list)
+    times: Times = field(default_factory=Times)
+    classes: list[ClassTime] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+
+    @property
+    def failures(self) -> list[Result]:
+        """All that went wrong, to be looked into one by one."""
+        return [result for result in self.results if not result.is_clean]
+
+    def as_json(self) -> dict[str, Any]:
+        """One JSON object: sums by assignment, hand, kind and source, and every failure in one line."""
+        by = ("assignment", "hand", "kind", "source")
+        rows = [
+            {**dict(zip(by, where, strict=True)), **tally.as_json()}
+            for where, tally in summed(self.results, by).items()
+        ]
+        return {
+            "rows": rows,
+            "milliseconds": {name: _spread(getattr(self.times, name)) for name in ("right", "wrong", "task")},
+            "classes": [asdict(one) for one in self.classes],
+            "failures": [str(result) for result in self.failures],
+            "refused": self.refused,
+        }
+
+
+def _spread(spent: Sequence[float]) -> dict[str, float] | None:
+    """Median and what 95 % keep within."""
+    if not spent:
+        return None
+    middle, most = np.percentile(spent, (50.0, 95.0))
+    return {"median": float(middle), "p95": float(most), "count": len(spent)}

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from grader.bench.judging_tables import judging_tables
+from grader.bench.judging_tally import JudgingFigures
 from grader.bench.lines import LinesFigures
 from grader.bench.lines_tables import lines_tables
 from grader.bench.plain_text import Table, as_text
@@ -16,7 +18,7 @@ from grader.bench.reading_tally import ReadingRow
 from grader.bench.solver import SolverFigures
 from grader.bench.tables import solver_tables
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +29,7 @@ class Report:
     reading: tuple[ReadingRow, ...] = ()
     foreign: tuple[ForeignRow, ...] = ()
     lines: LinesFigures | None = None
+    judging: JudgingFigures | None = None
 
     def as_json(self) -> dict[str, Any]:
         """One JSON object."""
@@ -41,12 +44,14 @@ class Report:
             "reading": [row.as_json() for row in self.reading],
             "foreign": [row.as_json() for row in self.foreign],
             "lines": None if self.lines is None else self.lines.as_json(),
+            "judging": None if self.judging is None else self.judging.as_json(),
         }
 
     def as_text(self) -> str:
         """Tables that read well in a terminal and in Markdown."""
         solver = [] if self.solver is None else solver_tables(self.solver)
-        return as_text([*solver, *all_reading_tables(self.reading, self.foreign, self.lines)])
+        judging = [] if self.judging is None else judging_tables(self.judging)
+        return as_text([*solver, *all_reading_tables(self.reading, self.foreign, self.lines), *judging])
 
 
 def all_reading_tables(
