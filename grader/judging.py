@@ -26,6 +26,9 @@ from grader.records import Problem
 from grader.rubric import RubricFile
 from grader.scoring import score
 from reference.assignment import Assignment, Variant
+from reference.elements import Parameters
+from reference.geometry import ComplexArray
+from reference.hand import Own, Skill, trace
 from reference.mistakes import Drawing
 from reference.replay import Seen
 
@@ -67,10 +70,11 @@ def _case(task: Task, comparison: Comparison) -> Case:
     used = {
         name: np.asarray(followed[name] if scale.assumed else scale.used) for name, scale in scales.items()
     }
+    parameters = {**task.parameters, **used}
     lost = [one for one in comparison.outcomes if one.verdict in {"none", "partial", "follow_through"}]
     return Case(
-        drawing=Drawing(task.construction, {**task.parameters, **used}),
-        seen=_seen(task, comparison),
+        drawing=Drawing(task.construction, parameters),
+        seen=_seen(task, comparison, parameters),
         lost={one.name: one.criterion for one in lost if one.name in vectors},
         assignment=task.assignment,
         variant=task.variant,
@@ -85,36 +89,39 @@ def _case(task: Task, comparison: Comparison) -> Case:
     )
 
 
-ERRORS_PER_TOLERANCE = 2.0
-"""A careful hand's standard deviation is taken for half the tolerance."""
+LEAST_MISS_MM = 0.15
+"""However well a hand draws, and however well its drawing is read."""
 
 
-def _seen(task: Task, comparison: Comparison) -> list[Seen]:
+def _seen(task: Task, comparison: Comparison, parameters: Parameters) -> list[Seen]:
     """The student's own nodes, and the vectors that lead to none of them."""
-    evidence, construction = comparison.evidence, task.construction
-    allowed = {
-        one.name: one.tolerance.length_mm
-        for one in comparison.outcomes
-        if one.tolerance.length_mm is not None
+    evidence, construction, hand = comparison.evidence, task.construction, task.rubric.hand
+    own = {
+        figure: {
+            step.node: Own(evidence.nodes[step.node]) for step in steps if step.node in evidence.nodes
+        }
+        for figure, steps in construction.figures.items()
     }
-    sigma = {
-        name: allowed.get(name, task.rubric.tolerance.length_mm) / ERRORS_PER_TOLERANCE
-        for name in construction.vectors
-    }
-    usual = task.rubric.tolerance.length_mm / ERRORS_PER_TOLERANCE
+    traced = trace(construction, parameters, Skill(hand.angle_deg, hand.place_mm, hand.mark_mm), own)
     seen = []
     for name, place in evidence.nodes.items():
-        if name not in construction.poles.values():
-            ending = [sigma[vector.name] for vector in construction.vectors.values() if vector.head == name]
-            seen.append(Seen(name, None, place, True, min(ending, default=usual)))
+        if name not in construction.poles.values() and name not in task.ground:
+            seen.append(Seen(name, None, place, True, _spread(traced.made[name].moved, LEAST_MISS_MM)))
     for name, vector in construction.vectors.items():
         drawn = evidence.vector(name)
         if drawn is None or drawn.confidence < task.rubric.least_confidence or vector.head in evidence.nodes:
             continue
         value = drawn.as_complex
-        off = math.hypot(sigma[name], drawn.se_mm)
-        seen.append(Seen(vector.head, vector.tail, value or drawn.length_mm, value is not None, off))
+        moved = traced.moved(vector.tail, vector.head)
+        spread = _spread(moved, math.hypot(LEAST_MISS_MM, drawn.se_mm, hand.ruler_mm))
+        seen.append(Seen(vector.head, vector.tail, value or drawn.length_mm, value is not None, spread))
     return seen
+
+
+def _spread(moved: ComplexArray, least_mm: float) -> tuple[float, float, float]:
+    """What independent errors make of an end together: variance along x, covariance, variance along y."""
+    x, y = moved.real, moved.imag
+    return float(x @ x) + least_mm**2, float(x @ y), float(y @ y) + least_mm**2
 
 
 def _with_mistake(outcome: Outcome, mistakes: Sequence[Mistake]) -> Outcome:

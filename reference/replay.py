@@ -10,6 +10,7 @@ What an account costs is -2 log of its probability, up to a constant: the square
 seen, and for each mistake how rare it is.
 """
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -38,7 +39,7 @@ RARITY: Mapping[str, float] = {
     "labels_swapped": 16.0,
     "figure_rotated": 14.0,
     "scale_wrong": 10.0,
-    "arithmetic": 22.0,
+    "arithmetic": 17.0,
 }
 """What a mistake costs: one step in a hundred or so goes wrong, in one of ten or so ways, and a slip in
 a computation may give any length."""
@@ -51,6 +52,8 @@ SUSPECT = 9.0
 WITHIN = 24.0
 """Accounts dearer than the cheapest by more than this are dropped."""
 AT_MOST = 48
+TINY = 1e-6
+"""Millimetres; a shorter vector has no direction."""
 STIFFNESS = 1e-3
 """How little a node is held to where its step puts it, against what was seen of it."""
 LEAST_FACTOR, MOST_FACTOR = 0.02, 30.0
@@ -66,14 +69,15 @@ class Seen:
     node : where it ends
     tail : the node from which it is seen; None for a place about the figure's origin
     value : complex millimetres, or a length where it has no direction
-    sigma_mm : standard deviation of a careful hand and its reading
+    spread : mm^2, how far the hand and the reading may miss the end: variance along x, covariance,
+        variance along y
     """
 
     node: str
     tail: str | None
     value: complex
     has_direction: bool
-    sigma_mm: float
+    spread: tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +106,14 @@ class Account:
     made : the mistakes, in the order of construction
     unexplained : nodes whose steps went wrong in no known way
     misfit : by node seen, root mean square in standard deviations
+    right : the same if its step were made rightly
     """
 
     cost: float
     made: tuple[Mistake, ...]
     unexplained: tuple[str, ...]
     misfit: Mapping[str, float]
+    right: Mapping[str, float]
 
 
 @dataclass(slots=True)
@@ -122,11 +128,12 @@ class _Branches:
     made: list[tuple[Mistake, ...]]
     unexplained: list[tuple[str, ...]]
     misfit: dict[str, FloatArray]
+    right: dict[str, FloatArray]
 
     def take(self, index: IntArray) -> None:
         """Only these branches, in this order; one may be taken several times."""
         arrays: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]
-        for arrays in (self.nodes, self.known, self.turned, self.misfit):  # type: ignore[assignment]
+        for arrays in (self.nodes, self.known, self.turned, self.misfit, self.right):  # type: ignore[assignment]
             arrays.update({name: array[index] for name, array in arrays.items() if np.ndim(array)})
         self.cost, self.is_blind = self.cost[index], self.is_blind[index]
         self.made = [self.made[i] for i in index]
@@ -160,12 +167,16 @@ class _Way:
 
 
 def replay(
-    drawing: Drawing, seen: Iterable[Seen], roots: Sequence[Root], *, blind: bool = False
+    drawing: Drawing, seen: Iterable[Seen], roots: Sequence[Root], *, care: float = 1.0, blind: bool = False
 ) -> list[Account]:
     """The accounts of a drawing, the likeliest first.
 
-    Arguments: `drawing` is the right one at its scales, parameters scalar; `blind`: mistakes are also
-    tried at steps of which nothing was seen, one to an account.
+    Arguments
+    ---------
+    drawing : the right one at its scales, parameters scalar
+    care : how many times the standard deviations supposed this hand's are; costs for different hands
+        may be compared
+    blind : mistakes are also tried at steps of which what was seen tells no place, one to an account
     """
     by_node = _by_node(drawing.construction, seen)
     branches = _open(drawing, roots)
@@ -175,7 +186,7 @@ def replay(
             for step in steps:
                 if step.node not in needed:
                     continue
-                sight = _Sight(tuple(by_node.get(step.node, ())), branches.turned.get(figure))
+                sight = _Sight(tuple(by_node.get(step.node, ())), branches.turned.get(figure), care)
                 ways = _ways(step, drawing.construction, branches, sight, blind=blind)
                 _go_on(step.node, branches, ways, sight)
     return _accounts(branches)
@@ -208,6 +219,7 @@ def _open(drawing: Drawing, roots: Sequence[Root]) -> _Branches:
         made=[root.made for root in roots],
         unexplained=[()] * count,
         misfit={},
+        right={},
     )
 
 
@@ -229,6 +241,7 @@ class _Sight:
 
     seen: tuple[Seen, ...]
     turned: ComplexArray | None
+    care: float
 
     def __bool__(self) -> bool:
         return bool(self.seen)
@@ -239,24 +252,36 @@ class _Sight:
             return np.asarray(one.value)
         return np.asarray(one.value / self.turned)
 
-    def deviations(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> Iterator[ComplexArray]:
-        """Of each thing seen from what a place of the node makes of it, in standard deviations."""
+    def misfit(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> FloatArray:
+        """The squared misfit of a place, in standard deviations; infinite where there is none."""
+        total = np.zeros(np.shape(place))
         for one in self.seen:
             vector = place if one.tail is None else place - nodes[one.tail]
-            if one.has_direction:
-                yield np.asarray((self.value(one) - vector) / one.sigma_mm)
-            else:
-                yield np.asarray((abs(one.value) - np.abs(vector)) / one.sigma_mm)
+            total = total + (self._off(one, vector) if one.has_direction else _off_length(one, vector))
+        return np.where(np.isfinite(total), total / self.care**2, np.inf)
 
-    def misfit(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> FloatArray:
-        """The squared misfit of a place, infinite where there is none."""
-        total = sum(np.abs(deviation) ** 2 for deviation in self.deviations(place, nodes))
-        return np.where(np.isfinite(total), total, np.inf)
+    def _off(self, one: Seen, vector: ComplexArray) -> FloatArray:
+        off = self.value(one) - vector
+        xx, xy, yy = one.spread
+        if self.turned is not None:
+            xx, xy, yy = (xx + yy) / 2.0, 0.0, (xx + yy) / 2.0
+        x, y = off.real, off.imag
+        return np.asarray((yy * x**2 - 2.0 * xy * x * y + xx * y**2) / (xx * yy - xy**2))
+
+    @property
+    def tells_place(self) -> bool:
+        """Whether what was seen leaves the node only one place."""
+        return any(one.has_direction for one in self.seen)
 
     @property
     def freedom(self) -> int:
         """How many numbers were seen."""
         return sum(2 if one.has_direction else 1 for one in self.seen)
+
+    @property
+    def width(self) -> float:
+        """What it costs that this hand's errors are wider spread than supposed, so that each is rarer."""
+        return 2.0 * self.freedom * math.log(self.care)
 
     @property
     def anywhere(self) -> float:
@@ -281,12 +306,23 @@ class _Sight:
         for one in self.seen:
             vector = place if one.tail is None else place - nodes[one.tail]
             length = np.abs(vector)
-            along = np.where(length > 0.0, vector / length, 0.0)
-            off = (abs(one.value) - length) * (length > 0.0)
+            is_long = length > TINY
+            along = np.where(is_long, vector / np.maximum(length, TINY), 0.0)
+            off = np.where(is_long, abs(one.value) - length, 0.0)
             xx, yy = xx + along.real**2, yy + along.imag**2
             xy = xy + along.real * along.imag
             rx, ry = rx + along.real * off, ry + along.imag * off
         return np.asarray(((yy * rx - xy * ry) + 1j * (xx * ry - xy * rx)) / (xx * yy - xy**2))
+
+
+def _off_length(one: Seen, vector: ComplexArray) -> FloatArray:
+    length = np.abs(vector)
+    x, y = vector.real, vector.imag
+    xx, xy, yy = one.spread
+    variance = np.where(
+        length > TINY, (xx * x**2 + 2.0 * xy * x * y + yy * y**2) / np.maximum(length, TINY) ** 2, xx + yy
+    )
+    return np.asarray((abs(one.value) - length) ** 2 / variance)
 
 
 # One step -----------------------------------------------------------------------------------------
@@ -305,20 +341,24 @@ def _ways(
         rarity = 0.0 if mistake is None else RARITY[mistake.code]
         if factors is not None:
             factors = np.broadcast_to(factors, (count,))
-        return _Way(place, branches.cost + rarity + misfit, misfit, mistake, factors)
+        return _Way(place, branches.cost + rarity + misfit + sight.width, misfit, mistake, factors)
 
     right = way(step, None)
-    if sight and not np.any(right.misfit > SUSPECT):
-        return [right]
-    if not sight and not blind:
+    is_suspect = right.misfit > SUSPECT if sight else np.zeros(count, np.bool_)
+    is_blind = blind and not sight.tells_place
+    if not np.any(is_suspect) and not is_blind:
         return [right]
     wrong = [way(changed, mistake) for mistake, changed in _known(construction, step)]
-    if not sight:
-        barred = [replace(one, cost=np.where(branches.is_blind, np.inf, one.cost)) for one in wrong]
-        return [right, *barred]
-    if isinstance(step, Given):
-        wrong.extend(_slips(step, view, sight, way))
-    return [right, *wrong, *_something_else(right, branches, sight)]
+    if is_blind:
+        barred = branches.is_blind & ~is_suspect
+        wrong = [replace(one, cost=np.where(barred, np.inf, one.cost)) for one in wrong]
+    if not np.any(is_suspect):
+        return [right, *wrong]
+    slips = list(_slips(step, view, sight, way)) if isinstance(step, Given) else []
+    if slips and not sight.tells_place:
+        # Of a computed length seen as a length alone, whatever it is may be a slip.
+        return [right, *wrong, *slips]
+    return [right, *wrong, *slips, *_something_else(right, branches, sight)]
 
 
 _WrongSteps = tuple[tuple[Mistake, Step], ...]
@@ -385,7 +425,7 @@ def _go_on(node: str, branches: _Branches, ways: Sequence[_Way], sight: _Sight) 
     """The branches after a step: each way in each branch, the likeliest of them."""
     if len(ways) == 1:
         chosen, index, which = ways[0], np.arange(len(branches.cost)), None
-        place, branches.cost, misfit = chosen.place, chosen.cost, chosen.misfit
+        place, branches.cost, misfit, right = chosen.place, chosen.cost, chosen.misfit, chosen.misfit
     else:
         costs = np.array([way.cost for way in ways])
         flat = np.argsort(costs, axis=None, kind="stable")[:AT_MOST]
@@ -394,19 +434,22 @@ def _go_on(node: str, branches: _Branches, ways: Sequence[_Way], sight: _Sight) 
         which, index = np.unravel_index(flat, costs.shape)
         place = np.array([way.place for way in ways])[which, index]
         misfit = np.array([way.misfit for way in ways])[which, index]
+        right = ways[0].misfit[index]
         branches.take(index)
         branches.cost = costs[which, index]
         for row, (one, branch) in enumerate(zip(which.tolist(), index.tolist(), strict=True)):
             branches.made[row] += ways[one].made(branch)
             if ways[one].is_something_else:
                 branches.unexplained[row] += (node,)
-        if not sight:
-            branches.is_blind |= which > 0
+        if not sight.tells_place:
+            suspect = ways[0].misfit[index] > SUSPECT
+            branches.is_blind |= (which > 0) & ~suspect
         if sight.turned is not None:
             sight = replace(sight, turned=sight.turned[index] if np.ndim(sight.turned) else sight.turned)
     branches.nodes[node] = sight.settled(place, branches.nodes) if sight else place
     if sight:
         branches.misfit[node] = np.sqrt(misfit / sight.freedom)
+        branches.right[node] = np.sqrt(right / sight.freedom)
 
 
 def _accounts(branches: _Branches) -> list[Account]:
@@ -417,6 +460,7 @@ def _accounts(branches: _Branches) -> list[Account]:
             branches.made[i],
             branches.unexplained[i],
             {node: float(misfit[i]) for node, misfit in branches.misfit.items()},
+            {node: float(misfit[i]) for node, misfit in branches.right.items()},
         )
         for i in order
         if np.isfinite(branches.cost[i])

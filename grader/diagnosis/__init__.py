@@ -17,7 +17,6 @@ import numpy as np
 
 from grader.diagnosis.telling import told
 from grader.outcomes import Mistake
-from grader.records import VELOCITY_PLAN
 from reference import mistakes as operators
 from reference.assignment import Assignment, Variant
 from reference.mistakes import Drawing
@@ -28,10 +27,13 @@ LEAST_CONFIDENCE = 0.6
 """An explanation less certain than this is not told."""
 FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
-USUAL_MISFIT = 0.85
-"""Median over the nodes of a hand whose standard deviation is the one supposed."""
-CARELESS, MOST_CARELESS = 1.25, 4.0
-"""From how many times that on a hand is measured by its own errors, and up to how many."""
+LEAST_WRONG = 0.06
+"""A scale off by a smaller share than this is nobody's mistake by name: a hand may draw so."""
+WORSE_HANDS, BETTER_HAND = (1.6, 2.5, 4.0), 0.6
+"""Other hands than the one supposed, as multiples of its standard deviations."""
+OFF, BETTER, ENOUGH = 3.0, 0.5, 6
+"""A worse hand is thought of where a node is off by so many, a better one where the middle one of enough
+nodes is off by less than that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +65,16 @@ def diagnose(case: Case) -> tuple[Mistake, ...]:
         return ()
     seen, roots = case.seen, [Root(), *_other_scales(case)]
     accounts = replay(case.drawing, seen, roots)
-    care = _carelessness(accounts)
-    if care > CARELESS:
-        seen = [replace(one, sigma_mm=one.sigma_mm * care) for one in seen]
-        accounts = replay(case.drawing, seen, roots)
+    care = 1.0
+    for other in _other_hands(accounts):
+        found = replay(case.drawing, seen, roots, care=other)
+        if found and found[0].cost < accounts[0].cost:
+            accounts, care = found, other
     if not _is_clear(accounts, case):
-        accounts = replay(case.drawing, seen, [*roots, *_of_the_whole(case)], blind=True)
+        accounts = replay(case.drawing, seen, [*roots, *_of_the_whole(case)], care=care, blind=True)
         for swap in _swaps(case.drawing, accounts):
-            found = replay(case.drawing, _renamed(seen, swap.other), [Root((swap,), cost=RARITY[swap.code])])
+            root = Root((swap,), cost=RARITY[swap.code])
+            found = replay(case.drawing, _renamed(seen, swap.other), [root], care=care)
             accounts = sorted([*accounts, *found], key=lambda account: account.cost)
     return told(accounts, case, LEAST_CONFIDENCE)
 
@@ -89,15 +93,16 @@ def _is_clear(accounts: Sequence[Account], case: Case) -> bool:
     return is_all_seen
 
 
-def _carelessness(accounts: Sequence[Account]) -> float:
-    """How many times the standard deviation supposed this hand has, by the likeliest account."""
+def _other_hands(accounts: Sequence[Account]) -> tuple[float, ...]:
+    """The hands to suppose instead, as multiples of the standard deviation: worse ones, or a better."""
     if not accounts:
-        return 1.0
+        return ()
     best = accounts[0]
-    misfits = sorted(misfit for node, misfit in best.misfit.items() if node not in best.unexplained)
-    if not misfits:
-        return 1.0
-    return min(misfits[len(misfits) // 2] / USUAL_MISFIT, MOST_CARELESS)
+    if best.unexplained or len(best.made) > 1 or max(best.right.values(), default=0.0) > OFF:
+        return WORSE_HANDS
+    misfits = sorted(best.misfit.values())
+    is_better = len(misfits) >= ENOUGH and misfits[len(misfits) // 2] < BETTER
+    return (BETTER_HAND,) if is_better else ()
 
 
 # Mistakes of the whole drawing --------------------------------------------------------------------
@@ -105,12 +110,16 @@ def _carelessness(accounts: Sequence[Account]) -> float:
 
 def _other_scales(case: Case) -> Iterator[Root]:
     """The drawing at the scales that it follows, where others were declared."""
-    if not case.followed:
-        return
+    factors = {
+        name: float(case.drawing.parameters[name]) / followed for name, followed in case.followed.items()
+    }
     made = tuple(
-        operators.Mistake("scale_wrong", name, factor=float(case.drawing.parameters[name]) / followed)
-        for name, followed in case.followed.items()
+        operators.Mistake("scale_wrong", name, factor=factor)
+        for name, factor in factors.items()
+        if abs(math.log(factor)) > LEAST_WRONG
     )
+    if not made:
+        return
     scales = {name: np.asarray(followed) for name, followed in case.followed.items()}
     yield Root(made, scales, cost=RARITY["scale_wrong"] + FURTHER_SCALE * (len(made) - 1))
 
@@ -119,10 +128,8 @@ def _of_the_whole(case: Case) -> Iterator[Root]:
     """A plan turned as a whole; another variant's data."""
     for plan in case.drawing.construction.poles:
         for quarters in (1, 2, 3):
-            # A velocity plan turned by 180 degrees is one with v_A reversed: told as that.
-            if quarters != 2 or plan != VELOCITY_PLAN:
-                turned = operators.Mistake("figure_rotated", plan, quarters=quarters)
-                yield Root((turned,), turned={plan: 1j**quarters}, cost=RARITY["figure_rotated"])
+            turned = operators.Mistake("figure_rotated", plan, quarters=quarters)
+            yield Root((turned,), turned={plan: 1j**quarters}, cost=RARITY["figure_rotated"])
     yield from _other_variants(case)
 
 

@@ -17,6 +17,10 @@ SURE_TOGETHER = 0.8
 LEAST_RIVAL = 0.1
 """A rival less likely than this is not named."""
 MOST_RIVALS = 3
+SUSPICIOUS, GROSS = 2.0, 4.5
+"""Standard deviations of this hand: what is off by less than the latter at a step is no mistake to be
+named. (Where it is not off at all, the mistake showed elsewhere.)"""
+OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
 RPM_WITHIN = 0.03
 """Relative: a scale off by 30/pi (squared for accelerations) this nearly was made from rev/min."""
 SCALES = frozenset({"kL", "kv", "ka"})
@@ -52,6 +56,8 @@ def told(accounts: Sequence[Account], case: Explained, least: float) -> tuple[Mi
         share = shares.of(_key(mistake))
         rivals = shares.rivals(_key(mistake), {_key(one) for one in best.made})
         together = share + sum(shares.instead(_key(mistake), _key(one)) for one in rivals)
+        if _is_slight(mistake, best):
+            continue
         if share < least and (together < SURE_TOGETHER or not rivals):
             continue
         others = tuple(_record(one, case, (), shares.instead(_key(mistake), _key(one))) for one in rivals)
@@ -62,6 +68,13 @@ def told(accounts: Sequence[Account], case: Explained, least: float) -> tuple[Mi
 
 def _key(mistake: operators.Mistake) -> Key:
     return mistake.code, mistake.at
+
+
+def _is_slight(mistake: operators.Mistake, account: Account) -> bool:
+    """Whether the step that it was made at is not far off: nothing that a hand could not do."""
+    if mistake.code in OF_THE_WHOLE:
+        return False
+    return SUSPICIOUS < account.right.get(mistake.at, 0.0) < GROSS
 
 
 class _Shares:
