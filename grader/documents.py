@@ -146,6 +146,8 @@ class ToleranceDocument(Document):
 
     length_mm: float | None = None
     direction_deg: float | None = None
+    value: float | None = None
+    """Of scales, angular quantities and computed values, in the unit of what is expected."""
 
 
 class CriterionDocument(Document):

@@ -233,7 +233,9 @@ def _criterion(
         measured=_quantity(outcome.measured),
         expected=_quantity(outcome.expected),
         tolerance=ToleranceDocument(
-            length_mm=outcome.tolerance.length_mm, direction_deg=outcome.tolerance.direction_deg
+            length_mm=outcome.tolerance.length_mm,
+            direction_deg=outcome.tolerance.direction_deg,
+            value=outcome.tolerance.value,
         ),
         confidence=outcome.confidence,
         mistake=outcome.mistake,
