@@ -9,6 +9,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from grader.platform_documents import (
+    CanvasMarksDocument,
+    GradescopeDocument,
+    LtiDocument,
+    MoodleMarksDocument,
+    MoodleRubricDocument,
+)
 from reference.assignment_file import AssignmentFile
 from reference.errors import CallError
 from reference.mechanism_file import MechanismFile
@@ -452,6 +459,11 @@ def _models() -> dict[str, tuple[type[BaseModel], Literal["validation", "seriali
         "plan": (PlanDocument, "serialization"),
         "lint": (LintDocument, "serialization"),
         "calibration": (CalibrationDocument, "serialization"),
+        "moodle-rubric": (MoodleRubricDocument, "serialization"),
+        "moodle-marks": (MoodleMarksDocument, "serialization"),
+        "canvas-marks": (CanvasMarksDocument, "serialization"),
+        "gradescope": (GradescopeDocument, "serialization"),
+        "lti": (LtiDocument, "serialization"),
         "mechanism": (MechanismFile, "validation"),
         "assignment": (AssignmentFile, "validation"),
         "rubric": (RubricFile, "validation"),

@@ -1,6 +1,6 @@
 """The command line. Each command's work is imported only when the command runs."""
 
-from grader.cli import commands  # noqa: F401 - registers the commands on the application
+from grader.cli import commands, exporting  # noqa: F401 - they register the commands on the application
 from grader.cli.app import app
 
 

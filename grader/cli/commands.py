@@ -261,41 +261,6 @@ def match(
 
 
 @app.command()
-def export(
-    results: Annotated[Path, typer.Argument(metavar="OUT", help="The folder that `planmark grade` wrote.")],
-    to: Annotated[str, typer.Option("--to", help="csv or moodle.")],
-    file: Annotated[
-        Path | None, typer.Option("--file", help="The file to write; OUT/export-TO.csv if absent.")
-    ] = None,
-    roster: RosterOption = None,
-    worksheet: Annotated[
-        Path | None,
-        typer.Option("--worksheet", help="Moodle's downloaded offline grading worksheet, to fill in."),
-    ] = None,
-    identity: Annotated[
-        str,
-        typer.Option("--identity", help="How Moodle's gradebook knows users: idnumber, email, username, id."),
-    ] = "idnumber",
-    item: Annotated[str, typer.Option("--item", help="The grade item's name.")] = "",
-    position: PositionOption = None,
-    combine: Annotated[
-        str | None, typer.Option("--combine", help="Of several positions: sum or mean.")
-    ] = None,
-    maximum: Annotated[float | None, typer.Option("--maximum", help="The grade item's maximum.")] = None,
-    rescale: Annotated[bool, typer.Option("--rescale", help="Convert points to that maximum.")] = False,
-    lang: LanguageOption = "en",
-) -> None:
-    """Write the results for a learning platform, validated before anything is written."""
-    from grader.cli.exporting import export_results
-
-    open_ends = export_results(
-        results, to, file, roster=roster, worksheet=worksheet, identity=identity, item=item,
-        position=position, combine=combine, maximum=maximum, rescale=rescale, lang=lang,
-    )  # fmt: skip
-    raise typer.Exit(1 if open_ends else 0)
-
-
-@app.command()
 def bench(
     quick: Annotated[bool, typer.Option("--quick", help="A few sheets and cases only.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
@@ -305,12 +270,19 @@ def bench(
     reading: Annotated[
         bool, typer.Option("--reading", help="The reading only: scenes, foreign pages, line detectors.")
     ] = False,
+    judging: Annotated[
+        bool, typer.Option("--judging", help="The judging only: verdicts, mistakes named, time.")
+    ] = False,
     students: Annotated[
-        int | None, typer.Option("--students", min=1, help="Simulated students per scene of the reading.")
+        int | None,
+        typer.Option(
+            "--students", min=1, help="Simulated students per scene of the reading, per kind of class."
+        ),
     ] = None,
 ) -> None:
     """Run time against error, on generated sheets with known truth."""
-    from grader.cli.benchmark import show_benchmark
+    from grader.cli.benchmark import PARTS, show_benchmark
 
-    only = None if solver == reading else "solver" if solver else "reading"
-    show_benchmark(quick=quick, as_json=as_json, only=only, students=students)
+    asked = {"solver": solver, "reading": reading, "judging": judging}
+    parts = [name for name, is_asked in asked.items() if is_asked] or PARTS
+    show_benchmark(quick=quick, as_json=as_json, parts=parts, students=students)

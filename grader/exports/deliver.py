@@ -1,26 +1,32 @@
 """One door for all exports: read the results, choose, validate, write."""
 
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 from pydantic import ValidationError
 
 from grader.documents import ResultsDocument
+from grader.exports import (
+    canvas_gradebook,
+    canvas_rubric,
+    gradescope,
+    lti,
+    moodle_feedback,
+    moodle_gradebook,
+    moodle_guide,
+    moodle_worksheet,
+)
+from grader.exports.archive import write_files
 from grader.exports.comments import comment
-from grader.exports.grades import Grade, Person, grades_of
-from grader.exports.moodle_gradebook import gradebook_text
-from grader.exports.summary import criteria_text
-from grader.exports.worksheet import fill
+from grader.exports.draft import Draft, ready, withheld
+from grader.exports.grades import Grade, grades_of
+from grader.exports.options import TARGETS, Options
+from grader.exports.summary import criteria_text, summary_text
 from grader.files import write_whole
 from reference.errors import CallError, InputFileError
-
-Target = Literal["csv", "moodle"]
-TARGETS: tuple[Target, ...] = ("csv", "moodle")
-
-_NOBODY: Mapping[str, Person] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,79 +71,135 @@ def read_results(out_dir: Path) -> ResultsDocument:
         ) from error
 
 
-def export(  # noqa: PLR0913 - an option each of the command
-    results: ResultsDocument,
-    to: str,
-    path: Path,
-    *,
-    people: Mapping[str, Person] = _NOBODY,
-    worksheet: Path | None = None,
-    identity: str = "idnumber",
-    item: str = "",
-    position: int | None = None,
-    combine: str | None = None,
-    maximum: float | None = None,
-    rescale: bool = False,
-    lang: str = "en",
-) -> Delivery:
-    """Write an export file.
+# What there is to deliver -------------------------------------------------------------------------
 
-    Arguments
-    ---------
-    to : ``csv`` (a row per criterion) or ``moodle``: the gradebook import file, or with `worksheet`
-        the teacher's downloaded offline grading worksheet, filled in
-    people : names and addresses by student_id, from the roster
-    identity : how the gradebook file names users: idnumber (the student_id), email, username, id
-    item : the grade item's name in the gradebook; the assignment's id where empty
-    position, combine : which of a student's positions counts, or ``sum`` or ``mean`` of all
-    maximum, rescale : the grade item's maximum, and leave to convert to it
-    lang : of the feedback comments' few words of their own
 
-    Raises CallError for a call that cannot be carried out, InputFileError for a worksheet that Moodle
-    would not take, OutputError where the file cannot be written. Nothing is written then.
-    """
-    if to == "csv":
-        write_whole(path, criteria_text(results))
-        return Delivery(path, tuple(dict.fromkeys(report.student_id for report in results.reports)))
-    if to != "moodle":
-        raise CallError("unknown_target", f"'{to}' is no export target: known are {', '.join(TARGETS)}")
-    grades = grades_of(results, position=position, combine=combine)
-    comments = {grade.student_id: comment(grade.reports, lang) for grade in grades}
-    if worksheet is not None:
-        return _worksheet(grades, people, comments, worksheet, path, rescale=rescale)
-    text = gradebook_text(
-        grades,
-        people,
-        identity=identity,
-        item=item or results.assignment,
-        maximum=maximum,
-        rescale=rescale,
-        comments=comments,
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """A file that a platform takes: what makes it, its ending, the options that it heeds."""
+
+    draft: Callable[[ResultsDocument, Options], Draft]
+    ending: str
+    used: frozenset[str]
+
+
+_POSITION = frozenset({"position", "combine"})
+_MAXIMUM = frozenset({"maximum", "rescale"})
+
+
+def _of_grades(
+    draft: Callable[[list[Grade], Options], Draft],
+) -> Callable[[ResultsDocument, Options], Draft]:
+    """A draft of results by one of grades."""
+    return lambda results, options: draft(
+        grades_of(results, position=options.position, combine=options.combine), options
     )
-    write_whole(path, text)
-    written = tuple(grade.student_id for grade in grades if grade.score is not None)
-    return Delivery(path, written, _withheld(grades))
 
 
-def _worksheet(
-    grades: list[Grade],
-    people: Mapping[str, Person],
-    comments: Mapping[str, str],
-    worksheet: Path,
-    path: Path,
-    *,
-    rescale: bool,
-) -> Delivery:
-    try:
-        data = worksheet.read_bytes()
-    except OSError as error:
-        raise InputFileError("worksheet", f"{worksheet}: cannot be read ({error.strerror})") from error
-    filled = fill(data, worksheet.name, grades, people, comments, rescale=rescale)
-    write_whole(path, filled.data)
+def _table(text: Callable[[ResultsDocument], str]) -> Callable[[ResultsDocument, Options], Draft]:
+    """A plain table of everything."""
+    return lambda results, _: Draft(
+        text(results), tuple(dict.fromkeys(report.student_id for report in results.reports))
+    )
+
+
+def _moodle_grades(grades: list[Grade], options: Options) -> Draft:
+    if options.form is None:
+        return moodle_gradebook.gradebook(grades, options)
+    for name in ("item", "identity", "maximum"):
+        if getattr(options, name) is not None and getattr(options, name) != "":
+            raise CallError("option_unused", f"--{name} has no meaning beside --worksheet: leave it out")
+    told = ready(grades)
+    comments = {grade.student_id: comment(grade.reports, options.lang) for grade in told}
+    filled = moodle_worksheet.fill(
+        _bytes(options.form), options.form.name, told, options.people, comments, rescale=options.rescale
+    )
     missing = dict(filled.not_found)
     missing.update(dict.fromkeys(filled.locked, "Moodle says that this grade cannot be changed"))
-    return Delivery(path, filled.written, _withheld(grades), missing, filled.notes)
+    return Draft(filled.data, filled.written, withheld(grades), missing, filled.notes)
 
 
-def _withheld(grades: list[Grade]) -> dict[str, str]:
-    return {grade.student_id: grade.withheld for grade in grades if grade.score is None}
+def _moodle_feedback(grades: list[Grade], options: Options) -> Draft:
+    worksheet = None if options.form is None else _bytes(options.form)
+    return moodle_feedback.feedback_files(grades, options, worksheet)
+
+
+def _canvas_grades(grades: list[Grade], options: Options) -> Draft:
+    if options.form is None:
+        return canvas_gradebook.gradebook(grades, options)
+    if options.maximum is not None:
+        raise CallError("option_unused", "--maximum has no meaning beside --gradebook: it states its own")
+    return canvas_gradebook.fill(_bytes(options.form), options.form.name, grades, options)
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputFileError("form_missing", f"{path}: cannot be read ({error.strerror})") from error
+
+
+KINDS: Mapping[tuple[str, str], _Kind] = {
+    ("csv", "marks"): _Kind(_table(criteria_text), ".csv", frozenset()),
+    ("csv", "grades"): _Kind(_table(summary_text), ".csv", frozenset()),
+    ("moodle", "grades"): _Kind(
+        _of_grades(_moodle_grades), ".csv", _POSITION | _MAXIMUM | {"form", "identity", "item"}
+    ),
+    ("moodle", "feedback"): _Kind(_of_grades(_moodle_feedback), ".zip", _POSITION | {"form"}),
+    ("moodle", "rubric"): _Kind(
+        _of_grades(moodle_guide.guide), ".json", _POSITION | {"criteria", "cmid", "context_id", "item"}
+    ),
+    ("moodle", "marks"): _Kind(
+        _of_grades(moodle_guide.fillings), ".json", _POSITION | {"criteria", "assignment_id"}
+    ),
+    ("canvas", "grades"): _Kind(_of_grades(_canvas_grades), ".csv", _POSITION | _MAXIMUM | {"form", "item"}),
+    ("canvas", "rubric"): _Kind(_of_grades(canvas_rubric.rubric), ".csv", _POSITION | {"item"}),
+    ("canvas", "marks"): _Kind(
+        _of_grades(canvas_rubric.assessments), ".json", _POSITION | {"criteria", "course_id", "assignment_id"}
+    ),
+    ("gradescope", "marks"): _Kind(_of_grades(gradescope.results), ".zip", _POSITION | {"visibility"}),
+    ("lti", "grades"): _Kind(_of_grades(lti.scores), ".json", _POSITION | _MAXIMUM),
+}
+"""By platform and what; a platform's first is what it is given where nothing is said."""
+
+
+def what_of(options: Options) -> str:
+    """What is delivered; CallError for a target or a thing that there is not."""
+    if options.to not in TARGETS:
+        raise CallError(
+            "unknown_target", f"'{options.to}' is no export target: known are {', '.join(TARGETS)}"
+        )
+    known = [what for to, what in KINDS if to == options.to]
+    if options.what is not None and options.what not in known:
+        raise CallError(
+            "unknown_target", f"{options.to} is given no '{options.what}': known are {', '.join(known)}"
+        )
+    return options.what or known[0]
+
+
+def usual_name(options: Options) -> str:
+    """The file's name where nobody gives one."""
+    what = what_of(options)
+    is_first = next(key for key in KINDS if key[0] == options.to) == (options.to, what)
+    return f"export-{options.to}{'' if is_first else '-' + what}{KINDS[options.to, what].ending}"
+
+
+def export(results: ResultsDocument, path: Path, options: Options) -> Delivery:
+    """Write an export file, or of several files an archive; into a folder where `path` has no ``.zip``.
+
+    Raises CallError for a call that cannot be carried out, InputFileError for a file of the platform
+    or results that cannot be used, OutputError where nothing can be written. Nothing is written then.
+    """
+    what = what_of(options)
+    kind = KINDS[options.to, what]
+    options.refuse_unused(kind.used, f"{options.to} {what}")
+    if options.maximum is not None and not (math.isfinite(options.maximum) and options.maximum > 0.0):
+        raise CallError("maximum", f"a grade's maximum is a positive number, not {options.maximum:g}")
+    draft = kind.draft(results, options)
+    if isinstance(draft.content, Mapping):
+        if (options.to, what) == ("moodle", "feedback") and path.suffix.lower() != ".zip":
+            raise CallError("archive_name", f"{path}: Moodle takes an archive; let its name end with .zip")
+        write_files(path, draft.content)
+    else:
+        write_whole(path, draft.content)
+    return Delivery(path, draft.written, draft.withheld, draft.not_found, draft.notes)

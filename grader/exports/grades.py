@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.documents import ReportDocument, ResultsDocument
-from reference.errors import CallError
+from grader.roster import STUDENT_ID
+from reference.errors import CallError, InputFileError
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,24 +14,32 @@ class Person:
 
     Attributes
     ----------
-    participant : number of the assignment's worksheet, where somebody knows it
+    platform_id : the platform's own number or name of the student
+    participant : number in the assignment's worksheet
     """
 
     name: str = ""
     email: str = ""
     username: str = ""
+    platform_id: str = ""
     participant: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Grade:
-    """A student's grade, or why there is none yet."""
+    """A student's grade, or why there is none yet.
+
+    Attributes
+    ----------
+    folders : of each report below the results: the student's, with several positions one for each
+    """
 
     student_id: str
     score: float | None
     max_score: float
     reports: tuple[ReportDocument, ...]
     withheld: str = ""
+    folders: tuple[str, ...] = ()
 
 
 COMBINE = ("sum", "mean")
@@ -44,13 +53,15 @@ def grades_of(
     A student with several positions needs a choice: one `position`, or `combine` by ``sum`` or
     ``mean``. A sum or mean waits for all of its parts.
 
-    Raises CallError where the choice is missing or not one.
+    Raises CallError where the choice is missing or not one, InputFileError for results that
+    contradict themselves.
     """
     if combine is not None and combine not in COMBINE:
         known = " or ".join(COMBINE)
         raise CallError("combine", f"'{combine}' is no way to combine positions: choose {known}")
     if position is not None and combine is not None:
         raise CallError("combine", "either one position or a way to combine them, not both")
+    _check(results.reports)
     found = []
     for student_id, reports in _by_student(results.reports).items():
         chosen = tuple(r for r in reports if position is None or r.position == position)
@@ -61,10 +72,31 @@ def grades_of(
                 " choose a position, or combine them by sum or mean",
             )
         if chosen:
-            found.append(_grade(student_id, chosen, combine))
+            folders = tuple(_folder(report, len(reports)) for report in chosen)
+            found.append(_grade(student_id, chosen, combine, folders))
     if not found:
         raise CallError("nothing_to_export", "the results hold no report that could be exported")
     return found
+
+
+def _check(reports: Sequence[ReportDocument]) -> None:
+    """Results that somebody has changed by hand, or a program has mixed up."""
+    faults = []
+    seen = set()
+    for report in reports:
+        who = report.student_id if report.position is None else f"{report.student_id} at {report.position}"
+        if not STUDENT_ID.fullmatch(report.student_id) or not report.student_id.strip("."):
+            faults.append(f"'{report.student_id}' is no student_id")
+        if (report.student_id, report.position) in seen:
+            faults.append(f"{who}: has two reports")
+        seen.add((report.student_id, report.position))
+        if report.score is not None and not 0.0 <= report.score <= report.max_score + 1e-9:
+            faults.append(f"{who}: the score {report.score:g} is not between 0 and {report.max_score:g}")
+        if report.max_score <= 0.0:
+            faults.append(f"{who}: the maximum is {report.max_score:g}")
+    if faults:
+        told = "\n".join(f"  {fault}" for fault in faults)
+        raise InputFileError("results_wrong", f"results.json contradicts itself; grade again\n{told}")
 
 
 def _by_student(reports: Sequence[ReportDocument]) -> Mapping[str, list[ReportDocument]]:
@@ -74,14 +106,22 @@ def _by_student(reports: Sequence[ReportDocument]) -> Mapping[str, list[ReportDo
     return students
 
 
-def _grade(student_id: str, reports: tuple[ReportDocument, ...], combine: str | None) -> Grade:
+def _folder(report: ReportDocument, of_the_student: int) -> str:
+    if of_the_student == 1:
+        return report.student_id
+    return f"{report.student_id}/{'unknown' if report.position is None else report.position}"
+
+
+def _grade(
+    student_id: str, reports: tuple[ReportDocument, ...], combine: str | None, folders: tuple[str, ...]
+) -> Grade:
     maximum = sum(report.max_score for report in reports)
-    waiting = [report for report in reports if report.score is None]
     parts = len(reports) if combine == "mean" else 1
+    waiting = [report for report in reports if report.status != "graded" or report.score is None]
     if waiting:
-        return Grade(student_id, None, maximum / parts, reports, _why(waiting))
+        return Grade(student_id, None, maximum / parts, reports, _why(waiting), folders)
     score = sum(report.score for report in reports if report.score is not None)
-    return Grade(student_id, score / parts, maximum / parts, reports)
+    return Grade(student_id, score / parts, maximum / parts, reports, folders=folders)
 
 
 def _why(waiting: list[ReportDocument]) -> str:
@@ -113,8 +153,6 @@ def rescaled(grade: Grade, maximum: float, *, rescale: bool) -> float | None:
         raise CallError(
             "maximum_differs",
             f"the grade's maximum there is {maximum:g}, the rubric's is {grade.max_score:g}:"
-            " set the same maximum there, or ask for rescaling",
+            " set the same maximum there, or ask for rescaling (--rescale)",
         )
-    if grade.max_score <= 0.0:
-        raise CallError("maximum_differs", f"{grade.student_id}: the rubric's maximum is {grade.max_score:g}")
     return grade.score * maximum / grade.max_score

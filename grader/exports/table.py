@@ -4,6 +4,8 @@ import csv
 import io
 from collections.abc import Iterable, Sequence
 
+from grader.exports.faults import not_as_meant
+
 Cell = str | int | float | None
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
@@ -11,12 +13,14 @@ FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "�
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
-    """A table as CSV text. Texts that a spreadsheet would run as a formula get an apostrophe before."""
+    """A table as CSV text, read back once. Texts that a spreadsheet would run get an apostrophe before."""
+    table = [[guarded(name) for name in header], *([written(cell) for cell in row] for row in rows)]
     buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\r\n")
-    writer.writerow([guarded(name) for name in header])
-    writer.writerows([written(cell) for cell in row] for row in rows)
-    return buffer.getvalue()
+    csv.writer(buffer, lineterminator="\r\n").writerows(table)
+    text = buffer.getvalue()
+    if list(csv.reader(io.StringIO(text, newline=""), strict=True)) != table:
+        raise not_as_meant("the table")
+    return text
 
 
 def written(cell: Cell) -> str:

@@ -5,9 +5,9 @@ import io
 
 import pytest
 
-from grader.exports import Person, export
+from grader.exports import Options, Person, export
 from grader.exports.grades import grades_of
-from grader.exports.worksheet import fill
+from grader.exports.moodle_worksheet import fill
 from reference.errors import CallError, InputFileError
 from tests.unit.exports.classroom import criterion, report, results
 
@@ -55,7 +55,7 @@ def test_only_grade_and_feedback_change_and_the_rest_stays_to_the_byte():
 
 
 def test_a_worksheet_without_changes_comes_back_as_it_was():
-    data = worksheet(line(101), line(102, "Ana Ionescu", "ana@x.ro", grade='"3,00"'))
+    data = worksheet(line(101), line(102, "Ana Ionescu", "ana@x.ro", grade='"3.00"'))
     assert filled_in(data, report("s01", None, status="needs_review")).data == data
 
 
@@ -136,6 +136,10 @@ def test_a_worksheet_downloaded_in_romanian_or_russian_is_understood():
         (worksheet(line(101), line(101, email="b@x.ro")), "same participant"),
         (worksheet(line("x")), "is not 'Participant' and a number"),
         (worksheet(line(101, maximum="ten")), "maximum grade 'ten'"),
+        (worksheet(line(101, maximum="0.00")), "maximum grade '0.00' is no positive"),
+        (worksheet(line(101), line(102, grade='"7,5"')), "row 3: the grade '7,5' has a comma.*would store 7"),
+        (worksheet(line(101), line(102, grade="abc")), "row 3: the grade 'abc' is no number"),
+        (worksheet(line(101), line(102, grade="10.5")), "row 3: the grade '10.5' is above the maximum"),
         (worksheet(line(101), header=HEADER.replace("Status", "Grade")), "2 columns 'Grade'"),
         (
             worksheet(",Participant 1,,-", header="Feedback comments,Identifier,Grade,Last modified (grade)"),
@@ -159,7 +163,9 @@ def test_nothing_is_written_when_the_worksheet_is_refused(tmp_path):
     sheet = tmp_path / "grades.csv"
     sheet.write_bytes(worksheet(line(101) + ",extra"))
     with pytest.raises(InputFileError):
-        export(results(report("s01", 5.0)), "moodle", tmp_path / "out.csv", worksheet=sheet, people=PEOPLE)
+        export(
+            results(report("s01", 5.0)), tmp_path / "out.csv", Options(to="moodle", form=sheet, people=PEOPLE)
+        )
     assert not (tmp_path / "out.csv").exists()
 
 
@@ -171,7 +177,8 @@ def test_the_delivery_lists_who_is_withheld_and_why(tmp_path):
             report("s01", 5.0, criteria=[criterion("v_A", "none", 0.0, 'Off by <b> & "more"')]),
             report("s02", None, status="needs_review"),
         ),
-        "moodle", tmp_path / "out.csv", worksheet=sheet, people=PEOPLE, lang="ro",
+        tmp_path / "out.csv",
+        Options(to="moodle", form=sheet, people=PEOPLE, lang="ro"),
     )  # fmt: skip
     assert told.withheld == {"s02": "needs review"}
     assert not told.is_complete

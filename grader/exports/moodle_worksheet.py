@@ -6,10 +6,11 @@ what is wrong: all of that is refused here.
 """
 
 import re
-import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from grader.exports.faults import listed, not_as_meant
+from grader.exports.finding import Evidence, Found, Rows, find
 from grader.exports.grades import Grade, Person, rescaled
 from grader.exports.raw_csv import RawTable, parse
 from grader.exports.table import number
@@ -38,6 +39,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 _REQUIRED = ("identifier", "grade", "modified")
 _NO = {"no", "nu", "нет"}
 _PARTICIPANT = re.compile(r"\s*\D*?(\d+)\s*")
+_EMPTY = {"", "-"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,20 +61,58 @@ class Filled:
 
 
 @dataclass(slots=True)
-class _Worksheet:
+class Worksheet:
+    """A worksheet that Moodle would take, and its columns by our names."""
+
     table: RawTable
     columns: Mapping[str, int]
     file: str
     notes: list[str] = field(default_factory=list)
 
     def value(self, row: int, name: str) -> str:
+        """A cell's text; empty where the worksheet has no such column."""
         column = self.columns.get(name)
         return "" if column is None else self.table.value(row, column).strip()
+
+    def participant(self, row: int) -> int | None:
+        """The participant's number, by which Moodle knows the row."""
+        found = _PARTICIPANT.fullmatch(self.value(row, "identifier"))
+        return None if found is None else int(found[1])
+
+    def is_locked(self, row: int) -> bool:
+        """Whether Moodle says that the grade cannot be changed."""
+        return self.value(row, "changeable").casefold() in _NO
 
     @property
     def people(self) -> list[int]:
         """The rows of participants; Moodle skips empty lines."""
         return [row for row in range(1, len(self.table.rows)) if self.table.rows[row] != [""]]
+
+    def whose(self, students: Mapping[str, Person]) -> Found:
+        """The rows of students, by participant number, address, number, username, name."""
+        known = [name for name in ("email", "id", "username", "name") if name in self.columns]
+        cells = [
+            (
+                row,
+                {
+                    "participant": str(self.participant(row)),
+                    **{name: self.value(row, name) for name in known},
+                },
+            )
+            for row in self.people
+        ]
+        evidence = {student: _evidence(student, person) for student, person in students.items()}
+        return find(Rows.of(cells), evidence, "the worksheet")
+
+
+def _evidence(student_id: str, person: Person) -> Evidence:
+    return (
+        ("participant", "" if person.participant is None else str(person.participant)),
+        ("email", person.email),
+        ("id", student_id),
+        ("username", person.username),
+        ("name", person.name),
+    )
 
 
 def fill(
@@ -94,54 +134,63 @@ def fill(
     Raises InputFileError with everything that is wrong with the worksheet, CallError where its
     maximum is not the rubric's and `rescale` is not asked for.
     """
-    sheet = _open(data, file)
-    replaced = 0
-    rows, not_found = _matched(sheet, grades, people)
-    written, locked = [], []
+    sheet = open_worksheet(data, file)
+    found = sheet.whose({one.student_id: people.get(one.student_id, Person()) for one in grades})
+    told: dict[int, str] = {}
+    written, locked, replaced = [], [], 0
     for grade in grades:
-        row = rows.get(grade.student_id)
+        row = found.rows.get(grade.student_id)
         if row is None or grade.score is None:
             continue
-        if sheet.value(row, "changeable").casefold() in _NO:
+        if sheet.is_locked(row):
             locked.append(grade.student_id)
             continue
         score = rescaled(grade, _maximum(sheet, row, grade), rescale=rescale)
-        text = number(score or 0.0)
-        replaced += sheet.value(row, "grade") not in {"", "-", text}
-        sheet.table.put(row, sheet.columns["grade"], text)
+        told[row] = number(score or 0.0)
+        replaced += sheet.value(row, "grade") not in {*_EMPTY, told[row]}
+        sheet.table.put(row, sheet.columns["grade"], told[row])
         if "feedback" in sheet.columns and grade.student_id in comments:
             sheet.table.put(row, sheet.columns["feedback"], comments[grade.student_id])
         written.append(grade.student_id)
+    if "feedback" not in sheet.columns:
+        sheet.notes.append("the worksheet has no column for feedback comments: only grades are filled in")
     if replaced:
         sheet.notes.append(
             f"{replaced} grade(s) that Moodle holds already are changed: it skips them unless the box for"
             " updating records is ticked at the upload, or the worksheet was downloaded afresh"
         )
-    return Filled(
-        sheet.table.text().encode("utf-8"), tuple(written), not_found, tuple(locked), tuple(sheet.notes)
-    )
+    filled = sheet.table.text().encode("utf-8")
+    _check(filled, file, told)
+    return Filled(filled, tuple(written), found.missing, tuple(locked), tuple(sheet.notes))
+
+
+def _check(filled: bytes, file: str, told: Mapping[int, str]) -> None:
+    """Read what was filled in as Moodle will, and find the grades in it that were meant."""
+    again = open_worksheet(filled, file)
+    if any(again.value(row, "grade") != text for row, text in told.items()):
+        raise not_as_meant("the worksheet")
 
 
 # The worksheet ------------------------------------------------------------------------------------
 
 
-def _open(data: bytes, file: str) -> _Worksheet:
+def open_worksheet(data: bytes, file: str) -> Worksheet:
+    """A worksheet as downloaded; InputFileError with everything that Moodle would not take."""
     table = parse(data, file)
     if not table.rows:
         raise InputFileError("worksheet", f"{file}: the worksheet is empty; download it from Moodle again")
     header = [table.value(0, column).strip() for column in range(len(table.rows[0]))]
     columns, faults = _columns(header)
     faults += list(_ragged(table))
-    sheet = _Worksheet(table, columns, file)
+    sheet = Worksheet(table, columns, file)
     if not faults:
         faults += list(_row_faults(sheet))
     if faults:
-        told = "\n".join(f"  {fault}" for fault in faults)
         raise InputFileError(
-            "worksheet", f"{file}: Moodle would not take this worksheet; download it again\n{told}"
+            "worksheet",
+            f"{file}: Moodle would not take this worksheet; download it again, with Moodle in English,"
+            f" Romanian or Russian, and do not resave it{listed(faults)}",
         )
-    if "feedback" not in columns:
-        sheet.notes.append("the worksheet has no column for feedback comments: only grades are filled in")
     if "maximum" not in columns:
         sheet.notes.append("the worksheet does not state its maximum grade: taken to be the rubric's")
     return sheet
@@ -170,85 +219,41 @@ def _ragged(table: RawTable) -> Iterator[str]:
             yield f"row {row + 1}: has {len(cells)} cells, the first row has {wide}"
 
 
-def _row_faults(sheet: _Worksheet) -> Iterator[str]:
+def _row_faults(sheet: Worksheet) -> Iterator[str]:
     seen: dict[int, int] = {}
+    comma = sheet.table.value(0, sheet.columns["grade"]).strip() != COLUMNS["grade"][0]
     for row in sheet.people:
-        found = _PARTICIPANT.fullmatch(sheet.value(row, "identifier"))
-        if found is None:
+        participant = sheet.participant(row)
+        if participant is None:
             yield f"row {row + 1}: '{sheet.value(row, 'identifier')}' is not 'Participant' and a number"
             continue
-        if int(found[1]) in seen:
-            yield f"row {row + 1}: the same participant as in row {seen[int(found[1])] + 1}"
-        seen[int(found[1])] = row
-        maximum = sheet.value(row, "maximum")
-        if "maximum" in sheet.columns and _amount(maximum) is None:
-            yield f"row {row + 1}: the maximum grade '{maximum}' is no positive number"
+        if participant in seen:
+            yield f"row {row + 1}: the same participant as in row {seen[participant] + 1}"
+        seen[participant] = row
+        stated, maximum = sheet.value(row, "maximum"), _amount(sheet.value(row, "maximum"))
+        if "maximum" in sheet.columns and not maximum:
+            yield f"row {row + 1}: the maximum grade '{stated}' is no positive number"
+        yield from _grade_faults(sheet.value(row, "grade"), row, maximum, comma=comma)
+
+
+def _grade_faults(text: str, row: int, maximum: float | None, *, comma: bool) -> Iterator[str]:
+    """What Moodle would misread among the grades that stand there already."""
+    value = _amount(text)
+    if text in _EMPTY:
+        return
+    if value is None:
+        yield f"row {row + 1}: the grade '{text}' is no number; Moodle would store 0"
+    elif "," in text and not comma:
+        yield f"row {row + 1}: the grade '{text}' has a comma; Moodle would store {text.partition(',')[0]}"
+    elif maximum and value > maximum:
+        yield f"row {row + 1}: the grade '{text}' is above the maximum; Moodle would skip it"
 
 
 def _amount(text: str) -> float | None:
-    """A positive number as Moodle writes it: 10.00, or 10,00 in many languages."""
+    """A number that is not negative as Moodle writes it: 10.00, or 10,00 in many languages."""
     plain = text.strip().replace("\u00a0", "").replace(",", ".")
-    if not re.fullmatch(r"\d+(\.\d+)?", plain) or float(plain) <= 0.0:
-        return None
-    return float(plain)
+    return float(plain) if re.fullmatch(r"\d+(\.\d+)?", plain) else None
 
 
-def _maximum(sheet: _Worksheet, row: int, grade: Grade) -> float:
-    stated = _amount(sheet.value(row, "maximum"))
-    return grade.max_score if stated is None else stated
-
-
-# Who is who ---------------------------------------------------------------------------------------
-
-
-def _matched(
-    sheet: _Worksheet, grades: Sequence[Grade], people: Mapping[str, Person]
-) -> tuple[dict[str, int], dict[str, str]]:
-    """The row of each student, and why others have none. No row serves two students."""
-    rows: dict[str, int] = {}
-    not_found: dict[str, str] = {}
-    for grade in grades:
-        found = _rows_of(sheet, grade.student_id, people.get(grade.student_id, Person()))
-        if len(found) == 1:
-            rows[grade.student_id] = found[0]
-        else:
-            not_found[grade.student_id] = (
-                "nobody in the worksheet has this number, e-mail address or name"
-                if not found
-                else f"rows {', '.join(str(row + 1) for row in found)} of the worksheet all fit"
-            )
-    for row in {row for row in rows.values() if list(rows.values()).count(row) > 1}:
-        claimed = [student for student, own in rows.items() if own == row]
-        for student in claimed:
-            del rows[student]
-            not_found[student] = f"row {row + 1} of the worksheet fits {' and '.join(claimed)} alike"
-    return rows, not_found
-
-
-def _rows_of(sheet: _Worksheet, student_id: str, person: Person) -> list[int]:
-    """Rows that fit a student by the strongest evidence there is: what fits is not looked for weaker."""
-    evidence = (
-        ("identifier", "" if person.participant is None else str(person.participant)),
-        ("email", person.email),
-        ("id", student_id),
-        ("username", person.username),
-        ("name", person.name),
-    )
-    for column, wanted in evidence:
-        if column not in sheet.columns or not wanted:
-            continue
-        found = [row for row in sheet.people if _fits(column, sheet.value(row, column), wanted)]
-        if found:
-            return found
-    return []
-
-
-def _fits(column: str, cell: str, wanted: str) -> bool:
-    if column == "identifier":
-        number_of = _PARTICIPANT.fullmatch(cell)
-        return number_of is not None and number_of[1] == wanted
-    return _folded(cell) == _folded(wanted)
-
-
-def _folded(text: str) -> str:
-    return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
+def _maximum(sheet: Worksheet, row: int, grade: Grade) -> float:
+    return _amount(sheet.value(row, "maximum")) or grade.max_score
