@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from grader.bench.judging_naming import first_of, is_named, mistakes_due
 from grader.bench.judging_students import Key, Source, Work
-from grader.bench.judging_truth import Due, Seen, first_of, is_named, mistakes_due, verdicts_due
+from grader.bench.judging_truth import Due, Seen, verdicts_due
 from grader.judging import Submission
 from grader.outcomes import Judgement, Mistake
 from reference import mistakes as operators

@@ -7,6 +7,7 @@ import pytest
 
 from grader.bench import branches, solver, speed, stability
 from grader.bench.branches import BranchRow
+from grader.bench.judging_tally import JudgingFigures
 from grader.bench.peers import PEERS, Package
 from grader.bench.reading_tally import Tally, row_of
 from grader.bench.report import Report
@@ -100,8 +101,10 @@ def test_a_peers_version_is_known_where_it_is_installed(peer):
     assert (peer.version is not None) == (importlib.util.find_spec(peer.module) is not None)
 
 
-@pytest.mark.parametrize(("only", "solved", "read"), [(None, 1, 1), ("solver", 1, 0), ("reading", 0, 1)])
-def test_the_command_prints_the_figures_of_the_part_asked_for(only, solved, read, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    "asked", [["solver", "reading", "judging"], ["solver"], ["reading"], ["judging", "reading"]]
+)
+def test_the_command_prints_the_figures_of_the_parts_asked_for(asked, monkeypatch, capsys):
     branch = BranchRow("closed form", 100, 0, 0, 0)
 
     class Bench:
@@ -109,16 +112,20 @@ def test_the_command_prints_the_figures_of_the_part_asked_for(only, solved, read
         figures = solver.SolverFigures(branches=(branch,))
         rows, foreign, lines = (READING,), (), None
 
-        def __init__(self, quick, students=None):
+        def __init__(self, quick, students=None, whole_class=None):
             assert quick
             assert students is None
+            if whole_class is not None:
+                self.figures = JudgingFigures()
 
         def run(self):
             yield "branches"
 
     monkeypatch.setattr("grader.bench.solver.SolverBench", Bench)
     monkeypatch.setattr("grader.bench.reading.ReadingBench", Bench)
-    show_benchmark(quick=True, as_json=True, only=only)
+    monkeypatch.setattr("grader.bench.judging.JudgingBench", Bench)
+    show_benchmark(quick=True, as_json=True, parts=asked)
     told = json.loads(capsys.readouterr().out)
-    assert (told["solver"] is not None) == bool(solved)
-    assert len(told["reading"]) == read
+    assert (told["solver"] is not None) == ("solver" in asked)
+    assert len(told["reading"]) == ("reading" in asked)
+    assert (told["judging"] is not None) == ("judging" in asked)

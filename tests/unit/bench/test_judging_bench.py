@@ -1,0 +1,289 @@
+"""The benchmark of judging: who drew what, what is due to it, and how it is counted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grader.bench import judging
+from grader.bench.judging import JudgingBench, judged, main
+from grader.bench.judging_assignments import ASSIGNMENTS, assignment_named
+from grader.bench.judging_naming import is_named, mistakes_due
+from grader.bench.judging_redrawn import Asked, meant, vectors_of
+from grader.bench.judging_students import SOURCES, Key, Work, student, submission
+from grader.bench.judging_tables import judging_tables
+from grader.bench.judging_tally import ClassTime, JudgingFigures, Marked, Tally, result_of, summed
+from grader.bench.judging_truth import Seen, off, verdicts_due
+from grader.bench.plain_text import as_text
+from grader.judging import judge, task_of
+from grader.lint import lint
+from grader.outcomes import Mistake as Named
+from grader.simulation.hand import draw
+from grader.simulation.hand import task_of as drawing_task
+from grader.simulation.settings import PERFECT, Student
+from reference.mistakes import Mistake, commit
+
+STEEP = Key("pump", "careful", "single", 1)
+ROUNDING_MM = 1e-9
+
+
+def drawn(name, *mistakes, n=None, position=None, declares=True, letters=False, left_out=()):
+    """A perfect hand's work with just these mistakes in it."""
+    assignment, rubric = assignment_named(name)
+    variant = assignment.variant(n, position)
+    habits = Student(sheets=1)
+    task = drawing_task(assignment, variant, habits, np.random.default_rng(1))
+    wrong = task.right
+    for mistake in mistakes:
+        wrong = wrong if mistake.code == "labels_swapped" else commit(mistake, wrong)
+    task = replace(task, wrong=wrong, mistakes=mistakes)
+    sheets = draw(task, PERFECT, habits, np.random.default_rng(2))
+    skipped = frozenset(left_out) | task.missing
+    return Work(STEEP, assignment, rubric, task, sheets, declares, letters, skipped)
+
+
+def due(work, source="nodes"):
+    """What is due to each criterion, and the mistakes."""
+    seen = Seen.of(submission(work, source))
+    return verdicts_due(work, source, seen), mistakes_due(work, source, seen), seen
+
+
+def group(found, verdict):
+    return {name for name, one in found.items() if one == verdict}
+
+
+# Who drew what --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [name for name in ASSIGNMENTS if name not in {"pump", "press"}])
+def test_every_mechanism_of_the_benchmark_can_be_drawn_in_all_its_variants(name):
+    assignment, rubric = assignment_named(name)
+    found = lint(assignment, rubric)
+    assert not [one for one in found.findings if one.severity == "fault"]
+
+
+def test_a_key_gives_the_same_student_in_every_run_and_another_key_another():
+    one, again, other = (student(Key("press", "typical", "single", seed)) for seed in (3, 3, 4))
+    assert one.sheets == again.sheets
+    assert one.sheets != other.sheets
+    assert submission(one, "directions") == submission(again, "directions")
+
+
+def test_the_same_drawing_is_handed_in_from_its_nodes_with_directions_and_by_its_lengths_alone():
+    work = student(Key("engine", "careful", "right", 5))
+    read, turned, ruled = (submission(work, source) for source in SOURCES)
+    assert read.readings
+    assert read.measured is None
+    sketch = work.own("velocity_plan")
+    pole, head = (read.readings[0].figures["velocity_plan"].nodes[name].at for name in ("o", "a"))
+    assert abs(head - pole - (sketch["a"] - sketch["o"])) < 1.0
+    lengths = ruled.measured.figures["velocity_plan"].vectors
+    assert lengths["v_A"].direction_deg is None
+    assert abs(lengths["v_A"].length_mm - abs(sketch["a"] - sketch["o"])) < 1.0
+    assert turned.measured.figures["velocity_plan"].vectors["v_A"].direction_deg is not None
+
+
+# What is due ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize(
+    ("name", "n", "position"), [("pump", 4, None), ("press", None, 1), ("offset", 5, None)]
+)
+def test_all_of_a_right_drawing_is_due_full_marks(name, n, position, source):
+    found, made, _ = due(drawn(name, n=n, position=position), source)
+    assert set(found.values()) <= {"right", "absent"}
+    assert not made
+
+
+def test_where_a_line_is_drawn_wrongly_its_nodes_vectors_are_wrong_and_the_rest_follows():
+    found, made, _ = due(drawn("press", Mistake("parallel_for_perpendicular", "b", 0), position=1))
+    assert group(found, "wrong") == {"v_B", "v_BA"}
+    assert group(found, "follows") >= {"v_C", "v_D", "a_BA_n", "a_B_n", "a_B", "a_D"}
+    assert found["v_A"] == found["a_A"] == "right"
+    assert [one.visible for one in made] == [True]
+
+
+def test_a_normal_component_the_wrong_way_round_does_not_show_in_lengths_where_it_was_made():
+    mistake = Mistake("normal_reversed", "n_B")
+    seen_whole, _, _ = due(drawn("press", mistake, position=1))
+    by_length, made, _ = due(drawn("press", mistake, position=1), "lengths")
+    assert seen_whole["a_B_n"] == "wrong"
+    assert seen_whole["a_B"] == "follows"
+    assert by_length["a_B_n"] == "right"
+    assert by_length["a_B"] == "either"
+    assert made[0].visible
+
+
+def test_of_a_plan_turned_as_a_whole_its_first_vector_is_wrong_and_lengths_show_nothing():
+    mistake = Mistake("figure_rotated", "velocity_plan", quarters=1)
+    found, _, _ = due(drawn("press", mistake, position=1))
+    assert group(found, "wrong") == {"v_A"}
+    assert found["v_B"] == found["v_DC"] == "follows"
+    assert found["a_A"] == "right"
+    by_length, made, _ = due(drawn("press", mistake, position=1), "lengths")
+    assert not group(by_length, "wrong")
+    assert not made[0].visible
+
+
+def test_a_wrong_scale_is_due_a_charge_itself_and_none_of_its_vectors():
+    mistake = Mistake("scale_wrong", "kv", factor=2.0)
+    found, made, _ = due(drawn("press", mistake, position=1))
+    assert group(found, "wrong") == {"kv"}
+    assert found["v_A"] == found["v_B"] == "follows"
+    assert made[0].visible
+    undeclared, made, _ = due(drawn("press", mistake, position=1, declares=False))
+    assert undeclared["kv"] == "absent"
+    assert undeclared["v_A"] == "either"
+    assert undeclared["v_B"] == "follows"
+    assert not made[0].visible
+
+
+def test_a_wrong_assembly_may_be_charged_where_the_plan_first_shows_it():
+    found, _, _ = due(drawn("press", Mistake("other_assembly", "D"), position=1))
+    assert group(found, "either") >= {"v_D", "v_DC"}
+    assert not group(found, "wrong")
+    assert found["a_DC_n"] == "follows"
+
+
+def test_of_another_students_data_the_driven_link_is_charged_and_the_rest_follows():
+    mistake = next(
+        meant_of("press", Named("other_variant", "mechanism", (), 1.0, {"position": 3}), position=1)
+    )
+    found, made, _ = due(drawn("press", mistake, position=1))
+    assert group(found, "wrong") == {"v_A"}
+    assert found["a_A"] == "either"
+    assert found["v_B"] == found["v_D"] == "follows"
+    assert made[0].visible
+
+
+def test_letters_swapped_are_wrong_in_every_vector_of_both_unless_told_as_letters():
+    swap = Mistake("labels_swapped", "velocity_plan", other=("b", "c"))
+    found, _, _ = due(drawn("pump", swap, n=4))
+    assert group(found, "wrong") >= {"v_B", "v_BA", "v_C", "v_CA", "v_DC"}
+    assert found["v_A"] == found["v_D"] == "right"
+    told, made, _ = due(drawn("pump", swap, n=4, letters=True))
+    assert told["v_B"] == "either"
+    assert made[0].visible
+
+
+def test_a_vector_that_is_not_drawn_shows_on_a_sheet_and_not_among_measurements():
+    work = drawn("press", Mistake("vector_missing", "v_D"), position=1)
+    found, made, _ = due(work)
+    assert found["v_D"] == "absent"
+    assert made[0].visible
+    assert not due(work, "lengths")[1][0].visible
+
+
+def test_what_a_hand_misses_by_itself_is_neither_right_nor_wrong():
+    work = drawn("engine", n=3)
+    first = work.sheets[0]
+    plan = next(one for one in first.figures if one.name == "velocity_plan")
+    moved = replace(plan, nodes={**plan.nodes, "b": plan.nodes["b"] + 2.0})
+    figures = tuple(moved if one is plan else one for one in first.figures)
+    found, _, _ = due(replace(work, sheets=(replace(first, figures=figures),)))
+    assert found["v_B"] == "missed"
+    assert found["v_A"] == "right"
+
+
+def test_vectors_are_compared_by_the_rubrics_plain_tolerance():
+    tolerance = assignment_named("press")[1].tolerance
+    assert off(51.0 + 0j, 50.0 + 0j, tolerance, directed=True) == pytest.approx(1.0)
+    assert off(202.0 + 0j, 200.0 + 0j, tolerance, directed=True) == pytest.approx(0.5)
+    turned = 50.0 * np.exp(1j * np.radians(3.0))
+    assert off(turned, 50.0 + 0j, tolerance, directed=True) == pytest.approx(2.0)
+    assert off(turned, 50.0 + 0j, tolerance, directed=False) == pytest.approx(0.0, abs=ROUNDING_MM)
+    assert off(1.0 + 0j, complex("nan"), tolerance, directed=True) == np.inf
+
+
+# What a report names --------------------------------------------------------------------------------
+
+
+def meant_of(name, named, n=None, position=None):
+    work = drawn(name, n=n, position=position)
+    return meant(Asked(work.assignment, work.variant, work.task.right), named)
+
+
+def test_two_mistakes_that_draw_the_same_count_as_each_other():
+    turned = Mistake("figure_rotated", "velocity_plan", quarters=2)
+    work = drawn("press", turned, position=1)
+    seen = Seen.of(submission(work, "nodes"))
+    right = work.task.right
+    both = [vectors_of(right, [one]) for one in (turned, Mistake("sense_reversed", "a"))]
+    assert all(abs(both[0][name] - both[1][name]) < ROUNDING_MM for name in both[0])
+    assert is_named(work, "nodes", seen, turned, Named("sense_reversed", "a", (), 0.9))
+    assert not is_named(work, "nodes", seen, turned, Named("sense_reversed", "a'", (), 0.9))
+    assert is_named(work, "nodes", seen, turned, Named(turned.code, turned.at, (), 0.9, {"degrees": 180.0}))
+
+
+def test_a_mistake_that_differs_only_in_direction_is_as_good_in_lengths_alone():
+    made = Mistake("image_mirrored", "c")
+    work = drawn("engine", Mistake("sense_reversed", "a"), n=3)
+    seen = Seen.of(submission(work, "lengths"))
+    named = Named("figure_rotated", "velocity_plan", (), 0.9, {"degrees": 90.0})
+    assert is_named(work, "lengths", seen, work.task.mistakes[0], named)
+    assert not is_named(work, "lengths", seen, made, Named("sense_reversed", "b", (), 0.9))
+
+
+# How it is counted ----------------------------------------------------------------------------------
+
+
+def result(made=(), **verdicts):
+    """A submission of the press with the right verdicts but for those given."""
+    work = drawn("press", *made, position=1)
+    handed_in = submission(work, "nodes")
+    judgement = judge(task_of(work.assignment, work.rubric, work.variant), handed_in)
+    outcomes = tuple(
+        replace(one, verdict=verdicts.get(one.criterion, one.verdict)) for one in judgement.outcomes
+    )
+    return result_of(work, "nodes", handed_in, replace(judgement, outcomes=outcomes, mistakes=()))
+
+
+def test_false_charges_and_false_credits_are_counted_apart():
+    right = result(v_B="none", v_C="review")
+    wrong = result([Mistake("parallel_for_perpendicular", "b", 0)], v_B="full", v_BA="none")
+    tally = Tally()
+    tally.add(right)
+    assert tally.false_charges.hits == 1
+    assert tally.reviews.hits == 1
+    assert tally.false_credits.of == 0
+    assert tally.accused.of == 1
+    tally.add(wrong)
+    assert (tally.false_credits.hits, tally.false_credits.of) == (1, 2)
+    assert (tally.named.hits, tally.named.of) == (0, 1)
+    assert "v_B full (due: wrong)" in str(wrong)
+    assert not right.is_clean
+
+
+def test_credit_given_for_what_follows_is_counted_of_all_that_follows():
+    tally = Tally()
+    for verdict in ("follow_through", "full", "none", "review", "not_judged"):
+        tally._add_criterion(Marked("v_C", "follows", verdict))
+    assert (tally.followed.hits, tally.followed.of) == (2, 4)
+    assert (tally.false_charges.hits, tally.false_charges.of) == (1, 4)
+
+
+def test_the_benchmark_measures_as_many_steps_as_it_says_and_tells_all_of_it(monkeypatch):
+    monkeypatch.setattr(judging, "HANDS", ("careful",))
+    timed = ClassTime("pump", 50, 50, 1.0, 1.1)
+    bench = JudgingBench(
+        students=1, assignments=("engine",), whole_class=lambda rows: replace(timed, rows=rows)
+    )
+    told = list(bench.run())
+    assert len(told) == bench.steps
+    figures = bench.figures
+    assert len(figures.results) == 3 * len(SOURCES)
+    assert {where for (where,) in summed(figures.results, ("kind",))} == {"right", "single", "pair"}
+    text = as_text(judging_tables(figures))
+    assert "engine" in text
+    assert "making the task" in text
+    assert figures.as_json()["classes"][0]["rows"] == 1000
+    assert JudgingFigures().as_json()["milliseconds"]["right"] is None
+
+
+def test_one_case_is_told_in_full(capsys):
+    main(["--case", "engine", "careful", "single", "4"])
+    told = capsys.readouterr().out
+    assert "engine careful single 4" in told
+    assert "due" in told
+    assert judged(Key("engine", "careful", "single", 4))
