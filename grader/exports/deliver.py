@@ -22,10 +22,12 @@ from grader.exports import (
 from grader.exports.archive import write_files
 from grader.exports.comments import comment
 from grader.exports.draft import Draft, ready, withheld
+from grader.exports.faults import faults_of, listed
 from grader.exports.grades import Grade, grades_of
 from grader.exports.options import TARGETS, Options
 from grader.exports.summary import criteria_text, summary_text
 from grader.files import write_whole
+from grader.versions import current
 from reference.errors import CallError, InputFileError
 
 
@@ -57,18 +59,19 @@ def read_results(out_dir: Path) -> ResultsDocument:
     """`results.json` of an output folder; InputFileError where it is missing or not one."""
     path = out_dir / "results.json"
     try:
-        return ResultsDocument.model_validate_json(path.read_bytes())
+        return ResultsDocument.model_validate(current(json.loads(path.read_bytes()), str(path)))
     except FileNotFoundError as error:
         raise InputFileError(
             "results_missing", f"{path}: there is no such file; run planmark grade first"
         ) from error
     except OSError as error:
         raise InputFileError("results_missing", f"{path}: cannot be read ({error.strerror})") from error
-    except (ValidationError, json.JSONDecodeError) as error:
-        first = str(error).splitlines()
+    except ValidationError as error:
         raise InputFileError(
-            "results_wrong", f"{path}: is not a planmark results file ({' '.join(first[:3])}); grade again"
+            "results_wrong", f"{path}: is not a planmark results file; grade again{listed(faults_of(error))}"
         ) from error
+    except (ValueError, RecursionError) as error:
+        raise InputFileError("results_wrong", f"{path}: is not JSON ({error}); grade again") from error
 
 
 # What there is to deliver -------------------------------------------------------------------------
