@@ -27,6 +27,10 @@ Version = Literal[1]
 Verdict = Literal["full", "partial", "none", "follow_through", "review", "not_judged"]
 Status = Literal["graded", "needs_review", "unreadable", "missing"]
 ScaleName = Literal["kL", "kv", "ka"]
+Cause = Literal["assignment", "rubric", "submission", "roster", "program", "new", "gone"]
+"""Why a mark moved."""
+Sign = Literal["hand_errors", "same_place", "same_numbers", "same_picture", "other_number"]
+"""Why sheets look alike."""
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
@@ -264,23 +268,65 @@ class StandingDocument(Document):
     score_range: tuple[float, float] | None
 
 
+class CriterionMovedDocument(Document):
+    """A criterion that is marked otherwise than before; null before or after where it was not asked for.
+
+    Points are out of `max_points`, null under review and where not judged.
+    """
+
+    id: str
+    title: str
+    before: Verdict | None
+    after: Verdict | None
+    points_before: float | None = None
+    points_after: float | None = None
+
+
 class MovedDocument(Document):
-    """A submission that stands elsewhere than after the run before; null before (new) or after (gone)."""
+    """A submission that stands elsewhere than after the run before; null before (new) or after (gone).
+
+    `why`: what changed in between; empty where nothing says.
+    """
 
     student_id: str
     position: int | None = None
     before: StandingDocument | None
     after: StandingDocument | None
+    why: list[Cause] = []
+    criteria: list[CriterionMovedDocument] = []
+
+
+class AlikeDocument(Document):
+    """Sheets that look alike, more than independent hands come to: a person should look at both.
+
+    Attributes
+    ----------
+    students, positions : whose, in pairs; more than two where several look alike
+    why : `hand_errors` (the same small errors of the hand), `same_place` (figures lie alike on the
+        sheet), `same_numbers` (entered values are the same where independent ones differ),
+        `same_picture` (the ink lies alike), `other_number` (drawn with the other's number)
+    measure : how many such pairs a class of this size would show by chance if everybody worked alone;
+        null for `other_number` by itself, which is no coincidence but may be a slip
+    share, compared : agreement of the errors or numbers compared, 0..1, and how many there were
+    """
+
+    students: list[str]
+    positions: list[int | None]
+    why: list[Sign]
+    measure: float | None
+    share: Share | None = None
+    compared: int = 0
 
 
 class ResultsDocument(Document):
-    """A class's results; `moved` against the run before, empty after the first."""
+    """A class's results; `moved` against the run before, empty after the first; `alike` sheets."""
 
     schema_version: Version = 1
     assignment: str
     reports: list[ReportDocument]
     unmatched: list[UnmatchedDocument] = []
     moved: list[MovedDocument] = []
+    alike: list[AlikeDocument] = []
 
 
 # Plan: the exact plan of a variant ----------------------------------------------------------------
