@@ -62,6 +62,20 @@ def simulate(
     ``acceleration``), drawn on instead of plain paper. Raises ValueError where a mistake asked for
     cannot be made.
     """
+    desk, drawn = drawn_by(assignment, variant, seed, settings, student_id=student_id, printed=printed)
+    return [_scanned(desk, sheet, (number, len(drawn))) for number, sheet in enumerate(drawn, start=1)]
+
+
+def drawn_by(
+    assignment: Assignment,
+    variant: Variant,
+    seed: int,
+    settings: Settings | None = None,
+    *,
+    student_id: str = "s01",
+    printed: Printed | None = None,
+) -> tuple[Desk, tuple[DrawnSheet, ...]]:
+    """The same student's desk and figures before anything is inked, as `simulate` takes them on."""
     chosen = settings or Settings()
     if printed is not None:
         chosen = replace(chosen, student=replace(chosen.student, sheets=1 if "all" in printed else 2))
@@ -71,10 +85,8 @@ def simulate(
         desk = Desk(task, tried, printed, student_id, seed)
         drawn = draw(task, tried.hand, tried.student, np.random.default_rng([seed, 1]))
         if all(desk.fits(sheet) for sheet in drawn):
-            break
-    else:
-        drawn = tuple(one for sheet in drawn for one in _split(sheet))
-    return [_scanned(desk, sheet, (number, len(drawn))) for number, sheet in enumerate(drawn, start=1)]
+            return desk, drawn
+    return desk, tuple(one for sheet in drawn for one in _split(sheet))
 
 
 def _with_crank(assignment: Assignment, variant: Variant, settings: Settings, share: float) -> Settings:
