@@ -24,9 +24,12 @@ QUICK = 5
 """In a quick run so many of each kind."""
 ROWS, ROWS_QUICK = 1000, 50
 """Of a class's measurements."""
+SCANNED = ("pump", "press", "engine", "shaper")
+SCANS: dict[Kind, int] = {"right": 1, "single": 4}
+"""Students of each kind, for a mechanism of these and a hand, whose scans are read."""
 
 
-def judged(key: Key, sources: Sequence[Source] = SOURCES, times: Times | None = None) -> list[Result]:
+def judged(key: Key, times: Times | None = None, sources: Sequence[Source] = SOURCES) -> list[Result]:
     """One student's work judged from each source, against what was due. Raises ValueError for no such one."""
     work = student(key)
     noted = times if times is not None else Times()
@@ -48,8 +51,9 @@ def _judged_from(work: Work, task: Task, source: Source, noted: Times) -> Result
 class JudgingBench:
     """The whole benchmark of judging; `run` tells what was measured, step by step.
 
-    Arguments: `students` of each kind for an assignment and a hand; `whole_class` measures a class of so
-    many rows through the whole program (`grader.bench.judging_class`), where that is wanted.
+    Arguments: `students` of each kind for an assignment and a hand. Where wanted, `whole_class` measures a
+    class of so many rows through the whole program (`grader.bench.judging_class`), and `scan` a student's
+    simulated scans (`grader.bench.judging_scans`): careful and typical hands, fewer of each kind.
     """
 
     def __init__(
@@ -59,6 +63,7 @@ class JudgingBench:
         students: int | None = None,
         assignments: Sequence[str] = ASSIGNMENTS,
         whole_class: Callable[[int], ClassTime] | None = None,
+        scan: Callable[[Key, Times], list[Result]] | None = None,
     ) -> None:
         few = students or (QUICK if quick else None)
         counts = (few,) * len(KINDS) if few else (RIGHT, SINGLE, PAIR)
@@ -66,23 +71,33 @@ class JudgingBench:
         self._classes = [(name, hand) for name in assignments for hand in HANDS]
         self._whole_class = whole_class
         self._rows = ROWS_QUICK if quick else ROWS
+        self._scan = None if quick else scan
+        self._scanned = [one for one in self._classes if one[0] in SCANNED and one[1] != "sloppy"]
         self.figures = JudgingFigures()
-        self.steps = len(self._classes) + (whole_class is not None)
+        self.steps = (
+            len(self._classes) + (whole_class is not None) + (self._scan is not None) * len(self._scanned)
+        )
 
     def run(self) -> Iterator[str]:
         """Measure, naming what was measured."""
         for name, hand in self._classes:
             for kind, count in self._counts.items():
                 for seed in range(1, count + 1):
-                    self._measure(Key(name, hand, kind, seed))
+                    self._measure(Key(name, hand, kind, seed), judged)
             yield f"judging: {name}, {hand} hands"
+        if self._scan is not None:
+            for name, hand in self._scanned:
+                for kind, count in SCANS.items():
+                    for seed in range(1, count + 1):
+                        self._measure(Key(name, hand, kind, seed), self._scan)
+                yield f"judging: {name}, {hand} hands, scans"
         if self._whole_class is not None:
             self.figures.classes.append(self._whole_class(self._rows))
             yield "judging: a class's measurements"
 
-    def _measure(self, key: Key) -> None:
+    def _measure(self, key: Key, how: Callable[[Key, Times], list[Result]]) -> None:
         try:
-            results = judged(key, times=self.figures.times)
+            results = how(key, self.figures.times)
         except ValueError as error:
             self.figures.refused.append(str(error))
         else:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.bench.judging_redrawn import Asked, is_same, meant, vectors_of
-from grader.bench.judging_students import Source, Work
+from grader.bench.judging_students import ON_SHEETS, Source, Work
 from grader.bench.judging_truth import CLEAR, Seen, off
 from grader.outcomes import Mistake as Named
 from reference.construction import Construction
@@ -65,7 +65,7 @@ def _place(construction: Construction, mistake: Mistake) -> int:
 def _shows(work: Work, source: Source, seen: Seen, mistake: Mistake) -> float:
     if mistake.code == "vector_missing":
         needed = {one.name for one in work.rubric.criterion if not one.optional}
-        return math.inf if source == "nodes" and mistake.at in needed else 0.0
+        return math.inf if source in ON_SHEETS and mistake.at in needed else 0.0
     if mistake.code == "rpm_not_converted":
         return math.inf if work.declares else 0.0
     if mistake.code == "scale_wrong" and not work.declares:

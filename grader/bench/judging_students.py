@@ -38,9 +38,11 @@ from reference.construction import Construction
 from reference.mistakes import CODES
 
 Kind = Literal["right", "single", "pair"]
-Source = Literal["nodes", "directions", "lengths"]
+Source = Literal["scans", "nodes", "directions", "lengths"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-SOURCES: tuple[Source, ...] = get_args(Source)
+SOURCES: tuple[Source, ...] = ("nodes", "directions", "lengths")
+"""Without pictures."""
+ON_SHEETS = frozenset({"scans", "nodes"})
 HANDS: Mapping[str, Hand] = {"careful": CAREFUL, "typical": TYPICAL, "sloppy": SLOPPY}
 UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
 
@@ -123,7 +125,7 @@ class Work:
 
     def by_letters(self, source: Source) -> bool:
         """Whether swapped letters are told as such, beside nodes named by their lines."""
-        return source == "nodes" and self.letters
+        return source in ON_SHEETS and self.letters
 
 
 def student(key: Key) -> Work:
@@ -142,7 +144,7 @@ def student(key: Key) -> Work:
             sheets = draw(task, HANDS[key.hand], habits, lot)
         except ValueError:  # a mistake that cannot be made here, or beside the other one
             continue
-        if _is_hidden(task):
+        if is_hidden(task):
             continue
         optional = {one.name for one in rubric.criterion if one.optional and one.vector}
         skipped = {name for name in optional if lot.random() < 0.7} if lot.random() < 0.3 else set()
@@ -160,7 +162,7 @@ def _habits(key: Key, assignment: Assignment, lot: np.random.Generator) -> Stude
     crank = float(lot.choice([30.0, 40.0, 50.0, 60.0])) if own and lot.random() < 0.5 else None
     ratios = [float(lot.choice([0.8, 1.25])) if own else 1.0 for _ in range(2)]
     has_crank = assignment.mechanism_file.crank is not None
-    codes = _codes(key, lot)
+    codes = codes_of(key, lot)
     # A sketch drawn wrongly about a single pivot would not tell how far it is turned.
     tells = len(assignment.mechanism_file.ground) > 1 or not {"other_variant", "other_assembly"} & set(codes)
     turn = float(lot.uniform(-25.0, 25.0)) if tells and lot.random() < 0.3 else 0.0
@@ -171,7 +173,7 @@ def _habits(key: Key, assignment: Assignment, lot: np.random.Generator) -> Stude
     )  # fmt: skip
 
 
-def _codes(key: Key, lot: np.random.Generator) -> tuple[str, ...]:
+def codes_of(key: Key, lot: np.random.Generator) -> tuple[str, ...]:
     """Codes of the mistakes to make; another student's data come before what is done with them."""
     if key.kind == "right":
         return ()
@@ -183,7 +185,7 @@ def _codes(key: Key, lot: np.random.Generator) -> tuple[str, ...]:
     return tuple(sorted((first, second), key=lambda code: code != "other_variant"))
 
 
-def _is_hidden(task: Task) -> bool:
+def is_hidden(task: Task) -> bool:
     """Whether one of two mistakes hides the other: at one line of one step, or both in a scale."""
     places = [(one.at, one.slot) for one in task.mistakes]
     in_scales = {"scale_wrong", "rpm_not_converted"} <= {one.code for one in task.mistakes}

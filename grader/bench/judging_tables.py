@@ -35,12 +35,13 @@ def _percent(count: Count) -> str:
 def _verdicts(results: Sequence[Result], by: Sequence[str], title: str) -> Table:
     heads = [
         *by, "students", "charged wrongly", "credited wrongly", "review", "follow-through credited",
-        "hand's own miss charged", "unpunished",
+        "hand's own miss charged", "unpunished", "nothing to judge by: review",
     ]  # fmt: skip
     rows = [
         [
             *where, str(one.students), _of(one.false_charges), _of(one.false_credits), _percent(one.reviews),
             f"{_percent(one.followed)} of {one.followed.of}", _of(one.missed), _of(one.unpunished),
+            _of(one.blank),
         ]
         for where, one in summed(results, by).items()
     ]  # fmt: skip
@@ -90,6 +91,7 @@ def _times(times: Times) -> Table:
         for name, spent in (
             ("right drawings", times.right),
             ("wrong drawings", times.wrong),
+            ("read from scans", times.scans),
             ("making the task", times.task),
         )
         if spent

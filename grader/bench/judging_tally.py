@@ -140,6 +140,7 @@ class Times:
     right: list[float] = field(default_factory=list)
     wrong: list[float] = field(default_factory=list)
     task: list[float] = field(default_factory=list)
+    scans: list[float] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,6 +182,7 @@ class Tally:
     reviews : of criteria judged
     followed : credit given for what follows from a mistake
     missed : criteria off by the hand alone that were charged
+    blank : criteria with nothing to judge by that go to a person
     named, surest, rivals : of drawings with a mistake to be named
     accused : of right drawings; misnamed : of wrong ones, with a mistake named that was not made
     """
@@ -191,6 +193,7 @@ class Tally:
     reviews: Count = field(default_factory=Count)
     followed: Count = field(default_factory=Count)
     missed: Count = field(default_factory=Count)
+    blank: Count = field(default_factory=Count)
     named: Count = field(default_factory=Count)
     surest: Count = field(default_factory=Count)
     rivals: Count = field(default_factory=Count)
@@ -219,6 +222,8 @@ class Tally:
         self.instead.update((made, named.code) for named in result.not_made)
 
     def _add_criterion(self, one: Marked) -> None:
+        if one.due == "absent":
+            self.blank.add(one.verdict == "review")
         if not one.counts:
             return
         self.reviews.add(one.verdict == "review")
@@ -272,7 +277,9 @@ class JudgingFigures:
         ]
         return {
             "rows": rows,
-            "milliseconds": {name: _spread(getattr(self.times, name)) for name in ("right", "wrong", "task")},
+            "milliseconds": {
+                name: _spread(getattr(self.times, name)) for name in ("right", "wrong", "task", "scans")
+            },
             "classes": [asdict(one) for one in self.classes],
             "failures": [str(result) for result in self.failures],
             "refused": self.refused,

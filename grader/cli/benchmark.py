@@ -19,6 +19,7 @@ def show_benchmark(
     """
     from grader.bench.judging import JudgingBench
     from grader.bench.judging_class import measure_class
+    from grader.bench.judging_scans import judged_scan
     from grader.bench.reading import ReadingBench
     from grader.bench.report import Report
     from grader.bench.solver import SolverBench
@@ -27,7 +28,7 @@ def show_benchmark(
     reading = ReadingBench(quick=quick, students=students) if "reading" in parts else None
     judging = None
     if "judging" in parts:
-        judging = JudgingBench(quick=quick, students=students, whole_class=measure_class)
+        judging = JudgingBench(quick=quick, students=students, whole_class=measure_class, scan=judged_scan)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         for bench in (solver, reading, judging):
             if bench is None:

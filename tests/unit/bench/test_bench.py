@@ -112,10 +112,10 @@ def test_the_command_prints_the_figures_of_the_parts_asked_for(asked, monkeypatc
         figures = solver.SolverFigures(branches=(branch,))
         rows, foreign, lines = (READING,), (), None
 
-        def __init__(self, quick, students=None, whole_class=None):
+        def __init__(self, quick, students=None, whole_class=None, scan=None):
             assert quick
             assert students is None
-            if whole_class is not None:
+            if whole_class is not None and scan is not None:
                 self.figures = JudgingFigures()
 
         def run(self):
