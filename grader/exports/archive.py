@@ -1,5 +1,6 @@
 """Several files as one archive, or in a folder; whole or not at all."""
 
+import contextlib
 import secrets
 import zipfile
 from collections.abc import Mapping
@@ -48,4 +49,5 @@ def _write_archive(path: Path, content: Content) -> None:
             f"{path}: cannot be written ({error.strerror or error}); choose another place or make room",
         ) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            temporary.unlink()

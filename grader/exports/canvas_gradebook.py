@@ -146,7 +146,7 @@ def fill(data: bytes, file: str, grades: Sequence[Grade], options: Options) -> D
     book = _open(data, file, options)
     told = ready(grades)
     found = _whose(book, {one.student_id: options.person(one.student_id) for one in told})
-    meant: dict[int, str] = {}
+    meant: dict[int, float] = {}
     missing, written, replaced = dict(found.missing), [], 0
     for grade in told:
         row = found.rows.get(grade.student_id)
@@ -156,15 +156,16 @@ def fill(data: bytes, file: str, grades: Sequence[Grade], options: Options) -> D
         if before.casefold() in {"ex", "n/a"}:
             missing[grade.student_id] = f"Canvas says '{before}': excused, or not given this assignment"
             continue
-        meant[row] = number(rescaled(grade, book.possible, rescale=options.rescale) or 0.0)
-        replaced += before not in {*_NO_GRADE, meant[row]} and _amount(before) != float(meant[row])
-        book.table.put(row, book.assignment, meant[row])
+        meant[row] = rescaled(grade, book.possible, rescale=options.rescale) or 0.0
+        if _amount(before) is None or number(_amount(before) or 0.0) != number(meant[row]):
+            replaced += before not in _NO_GRADE
+            book.table.put(row, book.assignment, number(meant[row]))
         written.append(grade.student_id)
     if replaced:
         book.notes.append(f"{replaced} grade(s) that Canvas holds already are changed")
     filled = book.table.text().encode("utf-8")
     again = _open(filled, file, options)
-    if any(again.grade(row) != text for row, text in meant.items()):
+    if any(number(_amount(again.grade(row)) or 0.0) != number(score) for row, score in meant.items()):
         raise not_as_meant("the gradebook")
     return Draft(
         filled, tuple(written), withheld=withheld(grades), not_found=missing, notes=tuple(book.notes)

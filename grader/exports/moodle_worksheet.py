@@ -145,10 +145,11 @@ def fill(
         if sheet.is_locked(row):
             locked.append(grade.student_id)
             continue
-        score = rescaled(grade, _maximum(sheet, row, grade), rescale=rescale)
-        told[row] = number(score or 0.0)
-        replaced += sheet.value(row, "grade") not in {*_EMPTY, told[row]}
-        sheet.table.put(row, sheet.columns["grade"], told[row])
+        told[row] = number(rescaled(grade, _maximum(sheet, row, grade), rescale=rescale) or 0.0)
+        before = sheet.value(row, "grade")
+        if before in _EMPTY or number(_amount(before) or 0.0) != told[row]:
+            replaced += before not in _EMPTY
+            sheet.table.put(row, sheet.columns["grade"], told[row])
         if "feedback" in sheet.columns and grade.student_id in comments:
             sheet.table.put(row, sheet.columns["feedback"], comments[grade.student_id])
         written.append(grade.student_id)
@@ -167,7 +168,7 @@ def fill(
 def _check(filled: bytes, file: str, told: Mapping[int, str]) -> None:
     """Read what was filled in as Moodle will, and find the grades in it that were meant."""
     again = open_worksheet(filled, file)
-    if any(again.value(row, "grade") != text for row, text in told.items()):
+    if any(number(_amount(again.value(row, "grade")) or 0.0) != text for row, text in told.items()):
         raise not_as_meant("the worksheet")
 
 

@@ -58,3 +58,22 @@ def a_class():
             problems=[ProblemDocument(code="pdf_encrypted", message="password", file="=s04.pdf")],
         ),
     )  # fmt: skip
+
+
+def marked(student_id, *points, position=None, status="graded", title="Vector {}", **more):
+    """A report of criteria of five points each: points, None for what was not judged."""
+    verdicts = {5.0: "full", 0.0: "none", None: "not_judged"}
+    criteria = [
+        criterion(f"c{place}", verdicts.get(one, "partial"), one, "Told <why> & how.").model_copy(
+            update={"title": title.format(place)}
+        )
+        for place, one in enumerate(points, start=1)
+    ]
+    judged = [one for one in points if one is not None]
+    score = sum(judged) * len(points) / len(judged)
+    if status != "graded":
+        score = None
+    return report(
+        student_id, score, status=status, position=position, max_score=5.0 * len(points), criteria=criteria,
+        score_range=(0.0, 5.0 * len(points)), **more,
+    )  # fmt: skip

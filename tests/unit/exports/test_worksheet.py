@@ -69,6 +69,12 @@ def test_grades_that_moodle_holds_already_are_changed_and_told():
     assert found.notes[0].startswith("1 grade(s) that Moodle holds already")
 
 
+def test_a_grade_that_moodle_holds_already_stays_as_it_is_written():
+    data = worksheet(line(101, grade="5.00"))
+    found = filled_in(data, report("s01", 5.0))
+    assert (found.data, found.written, found.notes) == (data, ("s01",), ())
+
+
 def test_what_waits_for_a_person_stays_blank():
     data = worksheet(line(101), line(102, "Ana Ionescu", "ana@x.ro"))
     found = filled_in(data, report("s01", 5.0), report("s02", None, status="needs_review"))

@@ -1,0 +1,129 @@
+"""One door for all exports: what is refused, how files are called, how long a large class takes."""
+
+import time
+import unicodedata
+
+import pytest
+
+from grader.exports import Options, Person, export, usual_name
+from grader.exports.deliver import KINDS
+from grader.exports.faults import MOST, listed
+from grader.exports.finding import Rows, find
+from grader.files import OutputError
+from reference.errors import CallError
+from tests.unit.exports.classroom import marked, report, results
+
+SECONDS_FOR_2000 = 5.0
+"""Generous: the machine may be busy. Looking every student up in every row took minutes."""
+
+
+@pytest.mark.parametrize("key", KINDS)
+def test_nothing_is_written_where_nobody_has_a_grade(key, tmp_path):
+    to, what = key
+    if to == "csv" or what == "rubric":
+        return
+    path = tmp_path / usual_name(Options(to=to, what=what))
+    with pytest.raises(CallError):
+        export(results(report("s01", None, status="missing")), path, Options(to=to, what=what))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [
+        (Options(to="csv"), "export-csv.csv"),
+        (Options(to="csv", what="grades"), "export-csv-grades.csv"),
+        (Options(to="moodle"), "export-moodle.csv"),
+        (Options(to="moodle", what="feedback"), "export-moodle-feedback.zip"),
+        (Options(to="canvas", what="marks"), "export-canvas-marks.json"),
+        (Options(to="gradescope"), "export-gradescope.zip"),
+        (Options(to="lti"), "export-lti.json"),
+    ],
+)
+def test_files_are_called_by_platform_and_thing(options, name):
+    assert usual_name(options) == name
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (Options(to="lti", item="x"), "--item has no meaning for lti grades"),
+        (Options(to="csv", position=1), "--position has no meaning for csv marks"),
+        (Options(to="canvas", identity="email"), "--identity has no meaning"),
+        (Options(to="canvas", what="marks", rescale=True), "--rescale has no meaning"),
+        (Options(to="gradescope", maximum=5.0), "--maximum has no meaning"),
+        (Options(to="moodle", cmid=5), "--cmid has no meaning"),
+        (Options(to="moodle", what="rubric", assignment_id=5), "--assignment-id has no meaning"),
+    ],
+)
+def test_an_option_without_meaning_is_refused_not_passed_over(options, told, tmp_path):
+    with pytest.raises(CallError, match=told):
+        export(results(marked("s01", 5.0)), tmp_path / "x", options)
+
+
+@pytest.mark.parametrize("option", [{"item": "Pump"}, {"identity": "email"}, {"maximum": 10.0}])
+def test_a_worksheet_says_itself_what_options_would(option, tmp_path):
+    form = tmp_path / "w.csv"
+    form.write_text("Identifier,Grade,Last modified (grade)\nParticipant 1,,-\n")
+    with pytest.raises(CallError, match="no meaning beside --worksheet"):
+        export(results(marked("s01", 5.0)), tmp_path / "x", Options(to="moodle", form=form, **option))
+
+
+def test_a_place_that_cannot_be_written_is_told(tmp_path):
+    (tmp_path / "file").write_text("")
+    for to, name in (("moodle", "x.csv"), ("gradescope", "x.zip"), ("gradescope", "folder")):
+        with pytest.raises(OutputError, match="cannot be written"):
+            export(results(marked("s01", 5.0)), tmp_path / "file" / name, Options(to=to))
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_long_list_of_faults_ends_with_how_many_more():
+    lines = listed([f"s{one}: wrong" for one in range(MOST + 30)]).splitlines()
+    assert len(lines) == MOST + 2
+    assert lines[-1] == "  and 30 more"
+
+
+def test_names_are_found_however_their_accents_are_written():
+    name = "Țuțu Ștefănescu-Ильин"
+    rows = Rows.of([(1, {"name": unicodedata.normalize("NFD", name)}), (2, {"name": "other"})])
+    assert find(rows, {"s01": (("name", name.upper()),)}, "the table").rows == {"s01": 1}
+
+
+# Two thousand students ----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def large():
+    reports = [marked(f"s{one:04}", 5.0, 2.5, None, n=one) for one in range(2000)]
+    people = {
+        one.student_id: Person(name=f"Nume {one.student_id}", email=f"{one.student_id}@x.ro")
+        for one in reports
+    }
+    return results(*reports), people
+
+
+def timed(large, tmp_path, **options):
+    begin = time.process_time()
+    delivery = export(large[0], tmp_path / "out", Options(people=large[1], **options))
+    assert len(delivery.written) == 2000
+    assert time.process_time() - begin < SECONDS_FOR_2000
+
+
+def test_a_worksheet_of_two_thousand_students_is_filled_in_quickly(large, tmp_path):
+    form = tmp_path / "w.csv"
+    lines = [f"Participant {one},Nume s{one:04},,15.00,-" for one in range(2000)]
+    form.write_text("\n".join(["Identifier,Full name,Grade,Maximum grade,Last modified (grade)", *lines]))
+    timed(large, tmp_path, to="moodle", form=form)
+
+
+def test_a_canvas_gradebook_of_two_thousand_students_is_filled_in_quickly(large, tmp_path):
+    form = tmp_path / "g.csv"
+    lines = [f"Nume s{one:04},{one + 1},x{one},y{one},1," for one in range(2000)]
+    head = ["Student,ID,SIS User ID,SIS Login ID,Section,Pump (1)", "    Points Possible,,,,,15"]
+    form.write_text("\n".join([*head, *lines]))
+    timed(large, tmp_path, to="canvas", form=form)
+
+
+@pytest.mark.parametrize("to", ["lti", "csv", "moodle"])
+def test_files_of_two_thousand_students_are_made_quickly(large, tmp_path, to):
+    timed(large, tmp_path, to=to)
