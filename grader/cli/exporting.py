@@ -115,8 +115,9 @@ def _export(
 
 
 def _tell(delivery: "Delivery") -> None:
-    told = delivery.written or delivery.withheld or delivery.not_found
-    typer.echo(f"{len(delivery.written)} students written to {delivery.path}" if told else f"{delivery.path}")
+    is_of_students = delivery.written or delivery.withheld or delivery.not_found
+    who = f"{len(delivery.written)} students " if is_of_students else ""
+    typer.echo(f"{who}written to {delivery.path}")
     for told, students in (("withheld", delivery.withheld), ("no place in the file", delivery.not_found)):
         for student, why in students.items():
             typer.echo(f"  {student}: {told}: {why}")
