@@ -1,7 +1,7 @@
-"""Measure and put the figures into benchmarks.md: `python docs/make_benchmarks.py`, some twenty minutes.
+"""Measure and put the figures into benchmarks.md: `python docs/make_benchmarks.py`, some half an hour.
 
-With `solver`, `reading` or `lines` only that part is measured and replaced; `reading 20` takes 20 students
-per scene.
+With `solver`, `reading`, `lines` or `judging` only that part is measured and replaced; `reading 20` takes 20
+students per scene, `judging 20` so many of each kind, hand and mechanism.
 """
 
 import re
@@ -11,6 +11,10 @@ from pathlib import Path
 
 import cv2
 
+from grader.bench.judging import JudgingBench
+from grader.bench.judging_class import measure_class
+from grader.bench.judging_scans import judged_scan
+from grader.bench.judging_tables import judging_tables
 from grader.bench.lines import measure_lines
 from grader.bench.lines_figure import lines_svg
 from grader.bench.lines_tables import lines_tables
@@ -25,29 +29,37 @@ PAGE = Path(__file__).resolve().parent / "benchmarks.md"
 FIGURE = PAGE.with_name("lines.svg")
 
 
-def _reading(students: int) -> Iterable[Table]:
+def _reading(students: int | None) -> Iterable[Table]:
     cv2.setNumThreads(1)
-    rows = tuple(measure_reading(students=students))
+    rows = tuple(measure_reading(students=students or STUDENTS))
     return [*reading_tables(rows), *foreign_tables(tuple(measure_foreign()))]
 
 
-def _lines(_: int) -> Iterable[Table]:
+def _lines(_: int | None) -> Iterable[Table]:
     cv2.setNumThreads(1)
     lines = measure_lines()
     FIGURE.write_text(lines_svg(lines), encoding="utf-8")
     return lines_tables(lines)
 
 
-PARTS: dict[str, Callable[[int], Iterable[Table]]] = {
+def _judging(students: int | None) -> Iterable[Table]:
+    bench = JudgingBench(students=students, whole_class=measure_class, scan=judged_scan)
+    for _ in bench.run():
+        pass
+    return judging_tables(bench.figures)
+
+
+PARTS: dict[str, Callable[[int | None], Iterable[Table]]] = {
     "solver": lambda _: solver_tables(measure_solver()),
     "reading": _reading,
     "lines": _lines,
+    "judging": _judging,
 }
 
 
 def main(wanted: list[str]) -> None:
     """Measure, and replace what stands between the marks of each part."""
-    students = next((int(told) for told in wanted if told.isdigit()), STUDENTS)
+    students = next((int(told) for told in wanted if told.isdigit()), None)
     parts = [told for told in wanted if not told.isdigit()]
     for part in parts or list(PARTS):
         write(part, as_text(PARTS[part](students)))
@@ -55,7 +67,7 @@ def main(wanted: list[str]) -> None:
 
 def write(part: str, tables: str) -> None:
     """Put a part's tables between its marks."""
-    figures = re.sub(r"(?m)^(Solver|Stability|Reading|Lines): (.*)$", r"### \1: \2", tables)
+    figures = re.sub(r"(?m)^(Solver|Stability|Reading|Lines|Judging): (.*)$", r"### \1: \2", tables)
     first, last = f"<!-- {part}: written by make_benchmarks.py -->\n", f"<!-- {part}: end -->"
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(first)
     _, _, after = rest.partition(last)
