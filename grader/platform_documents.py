@@ -67,7 +67,7 @@ class LtiDocument(Payload):
 
     schema_version: Version = 1
     assignment: str
-    scores: Annotated[list[LtiScore], Field(min_length=1)]
+    scores: list[LtiScore]
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
@@ -213,7 +213,7 @@ class CanvasGrade(Payload):
 class CanvasGrades(Payload):
     """By Canvas's number of the student, or `sis_user_id:` and the institution's."""
 
-    grade_data: Annotated[dict[str, CanvasGrade], Field(min_length=1)]
+    grade_data: dict[str, CanvasGrade]
 
 
 class CanvasBulk(Payload):
@@ -230,7 +230,7 @@ class CanvasMarksDocument(Payload):
     schema_version: Version = 1
     assignment: str
     criteria: list[PlatformCriterion]
-    calls: Annotated[list[CanvasCall], Field(min_length=1)]
+    calls: list[CanvasCall]
     bulk: CanvasBulk
 
     @model_validator(mode="after")
@@ -393,7 +393,7 @@ class MoodleMarksDocument(Payload):
     schema_version: Version = 1
     assignment: str
     criteria: list[PlatformCriterion]
-    calls: Annotated[list[MoodleCall], Field(min_length=1)]
+    calls: list[MoodleCall]
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:

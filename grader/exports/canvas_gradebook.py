@@ -57,7 +57,7 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Draft:
     if faults:
         raise CallError("gradebook", f"Canvas would misread this; nothing was written{listed(faults)}")
     rows = [_row(grade, options) for grade in told]
-    possible = {row.possible for row in rows}
+    possible = {row.possible for row in rows} or {options.maximum or grades[0].max_score}
     if len(possible) > 1:
         raise CallError(
             "maximum_differs",

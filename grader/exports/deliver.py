@@ -205,4 +205,7 @@ def export(results: ResultsDocument, path: Path, options: Options) -> Delivery:
         write_files(path, draft.content)
     else:
         write_whole(path, draft.content)
-    return Delivery(path, draft.written, draft.withheld, draft.not_found, draft.notes)
+    notes = draft.notes
+    if draft.withheld and not draft.written:
+        notes = ("nobody has a grade yet: there is nothing to upload", *notes)
+    return Delivery(path, draft.written, draft.withheld, draft.not_found, notes)

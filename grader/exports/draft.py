@@ -9,7 +9,7 @@ from pydantic import BaseModel, ValidationError
 from grader.exports.archive import Content
 from grader.exports.faults import faults_of, listed, not_as_meant
 from grader.exports.grades import Grade
-from reference.errors import CallError, InputFileError
+from reference.errors import InputFileError
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -40,12 +40,8 @@ def withheld(grades: Sequence[Grade]) -> dict[str, str]:
 
 
 def ready(grades: Sequence[Grade]) -> list[Grade]:
-    """The grades that can be told; CallError where there is none."""
-    found = [grade for grade in grades if grade.score is not None]
-    if not found:
-        told = listed([f"{student}: {why}" for student, why in withheld(grades).items()])
-        raise CallError("nothing_to_export", f"nobody has a grade yet; review the results first{told}")
-    return found
+    """The grades that can be told."""
+    return [grade for grade in grades if grade.score is not None]
 
 
 def document(model: type[Model], told: Mapping[str, object], where: str) -> Model:

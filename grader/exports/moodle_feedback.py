@@ -40,7 +40,7 @@ def feedback_files(grades: Sequence[Grade], options: Options, worksheet: bytes |
         raise InputFileError(
             "feedback_missing", f"not all feedback is there; grade again, nothing was written{listed(faults)}"
         )
-    if not files:
+    if missing and not files:
         raise CallError("nothing_to_export", f"no student has a number in Moodle{listed(_lines(missing))}")
     weight = sum(file.stat().st_size for file in files.values()) / 1e6
     return Draft(
@@ -66,7 +66,7 @@ def _numbers(
     people = {grade.student_id: options.person(grade.student_id) for grade in grades}
     if worksheet is None:
         numbers = {one: who.participant for one, who in people.items() if who.participant is not None}
-        if not numbers:
+        if people and not numbers:
             raise CallError(
                 "worksheet_needed",
                 "Moodle's numbers of participants are needed: give the downloaded grading worksheet"

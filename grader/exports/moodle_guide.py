@@ -106,7 +106,7 @@ def fillings(grades: Sequence[Grade], options: Options) -> Draft:
             "advancedgradingdata": {"guide": {"criteria": filled}},
         }
         calls.append({"student_id": grade.student_id, "arguments": arguments})
-    if not calls:
+    if missing and not calls:
         raise CallError(
             "ids_needed", "nobody's number in Moodle is known: give a table student_id,id (--ids)"
         )

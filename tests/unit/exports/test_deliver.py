@@ -17,15 +17,30 @@ SECONDS_FOR_2000 = 5.0
 """Generous: the machine may be busy. Looking every student up in every row took minutes."""
 
 
+NEEDED = {
+    ("moodle", "feedback"): {"people": {"s09": Person(participant=1)}},
+    ("moodle", "rubric"): {"cmid": 1, "context_id": 2},
+    ("moodle", "marks"): {"criteria": "c1,11", "assignment_id": 17},
+    ("canvas", "marks"): {"criteria": "c1,11"},
+}
+
+
 @pytest.mark.parametrize("key", KINDS)
-def test_nothing_is_written_where_nobody_has_a_grade(key, tmp_path):
-    to, what = key
-    if to == "csv" or what == "rubric":
-        return
-    path = tmp_path / usual_name(Options(to=to, what=what))
-    with pytest.raises(CallError):
-        export(results(report("s01", None, status="missing")), path, Options(to=to, what=what))
-    assert list(tmp_path.iterdir()) == []
+def test_where_nobody_has_a_grade_the_file_has_nobody_and_everybody_is_told(key, tmp_path):
+    options = dict(NEEDED.get(key, {}))
+    if "criteria" in options:
+        table = tmp_path / "criteria.csv"
+        table.write_text(f"criterion,id\n{options['criteria']}\n")
+        options["criteria"] = table
+    options = Options(to=key[0], what=key[1], **options)
+    path = tmp_path / usual_name(options)
+    waiting = marked("s01", 5.0, status="needs_review")
+    delivery = export(results(waiting, report("s02", None, status="missing")), path, options)
+    assert path.is_file()
+    if key[0] != "csv" and key[1] != "rubric":
+        assert delivery.written == ()
+        assert set(delivery.withheld) == {"s01", "s02"}
+        assert delivery.notes[0].startswith("nobody has a grade yet")
 
 
 @pytest.mark.parametrize(
