@@ -35,8 +35,7 @@ def _write_archive(path: Path, content: Content) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         with zipfile.ZipFile(temporary, "x", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
             for name, data in content.items():
-                # A fixed date: the same files make the same archive.
-                archive.writestr(zipfile.ZipInfo(name), _bytes(data), zipfile.ZIP_DEFLATED, 1)
+                archive.writestr(_entry(name), _bytes(data), zipfile.ZIP_DEFLATED, 1)
         with zipfile.ZipFile(temporary) as archive:
             if archive.namelist() != list(content):
                 raise not_as_meant("the archive")
@@ -51,3 +50,10 @@ def _write_archive(path: Path, content: Content) -> None:
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink()
+
+
+def _entry(name: str) -> zipfile.ZipInfo:
+    """A file's entry, of a fixed date: the same files make the same archive. Unpacked, all may read it."""
+    entry = zipfile.ZipInfo(name)
+    entry.external_attr = 0o644 << 16
+    return entry

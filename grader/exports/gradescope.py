@@ -1,6 +1,7 @@
 """Gradescope's `results.json`, one for each student: criteria as test cases.
 
-Gradescope guesses a missing status from the points, so each has one; who has no grade yet has no file.
+Gradescope guesses a missing status from the points, so each test has one. What was not judged has
+neither passed nor failed: it is no test, and is named beside them. Who has no grade yet has no file.
 """
 
 from collections.abc import Sequence
@@ -32,12 +33,13 @@ def results(grades: Sequence[Grade], options: Options) -> Draft:
 
 def _results(grade: Grade, visibility: str, options: Options) -> GradescopeDocument:
     parts = len(grade.reports) if options.combine == "mean" else 1
-    tests = [
-        _test(str(place), mark, parts, visibility) for place, mark in enumerate(marks_of(grade), start=1)
-    ]
+    marks = marks_of(grade, options.lang)
+    judged = [mark for mark in marks if mark.verdict != "not_judged"]
+    tests = [_test(str(place), mark, parts, visibility) for place, mark in enumerate(judged, start=1)]
+    others = [f"{_name(mark)}: {mark.remark}" for mark in marks if mark.verdict == "not_judged"]
     told = {
         "score": float(number(grade.score or 0.0)),
-        "output": plain_comment(grade.reports, options.lang),
+        "output": "\n".join([plain_comment(grade.reports, options.lang), *others]),
         "visibility": visibility,
         "tests": tests,
         "extra_data": {
@@ -50,9 +52,8 @@ def _results(grade: Grade, visibility: str, options: Options) -> GradescopeDocum
 
 
 def _test(place: str, mark: Mark, parts: int, visibility: str) -> dict[str, object]:
-    where = "" if mark.position is None else f" ({mark.position})"
     return {
-        "name": f"{mark.criterion}: {mark.title}{where}",
+        "name": _name(mark),
         "number": place,
         "score": mark.points / parts,
         "max_score": mark.max_points / parts,
@@ -61,3 +62,8 @@ def _test(place: str, mark: Mark, parts: int, visibility: str) -> dict[str, obje
         "visibility": visibility,
         "extra_data": {"criterion": mark.criterion, "position": mark.position, "verdict": mark.verdict},
     }
+
+
+def _name(mark: Mark) -> str:
+    where = "" if mark.position is None else f" ({mark.position})"
+    return f"{mark.criterion}: {mark.title}{where}"

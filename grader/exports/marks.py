@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from grader.documents import CriterionDocument, ReportDocument, Verdict
 from grader.exports.faults import listed
 from grader.exports.grades import Grade
+from grader.i18n import Tongue, tongue
 from grader.platform_documents import CLOSE
 from grader.scene import MARKS
 from reference.errors import InputFileError
@@ -38,12 +39,12 @@ class Mark:
         return math.isclose(self.points, self.max_points, abs_tol=CLOSE)
 
 
-def marks_of(grade: Grade) -> list[Mark]:
-    """The marks behind a grade, report by report.
+def marks_of(grade: Grade, lang: str) -> list[Mark]:
+    """The marks behind a grade, report by report; `lang` is of remarks' few words of their own.
 
     Raises InputFileError where they do not add up to the score.
     """
-    marks = outline(grade)
+    marks = outline(grade, lang)
     found = math.fsum(mark.points for mark in marks)
     meant = math.fsum(report.score or 0.0 for report in grade.reports)
     if not math.isclose(found, meant, abs_tol=CLOSE):
@@ -55,12 +56,13 @@ def marks_of(grade: Grade) -> list[Mark]:
     return marks
 
 
-def outline(grade: Grade) -> list[Mark]:
+def outline(grade: Grade, lang: str = "en") -> list[Mark]:
     """The marks of a grade that may still be open: what is under review counts nothing here."""
-    return [mark for report in grade.reports for mark in _of_report(report)]
+    speaker = tongue(lang)
+    return [mark for report in grade.reports for mark in _of_report(report, speaker)]
 
 
-def _of_report(report: ReportDocument) -> list[Mark]:
+def _of_report(report: ReportDocument, speaker: Tongue) -> list[Mark]:
     share = (report.score or 0.0) / report.max_score
     return [
         Mark(
@@ -69,15 +71,17 @@ def _of_report(report: ReportDocument) -> list[Mark]:
             round(share * one.max_points if one.points is None else one.points, DECIMALS),
             one.max_points,
             one.verdict,
-            _remark(one),
+            _remark(one, speaker),
             report.position,
         )
         for one in report.criteria
     ]
 
 
-def _remark(one: CriterionDocument) -> str:
-    return f"{MARKS[one.verdict]} {' '.join(one.feedback.split())}".strip()
+def _remark(one: CriterionDocument, speaker: Tongue) -> str:
+    words = [speaker.gettext("not judged")] if one.verdict == "not_judged" else []
+    said = ": ".join([*words, *([" ".join(one.feedback.split())] if one.feedback.strip() else [])])
+    return f"{MARKS[one.verdict]} {said}".strip()
 
 
 def together(marks: Sequence[Mark], combine: str | None) -> list[Mark]:

@@ -264,6 +264,7 @@ def test_points_add_up_to_the_grade_and_go_to_canvass_own_criteria(tmp_path, rub
         "_1": 3.0, "_2": 3.0,
     }  # fmt: skip
     assert second["body"]["submission"] == {"posted_grade": "6"}
+    assert second["body"]["rubric_assessment"]["_2"]["comments"].startswith("– not judged: ")
     bulk = told["bulk"]
     assert bulk["path"].endswith("/345/submissions/update_grades")
     assert list(bulk["body"]["grade_data"]) == ["sis_user_id:s01", "sis_user_id:s02"]

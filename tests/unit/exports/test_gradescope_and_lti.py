@@ -39,11 +39,11 @@ def test_each_student_with_a_grade_has_a_results_file(tmp_path):
     assert [(one["score"], one["max_score"], one["status"]) for one in told["tests"]] == [
         (5.0, 5.0, "passed"),
         (2.5, 5.0, "failed"),
-        (3.75, 5.0, "failed"),
     ]
-    assert [one["number"] for one in told["tests"]] == ["1", "2", "3"]
+    assert [one["number"] for one in told["tests"]] == ["1", "2"]
     assert {one["output_format"] for one in told["tests"]} == {"text"}
     assert told["tests"][1]["output"] == "~ Told <why> & how."
+    assert told["output"].splitlines()[-1] == "c3: Vector 3: – not judged: Told <why> & how."
     assert told["extra_data"]["schema_version"] == 1
     assert list(delivery.withheld) == ["s02", "s03", "s04"]
 
@@ -73,6 +73,14 @@ def test_an_unknown_visibility_is_refused(tmp_path):
     gradescope(tmp_path / "out", *CLASS, visibility="after_published")
     told = json.loads((tmp_path / "out" / "s01" / "results.json").read_bytes())
     assert {told["visibility"], *(one["visibility"] for one in told["tests"])} == {"after_published"}
+
+
+def test_points_that_belie_the_score_are_refused(tmp_path):
+    gradescope(tmp_path / "out", marked("s01", 5.0, 2.5))
+    told = json.loads((tmp_path / "out" / "s01" / "results.json").read_bytes())
+    for score in (7.0, 8.0, 10.5):
+        with pytest.raises(InputFileError, match="points"):
+            document(GradescopeDocument, {**told, "score": score}, "results.json")
 
 
 def test_a_status_that_belies_its_points_is_refused(tmp_path):
