@@ -7,10 +7,11 @@ Who draws what stands in `judging_students`, what is due in `judging_truth`. One
 
 import argparse
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from grader.bench.judging_assignments import ASSIGNMENTS
-from grader.bench.judging_students import HANDS, KINDS, SOURCES, Key, Kind, Source, Work, student, submission
+from grader.bench.judging_handed_in import submission
+from grader.bench.judging_students import HANDS, KINDS, SOURCES, Key, Kind, Source, Work, student
 from grader.bench.judging_tables import judging_tables
 from grader.bench.judging_tally import ClassTime, JudgingFigures, Result, Times, result_of, told
 from grader.bench.plain_text import as_text
@@ -18,14 +19,14 @@ from grader.judging import Task, judge, task_of
 
 __all__ = ["ASSIGNMENTS", "JudgingBench", "Key", "judged"]
 
-RIGHT, SINGLE, PAIR = 96, 48, 48
-"""Students of each kind for an assignment and a hand: 2,016 right drawings in all."""
-QUICK = 5
+STUDENTS: Mapping[Kind, int] = {"right": 96, "single": 48, "pair": 48, "slip": 12}
+"""Of each kind for an assignment and a hand: 2,016 right drawings in all."""
+QUICK = 4
 """In a quick run so many of each kind."""
 ROWS, ROWS_QUICK = 1000, 50
 """Of a class's measurements."""
 SCANNED = ("pump", "press", "engine", "shaper")
-SCANS: dict[Kind, int] = {"right": 1, "single": 4}
+SCANS: Mapping[Kind, int] = {"right": 1, "single": 4}
 """Students of each kind, for a mechanism of these and a hand, whose scans are read."""
 
 
@@ -66,8 +67,7 @@ class JudgingBench:
         scan: Callable[[Key, Times], list[Result]] | None = None,
     ) -> None:
         few = students or (QUICK if quick else None)
-        counts = (few,) * len(KINDS) if few else (RIGHT, SINGLE, PAIR)
-        self._counts: dict[Kind, int] = dict(zip(KINDS, counts, strict=True))
+        self._counts = dict.fromkeys(KINDS, few) if few else STUDENTS
         self._classes = [(name, hand) for name in assignments for hand in HANDS]
         self._whole_class = whole_class
         self._rows = ROWS_QUICK if quick else ROWS

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from grader.batch import Batch, grade
 from grader.bench.judging_assignments import assignment_named
-from grader.bench.judging_students import Key, student, submission
+from grader.bench.judging_handed_in import submission
+from grader.bench.judging_students import Key, student
 from grader.bench.judging_tally import ClassTime
 from grader.records import Reading
 

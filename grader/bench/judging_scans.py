@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 
 from grader.bench.judging_assignments import assignment_named
-from grader.bench.judging_students import HANDS, UNITS, Key, Work, codes_of, is_hidden
+from grader.bench.judging_handed_in import texts
+from grader.bench.judging_students import HANDS, Key, Work, codes_of, is_hidden
 from grader.bench.judging_tally import Result, Times, result_of
 from grader.judging import Submission, judge, task_of
 from grader.pipeline import Place, read, see
@@ -34,17 +35,13 @@ def judged_scan(key: Key, times: Times) -> list[Result]:
     finally:
         cv2.setNumThreads(threads)
     handed_in = Submission(
-        readings=tuple(one for one in readings if one.figures), declared=_texts(work.task.declared)
+        readings=tuple(one for one in readings if one.figures), declared=texts(work.task.declared)
     )
     task = task_of(work.assignment, work.rubric, work.variant)
     start = time.process_time()
     judgement = judge(task, handed_in)
     times.scans.append(1000.0 * (time.process_time() - start))
     return [result_of(work, "scans", handed_in, judgement)]
-
-
-def _texts(scales: Mapping[str, float]) -> dict[str, str]:
-    return {name: f"{value!r} {UNITS[name]}" for name, value in scales.items()}
 
 
 def _drawn(key: Key) -> tuple[Work, list[SimulatedSheet]]:
@@ -85,4 +82,4 @@ def _read(work: Work, pages: Sequence[SimulatedSheet]) -> list[Reading]:
     with tempfile.TemporaryDirectory() as folder:
         paths = [page.save(Path(folder) / str(number)) for number, page in enumerate(pages)]
         seen = [see(Place(path, 1, path.name)) for path in paths]
-        return read(seen, work.assignment, work.variant, _texts(work.task.declared), work.rubric.vectors)
+        return read(seen, work.assignment, work.variant, texts(work.task.declared), work.rubric.vectors)

@@ -1,13 +1,9 @@
-"""Simulated students without pictures: what they drew, and how it reaches the judge.
+"""Simulated students without pictures: what they drew.
 
 A student is told by a `Key` and is the same in every run: the variant, the scales, a turned sketch,
-vectors not drawn out, the mistakes and the hand's errors all follow from it. The same drawing is
-handed in three ways: as a perfect reader would read it (`nodes`), as its owner would measure it with
-ruler and protractor (`directions`), and with the ruler alone (`lengths`).
+vectors not drawn out, the mistakes and the hand's errors all follow from it.
 """
 
-import cmath
-import math
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,19 +12,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from grader.bench.judging_assignments import assignment_named
-from grader.bench.judging_redrawn import relabelled, vectors_of
-from grader.judging import Submission
-from grader.records import (
-    ACCELERATION_PLAN,
-    MECHANISM,
-    VELOCITY_PLAN,
-    Figure,
-    Reading,
-    ReadNode,
-    ReadVector,
-    Swapped,
-    Unread,
-)
+from grader.bench.judging_redrawn import relabelled
+from grader.records import ACCELERATION_PLAN
 from grader.rubric import RubricFile
 from grader.simulation import CAREFUL, SLOPPY, TYPICAL, Hand
 from grader.simulation.hand import DrawnSheet, Task, draw, task_of
@@ -37,22 +22,14 @@ from reference.assignment import Assignment, Variant
 from reference.construction import Construction
 from reference.mistakes import CODES
 
-Kind = Literal["right", "single", "pair"]
+Kind = Literal["right", "single", "pair", "slip"]
+"""Slip: rightly drawn, one value wrongly computed from it."""
 Source = Literal["scans", "nodes", "directions", "lengths"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 SOURCES: tuple[Source, ...] = ("nodes", "directions", "lengths")
 """Without pictures."""
 ON_SHEETS = frozenset({"scans", "nodes"})
 HANDS: Mapping[str, Hand] = {"careful": CAREFUL, "typical": TYPICAL, "sloppy": SLOPPY}
-UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
-
-SE_MM = (0.05, 0.1)
-"""A perfect reader's standard errors of a node lie between these."""
-SURE = (0.95, 0.99)
-RULER_MM, RULER_STEP_MM, PROTRACTOR_DEG, LEAST_TURN_MM = 0.2, 0.5, 0.4, 5.0
-DRAWN_MM = 0.8
-"""Shorter than this is a dot, not a vector: it is not measured unless it should be that short."""
-PAPER = {MECHANISM: 100 - 90j, VELOCITY_PLAN: 300 - 90j, ACCELERATION_PLAN: 200 - 220j}
 _TRIES = 60
 
 
@@ -175,7 +152,7 @@ def _habits(key: Key, assignment: Assignment, lot: np.random.Generator) -> Stude
 
 def codes_of(key: Key, lot: np.random.Generator) -> tuple[str, ...]:
     """Codes of the mistakes to make; another student's data come before what is done with them."""
-    if key.kind == "right":
+    if key.kind in {"right", "slip"}:
         return ()
     turn = CODES[(key.seed + zlib.crc32(f"{key.assignment} {key.hand}".encode())) % len(CODES)]
     first = turn if lot.random() < 0.9 else str(lot.choice(list(CODES)))
@@ -190,88 +167,3 @@ def is_hidden(task: Task) -> bool:
     places = [(one.at, one.slot) for one in task.mistakes]
     in_scales = {"scale_wrong", "rpm_not_converted"} <= {one.code for one in task.mistakes}
     return len(set(places)) < len(places) or in_scales
-
-
-# As a perfect reader reads it -----------------------------------------------------------------------
-
-
-def submission(work: Work, source: Source) -> Submission:
-    """The student's work as it is handed in."""
-    declared = {}
-    if work.declares:
-        declared = {name: f"{value!r} {UNITS[name]}" for name, value in work.task.declared.items()}
-    lot = work.key.lot(source)
-    if source == "nodes":
-        return Submission(readings=_readings(work, lot), declared=declared)
-    return Submission(measured=_measured(work, lot, with_turn=source == "directions"), declared=declared)
-
-
-def _readings(work: Work, lot: np.random.Generator) -> tuple[Reading, ...]:
-    se = float(lot.uniform(*SE_MM))
-    readings = []
-    for sheet in work.sheets:
-        figures, unread, swapped = {}, [], []
-        for drawn in sheet.figures:
-            named = work.named(drawn.nodes, "nodes")
-            places = {
-                name: PAPER[drawn.name] + place + se * complex(*lot.standard_normal(2))
-                for name, place in named.items()
-            }
-            nodes = {
-                name: ReadNode(place, np.eye(2) * se**2, float(lot.uniform(*SURE)))
-                for name, place in places.items()
-            }
-            figures[drawn.name] = Figure(nodes, _vectors(work, drawn.name, nodes, se))
-            unread += [
-                Unread(vector.name, f"no stroke between {vector.tail} and {vector.head} could be told apart")
-                for vector in work.construction.vectors_of(drawn.name)
-                if vector.name in work.left_out
-            ]
-            swapped += [
-                Swapped(drawn.name, first, second, 0.97)
-                for first, second in (work.swaps() if work.by_letters("nodes") else ())
-                if first in nodes
-            ]
-        readings.append(Reading(figures, tuple(unread), swapped=tuple(swapped)))
-    return tuple(readings)
-
-
-def _vectors(work: Work, figure: str, nodes: Mapping[str, ReadNode], se: float) -> dict[str, ReadVector]:
-    vectors = {}
-    for vector in work.construction.vectors_of(figure):
-        if vector.name in work.left_out:
-            continue
-        tail, head = nodes[vector.tail], nodes[vector.head]
-        drawn = head.at - tail.at
-        se_mm = math.sqrt(2.0) * se
-        se_deg = min(math.degrees(se_mm / abs(drawn)), 90.0) if drawn else None
-        turn = math.degrees(cmath.phase(drawn)) % 360.0 if drawn else None
-        sure = min(tail.confidence, head.confidence)
-        vectors[vector.name] = ReadVector(abs(drawn), se_mm, turn, se_deg, sure)
-    return vectors
-
-
-# As its owner measures it ---------------------------------------------------------------------------
-
-
-def _measured(work: Work, lot: np.random.Generator, *, with_turn: bool) -> Reading:
-    figures = {}
-    right = vectors_of(work.task.right, ())
-    for figure in work.construction.poles:
-        vectors = {}
-        named = work.named(work.own(figure), "lengths")
-        for vector in work.construction.vectors_of(figure):
-            drawn = named[vector.head] - named[vector.tail]
-            ruled = abs(drawn) + lot.normal(0.0, RULER_MM)
-            protracted = math.degrees(cmath.phase(drawn)) + lot.normal(0.0, PROTRACTOR_DEG)
-            is_dot = abs(drawn) < DRAWN_MM < abs(right[vector.name])
-            if vector.name in work.left_out or is_dot:
-                continue
-            length = max(0.0, round(ruled / RULER_STEP_MM) * RULER_STEP_MM)
-            turn = None
-            if with_turn and abs(drawn) > LEAST_TURN_MM:
-                sketch = math.degrees(float(work.task.right.parameters["turn"]))
-                turn = round(protracted - sketch) % 360.0
-            vectors[vector.name] = ReadVector(length, 0.0, turn, None if turn is None else 0.0, 1.0)
-        figures[figure] = Figure({}, vectors)
-    return Reading(figures)

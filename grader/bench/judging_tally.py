@@ -1,5 +1,6 @@
 """What judging came to, student by student and summed up."""
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -7,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from grader.bench.judging_naming import first_of, is_named, mistakes_due
-from grader.bench.judging_students import Key, Source, Work
+from grader.bench.judging_naming import Made, first_of, is_named, mistakes_due
+from grader.bench.judging_students import SOURCES, Key, Source, Work
 from grader.bench.judging_truth import Due, Seen, verdicts_due
+from grader.bench.judging_values import computed
 from grader.judging import Submission
 from grader.outcomes import Judgement, Mistake
 from reference import mistakes as operators
@@ -109,22 +111,29 @@ def result_of(work: Work, source: Source, handed_in: Submission, judgement: Judg
     due = verdicts_due(work, source, seen)
     marked = tuple(Marked(one.criterion, due[one.criterion], one.verdict) for one in judgement.outcomes)
     made = mistakes_due(work, source, seen)
+    told = computed(work)
+    if told.slip is not None and source in SOURCES:
+        made.append(Made(operators.Mistake("arithmetic", told.slip, factor=told.factor), math.inf))
     first = first_of(made)
 
     def names(mistake: Mistake, one: operators.Mistake) -> bool:
+        if told.slip is not None:
+            return mistake.code == one.code and one.at in {mistake.at, *mistake.explains}
         return is_named(work, source, seen, one, mistake)
 
     told_first = [first is not None and names(mistake, first) for mistake in judgement.mistakes]
+    if any(one.name == told.slip and one.mistake == "arithmetic" for one in judgement.outcomes):
+        told_first.append(True)
     rivals = [rival for mistake in judgement.mistakes for rival in mistake.rivals]
     not_made = [
         mistake
-        for mistake, is_first in zip(judgement.mistakes, told_first, strict=True)
+        for mistake, is_first in zip(judgement.mistakes, told_first, strict=False)
         if not is_first and not any(names(mistake, one.mistake) for one in made)
     ]
     charged = any(one.verdict in CHARGED | {"review"} for one in judgement.outcomes)
     by_letters = work.by_letters(source) and first is not None and first.code == "labels_swapped"
     return Result(
-        work.key, source, marked, work.task.mistakes, judgement.mistakes, first,
+        work.key, source, marked, tuple(one.mistake for one in made), judgement.mistakes, first,
         named=any(told_first),
         surest=bool(told_first) and told_first[0],
         among_rivals=first is not None and not any(told_first) and any(names(one, first) for one in rivals),

@@ -32,6 +32,9 @@ By code:
 - `rpm_not_converted`: velocities and scales are both too large, so the drawing is right: the declared
   kv is wrong, ka either (the same mistake again). Undeclared, nothing shows.
 - `vector_missing`: nothing to judge; to credit it in full is wrong where it is not optional.
+- angular quantities, computed from the own drawing (`grader.bench.judging_values`): right or following,
+  whatever was drawn; either where what was handed in does not tell the sense. A *slip* in computing one
+  value is wrong there and nowhere else.
 - `labels_swapped`: the vectors that begin or end in the two nodes, as named against as they should be;
   either where the letters themselves are told beside nodes named by their lines.
 """
@@ -45,7 +48,8 @@ from typing import Literal
 import numpy as np
 
 from grader.bench.judging_redrawn import SCALES
-from grader.bench.judging_students import Source, Work
+from grader.bench.judging_students import ON_SHEETS, SOURCES, Source, Work
+from grader.bench.judging_values import LEAST_SINE, Computed, across, computed, exact_rates, length_of
 from grader.judging import Submission
 from grader.rubric import CriterionTable, ToleranceTable
 from reference.construction import Construction, Vector, ancestors, evaluate
@@ -123,12 +127,41 @@ def verdicts_due(work: Work, source: Source, seen: Seen) -> dict[str, Due]:
             moved[name] = off(one.due, one.told, tolerance, directed=directed)
     for mistake in work.task.mistakes:
         _open_first_shown(work, mistake, by_vector, moved)
+    told = computed(work)
     for criterion in work.rubric.criterion:
         if criterion.scale:
             found[criterion.id] = _scale_due(work, criterion.name)
+        elif criterion.name == told.slip:
+            found[criterion.id] = "wrong"
+        elif criterion.angular:
+            found[criterion.id] = _rate_due(work, source, criterion, told, seen)
         else:
             found[criterion.id] = by_vector.get(criterion.name, "absent")
     return found
+
+
+def _rate_due(work: Work, source: Source, criterion: CriterionTable, told: Computed, seen: Seen) -> Due:
+    """Of a value rightly computed from the own drawing."""
+    name = criterion.name
+    if source not in SOURCES or name not in told.values:
+        return "absent"
+    exact, per_mm = exact_rates(work)[name]
+    tolerance, value = work.rubric.tolerance_of(criterion), told.values[name]
+    allowed = max(tolerance.length_mm, tolerance.length_relative * abs(exact) / per_mm) * per_mm
+    apart = abs(value - exact) / allowed
+    if apart <= PLAIN:
+        return "right"
+    rate = work.construction.rates[name]
+    is_same_link = len({length_of(one, rate, 0.0) for one in (work.task.right, work.task.wrong)}) == 1
+    # A sense that came out the other way cannot be told from lengths, nor without the own sketch; nothing
+    # can of a vector that was not seen, or of one that runs along the link instead of across.
+    of_sketch = any(one.code in {"other_assembly", "other_variant"} for one in work.task.mistakes)
+    knows_sense = seen.directed.get(rate.vector, False) and (source in ON_SHEETS or not of_sketch)
+    is_told = rate.vector in seen.directed and (knows_sense or value * exact > 0.0)
+    is_told &= abs(across(work, rate)) > LEAST_SINE
+    if not is_told or not is_same_link or abs(value) / per_mm < tolerance.least_mm:
+        return "either"
+    return "follows" if apart > CLEAR else "right"
 
 
 def _scale_due(work: Work, name: str) -> Due:

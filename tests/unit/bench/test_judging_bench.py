@@ -8,9 +8,10 @@ import pytest
 from grader.bench import judging
 from grader.bench.judging import JudgingBench, judged, main
 from grader.bench.judging_assignments import ASSIGNMENTS, assignment_named
+from grader.bench.judging_handed_in import submission
 from grader.bench.judging_naming import is_named, mistakes_due
 from grader.bench.judging_redrawn import Asked, meant, vectors_of
-from grader.bench.judging_students import SOURCES, Key, Work, student, submission
+from grader.bench.judging_students import SOURCES, Key, Work, student
 from grader.bench.judging_tables import judging_tables
 from grader.bench.judging_tally import ClassTime, JudgingFigures, Marked, Tally, result_of, summed
 from grader.bench.judging_truth import Seen, off, verdicts_due
@@ -272,8 +273,8 @@ def test_the_benchmark_measures_as_many_steps_as_it_says_and_tells_all_of_it(mon
     told = list(bench.run())
     assert len(told) == bench.steps
     figures = bench.figures
-    assert len(figures.results) == 3 * len(SOURCES)
-    assert {where for (where,) in summed(figures.results, ("kind",))} == {"right", "single", "pair"}
+    assert len(figures.results) == 4 * len(SOURCES)
+    assert {where for (where,) in summed(figures.results, ("kind",))} == {"right", "single", "pair", "slip"}
     text = as_text(judging_tables(figures))
     assert "engine" in text
     assert "making the task" in text
