@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from grader.documents import ReportDocument, ResultsDocument, UnmatchedDocument
 from grader.exports import write_summary
-from grader.feedback import Level, write_feedback, write_index
+from grader.feedback import About, Level, write_feedback, write_index
 from grader.files import make_folder, write_whole
 from grader.folder import submissions, told_name
 from grader.judging import unjudged_report
@@ -42,6 +42,7 @@ class Batch:
     pages_per_student : pages of each student in one class file, blank ones not counted
     jobs : processes
     lang, level : of feedback, where the roster does not say
+    with_pdf : whether each student's feedback is written for the printer, too
     """
 
     assignment: Assignment
@@ -53,6 +54,7 @@ class Batch:
     jobs: int = 1
     lang: str = "en"
     level: Level = "full"
+    with_pdf: bool = False
 
 
 def grade(batch: Batch, progress: Progress) -> ResultsDocument:
@@ -181,7 +183,7 @@ def _jobs(batch: Batch, works: Sequence[Work], surveys: Sequence[Survey]) -> lis
     content = {source.file: one.digest for one in surveys for source in one.pages}
     assignment = (batch.assignment.file.model_dump_json(), batch.assignment.mechanism_file.model_dump_json())
     read = digest_of((*assignment, *asked_of(batch.assignment, batch.rubric)))
-    marked = digest_of((*assignment, batch.rubric.model_dump_json(), batch.level))
+    marked = digest_of((*assignment, batch.rubric.model_dump_json(), batch.level, batch.with_pdf))
     jobs = []
     for work, folder in zip(works, folders_of(works), strict=True):
         pages = [(place.name, place.page, content.get(place.name, "")) for place in work.pages]
@@ -229,15 +231,19 @@ def _mark_one(batch: Batch, job: Job) -> ReportDocument:
     """Mark one submission and write its files; its key last, so that it stands for all of them."""
     work, where = job.work, batch.out / job.folder
     marked = mark_looked(work, batch.assignment, batch.rubric, _looked(batch, job), batch.level)
-    title = batch.assignment.file.title.in_language(work.lang)
-    names = batch.assignment.file.names
     write_feedback(
-        marked.report, marked.pictures, where, work.lang, batch.level,
-        title=title, student_name=work.name, names=names,
+        marked.report, marked.pictures, where, work.lang, batch.level, _about(batch, work),
+        with_pdf=batch.with_pdf,
     )  # fmt: skip
     write_whole(where / "report.json", marked.report.model_dump_json(indent=2))
     write_whole(_key_file(batch, job), job.key)
     return marked.report
+
+
+def _about(batch: Batch, work: Work) -> About:
+    """How the feedback calls the assignment, the student and the names in it."""
+    title = batch.assignment.file.title.in_language(work.lang)
+    return About(title, work.name, batch.assignment.file.names)
 
 
 def _looked(batch: Batch, job: Job) -> Sequence[Looked]:
@@ -258,7 +264,8 @@ def _failed(batch: Batch, job: Job, problem: Problem) -> ReportDocument:
         batch.assignment, batch.rubric, work.variant or Variant(), work.student_id, "unreadable",
         problems=(*work.problems, problem),
     )  # fmt: skip
-    write_feedback(report, [], where, work.lang, batch.level, student_name=work.name)
+    about = _about(batch, work)
+    write_feedback(report, [], where, work.lang, batch.level, about, with_pdf=batch.with_pdf)
     write_whole(where / "report.json", report.model_dump_json(indent=2))
     return report
 
@@ -284,7 +291,8 @@ def _known(batch: Batch, job: Job) -> ReportDocument | None:
     try:
         if _key_file(batch, job).read_text(encoding="utf-8") != job.key:
             return None
-        if not (where / "feedback.html").is_file():
+        wanted = ["feedback.html", *(["feedback.pdf"] if batch.with_pdf else [])]
+        if not all((where / name).is_file() for name in wanted):
             return None
         return ReportDocument.model_validate_json((where / "report.json").read_bytes())
     except (OSError, UnicodeDecodeError, ValidationError):

@@ -19,8 +19,11 @@ from grader.records import Box, FloatArray, GreyImage, Page, Reading, Sheet
 from grader.scene import (
     ARROW_WIDTH_MM,
     COLOURS,
-    DASH_MM,
     GHOST_COLOUR,
+    GHOST_DASH_MM,
+    GHOST_WIDTH_MM,
+    LEAST_ARROW_MM,
+    MARK_STROKES,
     NODE_COLOUR,
     XY,
     Arrow,
@@ -50,9 +53,10 @@ _TONES = np.array(
     dtype=np.uint8,
 )
 """What is shown for each share of the paper's brightness, 0..255."""
+_FEW_TONES = np.array([17 * round(tone / 17) for tone in range(256)], dtype=np.uint8)
+"""Sixteen tones: pencil and ink look the same, and a PNG is half a JPEG."""
 OPACITY = 0.82
 FRACTION_BITS = 4
-LEAST_ARROW_MM = 0.05
 JPEG_QUALITY = 78
 PNG_COMPRESSION = 1
 
@@ -109,8 +113,20 @@ def overlay(
         scene = scene_of(behind.page_mm, reading, vectors, outcomes, show_expected=show_expected)
     painted = paint(scan, scene)
     png = _encode(".png", painted, [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION])
+    return Picture(behind.source, behind.page, png, _smallest(scan), width, height, scene)
+
+
+def _smallest(scan: GreyImage) -> bytes:
+    """A cleaned scan as a small file: pencil on white paper needs few tones, a photo's shades many."""
     jpeg = _encode(".jpg", scan, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return Picture(behind.source, behind.page, png, jpeg, width, height, scene)
+    options = [
+        cv2.IMWRITE_PNG_COMPRESSION,
+        PNG_COMPRESSION,
+        cv2.IMWRITE_PNG_STRATEGY,
+        cv2.IMWRITE_PNG_STRATEGY_RLE,
+    ]
+    png = _encode(".png", _grey(cv2.LUT(scan, _FEW_TONES)), options)
+    return min(jpeg, png, key=len)
 
 
 def stored(behind: Backdrop) -> bytes:
@@ -186,7 +202,9 @@ def paint(scan: GreyImage, scene: Scene) -> ColourImage:
     px_per_mm = scan.shape[1] / scene.page_mm[0]
     brush = _Brush(image.copy(), px_per_mm)
     for ghost in scene.ghosts:
-        brush.ghost(ghost)
+        # What waits for a person may well be right: its ghost is for a closer look.
+        if ghost.verdict != "review":
+            brush.ghost(ghost)
     for arrow in scene.arrows:
         brush.arrow(arrow)
     for dot in scene.dots:
@@ -213,11 +231,11 @@ class _Brush:
         colour = _bgr(COLOURS[arrow.verdict])
         if arrow.length < LEAST_ARROW_MM:
             return
-        self.line(arrow.tail, arrow.neck(), colour, ARROW_WIDTH_MM, DASH_MM if arrow.doubtful else None)
+        self.line(arrow.tail, arrow.neck(), colour, ARROW_WIDTH_MM[arrow.verdict], arrow.dash)
         self.fill(arrow.head(), colour)
 
     def ghost(self, ghost: Ghost) -> None:
-        self.line(ghost.tail, ghost.tip, _bgr(GHOST_COLOUR), 0.4, (0.9, 0.9))
+        self.line(ghost.tail, ghost.tip, _bgr(GHOST_COLOUR), GHOST_WIDTH_MM, GHOST_DASH_MM)
         self.ring(ghost.tip, 0.9, _bgr(GHOST_COLOUR), 0.3)
 
     def dot(self, dot: Dot) -> None:
@@ -237,7 +255,7 @@ class _Brush:
 
     def mark(self, verdict: str, centre: XY) -> None:
         """✓ ✗ ~ ? → – as strokes: the drawing font has no such letters."""
-        for stroke in _MARK_STROKES[verdict]:
+        for stroke in MARK_STROKES[verdict]:
             points = [(centre[0] + 0.95 * px, centre[1] + 0.95 * py) for px, py in stroke]
             for start, end in itertools.pairwise(points):
                 self.line(start, end, (255, 255, 255), 0.42, None)
@@ -291,20 +309,6 @@ class _Brush:
         columns = slice(max(0, round(x0)), max(0, round(x1) + 1))
         part = self.image[rows, columns]
         part[:] = (part * 0.2 + 255 * 0.8).astype(np.uint8)
-
-
-_MARK_STROKES: dict[str, tuple[tuple[XY, ...], ...]] = {
-    "full": (((-1.0, 0.05), (-0.3, 0.8), (1.0, -0.8)),),
-    "none": (((-0.75, -0.75), (0.75, 0.75)), ((-0.75, 0.75), (0.75, -0.75))),
-    "partial": (((-1.0, 0.25), (-0.5, -0.3), (0.5, 0.3), (1.0, -0.25)),),
-    "review": (
-        ((-0.6, -0.55), (-0.3, -0.95), (0.3, -0.95), (0.6, -0.55), (0.5, -0.2), (0.0, 0.1), (0.0, 0.35)),
-        ((0.0, 0.9), (0.0, 0.92)),
-    ),
-    "follow_through": (((-1.0, 0.0), (0.95, 0.0)), ((0.3, -0.6), (0.95, 0.0), (0.3, 0.6))),
-    "not_judged": (((-0.8, 0.0), (0.8, 0.0)),),
-}
-"""In units of about a millimetre, y down."""
 
 
 def _dashes(start: XY, end: XY, dash: tuple[float, float] | None) -> list[tuple[XY, XY]]:

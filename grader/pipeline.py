@@ -14,7 +14,7 @@ from pathlib import Path
 
 from grader.declaring import Declarations, Source, declarations, sure_texts
 from grader.documents import ReadingDocument, ReportDocument
-from grader.feedback import Level, criterion_feedback
+from grader.feedback import Level, criterion_feedback, with_mistakes_told
 from grader.ink import find_ink
 from grader.intake import is_blank, page_of
 from grader.judging import Submission, Task, judge, report_of, task_of, unjudged_report
@@ -29,6 +29,7 @@ from grader.reading_document import reading_document
 from grader.records import MECHANISM, Box, Ink, Page, Problem, Reading, Sheet, Written
 from grader.rubric import RubricFile
 from grader.scene import Picture
+from grader.scene_measured import measured_picture
 from grader.sheet import rectify, straighten
 from reference.assignment import Assignment, Scales, Variant
 from reference.construction import Vector
@@ -196,7 +197,9 @@ def mark_looked(
         sheets=documents,
     )
     report = _with_sources(report, declared.sources)
-    return Marked(work, report, _pictures(looked, task.construction.vectors, judgement, level))
+    report = with_mistakes_told(report, judgement, assignment, task.variant, work.lang, level)
+    pictures = _pictures(looked, task.construction.vectors, judgement, level)
+    return Marked(work, report, pictures or _as_measured(work, task, judgement, level))
 
 
 def _only(one: Looked, names: Collection[str]) -> Looked:
@@ -370,6 +373,18 @@ def _pictures(
         for one in looked
         if one.backdrop is not None
     )
+
+
+def _as_measured(work: Work, task: Task, judgement: Judgement, level: Level) -> tuple[Picture, ...]:
+    """The plans as entered measurements draw them, where no page shows them."""
+    if work.measured is None:
+        return ()
+    outcomes = {outcome.name: outcome for outcome in judgement.outcomes}
+    picture = measured_picture(
+        work.measured.source, work.measured.reading, task.construction, outcomes,
+        show_expected=level == "full",
+    )  # fmt: skip
+    return () if picture is None else (picture,)
 
 
 @contextmanager

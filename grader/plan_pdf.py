@@ -2,8 +2,9 @@
 
 import io
 from collections.abc import Iterable, Sequence
+from functools import cache
 
-from reportlab.lib.colors import HexColor
+from reportlab.lib.colors import Color, HexColor
 from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 from reportlab.pdfgen.pathobject import PDFPathObject
@@ -39,6 +40,14 @@ def put_shapes(canvas: Canvas, shapes: Iterable[Shape], origin: tuple[float, flo
     canvas.restoreState()
 
 
+@cache
+def ink(colour: str) -> Color:
+    """A colour that leaves the canvas as opaque as it is set."""
+    made = HexColor(colour)
+    made.alpha = None
+    return made
+
+
 def _put(canvas: Canvas, shape: Shape) -> None:
     """One shape; the canvas' unit is the millimetre, y up."""
     match shape:
@@ -47,11 +56,13 @@ def _put(canvas: Canvas, shape: Shape) -> None:
             canvas.line(x1, -y1, x2, -y2)
         case Ring(centre=(x, y)):
             _pen(canvas, shape.width, shape.colour)
-            canvas.setFillColor(HexColor(shape.fill))
-            canvas.circle(x, -y, shape.radius, fill=1)
+            filled = shape.fill != "none"
+            if filled:
+                canvas.setFillColor(ink(shape.fill))
+            canvas.circle(x, -y, shape.radius, stroke=int(shape.width > 0), fill=int(filled))
         case Area(points=points):
             _pen(canvas, shape.width, shape.colour)
-            canvas.setFillColor(HexColor(shape.fill))
+            canvas.setFillColor(ink(shape.fill))
             canvas.drawPath(_path(canvas, points, closed=True), stroke=int(shape.width > 0), fill=1)
         case Curve(points=points):
             _pen(canvas, shape.width, shape.colour, shape.dash)
@@ -72,7 +83,7 @@ def _path(canvas: Canvas, points: Sequence[Point], *, closed: bool) -> PDFPathOb
 
 def _write(canvas: Canvas, label: Label) -> None:
     """A text: each of its pieces in its own place."""
-    canvas.setFillColor(HexColor(label.colour))
+    canvas.setFillColor(ink(label.colour))
     for piece in set_pieces(label.text, label.size):
         canvas.saveState()
         slant = SLANT if label.italic else 0.0
@@ -85,4 +96,4 @@ def _write(canvas: Canvas, label: Label) -> None:
 def _pen(canvas: Canvas, width_mm: float, colour: str, dash: tuple[float, ...] = ()) -> None:
     canvas.setDash(list(dash))
     canvas.setLineWidth(width_mm)
-    canvas.setStrokeColor(HexColor(colour))
+    canvas.setStrokeColor(ink(colour))

@@ -1,7 +1,8 @@
 """What an overlay shows, in sheet millimetres (x right, y down): arrows with verdicts, nodes, labels.
 
 Painters draw a scene on the scan: `grader.picture` as pixels, `grader.feedback.overlay` as SVG.
-Right and wrong differ by colour *and* by mark, doubtful ones are dashed: nothing rests on colour alone.
+Right and wrong differ by colour, mark *and* line: wrong ones are thick, nearly right ones have long
+dashes, doubtful ones short ones, expected ones dots. Nothing rests on colour alone.
 """
 
 import math
@@ -18,12 +19,12 @@ LEAST_SURE = 0.9
 """Confidence below which an arrow is shown as doubtful whatever its verdict."""
 
 COLOURS = {
-    "full": "#00725c",
-    "partial": "#9a6700",
-    "none": "#c2410c",
-    "follow_through": "#1d5fa8",
-    "review": "#6d3fb5",
-    "not_judged": "#5b6470",
+    "full": "#00594f",
+    "partial": "#9a6f00",
+    "none": "#98200c",
+    "follow_through": "#2b6cd4",
+    "review": "#7a1580",
+    "not_judged": "#73767a",
 }
 """Colours of the verdicts: apart in lightness and hue for every kind of colour vision."""
 
@@ -36,12 +37,35 @@ MARKS = {
     "not_judged": "–",
 }
 
-ARROW_WIDTH_MM = 0.5
+MARK_STROKES: dict[str, tuple[tuple[XY, ...], ...]] = {
+    "full": (((-1.0, 0.05), (-0.3, 0.8), (1.0, -0.8)),),
+    "none": (((-0.75, -0.75), (0.75, 0.75)), ((-0.75, 0.75), (0.75, -0.75))),
+    "partial": (((-1.0, 0.25), (-0.5, -0.3), (0.5, 0.3), (1.0, -0.25)),),
+    "review": (
+        ((-0.6, -0.55), (-0.3, -0.95), (0.3, -0.95), (0.6, -0.55), (0.5, -0.2), (0.0, 0.1), (0.0, 0.35)),
+        ((0.0, 0.9), (0.0, 0.92)),
+    ),
+    "follow_through": (((-1.0, 0.0), (0.95, 0.0)), ((0.3, -0.6), (0.95, 0.0), (0.3, 0.6))),
+    "not_judged": (((-0.8, 0.0), (0.8, 0.0)),),
+}
+"""The marks as strokes, in units of about a millimetre, y down: no font is needed for them."""
+
+ARROW_WIDTH_MM: Mapping[str, float] = {
+    "full": 0.5, "partial": 0.75, "none": 0.95, "follow_through": 0.5, "review": 0.5, "not_judged": 0.3,
+}  # fmt: skip
+"""What is wrong is thicker: seen in a grey print, too."""
 ARROWHEAD_MM = (3.2, 1.0)
 """Length and half width."""
+LEAST_ARROW_MM = 0.05
+"""Shorter ones are not drawn."""
 DASH_MM = (2.2, 1.5)
 """Of doubtful arrows: dash, gap."""
-GHOST_COLOUR = "#7d8590"
+NEARLY_MM = (5.0, 1.0)
+"""Of nearly right ones."""
+GHOST_COLOUR = "#59626d"
+GHOST_DASH_MM = (0.35, 1.0)
+GHOST_WIDTH_MM = 0.5
+"""Expected vectors are dotted."""
 NODE_COLOUR = "#24303c"
 
 
@@ -60,6 +84,13 @@ class Arrow:
     def length(self) -> float:
         """Millimetres."""
         return math.dist(self.tail, self.tip)
+
+    @property
+    def dash(self) -> XY | None:
+        """Dash and gap of its shaft, None for a solid one."""
+        if self.doubtful:
+            return DASH_MM
+        return NEARLY_MM if self.verdict == "partial" else None
 
     def neck(self, size: float = 1.0) -> XY:
         """Where the shaft ends and the head begins."""
@@ -80,19 +111,23 @@ class Arrow:
 
 @dataclass(frozen=True, slots=True)
 class Ghost:
-    """The vector that was expected, laid off from where the drawn one starts."""
+    """The vector that was expected, laid off from where the drawn one starts; `verdict` on the drawn one."""
 
+    name: str
+    figure: str
     tail: XY
     tip: XY
+    verdict: str = "none"
 
 
 @dataclass(frozen=True, slots=True)
 class Dot:
-    """A node as read."""
+    """A node as read; `lettered` where no drawing beneath has its letter."""
 
     name: str
     at: XY
     doubtful: bool
+    lettered: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +147,8 @@ class Picture:
     Attributes
     ----------
     png : the overlay, painted
-    jpeg : the cleaned scan alone, upright, for the page that draws the scene as SVG
+    scan : the cleaned scan alone, upright, for the page that draws the scene as SVG; a PNG or JPEG file,
+        whichever is smaller; empty where nothing was scanned
     width_px, height_px : of both
     scene : what is drawn on it; its page_mm spans the whole picture
     """
@@ -120,7 +156,7 @@ class Picture:
     source: str
     page: int
     png: bytes
-    jpeg: bytes
+    scan: bytes
     width_px: int
     height_px: int
     scene: Scene
@@ -172,9 +208,9 @@ def _arrows(
 
 
 def _ghosts(arrows: list[Arrow], outcomes: Mapping[str, Outcome]) -> Iterator[Ghost]:
-    """What was expected of the vectors that are off."""
+    """What was expected of the vectors that are off, or wait for a person."""
     for arrow in arrows:
-        if arrow.verdict not in {"none", "partial"}:
+        if arrow.verdict not in {"none", "partial", "review"}:
             continue
         expected = outcomes[arrow.name].expected
         if expected.length_mm is None or expected.direction_deg is None:
@@ -182,4 +218,4 @@ def _ghosts(arrows: list[Arrow], outcomes: Mapping[str, Outcome]) -> Iterator[Gh
         angle = math.radians(expected.direction_deg)
         x, y = arrow.tail
         tip = (x + expected.length_mm * math.cos(angle), y - expected.length_mm * math.sin(angle))
-        yield Ghost(arrow.tail, tip)
+        yield Ghost(arrow.name, arrow.figure, arrow.tail, tip, arrow.verdict)

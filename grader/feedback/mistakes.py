@@ -4,6 +4,8 @@
 link carries a guide: of a Coriolis component, and of the line along the guide.
 """
 
+import re
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from grader.i18n import N_
@@ -11,7 +13,10 @@ from grader.i18n import N_
 ALONG_GUIDE = "guide"
 """The detail `line` of a mistake in a line that runs along a moving guide."""
 CORIOLIS_END = "k_"
-"""How the nodes begin in which Coriolis components end."""
+"""How the nodes begin in which Coriolis components end,"""
+NORMAL_END = "n_"
+"""and normal ones."""
+_NAMED = re.compile(r"%\((\w+)\)s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +150,58 @@ _ALONG_GUIDE: dict[str, Words] = {
         N_("The block slides along its own guide: redraw the line by it."),
     ),
 }  # fmt: skip
+
+
+PRECISE: dict[str, tuple[str, ...]] = {
+    "parallel_for_perpendicular": (
+        N_("The line from %(from)s to %(at)s was drawn along %(link)s instead of perpendicular to it."),
+    ),
+    "wrong_link": (
+        N_("The line from %(from)s to %(at)s was drawn perpendicular to %(other)s instead of to %(link)s."),
+    ),
+    "wrong_intersection": (
+        N_("The line to %(at)s was drawn from %(other)s instead of from %(from)s, and so meets the other one"
+           " in the wrong place."),
+    ),
+    "normal_reversed": (
+        N_("The normal component %(vector)s was laid off away from the centre of rotation."),
+    ),
+    "normal_missing": (N_("The normal component %(vector)s was left out."),),
+    "normal_from_absolute": (
+        N_("The normal component %(vector)s was computed from an absolute velocity."),
+    ),
+    "scale_wrong": (
+        N_("All lengths that depend on %(at)s are %(factor)s times what they should be."),
+    ),
+    "labels_swapped": (N_("The letters %(first)s and %(second)s stand at each other's point."),),
+    "figure_rotated": (
+        N_("All of %(at)s is turned by %(degrees)s° counter-clockwise against the mechanism."),
+    ),
+    "other_variant": (
+        N_("The drawing fits the data of number %(n)s."),
+        N_("The drawing fits the data of position %(position)s."),
+    ),
+}  # fmt: skip
+"""Better than `Words.what` where every name in it is known, the first that has all of its names."""
+PRECISE_ALONG_GUIDE: dict[str, tuple[str, ...]] = {
+    "parallel_for_perpendicular": (
+        N_("The line from %(from)s to %(at)s was drawn perpendicular to the guide instead of along it."),
+    ),
+    "wrong_link": (
+        N_("The line from %(from)s to %(at)s was drawn along %(other)s instead of along the guide."),
+    ),
+}  # fmt: skip
+GIVING_AWAY = frozenset({"factor", "degrees", "n", "position"})
+"""What is told of a mistake only to those who may see the answers."""
+
+
+def precise(code: str, at: str, line: str, known: Collection[str]) -> str | None:
+    """The text that says what was done with all that is known of it; None where that is too little."""
+    if at.startswith(CORIOLIS_END):
+        return None
+    by_guide = line == ALONG_GUIDE and code in PRECISE_ALONG_GUIDE
+    texts = PRECISE_ALONG_GUIDE[code] if by_guide else PRECISE.get(code, ())
+    return next((text for text in texts if set(_NAMED.findall(text)) <= set(known)), None)
 
 
 def words_of(code: str, at: str = "", line: str = "") -> Words:

@@ -8,7 +8,7 @@ Names of vectors stand in sentences as `v_BA`, `a_BA_n`; pages set them with ind
 from collections.abc import Callable, Mapping
 from typing import Literal
 
-from grader.feedback.mistakes import MISTAKES, Words, words_of
+from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, words_of
 from grader.feedback.reasons import told_reason
 from grader.i18n import N_, Tongue, tongue
 from grader.outcomes import Mistake, Outcome, Param, Reason
@@ -90,6 +90,10 @@ FOLLOWS: dict[str, str] = {
 }
 """Reason `follows`, by what it follows from."""
 
+NEARLY = N_("Held against your own earlier work it is nearly right; held against the data:")
+MAY_FOLLOW = N_("It may follow rightly from your own earlier work; held against the data:")
+"""In place of `follows` where full marks do not follow, at level `full`."""
+
 MOST_REASONS = 3
 """More would hide the important ones."""
 
@@ -104,7 +108,12 @@ def criterion_feedback(
     if level == "symbol":
         return ""
     speaker = tongue(lang)
-    told = (reason_sentence(reason, speaker, level, names) for reason in _worth_telling(outcome))
+    told = (
+        speaker.gettext(_followed_in_part(outcome))
+        if reason.code == "follows" and outcome.verdict != "follow_through"
+        else reason_sentence(reason, speaker, level, names)
+        for reason in _worth_telling(outcome)
+    )
     parts = list(dict.fromkeys(told))[:MOST_REASONS]
     if outcome.mistake and outcome.verdict in {"none", "partial"} and outcome.mistake in MISTAKES:
         cause = outcome.cause
@@ -112,6 +121,10 @@ def criterion_feedback(
         title = speaker.gettext(words.title)
         parts.append(speaker.gettext("Likely cause: %(cause)s.") % {"cause": title})
     return " ".join(part for part in parts if part)
+
+
+def _followed_in_part(outcome: Outcome) -> str:
+    return NEARLY if outcome.verdict == "partial" else MAY_FOLLOW
 
 
 def _worth_telling(outcome: Outcome) -> list[Reason]:
@@ -134,20 +147,55 @@ def _worth_telling(outcome: Outcome) -> list[Reason]:
     ]
 
 
+RIVALS = N_("What was handed in does not tell this from something else:")
+"""Said between a mistake and those that explain the same nearly as well,"""
+OR = N_("or:")
+"""each after this."""
+
+
 def mistake_feedback(
     mistake: Mistake, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
 ) -> str:
-    """What was done, most likely, and what to redo; empty at level `symbol` and for an unknown code."""
+    """What was done, most likely, and what to redo; empty at level `symbol` and for an unknown code.
+
+    Where rivals explain the same nearly as well, they are told too, each after an "or".
+    """
     if level == "symbol" or mistake.code not in MISTAKES:
         return ""
+    speaker = tongue(lang)
+    told = one_mistake(mistake, speaker, level, names)
+    others = [one_mistake(one, speaker, level, names) for one in mistake.rivals if one.code in MISTAKES]
+    others = [one for one in dict.fromkeys(others) if one != told]
+    if not others:
+        return told
+    return " ".join((told, speaker.gettext(RIVALS), *(f"{speaker.gettext(OR)} {one}" for one in others)))
+
+
+def one_mistake(mistake: Mistake, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES) -> str:
+    """What was done and what to redo, whatever its rivals."""
     words = words_of(mistake.code, mistake.at, line_of(mistake))
-    return mistake_sentences(words, mistake.at, tongue(lang), names)
+    where = {"at": place(mistake.at, speaker, names)}
+    known = {**where, **_known(mistake, speaker, level, names)}
+    what = precise(mistake.code, mistake.at, line_of(mistake), known) or words.what
+    return f"{speaker.gettext(what) % known} {speaker.gettext(words.redo) % where}"
 
 
-def mistake_sentences(words: Words, at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
-    """What a mistake was and what to redo."""
-    where = {"at": place(at, speaker, names)}
-    return f"{speaker.gettext(words.what) % where} {speaker.gettext(words.redo) % where}"
+def mistake_title(mistake: Mistake, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
+    """Its name and place."""
+    title = speaker.gettext(words_of(mistake.code, mistake.at, line_of(mistake)).title)
+    return f"{title} ({place(mistake.at, speaker, names)})"
+
+
+def _known(mistake: Mistake, speaker: Tongue, level: Level, names: Mapping[str, str]) -> dict[str, str]:
+    """What is known of a mistake, in words; numbers only where they may be told."""
+    told = {
+        key: speaker.trimmed(value, 3) if isinstance(value, float) else names.get(str(value), str(value))
+        for key, value in mistake.detail.items()
+        if level == "full" or key not in GIVING_AWAY
+    }
+    if mistake.at.startswith(NORMAL_END):
+        told["vector"] = f"a_{mistake.at.removeprefix(NORMAL_END)}_n"
+    return told
 
 
 def line_of(mistake: Mistake) -> str:
@@ -198,7 +246,7 @@ def _speak(params: Mapping[str, Param], speaker: Tongue, names: Mapping[str, str
         if key == "reason":
             said[key] = told_reason(str(value), speaker)
         elif isinstance(value, str):
-            said[key] = names.get(value, value)
+            said[key] = place(value, speaker, names)
         elif suffix in {"mm", "deg"} and stem:
             said[stem] = _UNIT_WRITERS[suffix](speaker, value)
         elif key == "confidence":

@@ -6,6 +6,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from grader.documents import ReportDocument
 from grader.feedback import words
+from grader.feedback.sentences import OR, RIVALS
 from grader.i18n import Tongue, tongue
 from grader.scene import MARKS
 
@@ -30,7 +31,7 @@ def environment(lang: str) -> Environment:
     made.filters["points"] = lambda value: speaker.trimmed(value, 2)
     made.globals.update(
         speaker=speaker, verdicts=words.VERDICTS, states_words=words.STATES, state_marks=words.STATE_MARKS,
-        marks=MARKS,
+        marks=MARKS, rivals=speaker.gettext(RIVALS), either=speaker.gettext(OR),
     )  # fmt: skip
     return made
 

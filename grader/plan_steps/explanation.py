@@ -87,12 +87,12 @@ def _centres_found(speaker: Speaker) -> list[Step]:
 
 
 def _explanation(speaker: Speaker, number: int, step: Step) -> Explanation:
-    before = tuple(_computed(speaker, step))
+    before = tuple(computed(speaker, step))
     after = tuple(_read_off(speaker, step))
     return Explanation(number, step, before, sentences.sentence(speaker, step), after)
 
 
-def _computed(speaker: Speaker, step: Step) -> Iterator[Markup]:
+def computed(speaker: Speaker, step: Step) -> Iterator[Markup]:
     """The lengths that the step draws, from data or from earlier figures."""
     if isinstance(step, Given) and not isinstance(step.length, Scaled):
         yield from _component(speaker, step)
@@ -144,7 +144,7 @@ def _component(speaker: Speaker, step: Given) -> Iterator[Markup]:
     unit = speaker.unit_of("ka")
     if isinstance(step.length, Normal):
         squared, arm = _speed(speaker, (step.length.tail, step.length.head)), _arm(speaker, step.length)
-        link = _link_of(speaker, step)
+        link = sentences.link_of(speaker, step)
         yield Markup("{} = {}² / {} = {}² / {} = {}").format(
             name, squared[0], link, speaker.bare(squared[1]), speaker.bare(arm), speaker.real(real, unit)
         )
@@ -170,11 +170,6 @@ def _arm(speaker: Speaker, length: Normal) -> float:
     if length.measured is not None:
         return float(view.real_length(*length.measured))
     return float(view.parameters[length.length])
-
-
-def _link_of(speaker: Speaker, step: Given) -> Markup:
-    vectors = speaker.subject.plan.construction.vectors.values()
-    return next(speaker.name(*vector.link) for vector in vectors if vector.head == step.node and vector.link)
 
 
 def _divided(speaker: Speaker, name: Markup, real: float, scale: str) -> Markup:

@@ -94,16 +94,19 @@ def _given(speaker: Speaker, step: Given) -> Markup:
     mm = _length(speaker, step.length)
     if is_nothing(speaker, step.node, mm):
         return speaker.say(texts.NOTHING_TO_LAY_OFF, name=named_vector(speaker, step), node=node, start=start)
+    return speaker.say(
+        texts.LAY_OFF, start=start, node=node, segment=speaker.name(step.start, step.node),
+        length=speaker.mm(abs(mm)), direction=direction_told(speaker, step),
+    )  # fmt: skip
+
+
+def direction_told(speaker: Speaker, step: Given) -> Markup:
+    """Where the vector of a step points."""
     if isinstance(step.length, Coriolis):
         slide = named(speaker, *step.length.slide)
         rate = speaker.rate(f"omega_{coriolis_link(speaker, step)}")
-        direction = speaker.say(texts.CORIOLIS_DIRECTION, slide=slide, rate=rate)
-    else:
-        direction = speaker.vector_direction(step.along, mm)
-    return speaker.say(
-        texts.LAY_OFF, start=start, node=node, segment=speaker.name(step.start, step.node),
-        length=speaker.mm(abs(mm)), direction=direction,
-    )  # fmt: skip
+        return speaker.say(texts.CORIOLIS_DIRECTION, slide=slide, rate=rate)
+    return speaker.vector_direction(step.along, _length(speaker, step.length))
 
 
 def is_nothing(speaker: Speaker, node: str, mm: float) -> bool:
@@ -122,6 +125,12 @@ def named(speaker: Speaker, tail: str, head: str) -> Markup:
     """The vector between two nodes of a plan."""
     vectors = speaker.subject.plan.construction.vectors.values()
     return next(speaker.name(one.name) for one in vectors if (one.tail, one.head) == (tail, head))
+
+
+def link_of(speaker: Speaker, step: Given) -> Markup:
+    """The link of a normal component."""
+    vectors = speaker.subject.plan.construction.vectors.values()
+    return next(speaker.name(*vector.link) for vector in vectors if vector.head == step.node and vector.link)
 
 
 def coriolis_link(speaker: Speaker, step: Given) -> str:

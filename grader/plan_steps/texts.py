@@ -5,6 +5,7 @@ from grader.i18n import N_
 POLE = N_("Mark the pole %(node)s. It is the image of all fixed points: %(fixed)s.")
 PIVOT = N_("Mark the fixed joint %(node)s at x = %(x)s, y = %(y)s (real %(real_x)s and %(real_y)s).")
 LAY_OFF = N_("From %(start)s lay off %(segment)s = %(length)s, %(direction)s; it ends in %(node)s.")
+LAY_OFF_UNTOLD = N_("From %(start)s lay off %(segment)s, %(direction)s; it ends in %(node)s.")
 NOTHING_TO_LAY_OFF = N_("%(name)s is zero here: %(node)s falls on %(start)s.")
 CORIOLIS_DIRECTION = N_(
     "perpendicular to the guide: the sliding velocity %(slide)s turned by 90° in the sense of %(rate)s"
@@ -47,6 +48,11 @@ SIMILAR = N_(
     "On %(base)s draw the triangle similar to %(model)s, its letters following in the same sense: "
     "%(first)s = %(first_length)s, %(second)s = %(second_length)s. Its third corner is %(node)s."
 )
+SIMILAR_UNTOLD = N_(
+    "On %(base)s draw the triangle similar to %(model)s, its letters following in the same sense. "
+    "Its third corner is %(node)s."
+)
+DIVIDE_UNTOLD = N_("Take %(node)s on the line through %(p)s and %(q)s as the link's points divide it.")
 SIMILAR_FLAT = N_(
     "%(node)s divides %(base)s as %(third)s divides %(model)s: %(first)s = %(first_length)s, %(second)s "
     "= %(second_length)s."

@@ -5,21 +5,19 @@ import re
 import pytest
 
 from grader.documents import ProblemDocument, ReadingDocument, ReadSheets, SheetDocument
-from grader.feedback import write_feedback
+from grader.feedback import About, write_feedback
 from grader.feedback.class_page import index_page
 from grader.feedback.pages import feedback_page
 from grader.i18n import LANGUAGES
 from grader.scene import MARKS
 from tests.unit.feedback.parsed import Page
-from tests.unit.feedback.works import HOSTILE, hostile_report, picture, report, results
+from tests.unit.feedback.works import HOSTILE, criterion, hostile_report, picture, report, results
 
 
 def everything():
     return [
         feedback_page(report(), [picture(), picture("s07_2.jpg", spread=250.0)], "en"),
-        feedback_page(
-            hostile_report(), [picture(HOSTILE)], "ro", "hint", title=HOSTILE, student_name=HOSTILE
-        ),
+        feedback_page(hostile_report(), [picture(HOSTILE)], "ro", "hint", About(HOSTILE, HOSTILE)),
         feedback_page(report(criteria=[], mistakes=[], scales={}, status="missing", score=None), [], "ru"),
         index_page(results(report(), hostile_report()), "en", title=HOSTILE, student_names={"s08": HOSTILE}),
     ]
@@ -69,7 +67,12 @@ def test_a_page_says_its_language(lang):
 def test_a_page_in_russian_has_no_english_words_of_the_program():
     text = Page(feedback_page(report(), [picture()], "ru")).text
     text = text.replace("s07.jpg", "").replace("Vector", "").replace("Right.", "")
-    text = text.replace("It is too long.", "").replace("pump", "").replace("x = 1", "").replace("s07", "")
+    text = (
+        re.sub(r"It is too long\.|The normal component.*They meet in b'\.", "", text)
+        .replace("pump", "")
+        .replace("x = 1", "")
+        .replace("s07", "")
+    )
     words = set(re.findall(r"[A-Za-z]{4,}", text))
     assert words == set()
 
@@ -129,11 +132,14 @@ def test_problems_are_told_in_the_readers_language_with_the_programs_words():
 def test_the_scan_is_stored_once_however_often_it_is_shown():
     text = feedback_page(report(), [picture()], "en")
     assert text.count("data:image/jpeg") == 1
-    assert text.count('href="#scan-1"') == 1
+    assert text.count('id="scan-0"') == 1
+    assert text.count('href="#scan-0"') >= 2
 
 
 def test_a_plan_that_fills_the_sheet_has_no_close_up():
-    assert "#scan-1" not in feedback_page(report(), [picture(spread=250.0)], "en")
+    whole = report(criteria=[criterion("v_A")], mistakes=[])
+    assert feedback_page(whole, [picture()], "en").count("<figure") == 2
+    assert feedback_page(whole, [picture(spread=250.0)], "en").count("<figure") == 1
 
 
 def test_pictures_and_page_are_written_side_by_side(tmp_path):

@@ -10,11 +10,12 @@ from grader.documents import (
     QuantityDocument,
     ReportDocument,
     ResultsDocument,
+    RivalDocument,
     ScaleDocument,
     ToleranceDocument,
     UnmatchedDocument,
 )
-from grader.scene import Arrow, Dot, Picture, Scene
+from grader.scene import Arrow, Dot, Ghost, Picture, Scene
 
 HOSTILE = '<script>alert("x")</script>'
 
@@ -41,7 +42,13 @@ def report(**changes):
         "criteria": [criterion(), criterion("a_BA_n", "none", 2.5, feedback="It is too long.")],
         "mistakes": [
             MistakeDocument(
-                code="normal_reversed", at="n_BA", explains=["a_BA_n"], confidence=0.9, detail="x = 1"
+                code="normal_reversed",
+                at="n_BA",
+                explains=["a_BA_n"],
+                confidence=0.9,
+                detail="x = 1",
+                feedback="The normal component a_BA_n was laid off away from the centre of rotation.",
+                redo=["From a' lay off a'n_BA, parallel to BA; it ends in n_BA.", "They meet in b'."],
             )
         ],
         "scales": {"kv": ScaleDocument(declared=None, used=0.036, assumed=True)},
@@ -55,7 +62,14 @@ def hostile_report():
         criteria=[criterion(title=HOSTILE, feedback=HOSTILE)],
         scales={"kv": ScaleDocument(declared=0.1, used=0.1, assumed=False, text=HOSTILE, refused=HOSTILE)},
         problems=[ProblemDocument(code="odd", message=HOSTILE, file=HOSTILE)],
-    )
+        mistakes=[
+            MistakeDocument(
+                code="arithmetic", at=HOSTILE, explains=["a_BA_n", HOSTILE], confidence=0.9,
+                detail=HOSTILE, feedback=HOSTILE, redo=[HOSTILE],
+                rivals=[RivalDocument(code="scale_wrong", at=HOSTILE, confidence=0.2, feedback=HOSTILE)],
+            )
+        ],
+    )  # fmt: skip
 
 
 def results(*reports):
@@ -63,8 +77,8 @@ def results(*reports):
     return ResultsDocument(assignment="pump", reports=list(reports), unmatched=[nobody])
 
 
-def picture(source="s07.jpg", *, spread=60.0):
-    """A white sheet with a velocity plan `spread` mm wide on it."""
+def picture(source="s07.jpg", *, spread=60.0, scanned=True):
+    """A white sheet with a velocity plan `spread` mm wide on it; v_B was expected to end elsewhere."""
     _ok, jpeg = cv2.imencode(".jpg", np.full((297, 420), 255, np.uint8))
     _ok, png = cv2.imencode(".png", np.full((297, 420), 255, np.uint8))
     arrows = (
@@ -73,6 +87,8 @@ def picture(source="s07.jpg", *, spread=60.0):
         Arrow("v_C", "velocity_plan", (100.0, 100.0), (130.0, 140.0), "review", doubtful=True),
     )
     dots = (Dot("o", (100.0, 100.0), doubtful=False),)
-    return Picture(
-        source, 1, png.tobytes(), jpeg.tobytes(), 420, 297, Scene((420.0, 297.0), arrows, (), dots)
-    )
+    ghosts = (Ghost("v_B", "velocity_plan", (100.0, 100.0), (100.0 + spread, 150.0)),)
+    scene = Scene((420.0, 297.0), arrows, ghosts, dots)
+    if not scanned:
+        return Picture(source, 1, b"", b"", 0, 0, scene)
+    return Picture(source, 1, png.tobytes(), jpeg.tobytes(), 420, 297, scene)

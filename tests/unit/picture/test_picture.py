@@ -84,7 +84,7 @@ def bgr(verdict):
 def test_the_scan_is_shown_upright_with_every_point_in_its_place(rotation_deg, px_per_mm):
     registered = sheet(rotation_deg, px_per_mm)
     picture = overlay(backdrop(drawn_page(registered), registered, width_px=1680), None, {}, {})
-    scan = cv2.cvtColor(decoded(picture.jpeg), cv2.COLOR_BGR2GRAY)
+    scan = cv2.cvtColor(decoded(picture.scan), cv2.COLOR_BGR2GRAY)
     assert scan.shape == (1188, 1680)
     for at in NODES_MM.values():
         x, y = round(at[0] * 4), round(at[1] * 4)
@@ -109,7 +109,7 @@ def test_paper_becomes_white_in_a_shadow():
     shadow = np.linspace(0.55, 1.0, page.grey.shape[1])
     shaded = Page("s.png", 1, (page.grey * shadow).astype(np.uint8))
     picture = overlay(backdrop(shaded, registered, width_px=1680), None, {}, {})
-    scan = cv2.cvtColor(decoded(picture.jpeg), cv2.COLOR_BGR2GRAY)
+    scan = cv2.cvtColor(decoded(picture.scan), cv2.COLOR_BGR2GRAY)
     assert np.median(scan[:, :100]) > 250
     assert scan.min() < 120
 
@@ -196,7 +196,7 @@ def test_a_page_that_could_not_be_registered_is_shown_as_its_file_asks():
     grey = np.full((300, 200), 240, np.uint8)
     grey[:20, :20] = 0
     picture = overlay(backdrop(Page("x.jpg", 1, grey, turn_deg=90), None), None, {}, {})
-    scan = cv2.cvtColor(decoded(picture.jpeg), cv2.COLOR_BGR2GRAY)
+    scan = cv2.cvtColor(decoded(picture.scan), cv2.COLOR_BGR2GRAY)
     assert scan.shape == (200, 300)
     assert scan[190, 10] < 128 < scan[10, 10]
 
@@ -208,7 +208,7 @@ def test_zero_vectors_and_far_away_nodes_do_no_harm():
             Arrow("v_A", "velocity_plan", (5.0, 5.0), (5.0, 5.0), "full", doubtful=False),
             Arrow("v_B", "velocity_plan", (5.0, 5.0), (9000.0, -9000.0), "review", doubtful=True),
         ),
-        (Ghost((0.0, 0.0), (-50.0, -50.0)),),
+        (Ghost("v_A", "velocity_plan", (0.0, 0.0), (-50.0, -50.0)),),
     )
     assert paint(np.full((297, 420), 255, np.uint8), scene).shape == (297, 420, 3)
 

@@ -1,0 +1,112 @@
+"""What is to be drawn again from a wrong node on: the construction's own steps, in plain words.
+
+Names stand as in reports, `a_BA_n`, so that pages set them with their indices. Without numbers the
+sentences say which line goes where, and by what formula a length is found, but give no answer away.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from grader.i18n import N_, Tongue
+from grader.plan_steps import sentences, texts
+from grader.plan_steps.explanation import computed
+from grader.plan_steps.words import Speaker, speaker_of
+from reference.drawing.subject import Subject
+from reference.elements import Coriolis, Normal
+from reference.steps import Coincide, Divide, Given, Similar, Step, TwoLines
+
+MOST_STEPS = 8
+"""Of one figure that are told in full: what follows is told by its names."""
+THEN = N_("Then draw again what follows from it: %(nodes)s.")
+
+
+@dataclass(frozen=True, slots=True)
+class PlainSpeaker(Speaker):
+    """Says names as they stand in reports."""
+
+    def name(self, *names: str) -> Markup:
+        """A node, a vector, or several nodes side by side."""
+        return Markup("").join(self.subject.shown(name) for name in names)
+
+    def scale(self, scale: str) -> Markup:
+        """A scale's name."""
+        return Markup.escape(self.subject.shown(scale))
+
+    def rate(self, name: str) -> Markup:
+        """An angular velocity or acceleration."""
+        return Markup.escape(self.subject.shown(name))
+
+
+def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> list[str]:
+    """The steps from a node on: those of its figure in full, later figures' nodes by name.
+
+    Empty for what is no node of the construction. Without numbers, steps of the mechanism are left out:
+    they are nothing but given lengths.
+    """
+    construction = subject.plan.construction
+    order = [step.node for step in construction.steps]
+    if node not in order:
+        return []
+    found = speaker_of(subject, tongue)
+    speaker = PlainSpeaker(found.subject, found.tongue, found.view)
+    touched = _touched(construction.steps, node)
+    figure = construction.figure_of(node)
+    own = [step for step in touched if construction.figure_of(step.node) == figure]
+    told = [_told(speaker, step, with_numbers=with_numbers) for step in own[:MOST_STEPS]]
+    later = [step.node for step in (*own[MOST_STEPS:], *(step for step in touched if step not in own))]
+    if later:
+        told.append(speaker.say(THEN, nodes=speaker.names(tuple(later))))
+    return [line.unescape() for line in told if line]
+
+
+def _touched(steps: tuple[Step, ...], node: str) -> list[Step]:
+    """The step of a node and all that hang on it, in their order."""
+    nodes, touched = {node}, []
+    for step in steps:
+        if step.node in nodes or nodes & set(step.needs):
+            nodes.add(step.node)
+            touched.append(step)
+    return touched
+
+
+def _told(speaker: Speaker, step: Step, *, with_numbers: bool) -> Markup:
+    if not with_numbers:
+        return Markup(". ").join(_untold(speaker, step))
+    computing = Markup("; ").join(computed(speaker, step))
+    drawing = sentences.sentence(speaker, step)
+    return Markup("{}. {}").format(computing, drawing) if computing else drawing
+
+
+def _untold(speaker: Speaker, step: Step) -> Iterator[Markup]:
+    """A step without a number: its formula, then what is drawn."""
+    node = speaker.name(step.node)
+    match step:
+        case TwoLines() | Coincide():
+            yield sentences.sentence(speaker, step)
+        case Given(length=Normal() | Coriolis()):
+            yield _formula(speaker, step)
+            direction = sentences.direction_told(speaker, step)
+            yield speaker.say(
+                texts.LAY_OFF_UNTOLD, start=speaker.name(step.start), node=node,
+                segment=speaker.name(step.start, step.node), direction=direction,
+            )  # fmt: skip
+        case Similar(base=base, model=model):
+            yield speaker.say(
+                texts.SIMILAR_UNTOLD, base=speaker.name(*base), model=speaker.name(*model), node=node
+            )
+        case Divide(base=(p, q)):
+            yield speaker.say(texts.DIVIDE_UNTOLD, node=node, p=speaker.name(p), q=speaker.name(q))
+
+
+def _formula(speaker: Speaker, step: Given) -> Markup:
+    """How the component is computed, in names alone."""
+    name = sentences.named_vector(speaker, step)
+    if isinstance(step.length, Normal):
+        speed = sentences.named(speaker, step.length.tail, step.length.head)
+        return Markup("{} = {}² / {}").format(name, speed, sentences.link_of(speaker, step))
+    if isinstance(step.length, Coriolis):
+        rate = speaker.rate(f"omega_{sentences.coriolis_link(speaker, step)}")
+        return Markup("{} = 2 · {} · {}").format(name, rate, sentences.named(speaker, *step.length.slide))
+    return Markup("")

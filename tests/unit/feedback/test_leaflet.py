@@ -1,0 +1,73 @@
+"""What a student is told: mistakes first, each where it is seen, and what waits with its reason."""
+
+from grader.documents import MistakeDocument
+from grader.feedback import About
+from grader.feedback.leaflets import leaflet_of
+from grader.i18n import tongue
+from tests.unit.feedback.works import criterion, picture, report
+
+
+def leaflet(one, pictures=(), level="full", names=None):
+    return leaflet_of(one, pictures, tongue("en"), level, About(names=names or {}))
+
+
+def mistake(code, at, explains):
+    return MistakeDocument(code=code, at=at, explains=explains, confidence=0.9, feedback=f"{code} said")
+
+
+def test_mistakes_come_in_the_order_of_the_drawing_not_of_their_certainty():
+    one = report(
+        criteria=[criterion("v_A", "none", 0.0), criterion("v_B", "none", 0.0)],
+        mistakes=[mistake("wrong_link", "b", ["v_B"]), mistake("sense_reversed", "a", ["v_A"])],
+    )
+    assert [action.at for action in leaflet(one).actions] == ["a", "b"]
+
+
+def test_what_no_mistake_explains_is_told_too():
+    one = report(criteria=[criterion("v_B", "none", 0.0), criterion("v_C", "partial", 1.0)], mistakes=[])
+    (action,) = leaflet(one).actions
+    assert [title.striptags() for title in action.explains] == ["Vector vB", "Vector vC"]
+
+
+def test_a_right_drawing_has_nothing_to_put_right():
+    one = report(criteria=[criterion("v_B")], mistakes=[])
+    assert leaflet(one).actions == ()
+    assert leaflet(one).waiting == ()
+
+
+def test_a_mistake_is_shown_close_up_with_what_was_expected():
+    one = report(criteria=[criterion("v_B", "none", 0.0)], mistakes=[mistake("wrong_link", "b", ["v_B"])])
+    (action,) = leaflet(one, [picture()]).actions
+    assert action.look.names == ("v_B",)
+    x, y, wide, high = action.look.box
+    tip_and_aim = ((160.0, 130.0), (160.0, 150.0))
+    assert all(x < at[0] < x + wide and y < at[1] < y + high for at in tip_and_aim)
+
+
+def test_what_waits_is_told_by_its_reason():
+    near = criterion("v_B", "review", None).model_copy(update={"reasons": ["near_limit"]})
+    doubtful = [
+        criterion(name, "review", None).model_copy(update={"reasons": ["doubtful", "near_limit"]})
+        for name in ("v_A", "v_C")
+    ]
+    waiting = leaflet(report(criteria=[near, *doubtful], mistakes=[])).waiting
+    assert [[name.striptags() for name in one.names] for one in waiting] == [["vB"], ["vA", "vC"]]
+    assert waiting[1].why == "read with too little certainty"
+
+
+def test_a_review_for_a_reason_without_words_is_told_as_open():
+    odd = criterion("v_B", "review", None).model_copy(update={"reasons": ["brand_new"]})
+    assert leaflet(report(criteria=[odd], mistakes=[])).waiting[0].why == "open"
+
+
+def test_a_picture_is_told_in_words_for_those_who_do_not_see_it():
+    one = report(criteria=[criterion("v_A"), criterion("v_B", "none", 0.0)], mistakes=[])
+    told = leaflet(one, [picture()])
+    plan = next(look for look in told.sheets[0].looks if look.kind == "velocity_plan")
+    assert told.told(plan) == "the velocity plan. v_A: right; v_B: wrong"
+
+
+def test_plans_as_measured_have_no_sheet_beneath_them():
+    told = leaflet(report(), [picture(scanned=False)])
+    assert [look.kind for look in told.sheets[0].looks] == ["velocity_plan"]
+    assert "entered measurements" in told.sheets[0].source
