@@ -6,6 +6,7 @@ Who draws what stands in `judging_students`, what is due in `judging_truth`. One
 """
 
 import argparse
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -13,9 +14,10 @@ from grader.bench.judging_assignments import ASSIGNMENTS
 from grader.bench.judging_handed_in import submission
 from grader.bench.judging_students import HANDS, KINDS, SOURCES, Key, Kind, Source, Work, student
 from grader.bench.judging_tables import judging_tables
-from grader.bench.judging_tally import ClassTime, JudgingFigures, Result, Times, result_of, told
+from grader.bench.judging_tally import ClassTime, JudgingFigures, Result, Times, result_of
 from grader.bench.plain_text import as_text
 from grader.judging import Task, judge, task_of
+from grader.outcomes import Quantity
 
 __all__ = ["ASSIGNMENTS", "JudgingBench", "Key", "judged"]
 
@@ -127,10 +129,26 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _in_full(key: Key) -> Iterator[str]:
     work = student(key)
     yield f"{key}: {work.variant}, {'scales declared' if work.declares else 'nothing declared'}"
-    yield "made: " + ("; ".join(told(one) for one in work.task.mistakes) or "nothing")
-    for result in judged(key):
+    turn = math.degrees(float(work.task.right.parameters["turn"]))
+    yield f"sketch turned by {turn:.0f} degrees; not drawn: {', '.join(sorted(work.left_out)) or 'nothing'}"
+    task = task_of(work.assignment, work.rubric, work.variant)
+    for source in SOURCES:
+        handed_in = submission(work, source)
+        judgement = judge(task, handed_in)
+        result = result_of(work, source, handed_in, judgement)
         yield f"-- {result}"
-        yield from (f"   {one.criterion:10} due {one.due:8} {one.verdict}" for one in result.criteria)
+        for one, outcome in zip(result.criteria, judgement.outcomes, strict=True):
+            said = ", ".join(reason.code for reason in outcome.reasons)
+            seen = f"{_short(outcome.measured)} for {_short(outcome.expected)}"
+            yield f"   {one.criterion:10} due {one.due:8} {one.verdict:14} {seen}  {said}"
+
+
+def _short(quantity: Quantity) -> str:
+    """What a criterion was measured as, or should be."""
+    if quantity.length_mm is None:
+        return "-" if quantity.value is None else f"{quantity.value:.4g}"
+    turn = "" if quantity.direction_deg is None else f" at {quantity.direction_deg:.1f}"
+    return f"{quantity.length_mm:.2f} mm{turn}"
 
 
 if __name__ == "__main__":
