@@ -168,6 +168,9 @@ def _check_points(criteria: Iterable[PlatformCriterion], given: Iterable[tuple[s
 # Canvas -------------------------------------------------------------------------------------------
 
 
+CanvasUser = Annotated[str, Field(pattern=r"^([1-9][0-9]*|sis_(user|login|integration)_id:[^/?#\s]+)$")]
+
+
 class CanvasMark(Payload):
     """Points and comment on a criterion of the rubric."""
 
@@ -215,7 +218,7 @@ class CanvasGrade(Payload):
 class CanvasGrades(Payload):
     """By Canvas's number of the student, or `sis_user_id:` and the institution's."""
 
-    grade_data: dict[str, CanvasGrade]
+    grade_data: dict[CanvasUser, CanvasGrade]
 
 
 class CanvasBulk(Payload):

@@ -15,6 +15,8 @@ from grader.platform_documents import MoodleMarksDocument, MoodleRubricDocument
 from reference.errors import CallError
 
 _LONGEST_NAME = 255
+_NO_TAGS = str.maketrans("<>", "‹›")
+"""Moodle refuses names in which it sees a tag."""
 
 
 def class_marks(grades: Sequence[Grade], options: Options) -> list[tuple[Grade, list[Mark]]]:
@@ -53,7 +55,7 @@ def guide(grades: Sequence[Grade], options: Options) -> Draft:
     made = int(options.moment.timestamp())
     criteria = class_criteria(grades, options)
     definition = {
-        "name": options.item.strip() or grades[0].reports[0].assignment,
+        "name": (options.item.strip() or grades[0].reports[0].assignment).translate(_NO_TAGS),
         "timecreated": made,
         "timemodified": made,
         "guide": {
@@ -71,7 +73,7 @@ def guide(grades: Sequence[Grade], options: Options) -> Draft:
 def _criterion(order: int, one: Criterion) -> dict[str, object]:
     return {
         "sortorder": order,
-        "shortname": one.name[:_LONGEST_NAME],
+        "shortname": one.name.translate(_NO_TAGS)[:_LONGEST_NAME],
         "description": one.titles[0],
         "descriptionmarkers": "",
         "maxscore": one.max_points,

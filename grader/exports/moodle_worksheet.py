@@ -24,6 +24,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "email": ("Email address", "Adresă de email", "Adresa de email", "Адрес электронной почты"),
     "grade": ("Grade", "Notă", "Nota", "Оценка"),
     "maximum": ("Maximum grade", "Notă maximă", "Nota maximă", "Максимальная оценка"),
+    "scale": ("Scale", "Scală", "Scala", "Шкала"),
     "changeable": ("Grade can be changed", "Nota poate fi schimbată", "Оценка может быть изменена"),
     "modified": (
         "Last modified (grade)", "Ultima modificare (nota)", "Ultima modificare (notă)",
@@ -208,6 +209,10 @@ def _columns(header: list[str]) -> tuple[dict[str, int], list[str]]:
             columns[name] = places[0]
         elif name in _REQUIRED:
             faults.append(f"row 1: there is no column '{known[0]}' (columns: {', '.join(header)})")
+    if "scale" in columns:
+        faults.append(
+            "row 1: the assignment is graded by a scale, and Moodle would skip points: let it be points"
+        )
     if columns.get("feedback") == 0:
         faults.append("row 1: feedback comments stand in the first column, where Moodle drops them")
     return columns, faults

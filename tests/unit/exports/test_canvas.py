@@ -280,6 +280,12 @@ def test_paths_have_canvass_own_placeholders_where_numbers_are_not_told(tmp_path
     assert "--course-id" in delivery.notes[0]
 
 
+@pytest.mark.parametrize("number", ["0", "a/b", "sis_user_id:", "sis_user_id:a/../b", "name"])
+def test_a_number_that_canvas_would_not_take_is_refused(tmp_path, rubric, number):
+    with pytest.raises(InputFileError, match="grade_data"):
+        points(tmp_path, rubric, marked("s01", 5.0, 2.5), people={"s01": Person(platform_id=number)})
+
+
 @pytest.mark.parametrize(
     "answer",
     [

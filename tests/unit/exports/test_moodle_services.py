@@ -81,6 +81,17 @@ def test_the_rubric_becomes_a_marking_guide_of_the_activity(tmp_path, answer):
     assert delivery.is_complete
 
 
+def test_names_have_nothing_that_moodle_takes_for_a_tag(tmp_path, answer):
+    _, path = moodle(
+        tmp_path, "rubric", marked("s01", 5.0, title="v <{}> " + 300 * "x"), criteria=answer(), item="<Pump>"
+    )
+    (definition,) = json.loads(path.read_bytes())["arguments"]["areas"][0]["definitions"]
+    (one,) = definition["guide"]["guide_criteria"]
+    assert one["shortname"].startswith("c1: v ‹1› ")
+    assert len(one["shortname"]) == 255
+    assert definition["name"] == "‹Pump›"
+
+
 def test_the_activity_may_be_told_by_its_numbers(tmp_path):
     _, path = moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2)
     assert json.loads(path.read_bytes())["arguments"]["areas"][0]["contextid"] == 2

@@ -151,6 +151,7 @@ def test_a_worksheet_downloaded_in_romanian_or_russian_is_understood():
             worksheet(",Participant 1,,-", header="Feedback comments,Identifier,Grade,Last modified (grade)"),
             "first column",
         ),
+        (worksheet(line(101), header=HEADER.replace("Maximum grade", "Scale")), "graded by a scale"),
         (worksheet(line(101)).decode().encode("utf-16"), "not UTF-8"),
         (worksheet(line(101)).replace(b",", b";"), "no column"),
     ],
