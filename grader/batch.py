@@ -42,6 +42,7 @@ class Batch:
     pages_per_student : pages of each student in one class file, blank ones not counted
     jobs : processes
     lang, level : of feedback, where the roster does not say
+    with_ghosts : whether pictures show expected vectors beside wrong ones, at level `full`
     with_pdf : whether each student's feedback is written for the printer, too
     """
 
@@ -54,6 +55,7 @@ class Batch:
     jobs: int = 1
     lang: str = "en"
     level: Level = "full"
+    with_ghosts: bool = True
     with_pdf: bool = False
 
 
@@ -183,7 +185,9 @@ def _jobs(batch: Batch, works: Sequence[Work], surveys: Sequence[Survey]) -> lis
     content = {source.file: one.digest for one in surveys for source in one.pages}
     assignment = (batch.assignment.file.model_dump_json(), batch.assignment.mechanism_file.model_dump_json())
     read = digest_of((*assignment, *asked_of(batch.assignment, batch.rubric)))
-    marked = digest_of((*assignment, batch.rubric.model_dump_json(), batch.level, batch.with_pdf))
+    marked = digest_of(
+        (*assignment, batch.rubric.model_dump_json(), batch.level, batch.with_ghosts, batch.with_pdf)
+    )
     jobs = []
     for work, folder in zip(works, folders_of(works), strict=True):
         pages = [(place.name, place.page, content.get(place.name, "")) for place in work.pages]
@@ -230,7 +234,9 @@ def _position(work: Work) -> str:
 def _mark_one(batch: Batch, job: Job) -> ReportDocument:
     """Mark one submission and write its files; its key last, so that it stands for all of them."""
     work, where = job.work, batch.out / job.folder
-    marked = mark_looked(work, batch.assignment, batch.rubric, _looked(batch, job), batch.level)
+    marked = mark_looked(
+        work, batch.assignment, batch.rubric, _looked(batch, job), batch.level, with_ghosts=batch.with_ghosts
+    )
     write_feedback(
         marked.report, marked.pictures, where, work.lang, batch.level, _about(batch, work),
         with_pdf=batch.with_pdf,

@@ -168,9 +168,19 @@ def asked_of(assignment: Assignment, rubric: RubricFile) -> tuple[frozenset[str]
 
 
 def mark_looked(
-    work: Work, assignment: Assignment, rubric: RubricFile, looked: Sequence[Looked], level: Level = "full"
+    work: Work,
+    assignment: Assignment,
+    rubric: RubricFile,
+    looked: Sequence[Looked],
+    level: Level = "full",
+    *,
+    with_ghosts: bool = True,
 ) -> Marked:
-    """Mark a submission whose pages were read, now or in an earlier run."""
+    """Mark a submission whose pages were read, now or in an earlier run.
+
+    Arguments: pictures show expected vectors beside wrong ones at level `full`, unless without `with_ghosts`.
+    """
+    with_ghosts = with_ghosts and level == "full"
     looked = [_only(one, rubric.vectors) for one in looked]
     readings = [one.reading for one in looked]
     documents = [one.document for one in looked]
@@ -181,7 +191,7 @@ def mark_looked(
             assignment, rubric, work.variant or Variant(), work.student_id,
             "unreadable" if work.pages or work.measured else "missing", problems=problems, sheets=documents,
         )  # fmt: skip
-        return Marked(work, report, _pictures(looked, {}, None, level))
+        return Marked(work, report, _pictures(looked, {}, None, show_expected=with_ghosts))
     task, judgement, declared = judged
     names = assignment.file.names
     report = report_of(
@@ -198,8 +208,8 @@ def mark_looked(
     )
     report = _with_sources(report, declared.sources)
     report = with_mistakes_told(report, judgement, assignment, task.variant, work.lang, level)
-    pictures = _pictures(looked, task.construction.vectors, judgement, level)
-    return Marked(work, report, pictures or _as_measured(work, task, judgement, level))
+    pictures = _pictures(looked, task.construction.vectors, judgement, show_expected=with_ghosts)
+    return Marked(work, report, pictures or _as_measured(work, task, judgement, show_expected=with_ghosts))
 
 
 def _only(one: Looked, names: Collection[str]) -> Looked:
@@ -365,24 +375,28 @@ def _measuring_problems(work: Work) -> tuple[Problem, ...]:
 
 
 def _pictures(
-    looked: Sequence[Looked], vectors: Mapping[str, Vector], judgement: Judgement | None, level: Level
+    looked: Sequence[Looked],
+    vectors: Mapping[str, Vector],
+    judgement: Judgement | None,
+    *,
+    show_expected: bool,
 ) -> tuple[Picture, ...]:
     outcomes = {} if judgement is None else {outcome.name: outcome for outcome in judgement.outcomes}
     return tuple(
-        overlay(one.backdrop, one.reading, vectors, outcomes, show_expected=level == "full")
+        overlay(one.backdrop, one.reading, vectors, outcomes, show_expected=show_expected)
         for one in looked
         if one.backdrop is not None
     )
 
 
-def _as_measured(work: Work, task: Task, judgement: Judgement, level: Level) -> tuple[Picture, ...]:
+def _as_measured(work: Work, task: Task, judgement: Judgement, *, show_expected: bool) -> tuple[Picture, ...]:
     """The plans as entered measurements draw them, where no page shows them."""
     if work.measured is None:
         return ()
     outcomes = {outcome.name: outcome for outcome in judgement.outcomes}
     picture = measured_picture(
         work.measured.source, work.measured.reading, task.construction, outcomes,
-        show_expected=level == "full",
+        show_expected=show_expected,
     )  # fmt: skip
     return () if picture is None else (picture,)
 

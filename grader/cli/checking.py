@@ -5,14 +5,14 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from grader.cli.grading import check_language
+from grader.cli.grading import check_language, checked_level
 from grader.feedback import mistake_feedback, reason_sentence
 from grader.i18n import Tongue, tongue
 from grader.judging import Submission, judge, task_of
 from grader.measurements import Measurements, names_of, read_measurements
 from grader.outcomes import Mistake, Quantity
 from grader.rubric import rubric_of
-from grader.selfcheck import LEVELS, Checked, Level, is_all_right, likely_mistakes, told
+from grader.selfcheck import Checked, Level, is_all_right, likely_mistakes, told
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError
 
@@ -22,9 +22,7 @@ MARKS = {"right": ("✓", "green"), "off": ("✗", "red"), "open": ("?", "magent
 def check_measured(name: str, n: int | None, position: int | None, file: Path, lang: str, level: str) -> bool:
     """Tell right and off for every value of a measurement file; whether anything is off."""
     check_language(lang)
-    wanted = next((known for known in LEVELS if known == level), None)
-    if wanted is None:
-        raise CallError("unknown_level", f"--level {level}: known are {', '.join(LEVELS)}")
+    wanted = checked_level(level)
     assignment = load_assignment(name)
     rubric = rubric_of(assignment)
     words = tongue(lang)

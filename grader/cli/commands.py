@@ -159,13 +159,23 @@ def grade(
     ] = None,
     jobs: JobsOption = None,
     lang: LanguageOption = "en",
+    level: Annotated[
+        str, typer.Option("--level", help="What students are told: symbol, hint, or full (with the answers).")
+    ] = "full",
+    ghosts: Annotated[
+        bool, typer.Option("--ghosts/--no-ghosts", help="With --level full: draw expected vectors, dotted.")
+    ] = True,
+    pdf: Annotated[
+        bool, typer.Option("--pdf/--no-pdf", help="Write each student's feedback.pdf, to be printed, too.")
+    ] = False,
 ) -> None:
     """Grade a folder of scans (JPEG, PNG, TIFF, PDF) and measurement files (CSV, JSON)."""
     from grader.cli.grading import grade_folder
 
     open_ends = grade_folder(
-        folder, assignment, out, roster=roster, pages_per_student=pages_per_student, jobs=jobs, lang=lang
-    )
+        folder, assignment, out, roster=roster, pages_per_student=pages_per_student, jobs=jobs, lang=lang,
+        level=level, with_ghosts=ghosts, with_pdf=pdf,
+    )  # fmt: skip
     raise typer.Exit(1 if open_ends else 0)
 
 

@@ -20,6 +20,7 @@ from grader.moved import told_standing
 from grader.pipeline import Place, Seen, documents_of, read, see
 from grader.rubric import rubric_of
 from grader.samples_folder import samples_folder
+from grader.selfcheck import LEVELS, Level
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, InputFileError
 
@@ -35,16 +36,21 @@ def grade_folder(
     pages_per_student: int | None,
     jobs: int | None,
     lang: str,
+    level: str = "full",
+    with_ghosts: bool = True,
+    with_pdf: bool = False,
 ) -> bool:
     """Grade a folder and tell what came of it; whether anything is left for a person."""
     check_language(lang)
+    wanted = checked_level(level)
     if pages_per_student is not None and pages_per_student < 1:
         raise CallError("pages_per_student", "--pages-per-student must be 1 or more")
     assignment = load_assignment(name)
     rubric = rubric_of(assignment)
     batch = Batch(
-        assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1, lang
-    )
+        assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1, lang,
+        wanted, with_ghosts, with_pdf,
+    )  # fmt: skip
     with progress() as tell:
         results = grade(batch, tell)
     _tell(results, out)
@@ -55,6 +61,14 @@ def check_language(lang: str) -> None:
     """Refuse a language that there is no feedback in."""
     if lang not in LANGUAGES:
         raise CallError("unknown_language", f"--lang {lang}: known are {', '.join(LANGUAGES)}")
+
+
+def checked_level(level: str) -> Level:
+    """A level of feedback; raises CallError for another word."""
+    wanted = next((known for known in LEVELS if known == level), None)
+    if wanted is None:
+        raise CallError("unknown_level", f"--level {level}: known are {', '.join(LEVELS)}")
+    return wanted
 
 
 @contextmanager
@@ -113,7 +127,9 @@ def demo(out: Path, lang: str, jobs: int | None) -> None:
     for name in ("pump", "press"):
         typer.echo(f"Grading the {name} class of the samples")
         folder = samples_folder() / name
-        grade_folder(folder, name, out / name, roster=None, pages_per_student=None, jobs=jobs, lang=lang)
+        grade_folder(
+            folder, name, out / name, roster=None, pages_per_student=None, jobs=jobs, lang=lang, with_pdf=True
+        )
 
 
 def read_scans(
