@@ -28,7 +28,7 @@ from grader.scoring import score
 from reference.assignment import Assignment, Variant
 from reference.elements import Parameters
 from reference.geometry import ComplexArray
-from reference.hand import Own, Skill, trace
+from reference.hand import Skill, trace
 from reference.mistakes import Drawing
 from reference.replay import Seen
 
@@ -39,7 +39,7 @@ def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission)
     mistakes = diagnose(_case(task, comparison))
-    mistakes = (*mistakes, *_swaps_seen(task, submission, mistakes))
+    mistakes = (*mistakes, *_swaps_seen(task, submission, mistakes), *_not_drawn(task, comparison))
     outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
 
@@ -64,6 +64,30 @@ def _swaps_seen(task: Task, submission: Submission, known: Sequence[Mistake]) ->
     return found
 
 
+def _not_drawn(task: Task, comparison: Comparison) -> list[Mistake]:
+    """Vectors that are asked for, long enough, and not on the sheet although both their ends were read.
+
+    What was not measured says nothing: nobody need measure everything.
+    """
+    evidence, construction = comparison.evidence, task.construction
+    known = {*evidence.nodes, *construction.poles.values()} if evidence.has_sheets else set()
+    found = []
+    for one in comparison.outcomes:
+        vector = construction.vectors.get(one.name)
+        if vector is None or one.verdict not in {"none", "review"} or evidence.vector(one.name) is not None:
+            continue
+        is_left_out = {vector.tail, vector.head} <= known
+        if is_left_out and (one.expected.length_mm or 0.0) >= LEAST_LEFT_OUT_MM:
+            found.append(Mistake("vector_missing", one.name, (one.criterion,), LEFT_OUT))
+    return found
+
+
+LEAST_LEFT_OUT_MM = 5.0
+"""A shorter one may hide in its ends' marks."""
+LEFT_OUT = 0.9
+"""How sure it is: of 368 vectors drawn between two ends read for certain, none was overlooked."""
+
+
 def _case(task: Task, comparison: Comparison) -> Case:
     """The drawing to explain, at the scales used, with what contradicts them."""
     scales, followed, vectors = comparison.scales, comparison.followed, task.construction.vectors
@@ -71,51 +95,61 @@ def _case(task: Task, comparison: Comparison) -> Case:
         name: np.asarray(followed[name] if scale.assumed else scale.used) for name, scale in scales.items()
     }
     parameters = {**task.parameters, **used}
-    lost = [one for one in comparison.outcomes if one.verdict in {"none", "partial", "follow_through"}]
+    hand = task.rubric.hand
+    skill = Skill(hand.angle_deg, hand.place_mm, hand.mark_mm)
+    lost = [one for one in comparison.outcomes if one.verdict in LOST]
     return Case(
         drawing=Drawing(task.construction, parameters),
-        seen=_seen(task, comparison, parameters),
+        seen=_seen(task, comparison, parameters, skill),
         lost={one.name: one.criterion for one in lost if one.name in vectors},
         assignment=task.assignment,
         variant=task.variant,
+        skill=skill,
         followed={
             name: other
             for name, other in followed.items()
             if other != scales[name].used and not scales[name].assumed
         },
+        assumed=frozenset(name for name, scale in scales.items() if scale.assumed),
         scale_criteria={
-            one.name: one.criterion for one in lost if one.name in scales and one.verdict != "follow_through"
+            one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED
         },
     )
 
 
+CHARGED = frozenset({"none", "partial"})
+LOST = CHARGED | {"follow_through", "review"}
+"""Verdicts whose cause is looked for: also where a person has still to decide."""
 LEAST_MISS_MM = 0.15
 """However well a hand draws, and however well its drawing is read."""
 
 
-def _seen(task: Task, comparison: Comparison, parameters: Parameters) -> list[Seen]:
+def _seen(task: Task, comparison: Comparison, parameters: Parameters, skill: Skill) -> list[Seen]:
     """The student's own nodes, and the vectors that lead to none of them."""
-    evidence, construction, hand = comparison.evidence, task.construction, task.rubric.hand
-    own = {
-        figure: {
-            step.node: Own(evidence.nodes[step.node]) for step in steps if step.node in evidence.nodes
-        }
-        for figure, steps in construction.figures.items()
-    }
-    traced = trace(construction, parameters, Skill(hand.angle_deg, hand.place_mm, hand.mark_mm), own)
-    seen = []
-    for name, place in evidence.nodes.items():
-        if name not in construction.poles.values() and name not in task.ground:
-            seen.append(Seen(name, None, place, True, _spread(traced.made[name].moved, LEAST_MISS_MM)))
+    evidence, construction = comparison.evidence, task.construction
+    given = {*construction.poles.values(), *task.ground}
+    seen = [
+        Seen(name, None, place, _spread(NOTHING, LEAST_MISS_MM))
+        for name, place in evidence.nodes.items()
+        if name not in given
+    ]
+    traced = None
     for name, vector in construction.vectors.items():
         drawn = evidence.vector(name)
         if drawn is None or drawn.confidence < task.rubric.least_confidence or vector.head in evidence.nodes:
             continue
-        value = drawn.as_complex
-        moved = traced.moved(vector.tail, vector.head)
-        spread = _spread(moved, math.hypot(LEAST_MISS_MM, drawn.se_mm, hand.ruler_mm))
-        seen.append(Seen(vector.head, vector.tail, value or drawn.length_mm, value is not None, spread))
+        value, read_mm = drawn.as_complex, math.hypot(LEAST_MISS_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
+        if value is not None:
+            seen.append(Seen(vector.head, vector.tail, value, _spread(NOTHING, read_mm)))
+            continue
+        # What leads to a length is not seen: all earlier errors are in it.
+        traced = traced or trace(construction, parameters, skill)
+        spread = _spread(traced.moved(vector.tail, vector.head), read_mm)
+        seen.append(Seen(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
     return seen
+
+
+NOTHING: ComplexArray = np.zeros(0, np.complex128)
 
 
 def _spread(moved: ComplexArray, least_mm: float) -> tuple[float, float, float]:

@@ -90,6 +90,19 @@ def acts(construction: Construction) -> tuple[Act, ...]:
     return tuple((step.node, slot, kind) for step in construction.steps for slot, kind in acts_of(step))
 
 
+def hand_errors(step: Step, skill: Skill) -> Errors:
+    """The errors of one step's acts, arrays (acts + 1, 1): none in the first row, then one in each.
+
+    They are as small as `SMALL` says, in standard deviations.
+    """
+    own = acts_of(step)
+    rows = SMALL * np.eye(len(own), 1 + len(own), 1)[:, :, None]
+    return {
+        (step.node, slot, kind): row * skill.deviation(kind)
+        for (slot, kind), row in zip(own, rows, strict=True)
+    }
+
+
 @dataclass(frozen=True, slots=True)
 class Own:
     """A node as a student has drawn it, or as measurements lead to it.

@@ -17,8 +17,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from reference.construction import Construction
-from reference.elements import Coriolis, Normal, Parameters, View
+from reference.elements import Coriolis, Errors, Normal, Parameters, View
 from reference.geometry import ComplexArray, FloatArray
+from reference.hand import SMALL, Skill, hand_errors
 from reference.mistakes import Drawing, Mistake, changed_step, mistakes_of_step
 from reference.numbers import dot
 from reference.steps import Given, Step
@@ -39,14 +40,14 @@ RARITY: Mapping[str, float] = {
     "labels_swapped": 16.0,
     "figure_rotated": 14.0,
     "scale_wrong": 10.0,
-    "arithmetic": 17.0,
+    "arithmetic": 22.0,
 }
 """What a mistake costs: one step in a hundred or so goes wrong, in one of ten or so ways, and a slip in
 a computation may give any length."""
 SOMETHING_ELSE = 9.0
 """What a step costs that went wrong in a way nobody knows, beside what it makes likely: any place."""
-ANYWHERE = 8.8
-"""A length seen anywhere within some 100 mm instead of within its error; a place costs twice that."""
+ANYWHERE = 2.0 * math.log(100.0)
+"""A length may then be anything within some 100 mm; a place costs twice that."""
 SUSPECT = 9.0
 """From this misfit on (three standard errors) wrong ways are tried."""
 WITHIN = 24.0
@@ -69,15 +70,15 @@ class Seen:
     node : where it ends
     tail : the node from which it is seen; None for a place about the figure's origin
     value : complex millimetres, or a length where it has no direction
-    spread : mm^2, how far the hand and the reading may miss the end: variance along x, covariance,
-        variance along y
+    spread : mm^2, how far it may be missed: variance along x, covariance, variance along y; of what has
+        a direction by its reading alone, the hand's own errors come to it
     """
 
     node: str
     tail: str | None
     value: complex
-    has_direction: bool
     spread: tuple[float, float, float]
+    has_direction: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,15 +168,22 @@ class _Way:
 
 
 def replay(
-    drawing: Drawing, seen: Iterable[Seen], roots: Sequence[Root], *, care: float = 1.0, blind: bool = False
+    drawing: Drawing,
+    seen: Iterable[Seen],
+    roots: Sequence[Root],
+    skill: Skill,
+    *,
+    care: float = 1.0,
+    blind: bool = False,
 ) -> list[Account]:
     """The accounts of a drawing, the likeliest first.
 
     Arguments
     ---------
     drawing : the right one at its scales, parameters scalar
-    care : how many times the standard deviations supposed this hand's are; costs for different hands
-        may be compared
+    skill : of a usual hand
+    care : how many times its standard deviations this hand's are; costs for different hands may be
+        compared
     blind : mistakes are also tried at steps of which what was seen tells no place, one to an account
     """
     by_node = _by_node(drawing.construction, seen)
@@ -187,7 +195,8 @@ def replay(
                 if step.node not in needed:
                     continue
                 sight = _Sight(tuple(by_node.get(step.node, ())), branches.turned.get(figure), care)
-                ways = _ways(step, drawing.construction, branches, sight, blind=blind)
+                errors = hand_errors(step, skill) if sight.tells_place else {}
+                ways = _ways(step, drawing.construction, branches, sight, errors, blind=blind)
                 _go_on(step.node, branches, ways, sight)
     return _accounts(branches)
 
@@ -252,21 +261,28 @@ class _Sight:
             return np.asarray(one.value)
         return np.asarray(one.value / self.turned)
 
-    def misfit(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> FloatArray:
-        """The squared misfit of a place, in standard deviations; infinite where there is none."""
-        total = np.zeros(np.shape(place))
+    def held_against(
+        self, place: ComplexArray, moved: ComplexArray | None, nodes: Mapping[str, ComplexArray]
+    ) -> tuple[FloatArray, FloatArray]:
+        """The squared misfit of a place in standard deviations, infinite where there is none, and its cost.
+
+        The cost is -2 log of the density of what was seen, millimetres: wide errors make each place rarer.
+
+        Arguments: `moved` (acts, branches) is how far the acts of a usual hand move the place.
+        """
+        misfit = np.where(np.isfinite(place), 0.0, np.inf)
+        width = np.zeros(np.shape(place))
         for one in self.seen:
             vector = place if one.tail is None else place - nodes[one.tail]
-            total = total + (self._off(one, vector) if one.has_direction else _off_length(one, vector))
-        return np.where(np.isfinite(total), total / self.care**2, np.inf)
-
-    def _off(self, one: Seen, vector: ComplexArray) -> FloatArray:
-        off = self.value(one) - vector
-        xx, xy, yy = one.spread
-        if self.turned is not None:
-            xx, xy, yy = (xx + yy) / 2.0, 0.0, (xx + yy) / 2.0
-        x, y = off.real, off.imag
-        return np.asarray((yy * x**2 - 2.0 * xy * x * y + xx * y**2) / (xx * yy - xy**2))
+            if one.has_direction:
+                squared, variance = _off(self.value(one) - vector, one.spread, moved)
+            else:
+                squared, variance = _off_length(abs(one.value), vector, one.spread)
+            misfit = misfit + squared
+            width = width + np.log(variance)
+        misfit = np.where(np.isfinite(misfit), misfit / self.care**2, np.inf)
+        whole = misfit + width + self.freedom * math.log(math.tau * self.care**2)
+        return misfit, np.where(np.isfinite(whole), whole, np.inf)
 
     @property
     def tells_place(self) -> bool:
@@ -277,11 +293,6 @@ class _Sight:
     def freedom(self) -> int:
         """How many numbers were seen."""
         return sum(2 if one.has_direction else 1 for one in self.seen)
-
-    @property
-    def width(self) -> float:
-        """What it costs that this hand's errors are wider spread than supposed, so that each is rarer."""
-        return 2.0 * self.freedom * math.log(self.care)
 
     @property
     def anywhere(self) -> float:
@@ -315,33 +326,51 @@ class _Sight:
         return np.asarray(((yy * rx - xy * ry) + 1j * (xx * ry - xy * rx)) / (xx * yy - xy**2))
 
 
-def _off_length(one: Seen, vector: ComplexArray) -> FloatArray:
-    length = np.abs(vector)
-    x, y = vector.real, vector.imag
-    xx, xy, yy = one.spread
-    variance = np.where(
-        length > TINY, (xx * x**2 + 2.0 * xy * x * y + yy * y**2) / np.maximum(length, TINY) ** 2, xx + yy
-    )
-    return np.asarray((abs(one.value) - length) ** 2 / variance)
+def _off(
+    off: ComplexArray, spread: tuple[float, float, float], moved: ComplexArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """A deviation squared, in standard deviations, and the determinant of its covariance."""
+    xx, xy, yy = (np.asarray(one) for one in spread)
+    if moved is not None:
+        across, up = moved.real, moved.imag
+        xx, xy, yy = (
+            xx + np.sum(across * across, axis=0),
+            xy + np.sum(across * up, axis=0),
+            yy + np.sum(up * up, axis=0),
+        )
+    x, y = off.real, off.imag
+    determinant = xx * yy - xy**2
+    return np.asarray((yy * x**2 - 2.0 * xy * x * y + xx * y**2) / determinant), np.asarray(determinant)
+
+
+def _off_length(
+    seen_mm: float, vector: ComplexArray, spread: tuple[float, float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """A length's deviation squared, in standard deviations, and its variance."""
+    length, x, y = np.abs(vector), vector.real, vector.imag
+    xx, xy, yy = spread
+    along = (xx * x**2 + 2.0 * xy * x * y + yy * y**2) / np.maximum(length, TINY) ** 2
+    variance = np.where(length > TINY, along, xx + yy)
+    return np.asarray((seen_mm - length) ** 2 / variance), variance
 
 
 # One step -----------------------------------------------------------------------------------------
 
 
 def _ways(
-    step: Step, construction: Construction, branches: _Branches, sight: _Sight, *, blind: bool
+    step: Step, construction: Construction, branches: _Branches, sight: _Sight, errors: Errors, *, blind: bool
 ) -> list[_Way]:
     """The right way to make a step, and the wrong ones where that does not explain what was seen."""
-    view = View(branches.nodes, branches.known)
+    view = View(branches.nodes, branches.known, errors)
     count = len(branches.cost)
 
     def way(changed: Step, mistake: Mistake | None, factors: FloatArray | None = None) -> _Way:
-        place = np.broadcast_to(changed.place(view), (count,))
-        misfit = sight.misfit(place, branches.nodes) if sight else np.where(np.isfinite(place), 0.0, np.inf)
+        place, moved = _placed(changed, view, count)
+        misfit, cost = sight.held_against(place, moved, branches.nodes)
         rarity = 0.0 if mistake is None else RARITY[mistake.code]
         if factors is not None:
             factors = np.broadcast_to(factors, (count,))
-        return _Way(place, branches.cost + rarity + misfit + sight.width, misfit, mistake, factors)
+        return _Way(place, branches.cost + rarity + cost, misfit, mistake, factors)
 
     right = way(step, None)
     is_suspect = right.misfit > SUSPECT if sight else np.zeros(count, np.bool_)
@@ -359,6 +388,16 @@ def _ways(
         # Of a computed length seen as a length alone, whatever it is may be a slip.
         return [right, *wrong, *slips]
     return [right, *wrong, *slips, *_something_else(right, branches, sight)]
+
+
+def _placed(step: Step, view: View, count: int) -> tuple[ComplexArray, ComplexArray | None]:
+    """Where a step puts its node in each branch, and how far each act of a usual hand moves it there."""
+    place = np.asarray(step.place(view))
+    if not view.errors:
+        return np.broadcast_to(place, (count,)), None
+    place = place + view.error(step.node, 0, "x") + 1j * view.error(step.node, 0, "y")
+    place = np.broadcast_to(place, (place.shape[0], count))
+    return place[0], (place[1:] - place[0]) / SMALL
 
 
 _WrongSteps = tuple[tuple[Mistake, Step], ...]

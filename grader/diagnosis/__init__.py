@@ -15,10 +15,11 @@ from itertools import combinations
 
 import numpy as np
 
-from grader.diagnosis.telling import told
+from grader.diagnosis.telling import SCALES, told
 from grader.outcomes import Mistake
 from reference import mistakes as operators
 from reference.assignment import Assignment, Variant
+from reference.hand import Skill
 from reference.mistakes import Drawing
 from reference.parameters import parameters_of
 from reference.replay import RARITY, Account, Root, Seen, replay
@@ -27,6 +28,8 @@ LEAST_CONFIDENCE = 0.6
 """An explanation less certain than this is not told."""
 FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
+BEYOND_DOUBT = 20.0
+"""A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
 LEAST_WRONG = 0.06
 """A scale off by a smaller share than this is nobody's mistake by name: a hand may draw so."""
 WORSE_HANDS, BETTER_HAND = (1.6, 2.5, 4.0), 0.6
@@ -44,9 +47,11 @@ class Case:
     ----------
     drawing : how it should have been drawn, at the scales declared
     seen : what was drawn
-    lost : the vectors that lost points, with their criteria
+    lost : the vectors that lost points, or may lose some, with their criteria
     assignment, variant : whose plan it should be
+    skill : of a usual hand
     followed : scales that the drawing follows although others were declared
+    assumed : scales that nobody declared
     scale_criteria : the criterion of each scale that lost
     """
 
@@ -55,7 +60,9 @@ class Case:
     lost: Mapping[str, str]
     assignment: Assignment
     variant: Variant
+    skill: Skill
     followed: Mapping[str, float] = field(default_factory=dict)
+    assumed: frozenset[str] = frozenset()
     scale_criteria: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -64,19 +71,29 @@ def diagnose(case: Case) -> tuple[Mistake, ...]:
     if not case.lost and not case.followed:
         return ()
     seen, roots = case.seen, [Root(), *_other_scales(case)]
-    accounts = replay(case.drawing, seen, roots)
-    care = 1.0
+    accounts = replay(case.drawing, seen, roots, case.skill)
+    care, innocent = 1.0, _innocent(accounts)
     for other in _other_hands(accounts):
-        found = replay(case.drawing, seen, roots, care=other)
+        found = replay(case.drawing, seen, roots, case.skill, care=other)
+        innocent = min(innocent, _innocent(found))
         if found and found[0].cost < accounts[0].cost:
             accounts, care = found, other
     if not _is_clear(accounts, case):
-        accounts = replay(case.drawing, seen, [*roots, *_of_the_whole(case)], care=care, blind=True)
+        roots = [*roots, *_of_the_whole(case)]
+        accounts = replay(case.drawing, seen, roots, case.skill, care=care, blind=True)
         for swap in _swaps(case.drawing, accounts):
             root = Root((swap,), cost=RARITY[swap.code])
-            found = replay(case.drawing, _renamed(seen, swap.other), [root], care=care)
+            found = replay(case.drawing, _renamed(seen, swap.other), [root], case.skill, care=care)
             accounts = sorted([*accounts, *found], key=lambda account: account.cost)
+    if not accounts or innocent - accounts[0].cost < BEYOND_DOUBT:
+        return ()
     return told(accounts, case, LEAST_CONFIDENCE)
+
+
+def _innocent(accounts: Sequence[Account]) -> float:
+    """What the account costs in which everything was made rightly; infinite where it is beyond belief."""
+    costs = (account.cost for account in accounts if not account.made and not account.unexplained)
+    return min(costs, default=math.inf)
 
 
 def _is_clear(accounts: Sequence[Account], case: Case) -> bool:
@@ -87,10 +104,9 @@ def _is_clear(accounts: Sequence[Account], case: Case) -> bool:
         return True
     seen = {one.node for one in case.seen}
     given = {*case.drawing.construction.poles.values()}
-    is_all_seen = all(
+    return all(
         step.node in seen or step.node in given or not step.needs for step in case.drawing.construction.steps
     )
-    return is_all_seen
 
 
 def _other_hands(accounts: Sequence[Account]) -> tuple[float, ...]:
@@ -136,12 +152,12 @@ def _of_the_whole(case: Case) -> Iterator[Root]:
 def _other_variants(case: Case) -> Iterator[Root]:
     """Another student's data, all else right."""
     variants = case.assignment.variants()
-    scales = case.assignment.scales(variants)
+    scales = case.assignment.scales(variants, kL=float(case.drawing.parameters["kL"]))
     together = parameters_of(case.assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
     table = {
         name: np.broadcast_to(value, (len(variants),))
         for name, value in together.items()
-        if name not in {"kL", "kv", "ka"} and np.ndim(value) and np.ptp(value) > 0.0
+        if name not in SCALES - case.assumed and np.ndim(value) and np.ptp(value) > 0.0
     }
     for index, variant in enumerate(variants):
         if variant != case.variant and table:

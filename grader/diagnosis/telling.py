@@ -17,7 +17,7 @@ SURE_TOGETHER = 0.8
 LEAST_RIVAL = 0.1
 """A rival less likely than this is not named."""
 MOST_RIVALS = 3
-SUSPICIOUS, GROSS = 2.0, 4.5
+SUSPICIOUS, GROSS = 2.0, 5.0
 """Standard deviations of this hand: what is off by less than the latter at a step is no mistake to be
 named. (Where it is not off at all, the mistake showed elsewhere.)"""
 OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
@@ -135,7 +135,7 @@ def _explained(account: Account, case: Explained) -> dict[operators.Mistake, lis
 
 def _touches(mistake: operators.Mistake, scale: str, ends: set[str], reach: frozenset[str]) -> bool:
     if mistake.at in SCALES:
-        return scale == mistake.at or mistake.at == "kL"
+        return mistake.at in {scale, "kL"}
     if mistake.code == "labels_swapped":
         return bool(ends & set(mistake.other))
     return bool(ends & reach)

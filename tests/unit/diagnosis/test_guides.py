@@ -58,11 +58,11 @@ def test_a_line_along_a_guide_is_told_apart_from_one_across_a_link():
     along = found(Mistake("wrong_link", "a3", 1, other=("D", "E")), "sheet").mistakes[0]
     across = found(Mistake("wrong_link", "a3", 0, other=("D", "E")), "sheet").mistakes[0]
     assert along.detail["line"] == "guide"
-    assert "carries the guide" in mistake_feedback(along, "en")
+    assert "instead of along the guide" in mistake_feedback(along, "en")
     assert "line" not in across.detail
-    assert "perpendicular to another link" in mistake_feedback(across, "en")
+    assert "perpendicular to DE instead of to O2A3" in mistake_feedback(across, "en")
     report = report_of(SHAPER, found(Mistake("wrong_link", "a3", 1, other=("D", "E")), "sheet"), "s01")
-    assert "carries the guide" in feedback_page(report, (), "en")
+    assert "along the guide" in feedback_page(report, (), "en")
 
 
 def test_no_mistake_is_offered_that_changes_nothing():
