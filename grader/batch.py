@@ -1,6 +1,6 @@
 """A folder of submissions: survey, owners, marking in parallel, results. One bad file stops nothing."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,10 +11,18 @@ from grader.exports import write_summary
 from grader.feedback import About, Level, write_feedback, write_index
 from grader.files import make_folder, write_whole
 from grader.folder import submissions, told_name
+from grader.jobs import Job, alike_of_run, folders_of, inputs_of_run
 from grader.judging import unjudged_report
-from grader.kept import digest_of, forget_surveys, keep_looked, kept_looked, survey_kept
+from grader.kept import (
+    digest_of,
+    forget_surveys,
+    keep_looked,
+    keep_maps,
+    kept_looked,
+    survey_kept,
+)
 from grader.measurements import names_of
-from grader.moved import earlier_standings, moved
+from grader.moved import earlier, moved, note_inputs, noted_inputs
 from grader.ownership import Unmatched, assign_pages
 from grader.parallel import in_parallel
 from grader.pipeline import Looked, Work, asked_of, look, mark_looked
@@ -74,15 +82,20 @@ def grade(batch: Batch, progress: Progress) -> ResultsDocument:
     works, unmatched = _works(batch, roster, files, surveys)
     if not works and not unmatched:
         raise _nothing(batch)
-    before = earlier_standings(batch.out / "results.json", batch.assignment.id)
-    reports = _marked(batch, _jobs(batch, works, surveys), progress)
+    before = earlier(batch.out / "results.json", batch.assignment.id)
+    jobs = _jobs(batch, works, surveys)
+    reports = _marked(batch, jobs, progress)
+    notes = batch.out / KEPT_FOLDER
+    inputs = inputs_of_run(batch.assignment, batch.rubric, jobs, surveys)
     results = ResultsDocument(
         assignment=batch.assignment.id,
         reports=reports,
         unmatched=unmatched,
-        moved=moved(before, reports),
+        moved=moved(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
+        alike=alike_of_run(batch.assignment, jobs, reports, notes / "readings"),
     )
     _write_results(batch, results, works)
+    note_inputs(notes, inputs)
     return results
 
 
@@ -158,28 +171,6 @@ def _unmatched(one: Unmatched, broken: str | None) -> UnmatchedDocument:
 # Marking ------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Job:
-    """One submission to mark.
-
-    Attributes
-    ----------
-    folder : below the results: the student's, with several positions one for each
-    reading_key : a digest of everything that the reading of its pages depends on
-    key : a digest of everything that its report depends on
-    """
-
-    work: Work
-    folder: str
-    reading_key: str
-    key: str
-
-    @property
-    def name(self) -> str:
-        """Of what is kept of it."""
-        return self.folder.replace("/", "#")
-
-
 def _jobs(batch: Batch, works: Sequence[Work], surveys: Sequence[Survey]) -> list[Job]:
     """The works with digests of what they depend on; a file of many pages is looked at once."""
     content = {source.file: one.digest for one in surveys for source in one.pages}
@@ -217,20 +208,6 @@ def _marked(batch: Batch, jobs: Sequence[Job], progress: Progress) -> list[Repor
     return [reports[index] for index in range(len(jobs))]
 
 
-def folders_of(works: Iterable[Work]) -> list[str]:
-    """Each work's folder below the results: the student's, with several positions one for each."""
-    students = [work.student_id for work in works]
-    return [
-        work.student_id if students.count(work.student_id) == 1 else f"{work.student_id}/{_position(work)}"
-        for work in works
-    ]
-
-
-def _position(work: Work) -> str:
-    position = None if work.variant is None else work.variant.position
-    return "unknown" if position is None else str(position)
-
-
 def _mark_one(batch: Batch, job: Job) -> ReportDocument:
     """Mark one submission and write its files; its key last, so that it stands for all of them."""
     work, where = job.work, batch.out / job.folder
@@ -261,6 +238,7 @@ def _looked(batch: Batch, job: Job) -> Sequence[Looked]:
     looked = look(job.work, batch.assignment, batch.rubric)
     if looked:
         keep_looked(folder, job.name, job.reading_key, looked)
+        keep_maps(folder, job.name, looked)
     return looked
 
 

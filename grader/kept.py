@@ -7,6 +7,7 @@ match, or cannot be understood, is found out again.
 
 import hashlib
 import json
+import zlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from functools import cache
@@ -14,18 +15,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from grader.alike import CELLS, ink_map
 from grader.documents import ReadingDocument
 from grader.files import write_whole
 from grader.measurements import Names
 from grader.ownership import PageSource
 from grader.picture import Backdrop, restored, stored
 from grader.pipeline import Looked
-from grader.records import Figure, Identity, Problem, Reading, ReadNode, ReadVector, Unread, Written
+from grader.records import Figure, Identity, Problem, Reading, ReadNode, ReadVector, Swapped, Unread, Written
 from grader.survey import MEASUREMENT_TYPES, Survey, survey
 
 RECORDS: Mapping[str, type] = {
-    one.__name__: one for one in (Figure, Identity, Problem, Reading, ReadNode, ReadVector, Unread, Written)
+    one.__name__: one
+    for one in (Figure, Identity, Problem, Reading, ReadNode, ReadVector, Swapped, Unread, Written)
 }
 _PACKAGES = ("grader", "reference")
 _SOURCES = (".py", ".npz")
@@ -182,6 +186,29 @@ def kept_looked(folder: Path, name: str, key: str) -> tuple[Looked, ...] | None:
         )
     except (OSError, KeyError, TypeError, ValueError):
         return None
+
+
+# Ink maps -----------------------------------------------------------------------------------------
+
+
+def keep_maps(folder: Path, name: str, looked: Sequence[Looked]) -> None:
+    """Keep where the ink lies on a submission's registered pages, for holding a class's sheets together."""
+    maps = [
+        ink_map(one.backdrop.scan, one.backdrop.page_mm)
+        for one in looked
+        if one.backdrop is not None and one.backdrop.registered
+    ]
+    if maps:
+        write_whole(folder / f"{name}.ink", zlib.compress(np.array(maps).tobytes()))
+
+
+def kept_maps(folder: Path, name: str) -> list[NDArray[np.uint8]]:
+    """The ink maps of a submission's pages; none where there are none, or they are damaged."""
+    try:
+        data = zlib.decompress((folder / f"{name}.ink").read_bytes())
+        return list(np.frombuffer(data, np.uint8).reshape(-1, *CELLS))
+    except (OSError, ValueError, zlib.error):
+        return []
 
 
 def _backdrop(path: Path, about: Sequence[Any] | None) -> Backdrop | None:
