@@ -26,14 +26,15 @@ def current(
 
     Raises InputFileError for results of a later version.
     """
-    if not isinstance(told, dict) or not isinstance(told.get("schema_version"), int):
+    version = told.get("schema_version") if isinstance(told, dict) else None
+    if not isinstance(version, int) or version < 1:
         return told
-    if told["schema_version"] > newest:
+    if version > newest:
         raise InputFileError(
             "results_newer",
-            f"{file}: a later version of planmark wrote this (schema_version {told['schema_version']}, known"
+            f"{file}: a later version of planmark wrote this (schema_version {version}, known"
             f" is {newest}); update planmark, or grade again with this one",
         )
-    for version in range(told["schema_version"], newest):
-        told = {**steps[version](told), "schema_version": version + 1}
+    for step in range(version, newest):
+        told = {**steps[step](told), "schema_version": step + 1}
     return told
