@@ -81,7 +81,11 @@ class ScaleRow:
 
 @dataclass(frozen=True, slots=True)
 class Leaflet:
-    """All of it, in the student's language. `tally` counts criteria by verdict, those there are."""
+    """All of it, in the student's language.
+
+    `tally` counts criteria by verdict, those there are; `not_required` names those that need not be handed
+    in and were not, at level `full` with what is right.
+    """
 
     speaker: Tongue
     level: Level
@@ -99,6 +103,7 @@ class Leaflet:
     waiting_looks: tuple[Look, ...]
     sheets: tuple[Sheetful, ...]
     rows: tuple[Row, ...]
+    not_required: tuple[Markup, ...]
     scales: tuple[ScaleRow, ...]
     pictures: tuple[Picture, ...]
 

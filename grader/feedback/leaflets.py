@@ -46,7 +46,16 @@ def leaflet_of(
             Sheetful(tuple(looks_at(picture, index, names)), _source(report, picture, speaker, level))
             for index, picture in enumerate(pictures)
         ),
-        rows=tuple(_row(criterion, speaker, level, names) for criterion in report.criteria),
+        rows=tuple(
+            _row(criterion, speaker, level, names)
+            for criterion in report.criteria
+            if not _is_left_out(criterion)
+        ),
+        not_required=tuple(
+            _left_out(criterion, speaker, level, names)
+            for criterion in report.criteria
+            if _is_left_out(criterion)
+        ),
         scales=_scales(report, speaker, level, names),
         pictures=tuple(pictures),
     )
@@ -88,6 +97,20 @@ def _row(criterion: CriterionDocument, speaker: Tongue, level: Level, names: Map
         most=speaker.trimmed(criterion.max_points, 2),
         said=words.symbols(said),
     )
+
+
+def _is_left_out(criterion: CriterionDocument) -> bool:
+    """Whether it was not handed in and need not be."""
+    return criterion.verdict == "not_judged" and criterion.reasons[:1] == ["optional"]
+
+
+def _left_out(
+    criterion: CriterionDocument, speaker: Tongue, level: Level, names: Mapping[str, str]
+) -> Markup:
+    named = criterion.vector or criterion.id
+    name = words.symbols(names.get(named, named))
+    value = quantities.told(criterion.expected, speaker)[-1:] if level == "full" else []
+    return Markup("{} ({})").format(name, *value) if value else name
 
 
 def _tolerance(criterion: CriterionDocument, speaker: Tongue) -> tuple[str, ...]:

@@ -71,3 +71,14 @@ def test_plans_as_measured_have_no_sheet_beneath_them():
     told = leaflet(report(), [picture(scanned=False)])
     assert [look.kind for look in told.sheets[0].looks] == ["velocity_plan"]
     assert "entered measurements" in told.sheets[0].source
+
+
+def test_what_is_not_required_and_not_there_takes_one_line():
+    omega = criterion("omega_2", "not_judged", None).model_copy(
+        update={"reasons": ["optional", "not_measured"]}
+    )
+    told = leaflet(report(criteria=[criterion("v_A"), omega], mistakes=[]))
+    assert [row.vector for row in told.rows] == ["v_A"]
+    assert [one.striptags() for one in told.not_required] == ["ω2 (1.670 m/s)"]
+    hinted = leaflet(report(criteria=[omega], mistakes=[]), level="hint")
+    assert [one.striptags() for one in hinted.not_required] == ["ω2"]
