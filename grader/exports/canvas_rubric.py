@@ -9,8 +9,7 @@ from grader.exports.comments import plain_comment
 from grader.exports.draft import Draft, document, json_text, ready, withheld
 from grader.exports.faults import listed
 from grader.exports.grades import Grade
-from grader.exports.marks import Criterion, Mark
-from grader.exports.moodle_guide import class_criteria, class_marks
+from grader.exports.marks import Criterion, Mark, class_criteria, class_marks
 from grader.exports.options import Options
 from grader.exports.platform_ids import numbered
 from grader.exports.table import csv_text, number

@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from grader.documents import CriterionDocument, ReportDocument, Verdict
+from grader.exports.draft import ready
 from grader.exports.faults import listed
 from grader.exports.grades import Grade
+from grader.exports.options import Options
 from grader.i18n import Tongue, tongue
 from grader.platform_documents import CLOSE
 from grader.scene import MARKS
-from reference.errors import InputFileError
+from reference.errors import CallError, InputFileError
 
 DECIMALS = 6
 
@@ -129,7 +131,20 @@ class Criterion:
         return self.id in (name.strip(), head.strip()) or name.strip() in self.titles
 
 
-def criteria_of(students: Sequence[tuple[str, Sequence[Mark]]]) -> list[Criterion]:
+def class_marks(grades: Sequence[Grade], options: Options) -> list[tuple[Grade, list[Mark]]]:
+    """Everybody's marks who has a grade, one for each criterion."""
+    return [(grade, together(marks_of(grade, options.lang), options.combine)) for grade in ready(grades)]
+
+
+def class_criteria(grades: Sequence[Grade], options: Options) -> list[Criterion]:
+    """The rubric as the reports show it, those under review too; CallError where there are none."""
+    seen = [grade for grade in grades if all(report.criteria for report in grade.reports)]
+    if not seen:
+        raise CallError("nothing_to_export", "no report has criteria: nothing was handed in that was read")
+    return _criteria_of([(grade.student_id, together(outline(grade), options.combine)) for grade in seen])
+
+
+def _criteria_of(students: Sequence[tuple[str, Sequence[Mark]]]) -> list[Criterion]:
     """The criteria that all students were marked by.
 
     Raises InputFileError where some were marked by others.

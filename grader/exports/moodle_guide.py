@@ -6,9 +6,9 @@ Moodle checks neither the points' range nor that all criteria are filled: both a
 from collections.abc import Sequence
 from html import escape
 
-from grader.exports.draft import Draft, document, json_text, ready, withheld
+from grader.exports.draft import Draft, document, json_text, withheld
 from grader.exports.grades import Grade
-from grader.exports.marks import Criterion, Mark, criteria_of, marks_of, outline, together
+from grader.exports.marks import Criterion, Mark, class_criteria, class_marks
 from grader.exports.options import Options
 from grader.exports.platform_ids import Place, numbered, place_of
 from grader.platform_documents import MoodleMarksDocument, MoodleRubricDocument
@@ -17,19 +17,6 @@ from reference.errors import CallError
 _LONGEST_NAME = 255
 _NO_TAGS = str.maketrans("<>", "‹›")
 """Moodle refuses names in which it sees a tag."""
-
-
-def class_marks(grades: Sequence[Grade], options: Options) -> list[tuple[Grade, list[Mark]]]:
-    """Everybody's marks who has a grade, one for each criterion."""
-    return [(grade, together(marks_of(grade, options.lang), options.combine)) for grade in ready(grades)]
-
-
-def class_criteria(grades: Sequence[Grade], options: Options) -> list[Criterion]:
-    """The rubric as the reports show it, those under review too; CallError where there are none."""
-    seen = [grade for grade in grades if all(report.criteria for report in grade.reports)]
-    if not seen:
-        raise CallError("nothing_to_export", "no report has criteria: nothing was handed in that was read")
-    return criteria_of([(grade.student_id, together(outline(grade), options.combine)) for grade in seen])
 
 
 def guide(grades: Sequence[Grade], options: Options) -> Draft:

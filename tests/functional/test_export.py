@@ -1,0 +1,159 @@
+"""``planmark export`` as an instructor runs it: every command of the documentation, and wrong ones."""
+
+import json
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import jsonschema
+import pytest
+import typer.main
+from typer.testing import CliRunner
+
+from grader.cli import app
+from grader.documents import schema
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "tests" / "unit" / "older" / "2026-11-22-0304" / "results.json"
+DOCUMENT = (ROOT / "docs" / "exports.md").read_text(encoding="utf-8")
+COMMANDS = re.findall(r"(?m)^    planmark (export .*)$", DOCUMENT)
+SCHEMAS = {
+    "export-moodle-rubric.json": "moodle-rubric",
+    "export-moodle-marks.json": "moodle-marks",
+    "export-canvas-marks.json": "canvas-marks",
+    "export-lti.json": "lti",
+}
+
+
+def results():
+    return json.loads(RESULTS.read_bytes())
+
+
+@pytest.fixture
+def desk(tmp_path, monkeypatch):
+    """A folder with all the files that the documentation names; s08 is graded, s02 waits, s10 is missing."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "marks" / "s08").mkdir(parents=True)
+    shutil.copy(RESULTS, tmp_path / "marks" / "results.json")
+    (one,) = [report for report in results()["reports"] if report["student_id"] == "s08"]
+    (tmp_path / "marks" / "s08" / "report.json").write_text(json.dumps(one))
+    (tmp_path / "marks" / "s08" / "feedback.html").write_text("<p>page</p>")
+    files = {
+        "roster.csv": "student_id,name,email\ns02,B,b@x.ro\ns08,A,a@x.ro\ns10,C,c@x.ro\n",
+        "ids.csv": "student_id,id,participant\ns02,102,2\ns08,108,8\n",
+        "Grades-Pump.csv": "Identifier,Full name,Email address,Grade,Maximum grade,Last modified (grade)\n"
+        "Participant 8,A,a@x.ro,,40.00,-\nParticipant 2,B,b@x.ro,,40.00,-\n",
+        "export.csv": "Student,ID,SIS User ID,SIS Login ID,Section,Pump (12345)\n"
+        "    Points Possible,,,,,40\nA,108,s08,,1,\nB,102,s02,,1,5\n",
+        "rubric.json": json.dumps({"id": 1, "data": criteria("description", "points", "_")}),
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    definitions(tmp_path, with_guide=False)
+    return tmp_path
+
+
+def criteria(name, points, before):
+    (one,) = [report for report in results()["reports"] if report["student_id"] == "s08"]
+    return [
+        {"id": f"{before}{at}" if before else at, name: criterion["id"], points: criterion["max_points"]}
+        for at, criterion in enumerate(one["criteria"], start=1)
+    ]
+
+
+def definitions(folder, *, with_guide):
+    guide = {"method": "guide", "guide": {"guide_criteria": criteria("shortname", "maxscore", "")}}
+    area = {"cmid": 3, "contextid": 5, "definitions": [guide] if with_guide else []}
+    (folder / "definitions.json").write_text(json.dumps({"areas": [area]}), encoding="utf-8")
+
+
+def planmark(command):
+    return CliRunner().invoke(app, shlex.split(command))
+
+
+def test_the_documentation_shows_every_platform_and_thing():
+    shown = {tuple(re.findall(r"--(?:to|what) (\S+)", command)) for command in COMMANDS}
+    assert {to for to, *_ in shown} >= {"moodle", "canvas", "gradescope", "lti"}
+    assert {("moodle", what) for what in ("feedback", "rubric", "marks")} <= shown
+    assert {("canvas", what) for what in ("rubric", "marks")} <= shown
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_of_the_documentation_writes_its_file(desk, command):
+    definitions(desk, with_guide="--what marks" in command)
+    ran = planmark(command)
+    assert ran.exit_code == (0 if "--what rubric" in command else 1), ran.output
+    (written,) = [path for path in (desk / "marks").iterdir() if path.name.startswith("export-")]
+    assert f"written to {written.relative_to(desk)}" in ran.output
+    if "--what rubric" not in command:
+        assert "1 students written" in ran.output
+        assert "s02: withheld: needs review" in ran.output
+        assert "s10: withheld: nothing handed in" in ran.output
+    if written.name in SCHEMAS:
+        jsonschema.validate(json.loads(written.read_bytes()), schema(SCHEMAS[written.name]))
+
+
+def test_every_option_is_documented():
+    parameters = typer.main.get_command(app).commands["export"].params
+    options = {option for parameter in parameters for option in parameter.opts if option.startswith("--")}
+    assert options <= set(re.findall(r"--[a-z-]+", DOCUMENT))
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("export marks --to blackboard", "'blackboard' is no export target"),
+        ("export marks --to moodle --what results", "moodle is given no 'results'"),
+        ("export nowhere --to moodle", "run planmark grade first"),
+        ("export marks --to moodle --worksheet none.csv", "none.csv: cannot be read"),
+        ("export marks --to canvas --worksheet Grades-Pump.csv", "--worksheet is Moodle's"),
+        ("export marks --to moodle --gradebook export.csv", "--gradebook is Canvas's"),
+        ("export marks --to moodle --worksheet export.csv", "there is no column 'Identifier'"),
+        ("export marks --to canvas --gradebook Grades-Pump.csv", "is no gradebook as Canvas exports it"),
+        ("export marks --to canvas --gradebook rubric.json", "is no gradebook as Canvas exports it"),
+        ("export marks --to moodle --identity phone", "not by 'phone'"),
+        ("export marks --to moodle --identity email", "the roster gives no email"),
+        ("export marks --to moodle --maximum 100", "ask for rescaling"),
+        ("export marks --to moodle --maximum -1 --rescale", "a positive number"),
+        ("export marks --to lti --ids roster.csv", "columns out of student_id, id, username, participant"),
+        ("export marks --to lti --ids none.csv", "none.csv: cannot be read"),
+        ("export marks --to lti --lang xx", "xx"),
+        ("export marks --to lti --item Pump", "--item has no meaning for lti grades"),
+        ("export marks --to moodle --combine best", "sum or mean"),
+        ("export marks --to moodle --position 3", "no report"),
+        ("export marks --to moodle --what feedback", "--worksheet"),
+        ("export marks --to moodle --what rubric", "--cmid and --context-id"),
+        ("export marks --to moodle --what marks", "--assignment-id"),
+        (
+            "export marks --to canvas --what marks --criteria definitions.json",
+            "no criteria are in this answer",
+        ),
+        ("export marks --to canvas --what marks --criteria Grades-Pump.csv", "columns out of criterion, id"),
+        ("export marks --to gradescope --visibility shown", "is no visibility"),
+        ("export marks --to moodle --file Grades-Pump.csv/x", "cannot be written"),
+    ],
+)
+def test_a_wrong_call_is_told_in_words_and_nothing_is_written(desk, command, told):
+    before = {path: path.stat().st_mtime_ns for path in desk.rglob("*")}
+    ran = planmark(command)
+    assert ran.exit_code in {2, 5}, ran.output
+    assert told in " ".join(ran.output.split())
+    assert ran.exception is None or isinstance(ran.exception, SystemExit)
+    assert {path: path.stat().st_mtime_ns for path in desk.rglob("*")} == before
+
+
+def test_a_second_export_after_the_review_fills_in_the_rest(desk):
+    told = results()
+    command = "export marks --to moodle --worksheet Grades-Pump.csv --roster roster.csv"
+    assert planmark(command).exit_code == 1
+    first = (desk / "marks" / "export-moodle.csv").read_text(encoding="utf-8")
+    for report in told["reports"]:
+        if report["student_id"] == "s02":
+            report.update(status="graded", score=30.0, score_range=[30.0, 30.0])
+    told["reports"] = [report for report in told["reports"] if report["student_id"] != "s10"]
+    (desk / "marks" / "results.json").write_text(json.dumps(told), encoding="utf-8")
+    shutil.copy(desk / "marks" / "export-moodle.csv", desk / "Grades-Pump.csv")
+    assert planmark(command).exit_code == 0
+    second = (desk / "marks" / "export-moodle.csv").read_text(encoding="utf-8")
+    assert second == first.replace("Participant 2,B,b@x.ro,,", "Participant 2,B,b@x.ro,30,")
