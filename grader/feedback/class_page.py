@@ -2,19 +2,25 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from grader.documents import ReportDocument, ResultsDocument
+from grader.documents import AlikeDocument, MovedDocument, ReportDocument, ResultsDocument, StandingDocument
 from grader.feedback import statistics
+from grader.feedback.charts import distribution_svg
+from grader.feedback.class_words import CAUSES, CHANCE, SIGNS
 from grader.feedback.mistakes import MISTAKES
 from grader.feedback.problems import problem_sentence, unmatched_sentence
 from grader.feedback.templating import environment, told_score
+from grader.feedback.words import STATES, VERDICTS
 from grader.files import write_whole
-from grader.i18n import tongue
-from grader.scene import COLOURS
+from grader.i18n import Tongue, tongue
+from grader.scene import COLOURS, MARKS
 
 _NO_NAMES: Mapping[str, str] = {}
+SHOWN = 12
+"""Students named at once; the others unfold."""
 
 
 def write_index(
@@ -34,12 +40,98 @@ def index_page(
 ) -> str:
     """The class's page."""
     speaker = tongue(lang)
-    folders = folders_of(results.reports)
-    rows = [
+    who = _Who(results, student_names)
+    followed = statistics.followed(results)
+    return environment(speaker.lang).get_template("index.html").render(
+        results=results,
+        title=title or results.assignment,
+        rows=_rows(results, who, speaker),
+        has_positions=any(report.position is not None for report in results.reports),
+        has_n=any("n" in report.variant for report in results.reports),
+        unmatched=[unmatched_sentence(one, speaker) for one in results.unmatched],
+        states=statistics.states(results),
+        chart=distribution_svg(results, speaker),
+        spread=statistics.spread(results),
+        has_open=bool(statistics.open_shares(results)),
+        hardest=statistics.hardest(results),
+        commonest=[
+            (MISTAKES[code].title, len(found), [who.link(index) for index in found])
+            for code, found in statistics.commonest(results)
+            if code in MISTAKES
+        ],
+        followed=followed,
+        followers=[who.link(index) for index in followed.reports],
+        waiting=[
+            (who.link(one.index), one, results.reports[one.index]) for one in statistics.waiting(results)
+        ],
+        scales=[(who.link(index), *told) for index, *told in statistics.wrong_scales(results)],
+        alike=[_alike(one, who, speaker) for one in results.alike],
+        moved=[_moved(one, who, speaker) for one in results.moved],
+        causes=_causes(results.moved),
+        told_score=lambda report: told_score(report, speaker),
+        shown=SHOWN,
+        colours=COLOURS,
+    )  # fmt: skip
+
+
+def folders_of(reports: Sequence[ReportDocument]) -> list[str]:
+    """Each report's folder below the output folder: the student, with several positions also that."""
+    counts = Counter(report.student_id for report in reports)
+    return [
+        report.student_id
+        if counts[report.student_id] == 1
+        else f"{report.student_id}/{'unknown' if report.position is None else report.position}"
+        for report in reports
+    ]
+
+
+# Students -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A student's name as a link; `picture` of the first page, empty where there is none."""
+
+    text: str
+    page: str
+    picture: str
+
+
+class _Who:
+    """Links to students, by the index of their report or by id and position."""
+
+    def __init__(self, results: ResultsDocument, names: Mapping[str, str]) -> None:
+        reports, folders = results.reports, folders_of(results.reports)
+        several = {student for student, count in Counter(r.student_id for r in reports).items() if count > 1}
+        self.names = names
+        self.links = [
+            Link(
+                f"{report.student_id}, {report.position}"
+                if report.student_id in several
+                else report.student_id,
+                f"{quote(folder)}/feedback.html",
+                f"{quote(folder)}/overlay.png" if report.reading.sheets else "",
+            )
+            for report, folder in zip(reports, folders, strict=True)
+        ]
+        self.index = {(report.student_id, report.position): k for k, report in enumerate(reports)}
+
+    def link(self, index: int) -> Link:
+        """Of a report."""
+        return self.links[index]
+
+    def of(self, student: str, position: int | None) -> Link:
+        """Of a student, who may be gone."""
+        index = self.index.get((student, position))
+        return Link(student, "", "") if index is None else self.links[index]
+
+
+def _rows(results: ResultsDocument, who: _Who, speaker: Tongue) -> list[dict[str, object]]:
+    return [
         {
             "report": report,
-            "name": student_names.get(report.student_id, ""),
-            "link": f"{quote(folder)}/feedback.html",
+            "name": who.names.get(report.student_id, ""),
+            "link": who.link(index).page,
             "score": told_score(report, speaker),
             "waiting": sum(criterion.verdict == "review" for criterion in report.criteria),
             "problems": Counter(
@@ -47,33 +139,64 @@ def index_page(
             ),
             "best": report.score if report.score is not None else (report.score_range or (-1.0, -1.0))[0],
         }
-        for report, folder in zip(results.reports, folders, strict=True)
+        for index, report in enumerate(results.reports)
     ]
-    return environment(speaker.lang).get_template("index.html").render(
-        results=results,
-        title=title or results.assignment,
-        rows=rows,
-        has_positions=any(report.position is not None for report in results.reports),
-        has_n=any("n" in report.variant for report in results.reports),
-        unmatched=[unmatched_sentence(one, speaker) for one in results.unmatched],
-        states=statistics.states(results),
-        chart=statistics.distribution_svg(results, speaker),
-        hardest=statistics.hardest(results),
-        commonest=[
-            (MISTAKES[code].title, count) for code, count in statistics.commonest(results) if code in MISTAKES
+
+
+# Sheets that look alike, and what moved -----------------------------------------------------------
+
+
+def _alike(one: AlikeDocument, who: _Who, speaker: Tongue) -> dict[str, object]:
+    chance = "" if one.measure is None else speaker.gettext(CHANCE) % {"chance": _small(one.measure, speaker)}
+    return {
+        "students": [who.of(*key) for key in zip(one.students, one.positions, strict=True)],
+        "why": [speaker.gettext(SIGNS[sign]) for sign in one.why],
+        "share": None if one.share is None else f"{speaker.number(100.0 * one.share, 0)}\N{NO-BREAK SPACE}%",
+        "compared": one.compared,
+        "chance": chance,
+    }
+
+
+def _small(value: float, speaker: Tongue) -> str:
+    """A small number in words of tens: 0,0004, or under the least that means anything."""
+    return speaker.significant(value, 1) if value >= 1e-6 else f"< {speaker.number(1e-6, 6)}"
+
+
+def _moved(one: MovedDocument, who: _Who, speaker: Tongue) -> dict[str, object]:
+    return {
+        "student": who.of(one.student_id, one.position),
+        "before": _standing(one.before, speaker),
+        "after": _standing(one.after, speaker),
+        "why": [speaker.gettext(CAUSES[cause]) for cause in one.why],
+        "criteria": [
+            (
+                criterion.title,
+                _verdict(criterion.before, criterion.points_before, speaker),
+                _verdict(criterion.after, criterion.points_after, speaker),
+            )
+            for criterion in one.criteria
         ],
-        colours=COLOURS,
-    )  # fmt: skip
+    }
 
 
-def folders_of(reports: Sequence[ReportDocument]) -> list[str]:
-    """Each report's folder below the output folder: the student, with several positions also that."""
-    counts: dict[str, int] = {}
-    for report in reports:
-        counts[report.student_id] = counts.get(report.student_id, 0) + 1
-    return [
-        report.student_id
-        if counts[report.student_id] == 1
-        else f"{report.student_id}/{'unknown' if report.position is None else report.position}"
-        for report in reports
-    ]
+def _standing(one: StandingDocument | None, speaker: Tongue) -> str:
+    if one is None:
+        return "–"
+    if one.score is not None:
+        return speaker.trimmed(one.score, 2)
+    if one.status == "needs_review" and one.score_range is not None:
+        return "–".join(speaker.trimmed(value, 2) for value in dict.fromkeys(one.score_range))
+    return speaker.gettext(STATES[one.status])
+
+
+def _verdict(verdict: str | None, points: float | None, speaker: Tongue) -> str:
+    if verdict is None:
+        return "–"
+    told = f"{MARKS[verdict]} {speaker.gettext(VERDICTS[verdict])}"
+    return told if points is None else f"{told} ({speaker.trimmed(points, 2)})"
+
+
+def _causes(moved: Sequence[MovedDocument]) -> list[tuple[str, int]]:
+    """Why marks moved, and how often."""
+    times = Counter(cause for one in moved for cause in one.why)
+    return [(CAUSES[cause], count) for cause, count in times.most_common()]

@@ -1,19 +1,19 @@
-"""The class in figures: states, distribution of scores, hardest criteria, commonest mistakes."""
+"""The class in figures: states, scores, criteria, mistakes, what waits, what follows."""
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import floor
+from statistics import mean, median
 
-from markupsafe import Markup
-
-from grader.documents import ResultsDocument
-from grader.i18n import Tongue
+from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
 
 BINS = 10
-HARDEST = 6
-COMMONEST = 6
+HARDEST = 8
+COMMONEST = 8
 
 _JUDGED = {"full", "partial", "none", "follow_through"}
+_LOST = {"none", "partial"}
 
 
 def states(results: ResultsDocument) -> Counter[str]:
@@ -21,8 +21,11 @@ def states(results: ResultsDocument) -> Counter[str]:
     return Counter(report.status for report in results.reports)
 
 
+# Scores -------------------------------------------------------------------------------------------
+
+
 def shares(results: ResultsDocument) -> list[float]:
-    """Final scores as shares of the maximum; what waits for a person is not counted."""
+    """Final scores as shares of the maximum."""
     return [
         report.score / report.max_score
         for report in results.reports
@@ -30,12 +33,41 @@ def shares(results: ResultsDocument) -> list[float]:
     ]
 
 
-def histogram(values: list[float]) -> list[int]:
+def open_shares(results: ResultsDocument) -> list[float]:
+    """Of what waits for a person, the middle of the range that the score lies in, as a share."""
+    return [
+        sum(report.score_range) / 2.0 / report.max_score
+        for report in results.reports
+        if report.status == "needs_review" and report.score is None
+        if report.score_range is not None and report.max_score > 0.0
+    ]
+
+
+def histogram(values: Iterable[float]) -> list[int]:
     """Counts in ten equal bins of 0..1; full marks belong to the last."""
     counts = [0] * BINS
     for value in values:
         counts[min(BINS - 1, max(0, floor(value * BINS + 1e-9)))] += 1
     return counts
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Mean, median, least and largest of the final scores, as shares of the maximum."""
+
+    mean: float
+    median: float
+    least: float
+    largest: float
+
+
+def spread(results: ResultsDocument) -> Spread | None:
+    """How the final scores spread; None while there are none."""
+    values = shares(results)
+    return Spread(mean(values), median(values), min(values), max(values)) if values else None
+
+
+# Criteria -----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +90,7 @@ def hardest(results: ResultsDocument) -> list[Hardness]:
     about: dict[str, tuple[str, str | None]] = {}
     for report in results.reports:
         for criterion in report.criteria:
-            about[criterion.id] = (criterion.title, criterion.vector)
+            about.setdefault(criterion.id, (criterion.title, criterion.vector))
             if criterion.verdict == "review":
                 waiting[criterion.id] += 1
             if criterion.verdict in _JUDGED and criterion.points is not None:
@@ -73,37 +105,73 @@ def hardest(results: ResultsDocument) -> list[Hardness]:
     return sorted(found, key=lambda one: one.earned)[:HARDEST]
 
 
-def commonest(results: ResultsDocument) -> list[tuple[str, int]]:
-    """Codes of mistakes with the number of submissions that show them, commonest first."""
-    counts: Counter[str] = Counter()
-    for report in results.reports:
-        counts.update({mistake.code for mistake in report.mistakes})
-    return counts.most_common(COMMONEST)
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What counts as right because it follows from an own earlier value: each criterion, how often."""
+
+    points: float
+    reports: list[int]
+    criteria: list[tuple[str, int]]
 
 
-def distribution_svg(results: ResultsDocument, speaker: Tongue) -> Markup:
-    """The distribution of scores as a bar chart; empty where nothing is graded yet."""
-    values = shares(results)
-    if not values:
-        return Markup("")
-    counts = histogram(values)
-    tallest = max(counts)
-    parts: list[Markup] = []
-    for index, count in enumerate(counts):
-        height = 80.0 * count / tallest
-        x = 6 + index * 34
-        label = f"{10 * index}–{10 * (index + 1)}"
-        parts.append(
-            Markup(
-                '<rect x="{}" y="{:.1f}" width="28" height="{:.1f}" rx="2"><title>{} %: {}</title></rect>'
-            ).format(x, 100 - height, height, label, count)
-        )
-        if count:
-            parts.append(Markup('<text x="{}" y="{:.1f}">{}</text>').format(x + 14, 95 - height, count))
-        parts.append(Markup('<text class="axis" x="{}" y="115">{}</text>').format(x - 3, 10 * index))
-    parts.append(Markup('<text class="axis" x="343" y="115">100</text>'))
-    summary = speaker.gettext("Scores in per cent of the maximum: how many students in each tenth.")
-    return Markup(
-        '<svg class="chart" viewBox="0 0 352 122" role="img" aria-label="{}">{}'
-        '<line x1="2" y1="100.5" x2="350" y2="100.5"/></svg>'
-    ).format(summary, Markup("").join(parts))
+def followed(results: ResultsDocument) -> Followed:
+    """Follow-through granted, with the indices of the reports."""
+    points, reports, times = 0.0, [], Counter[str]()
+    for index, report in enumerate(results.reports):
+        given = [one for one in report.criteria if one.verdict == "follow_through"]
+        points += sum(one.points or 0.0 for one in given)
+        times.update(one.title for one in given)
+        reports += [index] if given else []
+    return Followed(points, reports, times.most_common(HARDEST))
+
+
+# Mistakes -----------------------------------------------------------------------------------------
+
+
+def commonest(results: ResultsDocument) -> list[tuple[str, list[int]]]:
+    """Codes of mistakes with the indices of the reports that show them, commonest first."""
+    found: dict[str, list[int]] = {}
+    for index, report in enumerate(results.reports):
+        for code in dict.fromkeys(mistake.code for mistake in report.mistakes):
+            found.setdefault(code, []).append(index)
+    return sorted(found.items(), key=lambda item: -len(item[1]))[:COMMONEST]
+
+
+def wrong_scales(results: ResultsDocument) -> list[tuple[int, list[str], list[str]]]:
+    """Reports (by index) whose scales were not right: the criteria lost, and the scales not understood."""
+    found = []
+    for index, report in enumerate(results.reports):
+        lost = [one.title for one in report.criteria if one.vector is None and one.verdict in _LOST]
+        refused = [f"{name} = {one.text}" for name, one in report.scales.items() if one.refused and one.text]
+        if lost or refused:
+            found.append((index, lost, refused))
+    return found
+
+
+# What waits ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A report (by index) that a person must look at, what is at stake, and the criteria that wait."""
+
+    index: int
+    points: float
+    criteria: list[CriterionDocument]
+
+
+def waiting(results: ResultsDocument) -> list[Waiting]:
+    """What waits for a person, that first which one look decides most of."""
+    found = [
+        Waiting(index, _stake(report), [one for one in report.criteria if one.verdict == "review"])
+        for index, report in enumerate(results.reports)
+        if report.status in {"needs_review", "unreadable"}
+    ]
+    return sorted(found, key=lambda one: -one.points)
+
+
+def _stake(report: ReportDocument) -> float:
+    """Points between the least and the largest score that are still possible."""
+    if report.status == "unreadable" or report.score_range is None:
+        return report.max_score
+    return report.score_range[1] - report.score_range[0]
