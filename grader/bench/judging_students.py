@@ -123,7 +123,7 @@ def student(key: Key) -> Work:
             continue
         if is_hidden(task):
             continue
-        optional = {one.name for one in rubric.criterion if one.optional and one.vector}
+        optional = [one.name for one in rubric.criterion if one.optional and one.vector]
         skipped = {name for name in optional if lot.random() < 0.7} if lot.random() < 0.3 else set()
         own_scales = habits.crank_mm is not None or (habits.kv_ratio, habits.ka_ratio) != (1.0, 1.0)
         declares = bool(lot.random() < 0.7) or own_scales

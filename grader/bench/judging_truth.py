@@ -53,7 +53,7 @@ from grader.bench.judging_values import LEAST_SINE, Computed, across, computed, 
 from grader.judging import Submission
 from grader.rubric import CriterionTable, ToleranceTable
 from reference.construction import Construction, Vector, ancestors, evaluate
-from reference.elements import Scaled
+from reference.elements import Scaled, View
 from reference.geometry import ComplexArray
 from reference.mistakes import Drawing, Mistake, commit
 from reference.steps import Given, Pivot
@@ -257,17 +257,19 @@ def _forms(work: Work, source: Source) -> dict[str, _Forms]:
     for figure in right.construction.poles:
         own = work.own(figure)
         named = work.named(own, source)
-        for vector in right.construction.vectors_of(figure):
-            driven = is_driven(right.construction, vector.head)
-            tail, due_of = own[vector.tail], right if driven else following
-            due = _head(due_of, own, vector.head) - tail
-            if driven and of_another:
-                due = _between(exact, vector)
+        vectors = right.construction.vectors_of(figure)
+        heads = {vector.head for vector in vectors}
+        driven = {head for head in heads if is_driven(right.construction, head)}
+        due_at = {head: _head(right if head in driven else following, own, head) for head in heads}
+        made_at = {head: _head(task.wrong, own, head) for head in heads}
+        for vector in vectors:
+            tail = own[vector.tail]
+            of_data = vector.head in driven and of_another
             forms[vector.name] = _Forms(
                 named=named[vector.head] - named[vector.tail],
                 drawn=own[vector.head] - tail,
-                due=due,
-                made=_head(task.wrong, own, vector.head) - tail,
+                due=_between(exact, vector) if of_data else due_at[vector.head] - tail,
+                made=made_at[vector.head] - tail,
                 exact=_between(exact, vector),
                 told=_between(told, vector),
             )
@@ -287,8 +289,9 @@ def _at_scales_followed(right: Drawing, mistakes: Sequence[Mistake]) -> Drawing:
 
 def _head(drawing: Drawing, own: Mapping[str, complex], head: str) -> complex:
     """A node as a drawing makes it from the student's own nodes before it."""
-    given = {name: np.asarray(place) for name, place in own.items() if name != head}
-    return complex(evaluate(drawing.construction, drawing.parameters, given=given, wanted=[head])[head])
+    nodes = {name: np.asarray(place) for name, place in own.items()}
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return complex(drawing.construction.step(head).place(View(nodes, drawing.parameters)))
 
 
 def _between(nodes: Mapping[str, ComplexArray], vector: Vector) -> complex:
