@@ -6,12 +6,13 @@ from rich.console import Console
 from rich.table import Table
 
 from grader.cli.grading import check_language, checked_level
-from grader.feedback import mistake_feedback, reason_sentence
+from grader.feedback import About, mistake_feedback, reason_sentence, write_leaflet
 from grader.i18n import Tongue, tongue
 from grader.judging import Submission, judge, task_of
 from grader.measurements import Measurements, names_of, read_measurements
 from grader.outcomes import Mistake, Quantity
-from grader.rubric import rubric_of
+from grader.pipeline import Work, mark_looked
+from grader.rubric import RubricFile, rubric_of
 from grader.selfcheck import Checked, Level, is_all_right, likely_mistakes, told
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError
@@ -19,18 +20,38 @@ from reference.errors import CallError
 MARKS = {"right": ("✓", "green"), "off": ("✗", "red"), "open": ("?", "magenta")}
 
 
-def check_measured(name: str, n: int | None, position: int | None, file: Path, lang: str, level: str) -> bool:
-    """Tell right and off for every value of a measurement file; whether anything is off."""
+PAGE_FILES = (".html", ".pdf")
+
+
+def check_measured(
+    name: str,
+    n: int | None,
+    position: int | None,
+    file: Path,
+    lang: str,
+    level: str,
+    page: Path | None = None,
+) -> bool:
+    """Tell right and off for every value of a measurement file; whether anything is off.
+
+    With a `page`, one student's values are drawn and told in that file, too.
+    """
     check_language(lang)
+    _check_page(page)
     wanted = checked_level(level)
     assignment = load_assignment(name)
     rubric = rubric_of(assignment)
     words = tongue(lang)
     console = Console()
     all_right = True
-    for entered in read_measurements(file, names_of(assignment)):
+    students = read_measurements(file, names_of(assignment))
+    if page is not None and len(students) != 1:
+        raise CallError("page_students", f"--page is one student's: {file} holds {len(students)}")
+    for entered in students:
         variant = _variant(assignment, entered, n, position)
         _tell_head(console, entered, variant)
+        if page is not None:
+            _write_page(page, assignment, rubric, variant, entered, lang, wanted)
         submission = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
         judgement = judge(task_of(assignment, rubric, variant), submission)
         checked = told(judgement, wanted)
@@ -38,6 +59,27 @@ def check_measured(name: str, n: int | None, position: int | None, file: Path, l
         _tell_mistakes(console, likely_mistakes(judgement, wanted), lang, assignment)
         all_right = all_right and is_all_right(checked) and bool(checked) and not entered.problems
     return not all_right
+
+
+def _check_page(page: Path | None) -> None:
+    if page is not None and page.suffix.lower() not in PAGE_FILES:
+        raise CallError("page_file", f"--page {page}: the name must end in {' or '.join(PAGE_FILES)}")
+
+
+def _write_page(
+    page: Path,
+    assignment: Assignment,
+    rubric: RubricFile,
+    variant: Variant,
+    entered: Measurements,
+    lang: str,
+    level: Level,
+) -> None:
+    """The same as a page, with the plans drawn as measured."""
+    work = Work(entered.student_id or "", variant, measured=entered, lang=lang)
+    marked = mark_looked(work, assignment, rubric, (), level)
+    about = About(assignment.file.title.in_language(lang), "", assignment.file.names)
+    write_leaflet(page, marked.report, marked.pictures, lang, level, about)
 
 
 def _variant(assignment: Assignment, entered: Measurements, n: int | None, position: int | None) -> Variant:

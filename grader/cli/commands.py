@@ -189,11 +189,14 @@ def check(
     level: Annotated[
         str, typer.Option("--level", help="symbol (right or off), hint (in which way), full (numbers).")
     ] = "hint",
+    page: Annotated[
+        Path | None, typer.Option("--page", help="Draw and tell it in this file, too: .html or .pdf.")
+    ] = None,
 ) -> None:
     """Check measured values: right, or off and in which way, without giving the answer away."""
     from grader.cli.checking import check_measured
 
-    raise typer.Exit(1 if check_measured(assignment, n, position, measured, lang, level) else 0)
+    raise typer.Exit(1 if check_measured(assignment, n, position, measured, lang, level, page) else 0)
 
 
 @app.command()

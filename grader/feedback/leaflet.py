@@ -113,6 +113,11 @@ class Leaflet:
         return self.level == "full"
 
     @property
+    def has_marks(self) -> bool:
+        """Whether anything is marked in a picture."""
+        return any(picture.scene.arrows for picture in self.pictures)
+
+    @property
     def has_ghosts(self) -> bool:
         """Whether any expected vector is drawn."""
         return any(picture.scene.ghosts for picture in self.pictures)

@@ -55,6 +55,24 @@ def write_feedback(  # noqa: PLR0913 - all that the files hold
             old.unlink(missing_ok=True)
 
 
+def write_leaflet(
+    file: Path,
+    report: ReportDocument,
+    pictures: Sequence[Picture],
+    lang: str,
+    level: Level = "full",
+    about: About = NOBODY,
+) -> None:
+    """Write the page of one submission into one file: for the printer where its name ends in ``.pdf``."""
+    leaflet = leaflet_of(report, pictures, tongue(lang), level, about)
+    if file.suffix.lower() == ".pdf":
+        from grader.feedback.printed import pdf_of  # noqa: PLC0415 - as above
+
+        write_whole(file, pdf_of(leaflet))
+    else:
+        write_whole(file, page_of(leaflet))
+
+
 def feedback_page(
     report: ReportDocument,
     pictures: Sequence[Picture],
@@ -80,4 +98,4 @@ def page_of(leaflet: Leaflet) -> str:
     )  # fmt: skip
 
 
-__all__ = ["feedback_page", "page_of", "write_feedback"]
+__all__ = ["feedback_page", "page_of", "write_feedback", "write_leaflet"]

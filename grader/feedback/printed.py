@@ -104,8 +104,9 @@ class _Story:
         yield from self.drawing()
         yield from self.criteria()
         yield from self.scales()
-        yield Spacer(1, 5 * mm)
-        yield text(self.leaflet.footer, 7, colour=SOFT)
+        if self.leaflet.rows:
+            yield Spacer(1, 5 * mm)
+            yield text(self.leaflet.footer, 7, colour=SOFT)
 
     def head(self) -> Flowable:
         """Title, student, state and score."""
@@ -211,6 +212,13 @@ class _Story:
             return
         yield CondPageBreak(90 * mm)
         yield from self.heading(N_("The drawing"))
+        if self.leaflet.has_marks:
+            yield from self.legend()
+        for sheet in self.leaflet.sheets:
+            yield from self.sheetful(sheet)
+
+    def legend(self) -> Iterator[Flowable]:
+        """What colours, marks and lines mean."""
         legend = [
             part
             for verdict, word in words.VERDICTS.items()
@@ -221,8 +229,6 @@ class _Story:
         lines = [f"- - -  {self.say(N_('doubtful'))}"]
         lines += [f"· · · ·  {self.say(N_('expected'))}"] if self.leaflet.has_ghosts else []
         yield text("     ".join(lines), 7.5, colour=SOFT)
-        for sheet in self.leaflet.sheets:
-            yield from self.sheetful(sheet)
 
     def sheetful(self, sheet: Sheetful) -> Iterator[Flowable]:
         """The whole page, then its plans two in a row."""
