@@ -1,24 +1,28 @@
 """The benchmark of judging: who drew what, what is due to it, and how it is counted."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from grader.bench import judging
+from grader.bench import judging, judging_scans
 from grader.bench.judging import JudgingBench, judged, main
 from grader.bench.judging_assignments import ASSIGNMENTS, assignment_named
+from grader.bench.judging_class import measure_class
 from grader.bench.judging_handed_in import submission
 from grader.bench.judging_naming import is_named, mistakes_due
 from grader.bench.judging_redrawn import Asked, meant, vectors_of
 from grader.bench.judging_students import SOURCES, Key, Work, student
 from grader.bench.judging_tables import judging_tables
-from grader.bench.judging_tally import ClassTime, JudgingFigures, Marked, Tally, result_of, summed
+from grader.bench.judging_tally import ClassTime, JudgingFigures, Marked, Tally, Times, result_of, summed
 from grader.bench.judging_truth import Seen, off, verdicts_due
+from grader.bench.judging_values import computed, exact_rates
 from grader.bench.plain_text import as_text
 from grader.judging import judge, task_of
 from grader.lint import lint
 from grader.outcomes import Mistake as Named
+from grader.records import Reading
 from grader.simulation.hand import draw
 from grader.simulation.hand import task_of as drawing_task
 from grader.simulation.settings import PERFECT, Student
@@ -288,3 +292,63 @@ def test_one_case_is_told_in_full(capsys):
     assert "engine careful single 4" in told
     assert "due" in told
     assert judged(Key("engine", "careful", "single", 4))
+
+
+# Values computed, scans, whole classes --------------------------------------------------------------
+
+
+def test_a_slip_in_one_value_is_wrong_there_and_nowhere_else():
+    work = student(Key("shaper", "careful", "slip", 1))
+    told = computed(work)
+    assert told.values[told.slip] == pytest.approx(told.right[told.slip] * told.factor)
+    assert {name for name in told.values if told.values[name] != told.right[name]} == {told.slip}
+    found, made, _ = due(work)
+    assert group(found, "wrong") == {told.slip}
+    assert not made
+    handed_in = submission(work, "nodes")
+    judgement = judge(task_of(work.assignment, work.rubric, work.variant), handed_in)
+    one = result_of(work, "nodes", handed_in, judgement)
+    assert one.first.code == "arithmetic"
+    assert one.first.at == told.slip
+
+
+def test_values_computed_from_a_right_drawing_are_the_exact_ones_to_a_hands_errors():
+    work = replace(drawn("shaper", n=4), key=Key("shaper", "careful", "slip", 2))
+    exact = exact_rates(work)
+    told = computed(work)
+    assert set(exact) <= set(told.right)
+    for name, (value, per_mm) in exact.items():
+        assert abs(told.right[name] - value) < 1.0 * per_mm + 0.005 * abs(value), name
+
+
+def test_the_sense_of_a_value_is_due_only_where_it_can_be_told():
+    mistake = Mistake("sense_reversed", "a")
+    work = replace(drawn("press", mistake, position=1), key=Key("press", "careful", "single", 0))
+    seeds = (Key("press", "careful", "single", seed) for seed in range(20))
+    with_values = next(one for key in seeds if computed(one := replace(work, key=key)).values)
+    found, _, _ = due(with_values, "directions")
+    by_length, _, _ = due(with_values, "lengths")
+    assert found["omega_2"] == "follows"
+    assert by_length["omega_2"] == "either"
+
+
+def test_scans_are_judged_as_read_against_what_was_drawn(monkeypatch):
+    """With a perfect reader in place of pictures: what is due does not hang on the reader."""
+    page = SimpleNamespace(truth={"figures": {"velocity_plan": {"missing": {"v_D": "not drawn out"}}}})
+    monkeypatch.setattr(judging_scans, "simulate", lambda *_: [page])
+    monkeypatch.setattr(
+        judging_scans, "_read", lambda work, _: [*submission(work, "nodes").readings, Reading({})]
+    )
+    times = Times()
+    (one,) = judging_scans.judged_scan(Key("engine", "careful", "single", 5), times)
+    assert one.source == "scans"
+    assert len(one.made) == len(times.scans) == 1
+    by_name = {marked.criterion: marked for marked in one.criteria}
+    assert by_name["v_D"].due == "absent"
+    assert by_name["v_A"].due != "absent"
+
+
+def test_a_class_goes_through_the_whole_program():
+    timed = measure_class(6, "engine")
+    assert timed.graded == timed.rows == 6
+    assert timed.processor_s > 0.0
