@@ -145,31 +145,39 @@ def fill(data: bytes, file: str, grades: Sequence[Grade], options: Options) -> D
     """
     book = _open(data, file, options)
     told = ready(grades)
-    found = _whose(book, {one.student_id: options.person(one.student_id) for one in told})
-    meant: dict[int, float] = {}
-    missing, written, replaced = dict(found.missing), [], 0
-    for grade in told:
+    here = {one.student_id: options.person(one.student_id) for one in grades}
+    found = _whose(book, {**options.people, **here})
+    meant, missing = _put(book, told, found, rescale=options.rescale)
+    written = tuple(one.student_id for one in told if one.student_id not in missing)
+    book.notes.extend(found.notes_on(written))
+    filled = book.table.text().encode("utf-8")
+    again = _open(filled, file, options)
+    if any(number(_amount(again.grade(row)) or 0.0) != score for row, score in meant.items()):
+        raise not_as_meant("the gradebook")
+    return Draft(filled, written, withheld=withheld(grades), not_found=missing, notes=tuple(book.notes))
+
+
+def _put(
+    book: _Gradebook, grades: Sequence[Grade], found: Found, *, rescale: bool
+) -> tuple[dict[int, str], dict[str, str]]:
+    """Put the grades into their cells: what stands in which row then, and why others have none."""
+    meant, missing, replaced = dict[int, str](), dict[str, str](), 0
+    for grade in grades:
         row = found.rows.get(grade.student_id)
         if row is None:
+            missing[grade.student_id] = found.missing[grade.student_id]
             continue
         before = book.grade(row)
         if before.casefold() in {"ex", "n/a"}:
             missing[grade.student_id] = f"Canvas says '{before}': excused, or not given this assignment"
             continue
-        meant[row] = rescaled(grade, book.possible, rescale=options.rescale) or 0.0
-        if _amount(before) is None or number(_amount(before) or 0.0) != number(meant[row]):
+        meant[row] = number(rescaled(grade, book.possible, rescale=rescale) or 0.0)
+        if _amount(before) is None or number(_amount(before) or 0.0) != meant[row]:
             replaced += before not in _NO_GRADE
-            book.table.put(row, book.assignment, number(meant[row]))
-        written.append(grade.student_id)
+            book.table.put(row, book.assignment, meant[row])
     if replaced:
         book.notes.append(f"{replaced} grade(s) that Canvas holds already are changed")
-    filled = book.table.text().encode("utf-8")
-    again = _open(filled, file, options)
-    if any(number(_amount(again.grade(row)) or 0.0) != number(score) for row, score in meant.items()):
-        raise not_as_meant("the gradebook")
-    return Draft(
-        filled, tuple(written), withheld=withheld(grades), not_found=missing, notes=tuple(book.notes)
-    )
+    return meant, missing
 
 
 def _open(data: bytes, file: str, options: Options) -> _Gradebook:
@@ -244,8 +252,8 @@ def _amount(text: str) -> float | None:
 
 
 def _whose(book: _Gradebook, students: Mapping[str, Person]) -> Found:
-    columns = {"id": "ID", "sis": "SIS User ID", "login": "SIS Login ID", "name": "Student"}
-    known = {name: book.about[title] for name, title in columns.items() if title in book.about}
+    titles = {"ID": "ID", "SIS User ID": "SIS User ID", "SIS Login ID": "SIS Login ID", "name": "Student"}
+    known = {name: book.about[title] for name, title in titles.items() if title in book.about}
     cells = []
     for row in book.people:
         told = {name: book.table.value(row, column) for name, column in known.items()}
@@ -253,7 +261,7 @@ def _whose(book: _Gradebook, students: Mapping[str, Person]) -> Found:
             last, first = (book.table.value(row, book.about[one]) for one in ("LastName", "FirstName"))
             told["name"] = f"{last}, {first}"
         if not all(_MANUAL.fullmatch(cell) for cell in told.values()):
-            cells.append((row, {**told, "first_last": _turned(told.get("name", ""))}))
+            cells.append((row, {**told, "name turned": _turned(told.get("name", ""))}))
     evidence = {student: _evidence(student, person) for student, person in students.items()}
     return find(Rows.of(cells), evidence, "the gradebook")
 
@@ -266,10 +274,10 @@ def _turned(name: str) -> str:
 
 def _evidence(student_id: str, person: Person) -> Evidence:
     return (
-        ("id", person.platform_id),
-        ("sis", student_id),
-        ("login", person.username or student_id),
-        ("login", person.email),
+        ("ID", person.platform_id),
+        ("SIS User ID", student_id),
+        ("SIS Login ID", person.username or student_id),
+        ("SIS Login ID", person.email),
         ("name", person.name),
-        ("first_last", person.name),
+        ("name turned", person.name),
     )

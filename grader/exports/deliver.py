@@ -21,7 +21,7 @@ from grader.exports import (
 )
 from grader.exports.archive import write_files
 from grader.exports.comments import comment
-from grader.exports.draft import Draft, ready, withheld
+from grader.exports.draft import Draft, ready
 from grader.exports.faults import faults_of, listed
 from grader.exports.grades import Grade, grades_of
 from grader.exports.options import TARGETS, Options
@@ -112,14 +112,8 @@ def _moodle_grades(grades: list[Grade], options: Options) -> Draft:
     for name in ("item", "identity", "maximum"):
         if getattr(options, name) is not None and getattr(options, name) != "":
             raise CallError("option_unused", f"--{name} has no meaning beside --worksheet: leave it out")
-    told = ready(grades)
-    comments = {grade.student_id: comment(grade.reports, options.lang) for grade in told}
-    filled = moodle_worksheet.fill(
-        _bytes(options.form), options.form.name, told, options.people, comments, rescale=options.rescale
-    )
-    missing = dict(filled.not_found)
-    missing.update(dict.fromkeys(filled.locked, "Moodle says that this grade cannot be changed"))
-    return Draft(filled.data, filled.written, withheld(grades), missing, filled.notes)
+    comments = {grade.student_id: comment(grade.reports, options.lang) for grade in ready(grades)}
+    return moodle_worksheet.fill(_bytes(options.form), options.form.name, grades, options, comments)
 
 
 def _moodle_feedback(grades: list[Grade], options: Options) -> Draft:

@@ -7,60 +7,107 @@ from dataclasses import dataclass, field
 
 Evidence = Sequence[tuple[str, str]]
 """Columns and what would stand there, the strongest first; an empty text is no evidence."""
+NAMES = frozenset({"name", "name turned"})
+"""Columns that two people may share."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Rows by what stands in their columns, without regard to case, spaces and ways to write an accent."""
+    """A table's rows, without regard to case, spaces and ways to write an accent.
 
+    Attributes
+    ----------
+    cells : of each row by column, folded
+    by_cell : rows by column and what stands there
+    """
+
+    cells: Mapping[int, Mapping[str, str]]
     by_cell: Mapping[str, Mapping[str, list[int]]]
 
     @staticmethod
-    def of(cells: Iterable[tuple[int, Mapping[str, str]]]) -> "Rows":
+    def of(rows: Iterable[tuple[int, Mapping[str, str]]]) -> "Rows":
         """Rows by number, each with its cells by column."""
-        found: dict[str, dict[str, list[int]]] = defaultdict(lambda: defaultdict(list))
-        for row, columns in cells:
-            for column, cell in columns.items():
-                found[column][folded(cell)].append(row)
-        return Rows(found)
+        cells = {row: {column: folded(cell) for column, cell in told.items()} for row, told in rows}
+        by_cell: dict[str, dict[str, list[int]]] = defaultdict(lambda: defaultdict(list))
+        for row, told in cells.items():
+            for column, cell in told.items():
+                by_cell[column][cell].append(row)
+        return Rows(cells, by_cell)
 
-    def fitting(self, evidence: Evidence) -> Sequence[int]:
-        """Rows that fit by the strongest evidence there is: where that fits, weaker is not asked."""
-        for column, wanted in evidence:
-            rows = self.by_cell.get(column, {}).get(folded(wanted), ()) if wanted else ()
-            if rows:
-                return rows
-        return ()
+    def with_cell(self, column: str, wanted: str) -> Sequence[int]:
+        """Rows where this stands in a column; none for an empty text."""
+        return self.by_cell.get(column, {}).get(folded(wanted), ()) if wanted.strip() else ()
 
 
 @dataclass(slots=True)
 class Found:
-    """The row of each student, and why others have none. No row serves two students."""
+    """The row of each student, and why others have none. No row serves two students.
+
+    Attributes
+    ----------
+    by_name : students for whom nothing but their name speaks
+    """
 
     rows: dict[str, int] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
+    by_name: list[str] = field(default_factory=list)
+
+    def notes_on(self, written: Sequence[str]) -> list[str]:
+        """What a person should look at among those who were written."""
+        doubtful = [student for student in self.by_name if student in set(written)]
+        if not doubtful:
+            return []
+        return [f"found by name alone, look whether they are these: {', '.join(doubtful)}"]
 
 
 def find(rows: Rows, students: Mapping[str, Evidence], table: str) -> Found:
-    """The row of each student in a table; `table` is its name in words."""
+    """The row of each student in a table; `table` is its name in words.
+
+    The strongest evidence that fits decides, unless stronger evidence speaks against that row: a
+    namesake with another address. Only columns that know anybody of these students can speak so.
+    """
+    speaking = {
+        column
+        for evidence in students.values()
+        for column, wanted in evidence
+        if rows.with_cell(column, wanted)
+    }
     found = Found()
     owners: dict[int, list[str]] = defaultdict(list)
+    columns: dict[str, str] = {}
     for student, evidence in students.items():
-        fitting = rows.fitting(evidence)
-        if len(fitting) == 1:
-            owners[fitting[0]].append(student)
-        elif fitting:
-            numbers = ", ".join(str(row + 1) for row in fitting)
-            found.missing[student] = f"rows {numbers} of {table} all fit"
+        row, column, why = _row(rows, evidence, speaking)
+        if row is None:
+            found.missing[student] = why.format(table=table)
         else:
-            known = ", ".join(f"{column} '{wanted}'" for column, wanted in evidence if wanted)
-            found.missing[student] = f"nobody in {table} has {known or 'anything known of the student'}"
+            owners[row].append(student)
+            columns[student] = column
     for row, claimed in owners.items():
         if len(claimed) == 1:
             found.rows[claimed[0]] = row
         for student in claimed if len(claimed) > 1 else ():
             found.missing[student] = f"row {row + 1} of {table} fits {' and '.join(claimed)} alike"
+    found.by_name = [student for student in found.rows if columns[student] in NAMES]
     return found
+
+
+def _row(rows: Rows, evidence: Evidence, speaking: set[str]) -> tuple[int | None, str, str]:
+    """A student's row and the column that decides, or why there is none."""
+    for place, (column, wanted) in enumerate(evidence):
+        fitting = rows.with_cell(column, wanted)
+        if len(fitting) > 1:
+            return None, column, f"rows {', '.join(str(row + 1) for row in fitting)} of {{table}} all fit"
+        for row in fitting:
+            for stronger, told in evidence[:place]:
+                own = rows.cells[row].get(stronger)
+                is_other = told and own and own != folded(told) and stronger != column
+                if is_other and stronger in speaking:
+                    why = f"row {row + 1} of {{table}} has the {column}, but another {stronger}"
+                    return None, column, why
+            return row, column, ""
+    known = ", ".join(f"{column} '{wanted}'" for column, wanted in evidence if wanted)
+    told = (known or "anything known of the student").replace("{", "{{").replace("}", "}}")
+    return None, "", f"nobody in {{table}} has {told}"
 
 
 def folded(text: str) -> str:

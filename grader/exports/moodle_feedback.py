@@ -11,7 +11,7 @@ from pathlib import Path
 from grader.exports.draft import Draft, ready, withheld
 from grader.exports.faults import listed
 from grader.exports.grades import Grade
-from grader.exports.moodle_worksheet import open_worksheet
+from grader.exports.moodle_worksheet import LOCKED, open_worksheet
 from grader.exports.options import Options
 from reference.errors import CallError, InputFileError
 
@@ -29,7 +29,9 @@ def feedback_files(grades: Sequence[Grade], options: Options, worksheet: bytes |
     another run.
     """
     told = ready(grades)
-    numbers, missing = _numbers(told, options, worksheet)
+    notes: list[str] = []
+    numbers, missing = _numbers(grades, options, worksheet, notes)
+    missing = {grade.student_id: missing[grade.student_id] for grade in told if grade.student_id in missing}
     files: dict[str, Path] = {}
     faults: list[str] = []
     for grade in told:
@@ -51,6 +53,7 @@ def feedback_files(grades: Sequence[Grade], options: Options, worksheet: bytes |
         notes=(
             f"{weight:.1f} MB: the site's upload limit must allow it",
             "upload grades before feedback files: they make Moodle take a worksheet for outdated",
+            *notes,
         ),
     )
 
@@ -60,13 +63,13 @@ def _lines(missing: Mapping[str, str]) -> list[str]:
 
 
 def _numbers(
-    grades: Sequence[Grade], options: Options, worksheet: bytes | None
+    grades: Sequence[Grade], options: Options, worksheet: bytes | None, notes: list[str]
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Moodle's number of each participant, and why others have none."""
+    """Moodle's number of each participant, and why others have none; what to look at goes to `notes`."""
     people = {grade.student_id: options.person(grade.student_id) for grade in grades}
     if worksheet is None:
         numbers = {one: who.participant for one, who in people.items() if who.participant is not None}
-        if people and not numbers:
+        if all(who.participant is None for who in options.people.values()):
             raise CallError(
                 "worksheet_needed",
                 "Moodle's numbers of participants are needed: give the downloaded grading worksheet"
@@ -74,14 +77,16 @@ def _numbers(
             )
         return numbers, {one: "the table of ids has no participant" for one in people if one not in numbers}
     sheet = open_worksheet(worksheet, options.form.name if options.form else "worksheet")
-    found = sheet.whose(people)
-    numbers, missing = {}, dict(found.missing)
-    for student, row in found.rows.items():
-        participant = sheet.participant(row)
-        if participant is None or sheet.is_locked(row):
-            missing[student] = "Moodle says that this grade cannot be changed"
-        else:
+    found = sheet.whose({**options.people, **people})
+    numbers, missing = {}, {one: why for one, why in found.missing.items() if one in people}
+    for student in people:
+        row = found.rows.get(student)
+        participant = None if row is None else sheet.participant(row)
+        if row is not None and sheet.is_locked(row):
+            missing[student] = LOCKED
+        elif participant is not None:
             numbers[student] = participant
+    notes.extend(found.notes_on(list(numbers)))
     return numbers, missing
 
 

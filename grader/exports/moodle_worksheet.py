@@ -9,9 +9,11 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from grader.exports.draft import Draft, ready, withheld
 from grader.exports.faults import listed, not_as_meant
 from grader.exports.finding import Evidence, Found, Rows, find
 from grader.exports.grades import Grade, Person, rescaled
+from grader.exports.options import Options
 from grader.exports.raw_csv import RawTable, parse
 from grader.exports.table import number
 from reference.errors import InputFileError
@@ -41,24 +43,7 @@ _REQUIRED = ("identifier", "grade", "modified")
 _NO = {"no", "nu", "нет"}
 _PARTICIPANT = re.compile(r"\s*\D*?(\d+)\s*")
 _EMPTY = {"", "-"}
-
-
-@dataclass(frozen=True, slots=True)
-class Filled:
-    """A worksheet filled in.
-
-    Attributes
-    ----------
-    written : students with a grade in the file
-    not_found : students with a grade who are not in the worksheet, with why
-    locked : students whose grade Moodle says cannot be changed
-    """
-
-    data: bytes
-    written: tuple[str, ...]
-    not_found: Mapping[str, str]
-    locked: tuple[str, ...]
-    notes: tuple[str, ...] = ()
+LOCKED = "Moodle says that this grade cannot be changed"
 
 
 @dataclass(slots=True)
@@ -117,43 +102,45 @@ def _evidence(student_id: str, person: Person) -> Evidence:
 
 
 def fill(
-    data: bytes,
-    file: str,
-    grades: Sequence[Grade],
-    people: Mapping[str, Person],
-    comments: Mapping[str, str],
-    *,
-    rescale: bool = False,
-) -> Filled:
-    """Fill in a worksheet.
+    data: bytes, file: str, grades: Sequence[Grade], options: Options, comments: Mapping[str, str]
+) -> Draft:
+    """Fill in a worksheet; only cells of those who have a grade change, the rest to the byte.
 
-    Arguments
-    ---------
-    people : names and e-mail addresses by student_id, by which students are found in the worksheet
-    comments : HTML by student_id; not written where the worksheet has no column for it
+    `comments` are HTML by student_id; not written where the worksheet has no column for them. Students
+    are found among the whole class: a row that fits two of them is given to neither.
 
     Raises InputFileError with everything that is wrong with the worksheet, CallError where its
-    maximum is not the rubric's and `rescale` is not asked for.
+    maximum is not the rubric's and nobody asks for rescaling.
     """
     sheet = open_worksheet(data, file)
-    found = sheet.whose({one.student_id: people.get(one.student_id, Person()) for one in grades})
-    told: dict[int, str] = {}
-    written, locked, replaced = [], [], 0
+    told = ready(grades)
+    here = {one.student_id: options.person(one.student_id) for one in grades}
+    found = sheet.whose({**options.people, **here})
+    meant, missing = _put(sheet, told, found, comments, rescale=options.rescale)
+    written = tuple(one.student_id for one in told if one.student_id not in missing)
+    filled = sheet.table.text().encode("utf-8")
+    _check(filled, file, meant)
+    notes = (*sheet.notes, *found.notes_on(written))
+    return Draft(filled, written, withheld=withheld(grades), not_found=missing, notes=notes)
+
+
+def _put(
+    sheet: Worksheet, grades: Sequence[Grade], found: Found, comments: Mapping[str, str], *, rescale: bool
+) -> tuple[dict[int, str], dict[str, str]]:
+    """Put grades and comments into their cells: what stands in which row then, and why others have none."""
+    meant, missing, replaced = dict[int, str](), dict[str, str](), 0
     for grade in grades:
-        row = found.rows.get(grade.student_id)
-        if row is None or grade.score is None:
+        student, row = grade.student_id, found.rows.get(grade.student_id)
+        if row is None or sheet.is_locked(row):
+            missing[student] = LOCKED if row is not None else found.missing[student]
             continue
-        if sheet.is_locked(row):
-            locked.append(grade.student_id)
-            continue
-        told[row] = number(rescaled(grade, _maximum(sheet, row, grade), rescale=rescale) or 0.0)
+        meant[row] = number(rescaled(grade, _maximum(sheet, row, grade), rescale=rescale) or 0.0)
         before = sheet.value(row, "grade")
-        if before in _EMPTY or number(_amount(before) or 0.0) != told[row]:
+        if before in _EMPTY or number(_amount(before) or 0.0) != meant[row]:
             replaced += before not in _EMPTY
-            sheet.table.put(row, sheet.columns["grade"], told[row])
-        if "feedback" in sheet.columns and grade.student_id in comments:
-            sheet.table.put(row, sheet.columns["feedback"], comments[grade.student_id])
-        written.append(grade.student_id)
+            sheet.table.put(row, sheet.columns["grade"], meant[row])
+        if "feedback" in sheet.columns and student in comments:
+            sheet.table.put(row, sheet.columns["feedback"], comments[student])
     if "feedback" not in sheet.columns:
         sheet.notes.append("the worksheet has no column for feedback comments: only grades are filled in")
     if replaced:
@@ -161,9 +148,7 @@ def fill(
             f"{replaced} grade(s) that Moodle holds already are changed: it skips them unless the box for"
             " updating records is ticked at the upload, or the worksheet was downloaded afresh"
         )
-    filled = sheet.table.text().encode("utf-8")
-    _check(filled, file, told)
-    return Filled(filled, tuple(written), found.missing, tuple(locked), tuple(sheet.notes))
+    return meant, missing
 
 
 def _check(filled: bytes, file: str, told: Mapping[int, str]) -> None:

@@ -46,10 +46,11 @@ def test_moodle_stores_what_was_meant_in_any_worksheet(people, style, mark):
     known = {f"s{at}": Person(participant=at) for at in range(len(people))}
     comments = {student: f"<p>{student}, said</p>" for student in known}
     data = written([HEADER, *rows], style, mark)
-    filled = fill_worksheet(data, "w.csv", grades_of(results(*graded)), known, comments)
-    stored = importers.moodle_worksheet(filled.data, 10.0)
+    options = Options(to="moodle", people=known)
+    filled = fill_worksheet(data, "w.csv", grades_of(results(*graded)), options, comments)
+    stored = importers.moodle_worksheet(filled.content, 10.0)
     assert stored == {at: (people[at][2], comments[f"s{at}"]) for at in range(len(people))}
-    for before, after in zip(read(data)[1:], read(filled.data)[1:], strict=True):
+    for before, after in zip(read(data)[1:], read(filled.content)[1:], strict=True):
         assert before[:2] + before[3:5] == after[:2] + after[3:5]
 
 
@@ -85,7 +86,7 @@ def test_a_file_of_any_content_is_used_or_refused(tmp_path, data):
     path.write_bytes(data)
     graded = grades_of(results(report("s0", 5.0)))
     with suppress(PlanmarkError):
-        fill_worksheet(data, "w.csv", graded, {}, {})
+        fill_worksheet(data, "w.csv", graded, Options(to="moodle"), {})
     with suppress(PlanmarkError):
         fill_gradebook(data, "g.csv", graded, Options(to="canvas"))
     with suppress(PlanmarkError):

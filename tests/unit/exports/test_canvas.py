@@ -76,17 +76,23 @@ def test_students_are_found_by_number_login_and_name(tmp_path, student, person):
     delivery, text = filled(tmp_path, report(student, 7.5), people={student: person})
     assert delivery.written == (student,)
     assert "1,4,7.5,," in text
-    assert delivery.notes == ("1 grade(s) that Canvas holds already are changed",)
+    assert delivery.notes[0] == "1 grade(s) that Canvas holds already are changed"
+    assert ("found by name alone" in delivery.notes[-1]) == bool(person.name)
 
 
 def test_who_is_not_there_or_shares_a_row_is_told(tmp_path):
-    people = {"s08": Person(name="Popescu, Ion"), "s09": Person(name="Nobody")}
-    delivery, text = filled(
-        tmp_path, report("s01", 7.5), report("s08", 1.0), report("s09", 2.0), people=people
-    )
-    assert text == EXPORTED
-    assert delivery.written == ()
-    assert "fits s01 and s08 alike" in delivery.not_found["s01"]
+    people = {
+        "s01": Person(username="ion@x.ro"),
+        "s02": Person(platform_id="4712"),
+        "S-02": Person(),
+        "s08": Person(name="Popescu, Ion"),
+        "s09": Person(name="Nobody"),
+    }
+    delivery, text = filled(tmp_path, *(report(one, 7.5) for one in people), people=people)
+    assert text == EXPORTED.replace('2",3,,55', '2",3,7.5,55')
+    assert delivery.written == ("s01",)
+    assert "fits s02 and S-02 alike" in delivery.not_found["s02"]
+    assert "has the name, but another SIS User ID" in delivery.not_found["s08"]
     assert "nobody in the gradebook has" in delivery.not_found["s09"]
 
 

@@ -104,6 +104,46 @@ def test_names_are_found_however_their_accents_are_written():
     assert find(rows, {"s01": (("name", name.upper()),)}, "the table").rows == {"s01": 1}
 
 
+def found(rows, **students):
+    return find(Rows.of(enumerate(rows, start=1)), {one: tuple(said) for one, said in students.items()}, "it")
+
+
+ION = {"email": "ion@x.ro", "name": "Ion"}
+ANA = {"email": "ana@x.ro", "name": "Ana"}
+
+
+def test_a_namesake_with_another_address_is_not_the_student():
+    told = found(
+        [ION, ANA],
+        s01=[("email", "other@x.ro"), ("name", "Ion")],
+        s02=[("email", "ana@x.ro"), ("name", "Ana")],
+    )
+    assert told.rows == {"s02": 2}
+    assert told.missing == {"s01": "row 2 of it has the name, but another email"}
+
+
+def test_addresses_of_another_kind_do_not_speak_against_names_which_are_told_to_be_all_there_is():
+    told = found(
+        [ION, ANA],
+        s01=[("email", "s01@private.ro"), ("name", "Ion")],
+        s02=[("email", ""), ("name", "Ana")],
+    )
+    assert told.rows == {"s01": 1, "s02": 2}
+    assert told.notes_on(["s01"]) == ["found by name alone, look whether they are these: s01"]
+    assert told.notes_on([]) == []
+
+
+def test_two_students_with_a_row_between_them_have_none_even_if_one_is_withheld(tmp_path):
+    form = tmp_path / "w.csv"
+    form.write_text("Identifier,Full name,Grade,Last modified (grade)\nParticipant 1,Ion,,-\n")
+    people = {"s01": Person(name="Ion"), "s02": Person(name="Ion")}
+    both = results(marked("s01", 5.0), marked("s02", 5.0, status="needs_review"))
+    delivery = export(both, tmp_path / "o.csv", Options(to="moodle", form=form, people=people))
+    assert delivery.written == ()
+    assert "fits s01 and s02 alike" in delivery.not_found["s01"]
+    assert set(delivery.withheld) == {"s02"}
+
+
 # Two thousand students ----------------------------------------------------------------------------
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from grader.exports import Options, Person, export
 from grader.exports.grades import grades_of
-from grader.exports.moodle_worksheet import fill
+from grader.exports.moodle_worksheet import LOCKED, fill
 from reference.errors import CallError, InputFileError
 from tests.unit.exports.classroom import criterion, report, results
 
@@ -37,7 +37,8 @@ def graded(*reports):
 
 
 def filled_in(data, *reports, people=PEOPLE, comments=None, **how):
-    return fill(data, "grades.csv", graded(*reports), people, comments or {}, **how)
+    options = Options(to="moodle", people=people, **how)
+    return fill(data, "grades.csv", graded(*reports), options, comments or {})
 
 
 def rows(data):
@@ -50,41 +51,41 @@ def test_only_grade_and_feedback_change_and_the_rest_stays_to_the_byte():
     found = filled_in(data, report("s01", 7.5), comments={"s01": "<p>Good, mostly</p>"})
     expected = data.decode().replace(',,10.00,Yes,-,"a', ',7.5,10.00,Yes,-,"a')
     expected = expected.replace('""b"", c",-,', '""b"", c",-,"<p>Good, mostly</p>"', 1)
-    assert found.data.decode() == expected
+    assert found.content.decode() == expected
     assert found.written == ("s01",)
 
 
 def test_a_worksheet_without_changes_comes_back_as_it_was():
     data = worksheet(line(101), line(102, "Ana Ionescu", "ana@x.ro", grade='"3.00"'))
-    assert filled_in(data, report("s01", None, status="needs_review")).data == data
+    assert filled_in(data, report("s01", None, status="needs_review")).content == data
 
 
 def test_grades_have_decimal_dots():
-    assert rows(filled_in(worksheet(line(101)), report("s01", 7.25)).data)[0]["Grade"] == "7.25"
+    assert rows(filled_in(worksheet(line(101)), report("s01", 7.25)).content)[0]["Grade"] == "7.25"
 
 
 def test_grades_that_moodle_holds_already_are_changed_and_told():
     found = filled_in(worksheet(line(101, grade="3.00")), report("s01", 5.0))
-    assert rows(found.data)[0]["Grade"] == "5"
+    assert rows(found.content)[0]["Grade"] == "5"
     assert found.notes[0].startswith("1 grade(s) that Moodle holds already")
 
 
 def test_a_grade_that_moodle_holds_already_stays_as_it_is_written():
     data = worksheet(line(101, grade="5.00"))
     found = filled_in(data, report("s01", 5.0))
-    assert (found.data, found.written, found.notes) == (data, ("s01",), ())
+    assert (found.content, found.written, found.notes) == (data, ("s01",), ())
 
 
 def test_what_waits_for_a_person_stays_blank():
     data = worksheet(line(101), line(102, "Ana Ionescu", "ana@x.ro"))
     found = filled_in(data, report("s01", 5.0), report("s02", None, status="needs_review"))
-    assert [row["Grade"] for row in rows(found.data)] == ["5", ""]
+    assert [row["Grade"] for row in rows(found.content)] == ["5", ""]
 
 
 def test_students_are_found_by_address_before_name():
     data = worksheet(line(101, "Ana Ionescu", "ion@x.ro"), line(102, "Ion Popescu", "ana@x.ro"))
     found = filled_in(data, report("s01", 5.0), report("s02", 6.0))
-    assert [row["Grade"] for row in rows(found.data)] == ["5", "6"]
+    assert [row["Grade"] for row in rows(found.content)] == ["5", "6"]
 
 
 def test_names_that_two_rows_bear_are_nobodys_and_told():
@@ -109,14 +110,14 @@ def test_students_who_are_not_in_the_worksheet_are_told():
 def test_a_locked_grade_is_left_and_told():
     data = worksheet(line(101, changeable="No"))
     found = filled_in(data, report("s01", 5.0))
-    assert (found.data, found.locked) == (data, ("s01",))
+    assert (found.content, found.not_found) == (data, {"s01": LOCKED})
 
 
 def test_another_maximum_is_refused_unless_rescaling_is_asked_for():
     data = worksheet(line(101, maximum="100.00"))
     with pytest.raises(CallError, match="maximum there is 100"):
         filled_in(data, report("s01", 7.5))
-    assert rows(filled_in(data, report("s01", 7.5), rescale=True).data)[0]["Grade"] == "75"
+    assert rows(filled_in(data, report("s01", 7.5), rescale=True).content)[0]["Grade"] == "75"
 
 
 def test_a_worksheet_downloaded_in_romanian_or_russian_is_understood():
@@ -125,10 +126,10 @@ def test_a_worksheet_downloaded_in_romanian_or_russian_is_understood():
         "Ultima modificare (nota)"
     )
     data = worksheet('Participant 7,Ion Popescu,ion@x.ro,,"10,00",Da,-', header=romanian)
-    assert b",8.5," in filled_in(data, report("s01", 8.5)).data
+    assert b",8.5," in filled_in(data, report("s01", 8.5)).content
     russian = "Идентификатор,Полное имя,Адрес электронной почты,Оценка,Последнее изменение (оценка)"
     data = worksheet("Участник 7,Ion Popescu,ion@x.ro,,-", header=russian)
-    assert b",8.5,-" in filled_in(data, report("s01", 8.5)).data
+    assert b",8.5,-" in filled_in(data, report("s01", 8.5)).content
 
 
 @pytest.mark.parametrize(
