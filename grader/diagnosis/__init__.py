@@ -32,11 +32,8 @@ BEYOND_DOUBT = 20.0
 """A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
 LEAST_WRONG = 0.06
 """A scale off by a smaller share than this is nobody's mistake by name: a hand may draw so."""
-WORSE_HANDS, BETTER_HAND = (1.6, 2.5, 4.0), 0.6
-"""Other hands than the one supposed, as multiples of its standard deviations."""
-OFF, BETTER, ENOUGH = 3.0, 0.5, 6
-"""A worse hand is thought of where a node is off by so many, a better one where the middle one of enough
-nodes is off by less than that."""
+HANDS = (0.6, 1.0, 1.6, 2.5, 4.0)
+"""The hands supposed, as multiples of a usual one's standard deviations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,30 +67,31 @@ def diagnose(case: Case) -> tuple[Mistake, ...]:
     """The mistakes that explain what was lost, in the order of construction; none where nothing does."""
     if not case.lost and not case.followed:
         return ()
-    seen, roots = case.seen, [Root(), *_other_scales(case)]
-    accounts = replay(case.drawing, seen, roots, case.skill)
-    care, innocent = 1.0, _innocent(accounts)
-    for other in _other_hands(accounts):
-        found = replay(case.drawing, seen, roots, case.skill, care=other)
-        innocent = min(innocent, _innocent(found))
-        if found and found[0].cost < accounts[0].cost:
-            accounts, care = found, other
-    if not _is_clear(accounts, case):
-        roots = [*roots, *_of_the_whole(case)]
-        accounts = replay(case.drawing, seen, roots, case.skill, care=care, blind=True)
-        for swap in _swaps(case.drawing, accounts):
-            root = Root((swap,), cost=RARITY[swap.code])
-            found = replay(case.drawing, _renamed(seen, swap.other), [root], case.skill, care=care)
-            accounts = sorted([*accounts, *found], key=lambda account: account.cost)
+    roots = [Root(), *_other_scales(case)]
+    accounts = replay(case.drawing, case.seen, roots, case.skill, cares=HANDS)
+    innocent = _innocent(accounts)
+    if accounts and not _is_clear(accounts, case):
+        accounts = _looked_into(case, roots, accounts[0].care, accounts)
     if not accounts or innocent - accounts[0].cost < BEYOND_DOUBT:
         return ()
     return told(accounts, case, LEAST_CONFIDENCE)
 
 
+def _looked_into(
+    case: Case, roots: Sequence[Root], care: float, accounts: Sequence[Account]
+) -> list[Account]:
+    """The accounts with mistakes of the whole drawing among them, and with guesses at what was not seen."""
+    whole = [*roots, *_of_the_whole(case)]
+    found = replay(case.drawing, case.seen, whole, case.skill, cares=(care,), blind=True) or [*accounts]
+    for swap in _swaps(case.drawing, found[0]):
+        root, seen = Root((swap,), cost=RARITY[swap.code]), _renamed(case.seen, swap.other)
+        found += replay(case.drawing, seen, [root], case.skill, cares=(care,))
+    return sorted(found, key=lambda account: account.cost)
+
+
 def _innocent(accounts: Sequence[Account]) -> float:
     """What the account costs in which everything was made rightly; infinite where it is beyond belief."""
-    costs = (account.cost for account in accounts if not account.made and not account.unexplained)
-    return min(costs, default=math.inf)
+    return min((account.cost for account in accounts if account.is_innocent), default=math.inf)
 
 
 def _is_clear(accounts: Sequence[Account], case: Case) -> bool:
@@ -107,18 +105,6 @@ def _is_clear(accounts: Sequence[Account], case: Case) -> bool:
     return all(
         step.node in seen or step.node in given or not step.needs for step in case.drawing.construction.steps
     )
-
-
-def _other_hands(accounts: Sequence[Account]) -> tuple[float, ...]:
-    """The hands to suppose instead, as multiples of the standard deviation: worse ones, or a better."""
-    if not accounts:
-        return ()
-    best = accounts[0]
-    if best.unexplained or len(best.made) > 1 or max(best.right.values(), default=0.0) > OFF:
-        return WORSE_HANDS
-    misfits = sorted(best.misfit.values())
-    is_better = len(misfits) >= ENOUGH and misfits[len(misfits) // 2] < BETTER
-    return (BETTER_HAND,) if is_better else ()
 
 
 # Mistakes of the whole drawing --------------------------------------------------------------------
@@ -166,12 +152,10 @@ def _other_variants(case: Case) -> Iterator[Root]:
             yield Root((other,), parameters, cost=RARITY["other_variant"])
 
 
-def _swaps(drawing: Drawing, accounts: Sequence[Account]) -> Iterator[operators.Mistake]:
+def _swaps(drawing: Drawing, account: Account) -> Iterator[operators.Mistake]:
     """Two images of a plan with each other's letters, both of which are off by the likeliest account."""
     construction = drawing.construction
-    off: set[str] = set()
-    for account in accounts[:1]:
-        off = {*account.unexplained, *(mistake.at for mistake in account.made)}
+    off = {*account.unexplained, *(mistake.at for mistake in account.made)}
     for figure, pole in construction.poles.items():
         images = sorted(
             v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
