@@ -23,6 +23,9 @@ optional                                                                     not
 unread                reason                                                 asked for, not read
 doubtful              confidence                                             read without confidence
 near_limit            se, off, tolerance, what                               the error straddles a limit
+hand_may_miss                                                                off by no more than a careful
+                                                                             hand may miss what is
+                                                                             ill-conditioned, or a mistake
 readings_disagree     first, second, unit                                    scan and measurements differ
 follows               what, of                                               right from own earlier value
                       (what: nodes, scale, vector, value; of: its name)
@@ -66,11 +69,17 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """What full marks allow; for values and scales `value` (same unit as the quantity)."""
+    """What full marks allow; for values and scales `value` (same unit as the quantity).
+
+    Attributes
+    ----------
+    widened : more than the rubric states, because a careful hand's small errors add up to it here
+    """
 
     length_mm: float | None = None
     direction_deg: float | None = None
     value: float | None = None
+    widened: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +98,7 @@ class Outcome:
     reasons : most important first; empty only for a declared scale that nothing can be held against
     mistake : code of the mistake that explains a loss, or None
     cause : that mistake, where diagnosis found it
+    shares : of the points, that `possible` gives; empty where the verdicts alone say it
     """
 
     criterion: str
@@ -102,6 +112,7 @@ class Outcome:
     possible: tuple[Verdict, Verdict]
     mistake: str | None = None
     cause: "Mistake | None" = None
+    shares: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,7 +82,9 @@ class HandTable(Authored):
     `angle_deg`: a line set along or across another; `place_mm`: a length transferred, an arc opened, the
     foot of a line by half of it; `mark_mm`: a point marked. `ruler_mm` and `protractor_deg`: a length and
     a direction measured and written down. A right drawing may be off by `sigmas` standard deviations of
-    what these make of it together; 0 leaves the tolerances as they are.
+    what these make of it together; 0 leaves the tolerances as they are. No tolerance grows to more than
+    `at_most` times itself: a mistake could hide in it. What is off by more, yet by no more than a careful
+    hand may be, goes to a person.
 
     Careful plotting is good to 0.1-0.4 mm, 0.25 mm usually taken; at both ends of a line of 70 mm that is
     0.3 degrees. Rulers are read to half a millimetre, protractors to a degree.
@@ -94,6 +96,7 @@ class HandTable(Authored):
     ruler_mm: NotNegative = 0.2
     protractor_deg: NotNegative = 0.4
     sigmas: NotNegative = 4.0
+    at_most: Annotated[float, Field(ge=1.0, allow_inf_nan=False)] = 2.5
 
 
 Section = Literal["mechanism", "scales", "velocity_plan", "acceleration_plan", "angular"]

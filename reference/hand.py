@@ -147,10 +147,12 @@ class Trace:
     ----------
     made : each node as its step makes it from the nodes before it, own ones where they are known
     nodes : each node as it is: the own one where it is known, else as made
+    hand : how many of the errors that may move them are the hand's; those of measuring come after
     """
 
     made: Mapping[str, Drawn]
     nodes: Mapping[str, Drawn]
+    hand: int
 
     def vector(self, tail: str, head: str) -> complex:
         """What the step of `head` makes of a vector."""
@@ -187,6 +189,7 @@ def trace(
     return Trace(
         {name: drawing.told(place) for name, place in drawing.made.items()},
         {name: drawing.told(place) for name, place in drawing.nodes.items()},
+        drawing.hand,
     )
 
 

@@ -1,8 +1,4 @@
-"""Readings and measurements brought into one frame: the assignment's, y up, plans about their poles.
-
-A sketch that is turned on its sheet is legitimate: directions on a sheet are turned back by the
-turn of the mechanism as drawn there, where it was read; else the sheet's x axis counts.
-"""
+"""Readings and measurements brought into one frame: the assignment's, y up, plans about their poles."""
 
 import cmath
 import math
@@ -10,12 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from grader.comparison.task import Task
+from grader.comparison.turn import turn_of
 from grader.records import MECHANISM, Figure, Reading, ReadNode
-
-FIT_MM = 1.0
-"""Root mean square misfit up to which the drawn mechanism is the right one, turned and scaled."""
-LEAST_GROUND_MM = 20.0
-"""Two pivots nearer than this do not tell the sketch's turn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,13 +52,16 @@ class Evidence:
 
     Attributes
     ----------
-    drawn : vectors read on the sheets
+    drawn : vectors and links read on the sheets
     measured : vectors measured by hand
     nodes : the student's own nodes, complex mm; plans about their pole, the mechanism about its
         assignment's origin
+    se_mm : their standard errors of reading
+    sketches : by plan, the mechanism's nodes as drawn beside it
     yardstick_mm : drawn length of the task's yardstick (the crank) and its standard error, or None
     unread : why something asked for was not read, by name
     has_sheets : whether any sheet was handed in
+    has_sketch : whether the mechanism was read on any
     written : lengths that stand in the sheets' cells, mm, and the probability that they do, by vector
     """
 
@@ -78,6 +73,9 @@ class Evidence:
     has_sheets: bool
     values: Mapping[str, float]
     written: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    se_mm: Mapping[str, float] = field(default_factory=dict)
+    sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
+    has_sketch: bool = False
 
     def vector(self, name: str) -> DrawnVector | None:
         """The vector as read, else as measured."""
@@ -86,76 +84,66 @@ class Evidence:
 
 def gather(task: Task, submission: Submission) -> Evidence:
     """All readings of a submission in the assignment's frame."""
-    drawn: dict[str, DrawnVector] = {}
-    nodes: dict[str, complex] = {}
-    lengths: list[tuple[float, float]] = []
-    turns: dict[str, float] = {}
+    sheets = _Sheets(task)
     for reading in submission.readings:
-        sketch = reading.figures.get(MECHANISM)
-        turn, se_turn = turn_of(task, sketch) if sketch else (0.0, 0.0)
-        for figure, read in reading.figures.items():
-            if figure == MECHANISM:
-                continue
-            for name, vector in _vectors(task, figure, read, turn, se_turn).items():
-                if name not in drawn or vector.confidence > drawn[name].confidence:
-                    drawn[name] = vector
-            turns.setdefault(figure, turn)
-            for name, place in _plan_nodes(task, figure, read, turn).items():
-                nodes.setdefault(name, place)
-        if sketch:
-            lengths.extend(_yardstick(task, sketch))
-            for name, place in _mechanism_nodes(task, sketch, turn).items():
-                nodes.setdefault(name, place)
+        sheets.take(reading)
     measured = _measured(submission.measured)
-    own = nodes if submission.readings else _nodes_from(task, measured)
-    length = min(lengths, key=lambda one: one[1], default=None)
-    unread = {gap.name: gap.reason for reading in submission.readings for gap in reading.unread}
-    written = {name: one for reading in submission.readings for name, one in reading.lengths.items()}
+    own = sheets.nodes if submission.readings else _nodes_from(task, measured)
     return Evidence(
-        drawn, measured, own, length, unread, bool(submission.readings), submission.values, written
+        drawn=sheets.drawn,
+        measured=measured,
+        nodes=own,
+        yardstick_mm=min(sheets.lengths, key=lambda one: one[1], default=None),
+        unread={gap.name: gap.reason for reading in submission.readings for gap in reading.unread},
+        has_sheets=bool(submission.readings),
+        values=submission.values,
+        written={name: one for reading in submission.readings for name, one in reading.lengths.items()},
+        se_mm=sheets.se_mm,
+        sketches=sheets.sketches,
+        has_sketch=any(MECHANISM in reading.figures for reading in submission.readings),
     )
 
 
-# The turn of a sketch -----------------------------------------------------------------------------
+@dataclass(slots=True)
+class _Sheets:
+    """What was read on the sheets so far; of a figure on two sheets the first one's nodes count."""
 
+    task: Task
+    drawn: dict[str, DrawnVector] = field(default_factory=dict)
+    nodes: dict[str, complex] = field(default_factory=dict)
+    se_mm: dict[str, float] = field(default_factory=dict)
+    sketches: dict[str, dict[str, complex]] = field(default_factory=dict)
+    lengths: list[tuple[float, float]] = field(default_factory=list)
 
-def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
-    """How far the mechanism is turned on its sheet, radians counter-clockwise, and its standard error.
+    def take(self, reading: Reading) -> None:
+        """One sheet."""
+        sketch = reading.figures.get(MECHANISM)
+        turn, se_turn = turn_of(self.task, sketch) if sketch else (0.0, 0.0)
+        joints: dict[str, complex] = {}
+        if sketch:
+            self.lengths.extend(_yardstick(self.task, sketch))
+            self.see(_links(self.task, sketch, turn, se_turn))
+            joints = _mechanism_nodes(self.task, sketch, turn)
+            self.keep(joints, sketch)
+        for figure, read in reading.figures.items():
+            if figure != MECHANISM:
+                self.see(_vectors(self.task, figure, read, turn, se_turn))
+                self.keep(_plan_nodes(self.task, figure, read, turn), read)
+                if joints:
+                    self.sketches.setdefault(figure, joints)
 
-    The whole mechanism tells it where it is the right one; where it is not, its pivots alone, that
-    no mistake moves; where there are none, zero.
-    """
-    exact = task.nodes({"kL": 1.0, "kv": 1.0, "ka": 1.0})
-    sure = {
-        name: node
-        for name, node in sketch.nodes.items()
-        if name in exact and node.confidence >= task.rubric.least_confidence
-    }
-    whole = _fit(sure, exact)
-    if whole is not None and whole[2] <= FIT_MM:
-        return whole[0], whole[1]
-    pivots = {name: node for name, node in sure.items() if name in task.ground}
-    ground = _fit(pivots, exact)
-    return (ground[0], ground[1]) if ground is not None else (0.0, 0.0)
+    def see(self, vectors: Mapping[str, DrawnVector]) -> None:
+        """Of a vector on two sheets the surer reading counts."""
+        for name, vector in vectors.items():
+            if name not in self.drawn or vector.confidence > self.drawn[name].confidence:
+                self.drawn[name] = vector
 
-
-def _fit(nodes: Mapping[str, ReadNode], exact: Mapping[str, complex]) -> tuple[float, float, float] | None:
-    """Turn, its standard error, and misfit in mm of the similarity from exact to drawn nodes."""
-    if len(nodes) < 2:
-        return None
-    drawn = [node.at for node in nodes.values()]
-    model = [exact[name] for name in nodes]
-    centre, middle = sum(drawn) / len(drawn), sum(model) / len(model)
-    drawn = [place - centre for place in drawn]
-    model = [place - middle for place in model]
-    spread = math.sqrt(sum(abs(place) ** 2 for place in drawn))
-    if spread < LEAST_GROUND_MM / math.sqrt(2.0):
-        return None
-    turn_and_scale = sum(d * m.conjugate() for d, m in zip(drawn, model, strict=True))
-    turn_and_scale /= sum(abs(m) ** 2 for m in model)
-    misfit = [abs(d - turn_and_scale * m) ** 2 for d, m in zip(drawn, model, strict=True)]
-    se = math.sqrt(sum(node.se_mm**2 for node in nodes.values()) / len(nodes)) / spread
-    return cmath.phase(turn_and_scale), se, math.sqrt(sum(misfit) / len(misfit))
+    def keep(self, places: Mapping[str, complex], read: Figure) -> None:
+        """Nodes that are not known yet."""
+        for name, place in places.items():
+            if name not in self.nodes:
+                self.nodes[name] = place
+                self.se_mm[name] = read.nodes[name].se_mm
 
 
 # Vectors and nodes --------------------------------------------------------------------------------
@@ -170,6 +158,21 @@ def _vectors(task: Task, figure: str, read: Figure, turn: float, se_turn: float)
         direction = None if one.direction_deg is None else math.radians(one.direction_deg) - turn
         se_deg = math.hypot(one.se_deg or 0.0, math.degrees(se_turn))
         found[vector.name] = DrawnVector(one.length_mm, one.se_mm, direction, se_deg, one.confidence, turn)
+    return found
+
+
+def _links(task: Task, sketch: Figure, turn: float, se_turn: float) -> dict[str, DrawnVector]:
+    """Links between joints that were read, by the links' names."""
+    found = {}
+    for name, (tail, head) in task.construction.links.items():
+        if tail not in sketch.nodes or head not in sketch.nodes:
+            continue
+        one, other = sketch.nodes[tail], sketch.nodes[head]
+        length, along = abs(other.at - one.at), cmath.phase(other.at - one.at)
+        se_mm = math.hypot(one.se_mm, other.se_mm)
+        se_deg = math.degrees(math.hypot(se_mm / length, se_turn)) if length > se_mm else 180.0
+        confidence = min(one.confidence, other.confidence)
+        found[name] = DrawnVector(length, se_mm, along - turn, se_deg, confidence, turn)
     return found
 
 
@@ -219,15 +222,17 @@ def _measured(reading: Reading | None) -> dict[str, DrawnVector]:
 
 
 def _nodes_from(task: Task, measured: Mapping[str, DrawnVector]) -> dict[str, complex]:
-    """The nodes that measured vectors with directions lead to, from the poles on."""
+    """The nodes that measured vectors with directions lead to, from the poles on by the shortest way."""
     nodes = dict.fromkeys(task.construction.poles.values(), 0j)
+    steps = {name: step for name, one in measured.items() if (step := one.as_complex) is not None}
+    vectors = [task.construction.vectors[name] for name in steps if name in task.construction.vectors]
     found = True
     while found:
-        found = False
-        for name, vector in task.construction.vectors.items():
-            one = measured.get(name)
-            step = one.as_complex if one else None
-            if step is not None and vector.tail in nodes and vector.head not in nodes:
-                nodes[vector.head] = nodes[vector.tail] + step
-                found = True
+        further = {
+            vector.head: nodes[vector.tail] + steps[vector.name]
+            for vector in reversed(vectors)
+            if vector.tail in nodes and vector.head not in nodes
+        }
+        nodes.update(further)
+        found = bool(further)
     return nodes

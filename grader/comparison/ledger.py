@@ -1,36 +1,45 @@
 """What earlier mistakes have cost, and what may follow through from them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
-from grader.comparison import verdicts
 from grader.comparison.evidence import Evidence
-from grader.comparison.following import Expectation, expectations, with_own_lengths
-from grader.comparison.limits import Mark
+from grader.comparison.following import NO_SPREAD, Expectation, Following, scaled
+from grader.comparison.limits import FULL, NONE, Mark, the_better
 from grader.comparison.marking import length_tolerance
+from grader.comparison.own import known, with_own_lengths
 from grader.comparison.scales import Scale, followed_scales, used_scales
-from grader.comparison.task import Task
+from grader.comparison.task import Segment, Task
 from grader.outcomes import Reason
+from grader.records import MECHANISM
+from reference.hand import Spread, spread
+
+
+class Against(Protocol):
+    """Marks a criterion against one expectation."""
+
+    def __call__(self, expected: complex, reach: Spread = NO_SPREAD, se: Spread = NO_SPREAD) -> Mark:
+        """The mark; `reach` is how far a careful hand may miss it, `se` its standard errors."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A mark with what it was held against."""
+
+    mark: Mark
+    expected: complex
+    reach: Spread = NO_SPREAD
+    is_followed: bool = False
 
 
 def open_ledger(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> "Ledger":
     """The ledger of a submission before anything is marked."""
-    used = used_scales(settled)
-    ledger = Ledger(task, evidence, settled, used, followed_scales(settled), _deviating(task, evidence, used))
+    used, followed = used_scales(settled), followed_scales(settled)
+    ledger = Ledger(task, evidence, settled, used, followed, Following(task, evidence, used, followed))
     # What was drawn contradicts a scale that nobody declared, or that nobody understood.
     ledger.doubtful.update(name for name, scale in settled.items() if scale.other and scale.used.assumed)
     return ledger
-
-
-def _deviating(task: Task, evidence: Evidence, used: Mapping[str, float]) -> frozenset[str]:
-    """The student's own nodes that are further from their right places than a length may be off."""
-    exact = task.nodes(with_own_lengths(task, evidence, used))
-    tolerance = task.rubric.tolerance
-    return frozenset(
-        name
-        for name, own in evidence.nodes.items()
-        if abs(own - exact[name]) > length_tolerance(tolerance, abs(exact[name]))
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +48,8 @@ class Ledger:
 
     What relies on a wrong node or scale may follow through only when that mistake has cost something:
     `charged` holds those. `cleared` holds the nodes that were judged and are within their tolerance,
-    `doubtful` the nodes and scales whose verdict is open.
+    `inherited` those that are right only as they follow from something charged, `doubtful` the nodes
+    and scales whose verdict is open.
     """
 
     task: Task
@@ -47,83 +57,152 @@ class Ledger:
     settled: Mapping[str, Scale]
     used: Mapping[str, float]
     followed: Mapping[str, float]
-    deviating: frozenset[str]
+    following: Following
     charged: set[str] = field(default_factory=set)
     cleared: set[str] = field(default_factory=set)
+    inherited: set[str] = field(default_factory=set)
     doubtful: set[str] = field(default_factory=set)
+    known_off: dict[str, bool] = field(default_factory=dict)
 
-    def best(self, name: str, against: Callable[[complex], Mark]) -> tuple[Mark, complex, bool]:
-        """The mark on the original data, or a better one on what follows from own earlier values.
+    def best(self, segment: Segment, against: Against, *, follows_through: bool) -> Found:
+        """The mark on the original data, or a better one on what follows from own earlier values."""
+        exact = segment.drawn(self.used)
+        found = original = Found(against(exact), exact)
+        if not original.mark.is_full and follows_through:
+            found = self.at_followed_scale(segment, against, original)
+        if not found.mark.is_full:
+            own = self.from_own_nodes(segment, against, original, follows_through=follows_through)
+            found = own if found is original or own.mark.is_better(found.mark) else found
+        if not found.mark.is_full and follows_through:
+            for one in self.following.expectations(segment):
+                if not self.following.is_trivial(segment, one.vector):
+                    found = self.the_better(found, one, against)
+        self.remember(segment.head, found.mark)
+        if found.is_followed and found.mark.is_full:
+            self.inherited.add(segment.head)
+        return found
 
-        Returns the mark, the expectation that it was held against, and whether that follows.
-        """
-        task = self.task
-        exact = chosen = task.drawn(name, self.used)
-        mark = original = against(exact)
-        is_drift = False
-        if original.worst != "full" and task.rubric.follow_through:
-            for one in expectations(task, self.evidence, name, self.used, self.followed):
-                candidate = self.allowed(one.relies_on, against(one.vector))
-                if verdicts.is_better(candidate, mark):
-                    mark = verdicts.the_better(candidate, original, *self.why(one))
-                    chosen, is_drift = one.vector, not self.wrong(one.relies_on)
-        self.remember(task.construction.vectors[name].head, mark)
-        if is_drift and mark.worst == "full" and original.level != "none":
-            # Every earlier step is within its tolerance, and so is this one: nothing is wrong.
-            return Mark("full", "full", "full"), exact, False
-        return mark, chosen, chosen is not exact
+    def at_followed_scale(self, segment: Segment, against: Against, original: Found) -> Found:
+        """The mark at the scale that the drawing follows, where that is not the one used."""
+        one = self.following.at_followed_scale(segment)
+        return original if one is None else self.the_better(original, one, against)
 
-    def opened(self, name: str, mark: Mark) -> Mark:
+    def from_own_nodes(
+        self, segment: Segment, against: Against, original: Found, *, follows_through: bool
+    ) -> Found:
+        """The mark with what a hand may miss, from the nodes that it started from where they are known."""
+        exact = original.expected
+        one = self.following.from_nodes(segment, self.used) if follows_through else None
+        if one is None or not one.relies_on:
+            reach = self.following.whole_reach(segment, exact)
+            return Found(against(exact, reach), exact, reach)
+        if self.wrong(one.relies_on):
+            reach = self.following.whole_reach(segment, exact)
+            whole = Found(against(exact, reach), exact, reach)
+            is_trivial = whole.mark.is_full or self.following.is_trivial(segment, one.vector)
+            return whole if is_trivial else self.the_better(whole, one, against)
+        # Every earlier step is within what a hand may miss: this step alone counts.
+        alone = against(exact, one.reach, one.se)
+        mark = against(one.vector, one.reach, one.se)
+        if not mark.is_better(alone):
+            return Found(alone, exact, one.reach)
+        reach = self.following.whole_reach(segment, exact)
+        reasons = () if mark.is_full else alone.reasons
+        return Found(Mark(mark.share, mark.worst, mark.best, reasons), exact, reach)
+
+    def the_better(self, found: Found, one: Expectation, against: Against) -> Found:
+        """What was found so far, or what follows where that leaves more."""
+        candidate = self.allowed(one.relies_on, against(one.vector, one.reach, one.se))
+        if not candidate.is_better(found.mark):
+            return found
+        return Found(
+            the_better(candidate, found.mark, *self.why(one)), one.vector, one.reach, is_followed=True
+        )
+
+    def opened(self, segment: Segment, mark: Mark, *, follows_through: bool) -> Mark:
         """A loss on a sheet is open while what it may follow from was not read for certain."""
-        unknown = self.unknown_upstream(name) if self.task.rubric.follow_through else ()
-        if mark.worst == "full" or not unknown:
+        unknown = self.unknown_upstream(segment) if follows_through else ()
+        if mark.is_full or not unknown:
             return mark
-        head = self.task.construction.vectors[name].head
-        self.charged.discard(head)
-        self.doubtful.add(head)
+        self.charged.discard(segment.head)
+        self.doubtful.add(segment.head)
         told = f"{', '.join(unknown)}, on which it hangs, was not read for certain"
-        return Mark(mark.level, mark.worst, "full", (*mark.reasons, Reason("unread", {"reason": told})))
+        return Mark(mark.share, mark.worst, FULL, (*mark.reasons, Reason("unread", {"reason": told})))
 
-    def unknown_upstream(self, name: str) -> tuple[str, ...]:
+    def unknown_upstream(self, segment: Segment) -> tuple[str, ...]:
         """The nodes that a vector's head is made from and that were not read, of figures that were."""
         construction, nodes = self.task.construction, self.evidence.nodes
-        read = {
-            figure
-            for figure, steps in construction.figures.items()
-            if any(step.node in nodes for step in steps)
-        }
-        needs = construction.step(construction.vectors[name].head).needs
-        return tuple(
-            dict.fromkeys(
-                need for need in needs if need not in nodes and construction.figure_of(need) in read
-            )
-        )
+        needs = [need for need in construction.step(segment.head).needs if need not in nodes]
+        if not needs:
+            return ()
+        read = {construction.figure_of(node) for node in nodes}
+        return tuple(dict.fromkeys(need for need in needs if construction.figure_of(need) in read))
+
+    # What is wrong --------------------------------------------------------------------------------
+
+    def is_off(self, node: str) -> bool:
+        """Whether an own node is further from its right place than a hand may miss it."""
+        if node not in self.known_off:
+            self.known_off[node] = self._is_off(node)
+        return self.known_off[node]
+
+    def _is_off(self, node: str) -> bool:
+        """Where it is beyond the plain tolerance, what a careful hand makes of it counts."""
+        task = self.task
+        own = self.own_place(node)
+        if own is None:
+            return False
+        exact = task.nodes(self.used)[node]
+        if task.construction.figure_of(node) == MECHANISM:
+            exact *= self.used["kL"] / with_own_lengths(task, self.evidence, self.used)["kL"]
+        off = own - exact
+        if abs(off) <= length_tolerance(task.rubric.tolerance, abs(exact)):
+            return False
+        reach = scaled(spread(task.traced(self.used).nodes[node].moved, off), task.rubric.hand.sigmas)
+        return abs(off) > reach.along
+
+    def own_place(self, node: str) -> complex | None:
+        """An own node as read or measured, or as lengths lead to it."""
+        if node in self.evidence.nodes:
+            return self.evidence.nodes[node]
+        for nodes in self.following.own(self.used).values():
+            if node in nodes:
+                return nodes[node].at
+        return None
 
     def wrong(self, relies_on: frozenset[str]) -> frozenset[str]:
         """What is wrong of the nodes and scales relied on: off, and not judged to be within tolerance."""
-        off = relies_on & self.deviating | relies_on - self.evidence.nodes.keys()
-        return frozenset(off - self.cleared | relies_on & self.charged)
+        return frozenset(self._wrong(relies_on))
+
+    def _wrong(self, relies_on: frozenset[str]) -> Iterator[str]:
+        nodes = known(self.following.own(self.used)) | self.evidence.nodes.keys()
+        for name in relies_on:
+            is_cleared = name in self.cleared and name not in self.inherited
+            if name in self.charged or not (is_cleared or (name in nodes and not self.is_off(name))):
+                yield name
 
     def allowed(self, relies_on: frozenset[str], mark: Mark) -> Mark:
         """Credit for following only where the earlier mistake has been charged; else it is charged here."""
         wrong = self.wrong(relies_on)
         has_doubtful_scale = bool(wrong & self.doubtful & self.settled.keys())
-        if not wrong or (wrong & self.charged and not has_doubtful_scale):
+        if not wrong or (wrong & (self.charged | self.inherited) and not has_doubtful_scale):
             return mark
         if wrong & self.doubtful:
-            return Mark("none", "none", mark.best, mark.reasons)
-        if mark.worst == "full":
+            return Mark(NONE, NONE, mark.best, mark.reasons)
+        if mark.is_full:
             self.charged.update(wrong)
-        return Mark("none", "none", "none", mark.reasons)
+        return Mark(NONE, NONE, NONE, mark.reasons)
 
     def remember(self, name: str, mark: Mark) -> None:
         """Whether a node or scale has cost something, or may have, or is right."""
         if not mark.is_certain:
             self.doubtful.add(name)
-        elif mark.level != "full":
+        elif mark.share != FULL:
             self.charged.add(name)
         else:
             self.cleared.add(name)
+
+    # Why ------------------------------------------------------------------------------------------
 
     def why(self, one: Expectation) -> tuple[Reason, ...]:
         """What an expectation follows from, and that its scale is not known where it is not."""

@@ -1,26 +1,18 @@
-"""One deviation against one tolerance, and what its standard error leaves open."""
+"""One deviation against one tolerance, and what its standard error leaves open.
 
-from collections.abc import Iterable
+A mark is the share of a criterion's points that it leaves: 1 full marks, 0 none, between them the
+shares of the tolerance's bands.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from grader.outcomes import Reason
 from grader.rubric import ToleranceTable
 
-Level = Literal["none", "partial", "full"]
-LEVELS: tuple[Level, ...] = ("none", "partial", "full")
+FULL, NONE = 1.0, 0.0
 ROUNDING = 1e-9
 """Relative: a deviation this little above its tolerance is on it."""
-
-
-def worse(levels: Iterable[Level]) -> Level:
-    """The worst level."""
-    return LEVELS[min(LEVELS.index(level) for level in levels)]
-
-
-def better(levels: Iterable[Level]) -> Level:
-    """The best level."""
-    return LEVELS[max(LEVELS.index(level) for level in levels)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,40 +23,45 @@ class Limit:
     ----------
     what : ``length``, ``direction``, ``value`` or ``scale``
     off : deviation without its sign, in the unit of `tolerance`
+    plain : the tolerance without what it was widened by
     se : standard error of the deviation
-    allowance : the tolerances that it is held against: the band of partial marks, and how many
-        standard errors a verdict must be away from changing
-    reason : said where the verdict is not full
+    table : the rubric's: bands of partial marks, and how many standard errors a verdict must be away
+        from changing
+    reason : said where the mark is not full
     """
 
     what: str
     off: float
     tolerance: float
+    plain: float
     se: float
-    allowance: ToleranceTable
+    table: ToleranceTable
     reason: Reason
 
-    def level_at(self, off: float) -> Level:
-        """The verdict if the deviation were this."""
-        limit = self.tolerance * (1.0 + ROUNDING)
-        if off <= limit:
-            return "full"
-        return "partial" if off <= limit * self.allowance.partial_factor else "none"
+    def share_at(self, off: float) -> float:
+        """The share of the points at a deviation; bands are as wide as the plain tolerance says."""
+        slack = 1.0 + ROUNDING
+        if off <= self.tolerance * slack:
+            return FULL
+        for factor, share in self.table.all_bands:
+            if off <= (self.tolerance + (factor - 1.0) * self.plain) * slack:
+                return share
+        return NONE
 
     @property
-    def level(self) -> Level:
-        """The verdict on the deviation as it is."""
-        return self.level_at(self.off)
+    def share(self) -> float:
+        """The mark on the deviation as it is."""
+        return self.share_at(self.off)
 
     @property
-    def worst(self) -> Level:
-        """The verdict at the far end of the standard error."""
-        return self.level_at(self.off + self.allowance.certain_errors * self.se)
+    def worst(self) -> float:
+        """The mark at the far end of the standard error."""
+        return self.share_at(self.off + self.table.certain_errors * self.se)
 
     @property
-    def best(self) -> Level:
-        """The verdict at the near end of the standard error."""
-        return self.level_at(max(self.off - self.allowance.certain_errors * self.se, 0.0))
+    def best(self) -> float:
+        """The mark at the near end of the standard error."""
+        return self.share_at(max(self.off - self.table.certain_errors * self.se, 0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,14 +70,14 @@ class Mark:
 
     Attributes
     ----------
-    level : the verdict as measured
-    worst, best : the verdicts that the standard errors leave open
+    share : of the points, as measured
+    worst, best : the shares that the standard errors leave open
     reasons : the losses, worst first; then remarks that cost nothing
     """
 
-    level: Level
-    worst: Level
-    best: Level
+    share: float
+    worst: float
+    best: float
     reasons: tuple[Reason, ...] = ()
 
     @property
@@ -88,13 +85,25 @@ class Mark:
         """Whether the standard errors leave only one verdict."""
         return self.worst == self.best
 
+    @property
+    def is_full(self) -> bool:
+        """Whether it is full marks for certain."""
+        return self.worst == FULL
 
-def mark(limits: list[Limit], remarks: tuple[Reason, ...] = ()) -> Mark:
+    def is_better(self, other: "Mark") -> bool:
+        """Whether it leaves more than another, first for certain, then at best."""
+        return (self.worst, self.best) > (other.worst, other.best)
+
+
+ALL_RIGHT = Mark(FULL, FULL, FULL)
+
+
+def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> Mark:
     """The mark that several limits give; full where there are none."""
     if not limits:
-        return Mark("full", "full", "full", remarks)
-    by_loss = sorted(limits, key=lambda limit: LEVELS.index(limit.level))
-    losses = tuple(limit.reason for limit in by_loss if limit.level != "full")
+        return Mark(FULL, FULL, FULL, remarks)
+    by_loss = sorted(limits, key=lambda limit: limit.share)
+    losses = tuple(limit.reason for limit in by_loss if limit.share != FULL)
     near = tuple(
         Reason(
             "near_limit",
@@ -104,8 +113,40 @@ def mark(limits: list[Limit], remarks: tuple[Reason, ...] = ()) -> Mark:
         if limit.worst != limit.best
     )
     return Mark(
-        worse(limit.level for limit in limits),
-        worse(limit.worst for limit in limits),
-        worse(limit.best for limit in limits),
+        min(limit.share for limit in limits),
+        min(limit.worst for limit in limits),
+        min(limit.best for limit in limits),
         (*losses, *near, *remarks),
+    )
+
+
+def open_between(low: float, high: float, found: Mark, *reasons: Reason) -> Mark:
+    """A mark that is open between two shares whatever was measured, with the reasons first."""
+    return Mark(found.share, low, high, (*reasons, *found.reasons))
+
+
+def left_open(found: Mark, by_hand: Mark) -> Mark:
+    """A mark that a careful hand's errors alone leave open; `by_hand` is it with all that they allow."""
+    if by_hand.best <= found.best:
+        return found
+    return open_between(found.worst, by_hand.best, found, Reason("hand_may_miss"))
+
+
+def the_better(found: Mark, other: Mark, *reasons: Reason) -> Mark:
+    """Two marks of which the better counts; the reasons are those of `other`, after `reasons`."""
+    return Mark(
+        max(found.share, other.share),
+        max(found.worst, other.worst),
+        max(found.best, other.best),
+        (*reasons, *other.reasons),
+    )
+
+
+def the_worse(found: Mark, other: Mark) -> Mark:
+    """Two marks of which the worse counts."""
+    return Mark(
+        min(found.share, other.share),
+        min(found.worst, other.worst),
+        min(found.best, other.best),
+        (*found.reasons, *other.reasons),
     )

@@ -6,16 +6,18 @@ proposes is no mistake. Where the drawn vectors follow another scale than the de
 wrong and the drawing is not.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from grader.comparison.evidence import DrawnVector, Evidence
-from grader.comparison.limits import Limit, Mark, mark
+from grader.comparison.limits import FULL, NONE, Limit, Mark, mark
 from grader.comparison.marking import length_tolerance
 from grader.comparison.task import SCALE_NAMES, Task, unit_of
 from grader.outcomes import Reason, UsedScale
 from grader.quantities import EXAMPLES, ByRule, ParsedScale, Refused, parse_scale
 from grader.rubric import ToleranceTable
+from reference.hand import spread
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ def _settle_one(
     if isinstance(parsed, Refused):
         used = UsedScale(text, None, rule, assumed=True, refused=parsed.why)
         reason = Reason("scale_refused", {"text": text or "", "why": parsed.why})
-        open_mark = Mark("none", "none", "full", (reason,))
+        open_mark = Mark(NONE, NONE, FULL, (reason,))
         return Scale(used, _contradiction(task, evidence, name, rule), open_mark)
     if isinstance(parsed, ByRule):
         value = parsed.per_mm({"omega": task.omega or 0.0, **followed_scales(before)})
@@ -122,7 +124,7 @@ def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> fl
     witness = _witness(task, evidence, name)
     if witness is None or name == "kL":
         return None
-    if _is_witnessed(task, witness, used):
+    if _is_witnessed(task, evidence, name, used):
         return None
     other = witness[0] / witness[1]
     return other if _fitting(task, evidence, name, other) > _fitting(task, evidence, name, used) else None
@@ -165,9 +167,10 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
     limit = Limit(
         what="scale",
         off=abs(real / scale.used - drawn_mm),
-        tolerance=length_tolerance(tolerance, drawn_mm),
+        tolerance=_allowed_mm(task, evidence, name, drawn_mm),
+        plain=length_tolerance(tolerance, drawn_mm),
         se=se_mm,
-        allowance=tolerance,
+        table=tolerance,
         reason=Reason("scale_off", told),
     )
     return Scale(scale, other, mark([limit]))
@@ -181,17 +184,43 @@ def _followed_instead(
     Arguments: `rule` is the assignment's, None where the declared one is that.
     """
     witness = _witness(task, evidence, name)
-    if witness is None or _is_witnessed(task, witness, declared):
+    if witness is None or _is_witnessed(task, evidence, name, declared):
         return None
     other = witness[0] / witness[1]
     if name == "kL":
         return other
     # Where nothing else tells, a drawing that follows the rule tells that the declaration does not.
-    follows_rule = rule is not None and _is_witnessed(task, witness, rule)
+    follows_rule = rule is not None and _is_witnessed(task, evidence, name, rule)
     return other if follows_rule else _contradiction(task, evidence, name, declared)
 
 
-def _is_witnessed(task: Task, witness: tuple[float, float, float], scale: float) -> bool:
+def _is_witnessed(task: Task, evidence: Evidence, name: str, scale: float) -> bool:
     """Whether a scale makes the real value of what was drawn."""
+    witness = _witness(task, evidence, name)
+    if witness is None:
+        return False
     expected_mm = witness[0] / scale
-    return abs(expected_mm - witness[1]) <= length_tolerance(task.rubric.tolerance, expected_mm)
+    off = abs(expected_mm - witness[1])
+    plain = length_tolerance(task.rubric.tolerance, expected_mm)
+    return off <= plain or off <= _allowed_mm(task, evidence, name, expected_mm)
+
+
+def _allowed_mm(task: Task, evidence: Evidence, name: str, expected_mm: float) -> float:
+    """How far what a scale is told by may be off, with what a careful hand makes of it."""
+    table, hand = task.rubric.tolerance, task.rubric.hand
+    plain, ends = length_tolerance(table, expected_mm), _ends(task, name)
+    if ends is None:
+        return plain
+    drawn = task.traced(task.rule_scales)
+    reach = hand.sigmas * spread(drawn.moved(*ends), drawn.vector(*ends)).along
+    if not evidence.has_sheets:
+        reach = math.hypot(reach, hand.sigmas * hand.ruler_mm)
+    return max(plain, min(reach, hand.at_most * plain))
+
+
+def _ends(task: Task, name: str) -> tuple[str, str] | None:
+    """Tail and head of what a scale is told by."""
+    if name == "kL":
+        return None if task.yardstick is None else (task.yardstick.tail, task.yardstick.head)
+    vector = task.construction.vectors.get(f"{name[1]}_{task.pin}")
+    return None if vector is None else (vector.tail, vector.head)

@@ -1,14 +1,15 @@
 """What is asked: one variant's exact plan, its construction, and the rubric."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference.assignment import Assignment, Variant
 from reference.construction import Construction, evaluate
-from reference.elements import Nodes, Parameters
+from reference.elements import Parameters
+from reference.hand import Skill, Trace, trace
 from reference.mechanism import Crank, Dyad, Mechanism, Slider
 from reference.plan import exact_plan
 
@@ -23,11 +24,13 @@ UNITS: Mapping[str, str] = {
     "epsilon": "rad/s^2",
 }
 """By scale, or by the part of a name before its first underscore."""
+KEPT = 64
+"""Drawings at scales of students' own that a task keeps."""
 
 
 def unit_of(name: str) -> str:
-    """The SI unit of a vector, angular quantity or scale (per millimetre on paper)."""
-    return UNITS[name.partition("_")[0]]
+    """The SI unit of a vector, angular quantity, scale (per millimetre on paper) or link."""
+    return UNITS.get(name.partition("_")[0], "m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +43,27 @@ class Yardstick:
 
 
 @dataclass(frozen=True, slots=True)
+class Segment:
+    """Something drawn from one node to another: a vector of a plan, or a link of the sketch.
+
+    Attributes
+    ----------
+    real : exact, complex SI
+    scale : ``kv``, ``ka`` or ``kL``
+    """
+
+    name: str
+    tail: str
+    head: str
+    scale: str
+    real: complex
+
+    def drawn(self, scales: Mapping[str, float]) -> complex:
+        """The exact one on paper, millimetres, at these scales."""
+        return self.real / scales[self.scale]
+
+
+@dataclass(frozen=True, slots=True)
 class Task:
     """One student's task with its right answer.
 
@@ -47,11 +71,13 @@ class Task:
     ----------
     construction, parameters : how it is drawn; the parameters' scales are those of the rule
     real : exact vectors, complex SI, by name
+    segments : the vectors and the links of the sketch, by name
     rates : exact angular quantities, rad/s and rad/s^2
     lengths_m : by angular quantity, the real length of its link
     pin : of the driven link
     yardstick : the crank; where a slider drives, the first link of given length; None without any
     omega : of the crank, None where a slider drives
+    memory : what has been drawn already, by what it depends on
     """
 
     assignment: Assignment
@@ -60,16 +86,31 @@ class Task:
     construction: Construction
     parameters: Parameters
     real: Mapping[str, complex]
+    segments: Mapping[str, Segment]
     rates: Mapping[str, float]
     lengths_m: Mapping[str, float]
     pin: str
     yardstick: Yardstick | None
     omega: float | None
     ground: Mapping[str, complex]
+    memory: dict[tuple[object, ...], object] = field(
+        init=False, repr=False, compare=False, default_factory=dict
+    )
 
     def tolerance(self, criterion: CriterionTable) -> ToleranceTable:
         """The tolerance of a criterion."""
         return self.rubric.tolerance_of(criterion)
+
+    @property
+    def skill(self) -> Skill:
+        """The hand that tolerances are widened for."""
+        hand = self.rubric.hand
+        return Skill(hand.angle_deg, hand.place_mm, hand.mark_mm)
+
+    @property
+    def rule_scales(self) -> dict[str, float]:
+        """The scales that the assignment's rule gives."""
+        return {name: float(self.parameters[name]) for name in SCALE_NAMES}
 
     def scale_of(self, vector: str) -> str:
         """``kv`` or ``ka``."""
@@ -79,11 +120,48 @@ class Task:
         """The exact vector on paper, millimetres, at these scales."""
         return self.real[vector] / scales[self.scale_of(vector)]
 
-    def nodes(self, scales: Mapping[str, float], own: Nodes | None = None) -> dict[str, complex]:
-        """All nodes at these scales, with some taken as they are."""
-        parameters = {**self.parameters, **{name: np.asarray(scales[name]) for name in SCALE_NAMES}}
-        found = evaluate(self.construction, parameters, given=own)
-        return {name: complex(np.ravel(node)[0]) for name, node in found.items()}
+    def at(self, scales: Mapping[str, float]) -> dict[str, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
+        """The parameters with other scales."""
+        return {**self.parameters, **{name: np.asarray(scales[name]) for name in SCALE_NAMES}}
+
+    def nodes(self, scales: Mapping[str, float]) -> Mapping[str, complex]:
+        """All nodes at these scales."""
+        key = ("nodes", *(scales[name] for name in SCALE_NAMES))
+        found = self.memory.get(key)
+        if found is None:
+            places = evaluate(self.construction, self.at(scales))
+            found = {name: complex(np.ravel(node)[0]) for name, node in places.items()}
+            self._keep(key, found)
+        return found  # type: ignore[return-value]
+
+    def traced(self, scales: Mapping[str, float]) -> Trace:
+        """The whole drawing with what a hand's errors make of it, at these scales.
+
+        The sketch at the rule's: its size changes next to nothing in how far a hand may miss.
+        """
+        key = ("traced", scales["kv"], scales["ka"], self.skill)
+        found = self.memory.get(key)
+        if found is None:
+            rule = {**scales, "kL": float(self.parameters["kL"])}
+            found = trace(self.construction, self.at(rule), self.skill)
+            self._keep(key, found)
+        return found  # type: ignore[return-value]
+
+    @property
+    def by_similarity(self) -> Construction:
+        """The construction with every image of a plate's point found by similarity."""
+        found = self.memory.get(("by similarity",))
+        if found is None:
+            found = self.construction
+            for image in self.construction.images.values():
+                found = found.with_step(image)
+            self._keep(("by similarity",), found)
+        return found  # type: ignore[return-value]
+
+    def _keep(self, key: tuple[object, ...], found: object) -> None:
+        if len(self.memory) >= KEPT:
+            self.memory.clear()
+        self.memory[key] = found
 
 
 def task_of(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
@@ -94,13 +172,23 @@ def task_of(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Tas
     plan = exact_plan(assignment, [variant], accelerations=rubric.needs_accelerations)
     construction, driver = plan.construction, plan.mechanism.driver
     parameters = {name: np.asarray(np.ravel(value)[0]) for name, value in plan.drawing.parameters.items()}
+    real = {name: complex(vector[0]) for name, vector in plan.vectors_si.items()}
+    places = {name: complex(np.ravel(place)[0]) for name, place in plan.motion.position.items()}
+    segments = {
+        v.name: Segment(v.name, v.tail, v.head, v.scale, real[v.name]) for v in construction.vectors.values()
+    }
+    segments |= {
+        name: Segment(name, tail, head, "kL", places[head] - places[tail])
+        for name, (tail, head) in construction.links.items()
+    }
     return Task(
         assignment=assignment,
         rubric=rubric,
         variant=variant,
         construction=construction,
         parameters=parameters,
-        real={name: complex(vector[0]) for name, vector in plan.vectors_si.items()},
+        real=real,
+        segments=segments,
         rates={name: float(rate[0]) for name, rate in plan.rates.items()},
         lengths_m={name: float(parameters[rate.length]) for name, rate in construction.rates.items()},
         pin=driver.pin,

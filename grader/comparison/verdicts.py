@@ -3,7 +3,7 @@
 import cmath
 from dataclasses import replace
 
-from grader.comparison.limits import LEVELS, Mark, better, worse
+from grader.comparison.limits import FULL, NONE, Mark, open_between
 from grader.comparison.marking import degrees
 from grader.comparison.task import unit_of
 from grader.documents import Verdict
@@ -17,36 +17,7 @@ def with_confidence(mark: Mark, confidence: float, least: float) -> Mark:
     """Anything is possible where the reading is less certain than the rubric asks."""
     if confidence >= least:
         return mark
-    return Mark(mark.level, "none", "full", (Reason("doubtful", {"confidence": confidence}), *mark.reasons))
-
-
-def is_better(mark: Mark, other: Mark) -> bool:
-    """Whether a mark leaves more than another, first for certain, then at best."""
-
-    def rank(one: Mark) -> tuple[int, int]:
-        return LEVELS.index(one.worst), LEVELS.index(one.best)
-
-    return rank(mark) > rank(other)
-
-
-def the_better(mark: Mark, other: Mark, *reasons: Reason) -> Mark:
-    """Two marks of which the better counts; the reasons are those of `other`, after `reasons`."""
-    return Mark(
-        better((mark.level, other.level)),
-        better((mark.worst, other.worst)),
-        better((mark.best, other.best)),
-        (*reasons, *other.reasons),
-    )
-
-
-def the_worse(mark: Mark, other: Mark) -> Mark:
-    """Two marks of which the worse counts."""
-    return Mark(
-        worse((mark.level, other.level)),
-        worse((mark.worst, other.worst)),
-        worse((mark.best, other.best)),
-        (*mark.reasons, *other.reasons),
-    )
+    return open_between(NONE, FULL, mark, Reason("doubtful", {"confidence": confidence}))
 
 
 def quantity(name: str, length_mm: float, direction_rad: float | None, value: float) -> Quantity:
@@ -61,6 +32,13 @@ def expected_quantity(name: str, expected: complex, scale: float, turn_rad: floa
     return quantity(name, abs(expected), direction, abs(expected) * scale)
 
 
+def verdict_of(share: float, *, followed: bool) -> Verdict:
+    """The verdict that a share of the points is told as."""
+    if share == FULL:
+        return "follow_through" if followed else "full"
+    return "none" if share == NONE else "partial"
+
+
 def outcome(  # noqa: PLR0913 - one argument per field of the record
     criterion: CriterionTable,
     mark: Mark,
@@ -73,22 +51,18 @@ def outcome(  # noqa: PLR0913 - one argument per field of the record
     mistake: str | None = None,
 ) -> Outcome:
     """The outcome of a marked criterion: under review where its mark is not certain."""
-
-    def verdict(level: Verdict) -> Verdict:
-        return "follow_through" if followed and level == "full" else level
-
-    lost = mark.level != "full" or not mark.is_certain or followed
-    reasons = mark.reasons if lost else (Reason("right"), *mark.reasons)
+    lost = mark.share != FULL or not mark.is_certain or followed
     return Outcome(
         criterion=criterion.id,
         name=criterion.name,
-        verdict=verdict(mark.level) if mark.is_certain else "review",
+        verdict=verdict_of(mark.share, followed=followed) if mark.is_certain else "review",
         measured=measured,
         expected=expected,
         tolerance=tolerance,
         confidence=confidence,
-        reasons=reasons,
-        possible=(verdict(mark.worst), verdict(mark.best)),
+        reasons=mark.reasons if lost else (Reason("right"), *mark.reasons),
+        possible=(verdict_of(mark.worst, followed=followed), verdict_of(mark.best, followed=followed)),
+        shares=(mark.worst, mark.best),
         mistake=mistake,
     )
 
@@ -97,7 +71,7 @@ def unjudged(
     criterion: CriterionTable, verdict: Verdict, reasons: tuple[Reason, ...], *, expected: Quantity
 ) -> Outcome:
     """The outcome of a criterion that nothing was handed in for, or nothing that could be read."""
-    possible: tuple[Verdict, Verdict] = ("none", "full") if verdict == "review" else (verdict, verdict)
+    is_open = verdict == "review"
     return Outcome(
         criterion=criterion.id,
         name=criterion.name,
@@ -105,9 +79,10 @@ def unjudged(
         measured=Quantity(),
         expected=expected,
         tolerance=Tolerance(),
-        confidence=0.0 if verdict == "review" else 1.0,
+        confidence=0.0 if is_open else 1.0,
         reasons=reasons,
-        possible=possible,
+        possible=("none", "full") if is_open else (verdict, verdict),
+        shares=(NONE, FULL if is_open else NONE),
     )
 
 
@@ -116,12 +91,18 @@ def both(first: Outcome, second: Outcome, allowed_mm: float) -> Outcome:
     lengths = first.measured.length_mm or 0.0, second.measured.length_mm or 0.0
     told: dict[str, float | str] = {"first": lengths[0], "second": lengths[1], "unit": "mm"}
     differ = Reason("readings_disagree", told)
-    if first.verdict == second.verdict and first.possible == second.possible:
+    if (first.verdict, first.possible, first.shares) == (second.verdict, second.possible, second.shares):
         if abs(lengths[0] - lengths[1]) <= allowed_mm:
             return first
         return replace(first, reasons=(*first.reasons, differ))
     ends = (*first.possible, *second.possible)
     low, high = min(ends, key=RANKS.__getitem__), max(ends, key=RANKS.__getitem__)
+    shares = (*first.shares, *second.shares)
     return replace(
-        first, verdict="review", possible=(low, high), reasons=(differ, *first.reasons), confidence=0.5
+        first,
+        verdict="review",
+        possible=(low, high),
+        shares=(min(shares), max(shares)),
+        reasons=(differ, *first.reasons),
+        confidence=0.5,
     )

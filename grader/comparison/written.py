@@ -1,7 +1,7 @@
 """A drawn length held against the one that the student measured and wrote into the sheet's cells."""
 
 from grader.comparison.evidence import DrawnVector
-from grader.comparison.limits import Mark
+from grader.comparison.limits import FULL, NONE, Mark, open_between
 from grader.comparison.marking import length_tolerance
 from grader.outcomes import Reason
 from grader.rubric import ToleranceTable
@@ -29,4 +29,4 @@ def held_against_written(
     if abs(drawn.length_mm - length_mm) <= allowed:
         return mark
     told: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
-    return Mark(mark.level, "none", "full", (Reason("written_disagrees", told), *mark.reasons))
+    return open_between(NONE, FULL, mark, Reason("written_disagrees", told))

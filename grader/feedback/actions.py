@@ -25,6 +25,7 @@ MOST_WAITING_DETAILS = 3
 WAITING: dict[str, str] = {
     "doubtful": N_("read with too little certainty"),
     "near_limit": N_("so near the limit of the tolerance that the scan cannot decide"),
+    "hand_may_miss": N_("off by no more than a careful hand may be where lines meet at a small angle"),
     "unread": N_("not read on the sheet"),
     "not_measured": N_("nothing was handed in for it"),
     "readings_disagree": N_("the drawing and the entered measurement differ"),

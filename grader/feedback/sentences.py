@@ -37,6 +37,9 @@ HINTS: dict[str, str] = {
     "unread": N_("It could not be read on the sheet."),
     "doubtful": N_("It was read with too little certainty."),
     "near_limit": N_("It lies so near the limit of the tolerance that the scan cannot decide."),
+    "hand_may_miss": N_(
+        "Its lines meet at so small an angle that a careful hand may be off by as much: a person must look."
+    ),
     "readings_disagree": N_("The drawing and the entered measurement differ."),
     "written_disagrees": N_("The drawing and the length written on the sheet differ: a person must look."),
     "follows": N_(

@@ -8,7 +8,7 @@ from grader.rubric import ToleranceTable
 
 TOLERANCE = ToleranceTable(length_mm=1.0, length_relative=0.02)
 SURE, LEAST = 0.99, 0.9
-RIGHT = Mark("full", "full", "full", ())
+RIGHT = Mark(1.0, 1.0, 1.0, ())
 RULER_MM = 0.5
 
 
@@ -20,7 +20,7 @@ def held(drawn_mm, written, se_mm=0.05):
 
 def test_a_written_length_far_from_the_drawn_one_is_for_a_person_whatever_the_mark_would_be():
     mark = held(46.4, (64.4, SURE))
-    assert (mark.worst, mark.best) == ("none", "full")
+    assert (mark.worst, mark.best) == (0.0, 1.0)
     assert mark.reasons[0].code == "written_disagrees"
     assert "written_disagrees" in HINTS.keys() & FULL.keys()
     assert dict(mark.reasons[0].params) == {"drawn": 46.4, "written": 64.4, "unit": "mm"}

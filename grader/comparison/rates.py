@@ -1,0 +1,52 @@
+"""Angular velocities and accelerations that the student computed."""
+
+from grader.comparison import verdicts
+from grader.comparison.absent import absent
+from grader.comparison.following import from_rate
+from grader.comparison.ledger import Ledger
+from grader.comparison.limits import the_better
+from grader.comparison.marking import length_tolerance, mark_value, tolerances, widened
+from grader.comparison.task import Segment, unit_of
+from grader.outcomes import Outcome, Quantity, Reason, Tolerance
+from grader.rubric import CriterionTable
+
+
+def rate(ledger: Ledger, criterion: CriterionTable) -> Outcome:
+    """An angular quantity against the exact one, then against what the student's own vector gives."""
+    task, name, unit = ledger.task, criterion.name, unit_of(criterion.name)
+    right = task.rates[name]
+    if name not in ledger.evidence.values:
+        return absent(ledger, criterion, Quantity(value=right, unit=unit))
+    value, table = ledger.evidence.values[name], task.tolerance(criterion)
+    turned = task.construction.rates[name]
+    segment = task.segments[turned.vector]
+    scale = ledger.used[segment.scale]
+    per_mm = scale / task.lengths_m[name]
+    plain = length_tolerance(table, abs(right) / per_mm) * per_mm
+    allowed = Tolerance(value=plain)
+    mark, followed = mark_value(value, right, plain, plain, table, unit), False
+    if not mark.is_full:
+        allowed = _widened(ledger, criterion, segment, per_mm)
+        mark = mark_value(value, right, allowed.value or 0.0, plain, table, unit)
+    ledger.remember(name, mark)
+    follows = task.rubric.follows_through(criterion)
+    own = from_rate(task, ledger.evidence, turned, scale) if follows and not mark.is_full else None
+    if own is not None:
+        limit = length_tolerance(table, abs(own) / per_mm) * per_mm
+        candidate = ledger.allowed(
+            frozenset({segment.head}), mark_value(value, own, limit, limit, table, unit)
+        )
+        if candidate.is_better(mark):
+            told = Reason("follows", {"what": "vector", "of": turned.vector})
+            mark, right, followed = the_better(candidate, mark, told), own, True
+    measured, expected = Quantity(value=value, unit=unit), Quantity(value=right, unit=unit)
+    return verdicts.outcome(criterion, mark, measured, expected, allowed, followed=followed)
+
+
+def _widened(ledger: Ledger, criterion: CriterionTable, segment: Segment, per_mm: float) -> Tolerance:
+    """The tolerance with what a careful hand may miss of the vector that turns the link."""
+    exact = segment.drawn(ledger.used)
+    plain = tolerances(ledger.task.tolerance(criterion), abs(exact), with_direction=False)
+    reach = ledger.following.whole_reach(segment, exact)
+    wider = widened(plain, abs(exact), reach, ledger.task.rubric.hand.at_most)
+    return Tolerance(value=(wider.length_mm or 0.0) * per_mm, widened=wider.widened)

@@ -1,0 +1,138 @@
+"""Which mechanism plans were drawn for, where no sketch tells: the right one, or a wrong one throughout.
+
+Another assembly, or another variant's data, moves nearly everything; where one of them explains the
+measured vectors far better than the right mechanism does, what is drawn from it follows.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grader.comparison.evidence import DrawnVector, Evidence
+from grader.comparison.task import SCALE_NAMES, Task
+from reference.construction import Construction, evaluate
+from reference.elements import Parameters
+from reference.errors import PlanmarkError
+from reference.geometry import ComplexArray
+from reference.parameters import parameters_of
+from reference.steps import ArcAndLine, TwoArcs
+
+BETTER_BY = 3
+"""So many more vectors a wrong mechanism must explain."""
+LEAST_SHARE = 0.6
+"""Of the measured vectors that it explains."""
+BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+
+@dataclass(frozen=True, slots=True)
+class Sketch:
+    """What plans may have been drawn by: a construction with its parameters, under a name of its own."""
+
+    name: str
+    construction: Construction
+    parameters: Parameters
+
+
+def other_sketch(
+    task: Task, evidence: Evidence, scales: tuple[Mapping[str, float], Mapping[str, float]]
+) -> Sketch | None:
+    """The wrong mechanism that the vectors were drawn for; None where the right one explains them.
+
+    Arguments: `scales` are those used, and those that the drawing seems to follow.
+    """
+    known = {name: one for name in task.real if (one := evidence.vector(name)) is not None}
+    if evidence.has_sketch or len(known) < BETTER_BY:
+        return None
+    each = [scales[0]] if scales[0] == scales[1] else list(scales)
+    right = max(
+        int(_fitting(task, Sketch("right", task.construction, task.at(one)), known)[0]) for one in each
+    )
+    least, best = max(right + BETTER_BY, math.ceil(LEAST_SHARE * len(known))), None
+    for sketch, count in (tried for one in each for tried in _tried(task, one, known)):
+        if count >= least:
+            best, least = sketch, count + 1
+    return best
+
+
+def _tried(
+    task: Task, scales: Mapping[str, float], known: Mapping[str, DrawnVector]
+) -> list[tuple[Sketch, int]]:
+    """Every wrong mechanism with the number of vectors that it explains."""
+    found = []
+    for construction in _other_assemblies(task.construction):
+        sketch = Sketch("other", construction, task.at(scales))
+        found.append((sketch, int(_fitting(task, sketch, known)[0])))
+    for parameters in _other_variants(task, scales):
+        counts = _fitting(task, Sketch("other", task.construction, parameters), known)
+        best = int(np.argmax(counts))
+        one = {
+            name: np.asarray(np.ravel(value)[best if np.size(value) > 1 else 0])
+            for name, value in parameters.items()
+        }
+        found.append((Sketch("other", task.construction, one), int(counts[best])))
+    return found
+
+
+def _other_assemblies(construction: Construction) -> list[Construction]:
+    return [
+        construction.with_step(replace(step, side=-step.side))
+        for step in construction.figures["mechanism"]
+        if isinstance(step, TwoArcs | ArcAndLine)
+    ]
+
+
+def _other_variants(task: Task, scales: Mapping[str, float]) -> list[Parameters]:
+    """All other variants' data, at the scales given and at their own: arrays over variants."""
+    key = ("variants",)
+    if key not in task.memory:
+        task.memory[key] = _variants(task)
+    together: Parameters = task.memory[key]  # type: ignore[assignment]
+    if not together:
+        return []
+    fixed = {name: np.asarray(scales[name]) for name in SCALE_NAMES}
+    return [together, {**together, **fixed}]
+
+
+def _variants(task: Task) -> Parameters:
+    others = [one for one in task.assignment.variants() if one != task.variant]
+    if not others:
+        return {}
+    try:
+        mechanism, scales = task.assignment.mechanism(others), task.assignment.scales(others)
+    except PlanmarkError:
+        return {}
+    found = parameters_of(mechanism, scales.kL, scales.kv, scales.ka)
+    return {
+        **{name: np.asarray(value) for name, value in task.parameters.items() if name not in found},
+        **found,
+    }
+
+
+def _fitting(
+    task: Task, sketch: Sketch, known: Mapping[str, DrawnVector]
+) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+    """How many of the vectors lie within twice their tolerance, by variant."""
+    vectors = sketch.construction.vectors
+    ends = {node for name in known for node in (vectors[name].tail, vectors[name].head)}
+    nodes = evaluate(sketch.construction, sketch.parameters, wanted=ends)
+    fits = [
+        _fits(task, np.ravel(nodes[vectors[name].head] - nodes[vectors[name].tail]), one)
+        for name, one in known.items()
+    ]
+    return np.asarray(sum(fit.astype(np.int64) for fit in np.broadcast_arrays(*fits)))
+
+
+def _fits(task: Task, meant: ComplexArray, drawn: DrawnVector) -> BoolArray:
+    table = task.rubric.tolerance
+    size = np.abs(meant)
+    allowed = 2.0 * np.maximum(table.length_mm, table.length_relative * size)
+    near = np.abs(size - drawn.length_mm) <= allowed
+    if drawn.direction_rad is not None:
+        turned = np.abs(np.angle(meant * np.exp(-1j * drawn.direction_rad)))
+        across = np.maximum(
+            math.radians(2.0 * table.direction_deg), 2.0 * table.across_mm / np.maximum(size, 1e-9)
+        )
+        near &= turned <= across
+    return np.asarray(near)
