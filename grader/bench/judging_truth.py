@@ -210,10 +210,11 @@ def _due(work: Work, source: Source, criterion: CriterionTable, forms: _Forms, s
         return "either"
     if by_hand > PLAIN:
         return "missed"
-    if apart(forms.due, forms.told) <= CLEAR:
-        return "right"
+    moved = apart(forms.due, forms.told)
     least = max(tolerance.least_mm, work.rubric.least_followed_share * abs(forms.told))
-    return "either" if abs(forms.due) < least else "follows"
+    if moved > PLAIN and abs(forms.due) < least:
+        return "either"
+    return "follows" if moved > CLEAR else "right"
 
 
 def _touches_swap(work: Work, vector: Vector) -> bool:
