@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -202,4 +202,15 @@ def export(results: ResultsDocument, path: Path, options: Options) -> Delivery:
     notes = draft.notes
     if draft.withheld and not draft.written:
         notes = ("nobody has a grade yet: there is nothing to upload", *notes)
+    notes = (*notes, *_alike(results, draft.written))
     return Delivery(path, draft.written, draft.withheld, draft.not_found, notes)
+
+
+def _alike(results: ResultsDocument, written: Sequence[str]) -> list[str]:
+    """Sheets that look alike among those whose grades go out."""
+    found = [list(dict.fromkeys(one.students)) for one in results.alike]
+    return [
+        f"the sheets of {' and '.join(students)} look alike: look at them before their grades are out"
+        for students in found
+        if set(students) & set(written)
+    ]

@@ -86,7 +86,7 @@ def _numbers(
             missing[student] = LOCKED
         elif participant is not None:
             numbers[student] = participant
-    notes.extend(found.notes_on(list(numbers)))
+    notes.extend(found.notes_on([one.student_id for one in ready(grades) if one.student_id in numbers]))
     return numbers, missing
 
 

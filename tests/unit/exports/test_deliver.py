@@ -5,6 +5,7 @@ import unicodedata
 
 import pytest
 
+from grader.documents import AlikeDocument
 from grader.exports import Options, Person, export, usual_name
 from grader.exports.deliver import KINDS
 from grader.exports.faults import MOST, listed
@@ -102,6 +103,16 @@ def test_names_are_found_however_their_accents_are_written():
     name = "Țuțu Ștefănescu-Ильин"
     rows = Rows.of([(1, {"name": unicodedata.normalize("NFD", name)}), (2, {"name": "other"})])
     assert find(rows, {"s01": (("name", name.upper()),)}, "the table").rows == {"s01": 1}
+
+
+def test_sheets_that_look_alike_are_told_before_their_grades_are_out(tmp_path):
+    pair = AlikeDocument(students=["s01", "s02"], positions=[None, None], why=["same_numbers"], measure=0.01)
+    two = results(marked("s01", 5.0), marked("s02", 5.0, status="needs_review"))
+    delivery = export(two.model_copy(update={"alike": [pair]}), tmp_path / "o", Options(to="lti"))
+    assert delivery.notes[-1].startswith("the sheets of s01 and s02 look alike")
+    one = results(marked("s01", 5.0, status="needs_review"))
+    delivery = export(one.model_copy(update={"alike": [pair]}), tmp_path / "o", Options(to="lti"))
+    assert not any("alike" in note for note in delivery.notes)
 
 
 def found(rows, **students):
