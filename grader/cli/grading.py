@@ -2,7 +2,6 @@
 
 import json
 import os
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,18 +12,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from grader.batch import Batch, grade, needs_person
 from grader.batch import Progress as Tell
-from grader.documents import ReadingDocument, ResultsDocument
+from grader.cli.telling import tell_class
+from grader.documents import ReadingDocument
 from grader.i18n import LANGUAGES
 from grader.intake import count_pages
-from grader.moved import told_standing
 from grader.pipeline import Place, Seen, documents_of, read, see
 from grader.rubric import rubric_of
 from grader.samples_folder import samples_folder
 from grader.selfcheck import LEVELS, Level
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, InputFileError
-
-SHOWN = 12
 
 
 def grade_folder(
@@ -53,7 +50,7 @@ def grade_folder(
     )  # fmt: skip
     with progress() as tell:
         results = grade(batch, tell)
-    _tell(results, out)
+    tell_class(results, out)
     return needs_person(results)
 
 
@@ -84,42 +81,6 @@ def progress() -> Iterator[Tell]:
             bar.update(tasks[what], completed=done, total=total)
 
         yield tell
-
-
-def _tell(results: ResultsDocument, out: Path) -> None:
-    states = Counter(report.status for report in results.reports)
-    told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
-    typer.echo(f"{len(results.reports)} submissions: {told or 'none'}")
-    _tell_moved(results, out)
-    lines = [
-        f"  {one.file}{'' if one.page is None else f'#{one.page}'}: {one.message}"
-        for one in results.unmatched
-    ]
-    lines += [
-        f"  {report.student_id}: {report.status.replace('_', ' ')}"
-        + "".join(f"; {problem.message}" for problem in report.problems[:1])
-        for report in results.reports
-        if report.status != "graded"
-    ]
-    if lines:
-        typer.echo("A person must look at:")
-        for line in lines[:SHOWN]:
-            typer.echo(line)
-        if len(lines) > SHOWN:
-            typer.echo(f"  ... and {len(lines) - SHOWN} more, all in {out / 'index.html'}")
-    typer.echo(f"Look at {out / 'index.html'}; for programs there is {out / 'results.json'}")
-
-
-def _tell_moved(results: ResultsDocument, out: Path) -> None:
-    """Whose marks are others than after the run before."""
-    if not results.moved:
-        return
-    typer.echo(f"Moved since the last run: {len(results.moved)}")
-    for one in results.moved[:SHOWN]:
-        position = "" if one.position is None else f", position {one.position}"
-        typer.echo(f"  {one.student_id}{position}: {told_standing(one.before)} -> {told_standing(one.after)}")
-    if len(results.moved) > SHOWN:
-        typer.echo(f"  ... and {len(results.moved) - SHOWN} more, all in {out / 'results.json'}")
 
 
 def demo(out: Path, lang: str, jobs: int | None) -> None:
