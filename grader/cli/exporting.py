@@ -105,7 +105,8 @@ def _export(
     people = {}
     if roster is not None:
         people = {
-            row.student_id: Person(name=row.name, email=row.email or "") for row in read_roster(roster).rows
+            row.student_id: Person(name=row.name, email=row.email or "", lang=row.lang or "")
+            for row in read_roster(roster).rows
         }
     if ids is not None:
         people = with_ids(people, ids)

@@ -7,19 +7,26 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from grader.exports.faults import not_as_meant
-from grader.files import OutputError, create_whole
+from grader.files import OutputError, create_whole, write_whole
+from reference.errors import CallError
 
 Content = Mapping[str, bytes | Path]
 """Names, and what stands under them: bytes, or a file that is read when its turn comes."""
+_ONE_FILE = frozenset({".json", ".csv"})
 
 
 def write_files(path: Path, content: Content) -> None:
-    """Write an archive where the name ends with ``.zip``, else files below a new folder.
+    """Write an archive where the name ends with ``.zip``, else files below a new folder; one alone as it is.
 
-    Raises CallError for a folder that holds such a file already, OutputError with the system's reason.
+    Raises CallError for a folder that holds such a file already and for a file's name for several,
+    OutputError with the system's reason.
     """
     if path.suffix.lower() == ".zip":
         _write_archive(path, content)
+    elif path.suffix.lower() in _ONE_FILE:
+        if len(content) != 1:
+            raise CallError("archive_name", f"{path}: {len(content)} files; name a .zip, or a folder")
+        write_whole(path, *(_bytes(data) for data in content.values()))
     else:
         create_whole({path / name: _bytes(data).decode("utf-8") for name, data in content.items()})
 

@@ -62,7 +62,10 @@ def assessments(grades: Sequence[Grade], options: Options) -> Draft:
     course = options.course_id or ":course_id"
     assignment = options.assignment_id or ":assignment_id"
     path = f"/api/v1/courses/{course}/assignments/{assignment}/submissions"
-    told = {user(grade, options): _told(grade, marks, numbers, options.lang) for grade, marks in marked}
+    told = {
+        user(grade, options): _told(grade, marks, numbers, options.lang_of(grade.student_id))
+        for grade, marks in marked
+    }
     if len(told) < len(marked):
         raise CallError("ids", "two students have the same number in Canvas (--ids)")
     calls = [

@@ -112,7 +112,9 @@ def _moodle_grades(grades: list[Grade], options: Options) -> Draft:
     for name in ("item", "identity", "maximum"):
         if getattr(options, name) is not None and getattr(options, name) != "":
             raise CallError("option_unused", f"--{name} has no meaning beside --worksheet: leave it out")
-    comments = {grade.student_id: comment(grade.reports, options.lang) for grade in ready(grades)}
+    comments = {
+        grade.student_id: comment(grade.reports, options.lang_of(grade.student_id)) for grade in ready(grades)
+    }
     return moodle_worksheet.fill(_bytes(options.form), options.form.name, grades, options, comments)
 
 

@@ -16,6 +16,7 @@ class Person:
     ----------
     platform_id : the platform's own number or name of the student
     participant : number in the assignment's worksheet
+    lang : in which the feedback is
     """
 
     name: str = ""
@@ -23,6 +24,7 @@ class Person:
     username: str = ""
     platform_id: str = ""
     participant: int | None = None
+    lang: str = ""
 
 
 @dataclass(frozen=True, slots=True)

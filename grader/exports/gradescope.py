@@ -33,13 +33,13 @@ def results(grades: Sequence[Grade], options: Options) -> Draft:
 
 def _results(grade: Grade, visibility: str, options: Options) -> GradescopeDocument:
     parts = len(grade.reports) if options.combine == "mean" else 1
-    marks = marks_of(grade, options.lang)
+    marks = marks_of(grade, options.lang_of(grade.student_id))
     judged = [mark for mark in marks if mark.verdict != "not_judged"]
     tests = [_test(str(place), mark, parts, visibility) for place, mark in enumerate(judged, start=1)]
     others = [f"{_name(mark)}: {mark.remark}" for mark in marks if mark.verdict == "not_judged"]
     told = {
         "score": float(number(grade.score or 0.0)),
-        "output": "\n".join([plain_comment(grade.reports, options.lang), *others]),
+        "output": "\n".join([plain_comment(grade.reports, options.lang_of(grade.student_id)), *others]),
         "visibility": visibility,
         "tests": tests,
         "extra_data": {

@@ -61,5 +61,5 @@ def _graded(grade: Grade, options: Options) -> dict[str, object]:
         "gradingProgress": "FullyGraded",
         "scoreGiven": round(score, DECIMALS),
         "scoreMaximum": maximum,
-        "comment": plain_comment(grade.reports, options.lang),
+        "comment": plain_comment(grade.reports, options.lang_of(grade.student_id)),
     }

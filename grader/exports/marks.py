@@ -133,7 +133,10 @@ class Criterion:
 
 def class_marks(grades: Sequence[Grade], options: Options) -> list[tuple[Grade, list[Mark]]]:
     """Everybody's marks who has a grade, one for each criterion."""
-    return [(grade, together(marks_of(grade, options.lang), options.combine)) for grade in ready(grades)]
+    return [
+        (grade, together(marks_of(grade, options.lang_of(grade.student_id)), options.combine))
+        for grade in ready(grades)
+    ]
 
 
 def class_criteria(grades: Sequence[Grade], options: Options) -> list[Criterion]:

@@ -75,7 +75,7 @@ def _row(grade: Grade, options: Options, identity: str) -> Row:
     told = {
         "user": _name(grade.student_id, options.people, identity),
         "grade": number(score or 0.0),
-        "feedback": comment(grade.reports, options.lang),
+        "feedback": comment(grade.reports, options.lang_of(grade.student_id)),
     }
     return document(Row, told, f"the row of {grade.student_id}")
 

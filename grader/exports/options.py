@@ -34,7 +34,7 @@ class Options:
     maximum, rescale : the platform's maximum, and leave to convert to it
     visibility : of Gradescope's results
     course_id, assignment_id, cmid, context_id : the platform's numbers of places
-    lang : of comments' few words of their own
+    lang : of comments' few words of their own, where the roster says no other
     now : the time told to platforms; the clock's if None
     """
 
@@ -66,6 +66,10 @@ class Options:
     def person(self, student_id: str) -> Person:
         """Who a student is outside, as far as known."""
         return self.people.get(student_id, Person())
+
+    def lang_of(self, student_id: str) -> str:
+        """The language of a student's comments."""
+        return self.person(student_id).lang or self.lang
 
     def refuse_unused(self, used: frozenset[str], where: str) -> None:
         """CallError for an option that was given and has no meaning for this delivery."""

@@ -55,6 +55,24 @@ def test_a_folder_is_written_whole_and_never_over_another(tmp_path):
         gradescope(tmp_path / "out", *CLASS)
 
 
+def test_a_files_name_is_for_one_student(tmp_path):
+    gradescope(tmp_path / "results.json", *CLASS)
+    assert json.loads((tmp_path / "results.json").read_bytes())["score"] == 11.25
+    with pytest.raises(CallError, match=r"2 files; name a \.zip, or a folder"):
+        gradescope(tmp_path / "other.json", *CLASS, marked("s09", 5.0))
+    assert not (tmp_path / "other.json").exists()
+
+
+def test_comments_are_in_the_students_own_language(tmp_path):
+    people = {"s01": Person(lang="ro"), "s02": Person(lang="ru")}
+    _, scores = lti(tmp_path, marked("s01", 5.0), marked("s02", 5.0), marked("s03", 5.0), people=people)
+    assert [one["comment"] for one in scores] == [
+        "Totul este corect.",
+        "Всё верно.",
+        "Everything is right.",
+    ]
+
+
 def test_positions_are_tests_of_their_own(tmp_path):
     both = marked("s01", 5.0, position=1), marked("s01", 2.5, position=2)
     gradescope(tmp_path / "sum", *both, combine="sum")
