@@ -528,4 +528,8 @@ def schema(name: str) -> dict[str, Any]:
         raise CallError("unknown_schema", f"there is no schema '{name}': known are {', '.join(models)}")
     model, mode = models[name]
     found = model.model_json_schema(mode=mode)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:planmark:{name}:{SCHEMA_VERSION}",
+        **found,
+    }

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from grader.comparison import Submission
 from grader.documents import (
+    SCHEMA_VERSION,
     MeasurementsDocument,
     ReportDocument,
     ResultsDocument,
@@ -28,6 +29,7 @@ PRESS = task_for("press", position=1)
 @pytest.mark.parametrize("name", schema_names())
 def test_every_schema_is_one(name):
     jsonschema.Draft202012Validator.check_schema(schema(name))
+    assert schema(name)["$id"] == f"urn:planmark:{name}:{SCHEMA_VERSION}"
 
 
 def test_an_unknown_schema_is_a_wrong_call():
