@@ -184,7 +184,7 @@ def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
     """
     told = sentences or {}
     titles = {one.id: one.title.in_language(language) for one in task.rubric.criterion}
-    maxima = {one.id: one.points for one in task.rubric.criterion}
+    maxima = task.rubric.points
     refused = [
         Problem("scale_refused", f"{name}: {scale.refused}")
         for name, scale in judgement.scales.items()
@@ -256,7 +256,7 @@ def _problems(problems: Sequence[Problem]) -> list[ProblemDocument]:
 def _criterion(
     outcome: Outcome, title: str, points: float | None, max_points: float, feedback: str
 ) -> CriterionDocument:
-    is_vector = outcome.name not in {"kL", "kv", "ka"}
+    is_vector = outcome.name not in {"kL", "kv", "ka"} and "_" in outcome.name
     return CriterionDocument(
         id=outcome.criterion,
         title=title,

@@ -186,11 +186,12 @@ def trace(
     with np.errstate(all="ignore"):
         for figure, steps in construction.figures.items():
             drawing.trace(figure, steps)
-    return Trace(
-        {name: drawing.told(place) for name, place in drawing.made.items()},
-        {name: drawing.told(place) for name, place in drawing.nodes.items()},
-        drawing.hand,
-    )
+    made = {name: drawing.told(place) for name, place in drawing.made.items()}
+    nodes = {
+        name: made[name] if place is drawing.made[name] else drawing.told(place)
+        for name, place in drawing.nodes.items()
+    }
+    return Trace(made, nodes, drawing.hand)
 
 
 @dataclass(slots=True)

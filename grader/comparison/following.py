@@ -60,6 +60,7 @@ class Following:
     places: dict[tuple[object, ...], Nodes] = field(default_factory=dict)
     traces: dict[tuple[object, ...], Trace] = field(default_factory=dict)
     sketch: list[Sketch | None] = field(default_factory=list)
+    named_nodes: dict[int, frozenset[str]] = field(default_factory=dict)
 
     @property
     def wrong_scales(self) -> frozenset[str]:
@@ -76,6 +77,12 @@ class Following:
                 self.task, self.evidence, self.right(scales) if sketch is None else sketch
             )
         return self.places[key]
+
+    def names(self, own: Nodes) -> frozenset[str]:
+        """The names of all own nodes."""
+        if id(own) not in self.named_nodes:
+            self.named_nodes[id(own)] = known(own)
+        return self.named_nodes[id(own)]
 
     def right(self, scales: Mapping[str, float]) -> Sketch:
         """The right mechanism, at the scale that its sketch has where that was read."""
@@ -112,9 +119,11 @@ class Following:
         upstream = self.task.construction.upstream(segment.head) | self.task.construction.upstream(
             segment.tail
         )
-        relies_on = (known(own) & upstream) - {segment.head}
-        is_own = bool(relies_on) or sketch is not None
-        vector = found.vector(segment.tail, segment.head) if is_own else segment.drawn(scales)
+        relies_on = (self.names(own) & upstream) - {segment.head}
+        if not relies_on and sketch is None:
+            exact = segment.drawn(scales)
+            return Expectation(exact, "nodes", "", relies_on, self.whole_reach(segment, exact))
+        vector = found.vector(segment.tail, segment.head)
         reach, se = self.spreads(found.moved(segment.tail, segment.head), found.hand, vector)
         return Expectation(vector, "nodes", "", relies_on, reach, se)
 
@@ -207,6 +216,13 @@ class Following:
 
     def whole_reach(self, segment: Segment, along: complex) -> Spread:
         """How far a hand may miss a vector from the start of the drawing."""
+        task, scales = self.task, (self.used["kv"], self.used["ka"])
+        key = ("reach", segment.name, abs(along), cmath.phase(along), *scales, self.evidence.has_sheets)
+        if key not in task.memory:
+            task.keep(key, self._whole_reach(segment, along))
+        return task.memory[key]  # type: ignore[return-value]
+
+    def _whole_reach(self, segment: Segment, along: complex) -> Spread:
         moved = self.task.traced(self.used).moved(segment.tail, segment.head)
         found = spread(moved * np.exp(1j * (cmath.phase(along) - cmath.phase(segment.real))), along)
         if not self.evidence.has_sheets:

@@ -8,7 +8,7 @@ from grader.comparison.evidence import Evidence
 from grader.comparison.following import NO_SPREAD, Expectation, Following, scaled
 from grader.comparison.limits import FULL, NONE, Mark, the_better
 from grader.comparison.marking import length_tolerance
-from grader.comparison.own import known, with_own_lengths
+from grader.comparison.own import with_own_lengths
 from grader.comparison.scales import Scale, followed_scales, used_scales
 from grader.comparison.task import Segment, Task
 from grader.outcomes import Reason
@@ -175,7 +175,7 @@ class Ledger:
         return frozenset(self._wrong(relies_on))
 
     def _wrong(self, relies_on: frozenset[str]) -> Iterator[str]:
-        nodes = known(self.following.own(self.used)) | self.evidence.nodes.keys()
+        nodes = self.following.names(self.following.own(self.used)) | self.evidence.nodes.keys()
         for name in relies_on:
             is_cleared = name in self.cleared and name not in self.inherited
             if name in self.charged or not (is_cleared or (name in nodes and not self.is_off(name))):

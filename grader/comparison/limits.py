@@ -5,7 +5,7 @@ shares of the tolerance's bands.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from grader.outcomes import Reason
 from grader.rubric import ToleranceTable
@@ -28,6 +28,7 @@ class Limit:
     table : the rubric's: bands of partial marks, and how many standard errors a verdict must be away
         from changing
     reason : said where the mark is not full
+    share, worst, best : the mark on the deviation as it is, at the far and at the near end of its error
     """
 
     what: str
@@ -37,6 +38,15 @@ class Limit:
     se: float
     table: ToleranceTable
     reason: Reason
+    share: float = field(init=False)
+    worst: float = field(init=False)
+    best: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        margin, share = self.table.certain_errors * self.se, self.share_at(self.off)
+        object.__setattr__(self, "share", share)
+        object.__setattr__(self, "worst", self.share_at(self.off + margin) if margin else share)
+        object.__setattr__(self, "best", self.share_at(max(self.off - margin, 0.0)) if margin else share)
 
     def share_at(self, off: float) -> float:
         """The share of the points at a deviation; bands are as wide as the plain tolerance says."""
@@ -47,21 +57,6 @@ class Limit:
             if off <= (self.tolerance + (factor - 1.0) * self.plain) * slack:
                 return share
         return NONE
-
-    @property
-    def share(self) -> float:
-        """The mark on the deviation as it is."""
-        return self.share_at(self.off)
-
-    @property
-    def worst(self) -> float:
-        """The mark at the far end of the standard error."""
-        return self.share_at(self.off + self.table.certain_errors * self.se)
-
-    @property
-    def best(self) -> float:
-        """The mark at the near end of the standard error."""
-        return self.share_at(max(self.off - self.table.certain_errors * self.se, 0.0))
 
 
 @dataclass(frozen=True, slots=True)

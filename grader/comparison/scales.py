@@ -9,6 +9,7 @@ wrong and the drawing is not.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.limits import FULL, NONE, Limit, Mark, mark
@@ -59,8 +60,8 @@ def followed_scales(settled: Mapping[str, Scale]) -> dict[str, float]:
 def _settle_one(
     task: Task, evidence: Evidence, name: str, text: str | None, before: Mapping[str, Scale]
 ) -> Scale:
-    rule = _by_rule(task, evidence, name, before)
     parsed = _parsed(task, name, text)
+    rule = _by_rule(task, evidence, name, before)
     if parsed is None:
         used = UsedScale(None, None, rule, assumed=True)
         return Scale(used, _contradiction(task, evidence, name, rule), None, (_assumed(name, rule),))
@@ -81,11 +82,17 @@ def _parsed(task: Task, name: str, text: str | None) -> ParsedScale | None:
         return None
     units = task.assignment.file.scales.bare_units
     bare = next((unit for scale, unit in units.items() if scale == name), None)
-    parsed = parse_scale(name, text, bare_unit=bare)
+    parsed = _understood(name, text, bare)
     if isinstance(parsed, ByRule) and "omega" in parsed.powers and task.omega is None:
         with_unit, _, _ = EXAMPLES[name].partition(" or ")
         return Refused(f"a slider drives this mechanism, there is no crank's omega; write {with_unit}")
     return parsed
+
+
+@lru_cache(maxsize=4096)
+def _understood(name: str, text: str, bare_unit: str | None) -> ParsedScale:
+    """A class declares the same few scales again and again."""
+    return parse_scale(name, text, bare_unit=bare_unit)
 
 
 def _assumed(name: str, rule: float) -> Reason:
@@ -99,8 +106,11 @@ def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Sca
         witness = _witness(task, evidence, name)
         if witness is not None:
             return witness[0] / witness[1]
-    found = task.assignment.scales([task.variant], **known)
-    return float(getattr(found, name)[0])
+    key = ("rule", *known.items())
+    if key not in task.memory:
+        found = task.assignment.scales([task.variant], **known)
+        task.keep(key, float(getattr(found, name)[0]))
+    return task.memory[key]  # type: ignore[return-value]
 
 
 # What the drawing says ----------------------------------------------------------------------------

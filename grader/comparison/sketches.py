@@ -46,33 +46,52 @@ def other_sketch(
     if evidence.has_sketch or len(known) < BETTER_BY:
         return None
     each = [scales[0]] if scales[0] == scales[1] else list(scales)
-    right = max(
-        int(_fitting(task, Sketch("right", task.construction, task.at(one)), known)[0]) for one in each
-    )
+    tried = [one for scale in each for one in _tried(task, scale)]
+    counts = [_fitting(task, plans, known) for _, plans in tried]
+    right = max(int(count[0]) for (name, _), count in zip(tried, counts, strict=True) if name == "right")
     least, best = max(right + BETTER_BY, math.ceil(LEAST_SHARE * len(known))), None
-    for sketch, count in (tried for one in each for tried in _tried(task, one, known)):
-        if count >= least:
-            best, least = sketch, count + 1
+    for (name, plans), count in zip(tried, counts, strict=True):
+        most = int(np.argmax(count))
+        if name != "right" and count[most] >= least:
+            best, least = plans.sketch(most), int(count[most]) + 1
     return best
 
 
-def _tried(
-    task: Task, scales: Mapping[str, float], known: Mapping[str, DrawnVector]
-) -> list[tuple[Sketch, int]]:
-    """Every wrong mechanism with the number of vectors that it explains."""
-    found = []
-    for construction in _other_assemblies(task.construction):
-        sketch = Sketch("other", construction, task.at(scales))
-        found.append((sketch, int(_fitting(task, sketch, known)[0])))
-    for parameters in _other_variants(task, scales):
-        counts = _fitting(task, Sketch("other", task.construction, parameters), known)
-        best = int(np.argmax(counts))
+@dataclass(frozen=True, slots=True)
+class _Plans:
+    """What one construction makes of one or several variants' data: vectors (variants,), millimetres."""
+
+    construction: Construction
+    parameters: Parameters
+    vectors: Mapping[str, ComplexArray]
+
+    def sketch(self, index: int) -> Sketch:
+        """One of them, as plans may have been drawn for it."""
         one = {
-            name: np.asarray(np.ravel(value)[best if np.size(value) > 1 else 0])
-            for name, value in parameters.items()
+            name: np.asarray(np.ravel(value)[index if np.size(value) > 1 else 0])
+            for name, value in self.parameters.items()
         }
-        found.append((Sketch("other", task.construction, one), int(counts[best])))
-    return found
+        return Sketch("other", self.construction, one)
+
+
+def _tried(task: Task, scales: Mapping[str, float]) -> list[tuple[str, _Plans]]:
+    """The plans for the right mechanism and for every wrong one."""
+    key = ("plans", *(scales[name] for name in SCALE_NAMES))
+    if key not in task.memory:
+        right = task.at(scales)
+        found = [("right", _plans(task.construction, right))]
+        found += [("assembly", _plans(one, right)) for one in _other_assemblies(task.construction)]
+        found += [("variant", _plans(task.construction, one)) for one in _other_variants(task, scales)]
+        task.keep(key, found)
+    return task.memory[key]  # type: ignore[return-value]
+
+
+def _plans(construction: Construction, parameters: Parameters) -> _Plans:
+    nodes = evaluate(construction, parameters)
+    vectors = {
+        name: np.ravel(nodes[one.head] - nodes[one.tail]) for name, one in construction.vectors.items()
+    }
+    return _Plans(construction, parameters, vectors)
 
 
 def _other_assemblies(construction: Construction) -> list[Construction]:
@@ -87,7 +106,7 @@ def _other_variants(task: Task, scales: Mapping[str, float]) -> list[Parameters]
     """All other variants' data, at the scales given and at their own: arrays over variants."""
     key = ("variants",)
     if key not in task.memory:
-        task.memory[key] = _variants(task)
+        task.keep(key, _variants(task))
     together: Parameters = task.memory[key]  # type: ignore[assignment]
     if not together:
         return []
@@ -111,16 +130,10 @@ def _variants(task: Task) -> Parameters:
 
 
 def _fitting(
-    task: Task, sketch: Sketch, known: Mapping[str, DrawnVector]
+    task: Task, plans: _Plans, known: Mapping[str, DrawnVector]
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
     """How many of the vectors lie within twice their tolerance, by variant."""
-    vectors = sketch.construction.vectors
-    ends = {node for name in known for node in (vectors[name].tail, vectors[name].head)}
-    nodes = evaluate(sketch.construction, sketch.parameters, wanted=ends)
-    fits = [
-        _fits(task, np.ravel(nodes[vectors[name].head] - nodes[vectors[name].tail]), one)
-        for name, one in known.items()
-    ]
+    fits = [_fits(task, plans.vectors[name], one) for name, one in known.items()]
     return np.asarray(sum(fit.astype(np.int64) for fit in np.broadcast_arrays(*fits)))
 
 

@@ -26,6 +26,8 @@ UNITS: Mapping[str, str] = {
 """By scale, or by the part of a name before its first underscore."""
 KEPT = 64
 """Drawings at scales of students' own that a task keeps."""
+TASKS = 256
+"""That are kept: students of the same variant have the same task."""
 
 
 def unit_of(name: str) -> str:
@@ -131,7 +133,7 @@ class Task:
         if found is None:
             places = evaluate(self.construction, self.at(scales))
             found = {name: complex(np.ravel(node)[0]) for name, node in places.items()}
-            self._keep(key, found)
+            self.keep(key, found)
         return found  # type: ignore[return-value]
 
     def traced(self, scales: Mapping[str, float]) -> Trace:
@@ -144,7 +146,7 @@ class Task:
         if found is None:
             rule = {**scales, "kL": float(self.parameters["kL"])}
             found = trace(self.construction, self.at(rule), self.skill)
-            self._keep(key, found)
+            self.keep(key, found)
         return found  # type: ignore[return-value]
 
     @property
@@ -155,20 +157,34 @@ class Task:
             found = self.construction
             for image in self.construction.images.values():
                 found = found.with_step(image)
-            self._keep(("by similarity",), found)
+            self.keep(("by similarity",), found)
         return found  # type: ignore[return-value]
 
-    def _keep(self, key: tuple[object, ...], found: object) -> None:
+    def keep(self, key: tuple[object, ...], found: object) -> None:
+        """Remember what was drawn, by what it depends on."""
         if len(self.memory) >= KEPT:
             self.memory.clear()
         self.memory[key] = found
 
 
+_tasks: dict[tuple[int, int, Variant], Task] = {}
+
+
 def task_of(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
-    """The task of one variant.
+    """The task of one variant; the same one for the same assignment and rubric.
 
     Raises MechanismError where the variant does not assemble.
     """
+    key = (id(assignment), id(rubric), variant)
+    if key not in _tasks:
+        if len(_tasks) >= TASKS:
+            _tasks.clear()
+        # The task holds both, so that no other object takes their place.
+        _tasks[key] = _made(assignment, rubric, variant)
+    return _tasks[key]
+
+
+def _made(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
     plan = exact_plan(assignment, [variant], accelerations=rubric.needs_accelerations)
     construction, driver = plan.construction, plan.mechanism.driver
     parameters = {name: np.asarray(np.ravel(value)[0]) for name, value in plan.drawing.parameters.items()}
