@@ -142,7 +142,8 @@ def _habits(key: Key, assignment: Assignment, lot: np.random.Generator) -> Stude
     codes = codes_of(key, lot)
     # A sketch drawn wrongly about a single pivot would not tell how far it is turned.
     tells = len(assignment.mechanism_file.ground) > 1 or not {"other_variant", "other_assembly"} & set(codes)
-    turn = float(lot.uniform(-25.0, 25.0)) if tells and lot.random() < 0.3 else 0.0
+    # Nobody turns a sketch by a degree or two on purpose.
+    turn = float(lot.uniform(5.0, 25.0) * lot.choice([-1, 1])) if tells and lot.random() < 0.3 else 0.0
     pages = {page.kind for page in assignment.file.page}
     return Student(
         crank_mm=crank if has_crank else None, kv_ratio=ratios[0], ka_ratio=ratios[1], turn_deg=turn,

@@ -61,6 +61,8 @@ from reference.steps import Given, Pivot
 Due = Literal["right", "follows", "wrong", "either", "missed", "absent"]
 CLEAR, PLAIN = 2.5, 1.0
 """Multiples of the rubric's tolerance beyond which it is clearly wrong, and up to which it is right."""
+SHORT = 1.5
+"""A value from a vector shorter than so many times the least to be judged may be taken for trivial."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +161,7 @@ def _rate_due(work: Work, source: Source, criterion: CriterionTable, told: Compu
     knows_sense = seen.directed.get(rate.vector, False) and (source in ON_SHEETS or not of_sketch)
     is_told = rate.vector in seen.directed and (knows_sense or value * exact > 0.0)
     is_told &= abs(across(work, rate)) > LEAST_SINE
-    if not is_told or not is_same_link or abs(value) / per_mm < tolerance.least_mm:
+    if not is_told or not is_same_link or abs(value) / per_mm < SHORT * tolerance.least_mm:
         return "either"
     return "follows" if apart > CLEAR else "right"
 
