@@ -98,9 +98,13 @@ def _export(
     from grader.exports import Person, read_results, usual_name, with_ids
     from grader.exports import export as deliver
     from grader.roster import read_roster
+    from reference.errors import CallError
 
     check_language(options.lang)
     path = file or folder / usual_name(options)
+    for read in (folder / "results.json", options.form, options.criteria, roster, ids):
+        if read is not None and path.resolve() == read.resolve():
+            raise CallError("file_exists", f"{path}: is read for this export; name another file (--file)")
     results = read_results(folder)
     people = {}
     if roster is not None:

@@ -132,6 +132,12 @@ def test_every_option_is_documented():
         ("export marks --to canvas --what marks --criteria Grades-Pump.csv", "columns out of criterion, id"),
         ("export marks --to gradescope --visibility shown", "is no visibility"),
         ("export marks --to moodle --file Grades-Pump.csv/x", "cannot be written"),
+        ("export marks --to lti --file marks/results.json", "is read for this export"),
+        ("export marks --to lti --ids ids.csv --file ids.csv", "is read for this export"),
+        (
+            "export marks --to canvas --item Pump --gradebook export.csv --file ./export.csv",
+            "is read for this export",
+        ),
     ],
 )
 def test_a_wrong_call_is_told_in_words_and_nothing_is_written(desk, command, told):
