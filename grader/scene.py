@@ -128,6 +128,7 @@ class Dot:
     at: XY
     doubtful: bool
     lettered: bool = False
+    figure: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,8 +174,8 @@ def scene_of(
     """The scene of one sheet's reading; `outcomes` by vector name."""
     arrows = list(_arrows(reading, vectors, outcomes))
     dots = tuple(
-        Dot(name, _xy(node.at), node.confidence < LEAST_SURE)
-        for figure in reading.figures.values()
+        Dot(name, _xy(node.at), node.confidence < LEAST_SURE, figure=kind)
+        for kind, figure in reading.figures.items()
         for name, node in figure.nodes.items()
     )
     ghosts = tuple(_ghosts(arrows, outcomes)) if show_expected else ()

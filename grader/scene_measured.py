@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from grader.outcomes import Outcome
 from grader.records import Reading
-from grader.scene import XY, Arrow, Dot, Ghost, Picture, Scene
+from grader.scene import LEAST_ARROW_MM, XY, Arrow, Dot, Ghost, Picture, Scene
 from reference.construction import Construction, Vector
 
 MARGIN_MM = 14.0
@@ -77,7 +77,9 @@ def _plan(
             continue
         direction = one.direction_deg
         along = expected.get(name)
-        if direction is not None:
+        if one.length_mm < LEAST_ARROW_MM:
+            steps[name] = 0j
+        elif direction is not None:
             steps[name] = cmath.rect(one.length_mm, math.radians(direction))
         elif along:
             steps[name] = one.length_mm * along / abs(along)
@@ -89,7 +91,9 @@ def _plan(
         for one in arrows
         if one.verdict in OFF and (found := expected.get(one.name)) is not None
     )
-    dots = tuple(Dot(name, _xy(place), doubtful=False, lettered=True) for name, place in nodes.items())
+    dots = tuple(
+        Dot(name, _xy(place), doubtful=False, lettered=True, figure=figure) for name, place in nodes.items()
+    )
     return _Plan(arrows, ghosts, dots)
 
 

@@ -46,11 +46,11 @@ SAME_PLACE_MM = 0.05
 CUTS = 64
 MOST_DETAIL_SHARE = 0.8
 """A detail as large as this share of the sheet shows nothing that the whole does not."""
-WHOLE_SIZE_PER_MM = 0.0062
+WHOLE_SIZE_PER_MM = 0.0041
 CLOSE_UP_SIZE_PER_MM = 0.0105
 DETAIL_SIZE_PER_MM = 0.0145
 """Size of marks and letters by the width shown: close-ups stand two in a row, details up to three."""
-LEAST_SIZE, LARGEST_SIZE = 0.3, 1.7
+LEAST_SIZE, LARGEST_SIZE = 0.3, 3.0
 ARROW_OPACITY, FAINT, GROUND_OPACITY = 0.85, 0.3, 0.82
 WRONG = frozenset({"none", "partial"})
 
@@ -174,6 +174,7 @@ def _part(scene: Scene, figure: str) -> Scene:
         scene,
         arrows=tuple(_arrows_of(scene, figure)),
         ghosts=tuple(ghost for ghost in scene.ghosts if ghost.figure == figure and ghost.verdict in WRONG),
+        dots=tuple(dot for dot in scene.dots if dot.figure in {"", figure}),
     )
 
 

@@ -163,6 +163,7 @@ PRECISE: dict[str, tuple[str, ...]] = {
         N_("The line to %(at)s was drawn from %(other)s instead of from %(from)s, and so meets the other one"
            " in the wrong place."),
     ),
+    "sense_reversed": (N_("The vector %(vector)s was laid off the wrong way round."),),
     "normal_reversed": (
         N_("The normal component %(vector)s was laid off away from the centre of rotation."),
     ),

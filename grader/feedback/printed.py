@@ -45,6 +45,8 @@ from grader.scene import COLOURS
 MARGIN_MM = 14.0
 WIDE_MM = A4[0] / mm - 2 * MARGIN_MM
 GAP_MM = 4.0
+ORIENTING_SHARE = 0.66
+"""Of the width, for a sheet whose plans are seen close up below."""
 HALF_MM = (WIDE_MM - GAP_MM) / 2
 STATE_COLOURS = {"graded": "full", "needs_review": "review", "unreadable": "none", "missing": "not_judged"}
 
@@ -239,7 +241,8 @@ class _Story:
         else:
             rows = [[look] for look in whole] + [plans[k : k + 2] for k in range(0, len(plans), 2)]
         for number, row in enumerate(rows):
-            wide = WIDE_MM if len(row) == 1 and row[0] in whole else HALF_MM
+            beside = WIDE_MM if not plans else ORIENTING_SHARE * WIDE_MM
+            wide = beside if len(row) == 1 and row[0] in whole else HALF_MM
             cells = [self.look(look, wide, sheet.source if look in whole else "") for look in row]
             parts: list[Flowable] = [Spacer(1, 2 * mm), table([cells], [wide + GAP_MM] * len(cells))]
             if number == 0 and not whole:

@@ -5,6 +5,7 @@ something is off without giving the answer away; ``symbol``, which says nothing 
 Names of vectors stand in sentences as `v_BA`, `a_BA_n`; pages set them with indices.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from typing import Literal
 
@@ -115,7 +116,7 @@ def criterion_feedback(
         speaker.gettext(_followed_in_part(outcome))
         if reason.code == "follows" and outcome.verdict != "follow_through"
         else reason_sentence(reason, speaker, level, names)
-        for reason in _worth_telling(outcome)
+        for reason in _worth_telling(outcome, level)
     )
     parts = list(dict.fromkeys(told))[:MOST_REASONS]
     if outcome.mistake and outcome.verdict in {"none", "partial"} and outcome.mistake in MISTAKES:
@@ -130,8 +131,8 @@ def _followed_in_part(outcome: Outcome) -> str:
     return NEARLY if outcome.verdict == "partial" else MAY_FOLLOW
 
 
-def _worth_telling(outcome: Outcome) -> list[Reason]:
-    """The reasons without those that say nothing beside the others."""
+def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
+    """The reasons without those that say nothing beside the others, or too much."""
     codes = {reason.code for reason in outcome.reasons}
     by_scale = any(one.code == "follows" and one.params.get("what") == "scale" for one in outcome.reasons)
     if outcome.verdict == "review" and "scale_assumed" in codes and by_scale:
@@ -139,6 +140,9 @@ def _worth_telling(outcome: Outcome) -> list[Reason]:
     if outcome.verdict == "follow_through" and "follows" in codes:
         return [reason for reason in outcome.reasons if reason.code == "follows"]
     needless = {"right"} if codes - {"right"} else set()
+    if level != "full" and codes & {"not_measured", "unread"}:
+        # How short it should be is an answer, where nothing was drawn.
+        needless |= {"too_short_to_judge"}
     if "optional" in codes:
         needless |= {"not_measured", "unread"}
     near = next((reason for reason in outcome.reasons if reason.code == "near_limit"), None)
@@ -198,7 +202,15 @@ def _known(mistake: Mistake, speaker: Tongue, level: Level, names: Mapping[str, 
     }
     if mistake.at.startswith(NORMAL_END):
         told["vector"] = f"a_{mistake.at.removeprefix(NORMAL_END)}_n"
+    elif _IMAGE.fullmatch(mistake.at):
+        told["vector"] = (
+            f"{'a' if mistake.at.endswith(ACCELERATED) else 'v'}_{mistake.at.rstrip(ACCELERATED).upper()}"
+        )
     return told
+
+
+_IMAGE, ACCELERATED = re.compile("[a-z][0-9]?'?"), "'"
+"""How the images of joints are named in the plans, and those in the acceleration plan."""
 
 
 def line_of(mistake: Mistake) -> str:

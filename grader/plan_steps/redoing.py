@@ -14,7 +14,7 @@ from grader.plan_steps import sentences, texts
 from grader.plan_steps.explanation import computed
 from grader.plan_steps.words import Speaker, speaker_of
 from reference.drawing.subject import Subject
-from reference.elements import Coriolis, Normal
+from reference.elements import Along, Coriolis, Normal
 from reference.steps import Coincide, Divide, Given, Similar, Step, TwoLines
 
 MOST_STEPS = 8
@@ -85,8 +85,8 @@ def _untold(speaker: Speaker, step: Step) -> Iterator[Markup]:
     match step:
         case TwoLines() | Coincide():
             yield sentences.sentence(speaker, step)
-        case Given(length=Normal() | Coriolis()):
-            yield _formula(speaker, step)
+        case Given(along=Along()) | Given(length=Coriolis()):
+            yield from _formula(speaker, step)
             direction = sentences.direction_told(speaker, step)
             yield speaker.say(
                 texts.LAY_OFF_UNTOLD, start=speaker.name(step.start), node=node,
@@ -100,13 +100,12 @@ def _untold(speaker: Speaker, step: Step) -> Iterator[Markup]:
             yield speaker.say(texts.DIVIDE_UNTOLD, node=node, p=speaker.name(p), q=speaker.name(q))
 
 
-def _formula(speaker: Speaker, step: Given) -> Markup:
+def _formula(speaker: Speaker, step: Given) -> Iterator[Markup]:
     """How the component is computed, in names alone."""
     name = sentences.named_vector(speaker, step)
     if isinstance(step.length, Normal):
         speed = sentences.named(speaker, step.length.tail, step.length.head)
-        return Markup("{} = {}² / {}").format(name, speed, sentences.link_of(speaker, step))
+        yield Markup("{} = {}² / {}").format(name, speed, sentences.link_of(speaker, step))
     if isinstance(step.length, Coriolis):
         rate = speaker.rate(f"omega_{sentences.coriolis_link(speaker, step)}")
-        return Markup("{} = 2 · {} · {}").format(name, rate, sentences.named(speaker, *step.length.slide))
-    return Markup("")
+        yield Markup("{} = 2 · {} · {}").format(name, rate, sentences.named(speaker, *step.length.slide))

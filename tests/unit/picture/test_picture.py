@@ -1,5 +1,8 @@
 """Overlay pictures: in the right place, upright, and legible without colours."""
 
+import itertools
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -8,7 +11,7 @@ from grader.labels import labels_of
 from grader.outcomes import Outcome, Quantity, Tolerance
 from grader.picture import backdrop, overlay, paint, restored, stored
 from grader.records import Figure, Page, Reading, ReadNode, ReadVector, Sheet
-from grader.scene import COLOURS, MARKS, Arrow, Ghost, Scene, scene_of
+from grader.scene import ARROW_WIDTH_MM, COLOURS, MARKS, Arrow, Ghost, Scene, scene_of
 from reference.construction import Vector
 
 PAGE_MM = (420.0, 297.0)
@@ -185,11 +188,41 @@ def test_colours_stand_out_from_paper():
     ],
 )
 def test_right_and_wrong_look_different_to_the_colour_blind(seen):
-    shown = np.clip(np.array([np.array(seen) @ linear(one) for one in ("full", "none")]), 0, 1)
+    assert apart(seen, "full", "none") > 10 * JUST_NOTICEABLE
+
+
+JUST_NOTICEABLE = 2.3
+
+
+def apart(seen, *verdicts):
+    """How far apart two verdicts' colours look, CIE L*a*b*."""
+    shown = np.clip(np.array([np.array(seen) @ linear(one) for one in verdicts]), 0, 1)
     gamma = np.where(shown <= 0.0031308, 12.92 * shown, 1.055 * shown ** (1 / 2.4) - 0.055)
     lab = cv2.cvtColor(gamma[None].astype(np.float32), cv2.COLOR_RGB2LAB)[0]
-    just_noticeable = 2.3
-    assert np.linalg.norm(lab[0] - lab[1]) > 10 * just_noticeable
+    return np.linalg.norm(lab[0] - lab[1])
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [
+        np.eye(3),
+        # No long, middle or short cones: Machado, Oliveira and Fernandes 2009, severity 1, linear RGB.
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+        [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+    ],
+)
+def test_all_verdicts_look_different_to_every_eye(seen):
+    pairs = itertools.combinations(COLOURS, 2)
+    assert min(apart(seen, *pair) for pair in pairs) > 6 * JUST_NOTICEABLE
+
+
+def test_verdicts_differ_in_a_grey_print():
+    # By mark everywhere; wrong, nearly right and doubtful arrows by their lines, too.
+    assert ARROW_WIDTH_MM["none"] > 1.5 * ARROW_WIDTH_MM["full"]
+    right = Arrow("v_A", "velocity_plan", (0.0, 0.0), (50.0, 0.0), "full", doubtful=False)
+    lines = [right.dash, replace(right, verdict="partial").dash, replace(right, doubtful=True).dash]
+    assert len(set(lines)) == 3
 
 
 def test_a_page_that_could_not_be_registered_is_shown_as_its_file_asks():

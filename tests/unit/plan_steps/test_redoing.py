@@ -1,0 +1,60 @@
+"""What is to be drawn again: from the wrong point on, all that hangs on it, with or without numbers."""
+
+import re
+
+import pytest
+
+from grader.i18n import LANGUAGES, tongue
+from grader.plan_steps import redo, wording_of
+from reference.assignment import load_assignment
+from reference.construction import ancestors
+from reference.drawing.subject import Subject
+from reference.plan import exact_plan
+
+
+def subject(name="pump", n=12, position=None, lang="en"):
+    assignment = load_assignment(name)
+    plan = exact_plan(assignment, [assignment.variant(n, position)])
+    return Subject(assignment, plan, 0, wording_of(tongue(lang)))
+
+
+def test_the_first_step_is_that_of_the_wrong_point():
+    first, *_ = redo(subject(), tongue("en"), "b", with_numbers=False)
+    drawn = "Through a draw a line perpendicular to AB, and through o a line perpendicular to O2B."
+    assert first == f"{drawn} They meet in b."
+
+
+@pytest.mark.parametrize("node", ["a", "b", "c", "d", "n_BA", "b'", "c'", "d'"])
+def test_all_that_hangs_on_the_point_is_named_and_nothing_else(node):
+    one = subject()
+    construction = one.plan.construction
+    hanging = {step.node for step in construction.steps if node in ancestors(construction, [step.node])}
+    lines = redo(one, tongue("en"), node, with_numbers=False)
+    ends = set(re.findall(r"(?:meet in|ends in|corner is) (\S+?)\.(?:\s|$)", " ".join(lines)))
+    later = re.search(r"what follows from it: (.*)\.$", lines[-1])
+    named = ends | set(later[1].split(", ") if later else [])
+    assert named == hanging
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+@pytest.mark.parametrize(
+    ("name", "n", "position"), [("pump", 12, None), ("press", None, 1), ("shaper", 3, None)]
+)
+def test_without_numbers_no_step_says_one(name, n, position, lang):
+    one = subject(name, n, position, lang)
+    for step in one.plan.construction.steps:
+        for line in redo(one, tongue(lang), step.node, with_numbers=False):
+            assert not re.search(r"\d[.,]\d|\d\s*(?:mm|мм|°)", line.replace("90°", "")), line
+
+
+def test_with_numbers_the_lengths_are_those_of_the_plan():
+    one = subject()
+    line = redo(one, tongue("en"), "n_BA", with_numbers=True)[0]
+    length = abs(one.plan.drawn_mm("a_BA_n")[0])
+    assert f"{length:.2f}\u00a0mm" in line
+    assert line.startswith("a_BA_n = v_BA² / AB")
+
+
+def test_what_is_no_point_has_no_steps():
+    for where in ("kv", "velocity_plan", "nowhere"):
+        assert redo(subject(), tongue("en"), where, with_numbers=True) == []
