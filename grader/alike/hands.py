@@ -70,7 +70,8 @@ def hands_of(
     chosen = [handed[row.owner] for row in rows]
     placed = {figure: one.at[owner] for figure, one in drawn.items()}
     misses, by_scale = _misses(assignment, chosen, variants, placed)
-    return Hands(rows, _centred(_without(_normed(misses), by_scale), variants))
+    errors = _normed(misses - _scale(misses, by_scale) * by_scale)
+    return Hands(rows, _centred(_without(errors, by_scale), variants))
 
 
 # Misses -------------------------------------------------------------------------------------------
@@ -176,6 +177,17 @@ def _normed(misses: FloatArray) -> FloatArray:
         scaled = misses / np.maximum(usual, LEAST_SPREAD)
         scaled[np.abs(scaled) > GROSS] = np.nan
         return np.clip(scaled, -TAIL, TAIL)
+
+
+def _scale(misses: FloatArray, by_scale: FloatArray) -> FloatArray:
+    """(rows, 1) the common enlargement, the median of what each length tells, by its weight."""
+    weight = np.where(np.isfinite(misses) & np.isfinite(by_scale), np.abs(by_scale), 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        told = np.where(weight > 0.0, misses / by_scale, 0.0)
+    order = np.argsort(told, axis=1)
+    reached = np.cumsum(np.take_along_axis(weight, order, axis=1), axis=1)
+    middle = (reached >= reached[:, -1:] / 2.0).argmax(axis=1)[:, None]
+    return np.take_along_axis(np.take_along_axis(told, order, axis=1), middle, axis=1)
 
 
 def _without(errors: FloatArray, by_scale: FloatArray) -> FloatArray:

@@ -8,10 +8,10 @@ exactly has the same ones. What is far off is a mistake, which two may make alik
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import lgamma
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammaln
 
 from grader.alike.handed import Handed
 from grader.records import FloatArray
@@ -90,43 +90,48 @@ def like_numbers(assignment: Assignment, handed: Sequence[Handed]) -> LikeNumber
     if len(having) < 2:
         return LikeNumbers(chance, equal, compared, 0)
     table = _table(assignment, [handed[k] for k in having])
-    same, telling, both = _counted(table)
+    single = _single(table)
+    same, telling, alone, both = _counted(table, single)
     people = np.array([handed[k].student_id for k in having])
     strangers = people[:, None] != people[None, :]
     pairs = max(int(strangers.sum()) // 2, 1)
-    single = _single(table)
+    choices = _choices(both, same)
+    likely = (same >= LEAST_EQUAL) & (telling >= LEAST_TELLING) & (alone + choices <= -np.log(pairs))
     known: dict[tuple[int, bytes], float] = {}
-    for i, j in np.argwhere((same >= LEAST_EQUAL) & (telling >= LEAST_TELLING) & strangers):
+    for i, j in np.argwhere(likely & strangers):
         chosen = (table.entered[i] == table.entered[j]) & table.usable[i]
-        choices = _choices(int(both[i, j]), int(same[i, j]))
-        if single[i][chosen].sum() + choices > -np.log(pairs):
-            continue
         key = int(i), chosen.tobytes()
         if key not in known:
             known[key] = _chance(table, int(i), chosen)
         # Whoever copied, the values came from one of both drawings.
         a, b = having[i], having[j]
-        chance[a, b] = chance[b, a] = min(chance[a, b], known[key] + choices)
+        chance[a, b] = chance[b, a] = min(chance[a, b], known[key] + choices[i, j])
     where = np.ix_(having, having)
     equal[where], compared[where] = np.maximum(same, same.T), both
     return LikeNumbers(chance, equal, compared, pairs)
 
 
-def _counted(table: _Table) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(students, students) usable values of the first that the second has, too; telling ones; all of both."""
+def _counted(table: _Table, single: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """What every two students have in common, arrays (students, students).
+
+    Usable values of the first that the second has, too; telling ones of them; the log of their chances,
+    each taken by itself; and all values that both have.
+    """
     count = len(table.entered)
-    same, telling = np.zeros((count, count)), np.zeros((count, count))
+    same, telling, alone = (np.zeros((count, count)) for _ in range(3))
     for field, column in enumerate(table.entered.T):
         alike = column[:, None] == column[None, :]
-        same += alike & table.usable[:, field, None]
+        usable = alike & table.usable[:, field, None]
+        same += usable
+        alone += np.where(usable, single[:, field, None], 0.0)
         telling += alike & table.telling[:, field, None]
     known = np.isfinite(table.entered).astype(np.float64)
-    return same, telling, known @ known.T
+    return same, telling, alone, known @ known.T
 
 
-def _choices(both: int, equal: int) -> float:
+def _choices(both: FloatArray, equal: FloatArray) -> FloatArray:
     """Log of the number of ways in which so many of the values can be the equal ones."""
-    return lgamma(both + 1) - lgamma(equal + 1) - lgamma(both - equal + 1)
+    return np.asarray(gammaln(both + 1.0) - gammaln(equal + 1.0) - gammaln(both - equal + 1.0))
 
 
 # The table ----------------------------------------------------------------------------------------

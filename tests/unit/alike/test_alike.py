@@ -1,0 +1,219 @@
+"""Sheets that look alike: independent hands never, copies nearly always; exactness is no evidence."""
+
+import time
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from grader.alike import CELLS, find_alike, ink_map
+from grader.alike.drawings import like_drawings
+from grader.alike.hands import log_chance
+from grader.simulation import PERFECT
+from reference.assignment import load_assignment
+from tests.unit.alike import classes
+from tests.unit.alike.classes import changed, drawing, measured, scanned, scanned_class
+
+SECONDS = 1.0
+COPIES = 12
+
+
+def found(name, handed, maps=()):
+    return {frozenset(one.students): one for one in find_alike(load_assignment(name), handed, maps)}
+
+
+# Independent hands --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "variants", "hand", "count"),
+    [
+        ("press", "same", "typical", 300),
+        ("pump", "different", "careful", 300),
+        ("pump", "same", "careful", 100),
+        ("pump", "same", "sloppy", 60),
+        ("press", "same", "careful", 100),
+        ("press", "different", "typical", 100),
+        ("pump", "different", "sloppy", 60),
+    ],
+)
+def test_no_two_of_many_independent_students_look_alike(name, variants, hand, count):
+    assert found(name, scanned_class(name, count, hand, variants)) == {}
+
+
+def test_a_copier_that_enlarges_every_sheet_alike_makes_nobody_alike():
+    made = [scanned(drawing("press", seed, seed), seed, scale=0.99) for seed in range(60, 160)]
+    assert found("press", made) == {}
+
+
+def test_the_same_mistake_in_the_same_variant_makes_nobody_alike():
+    for code in ("normal_from_absolute", "image_mirrored"):
+        assert found("pump", scanned_class("pump", 60, mistakes=(code,))) == {}
+
+
+def test_a_teacher_who_says_where_everything_belongs_makes_nobody_alike():
+    made = []
+    for seed, one in enumerate(scanned_class("press", 100, "careful")):
+        (sheet,) = one.sheets
+        rng = np.random.default_rng([seed, 31])
+        placed = {}
+        for k, (figure, nodes) in enumerate(sheet.items()):
+            first = drawing("press", 1, seed, "careful").sheets[0][figure]
+            shift = 100 * (k + 1) - 100j - next(iter(first.values())) + complex(*rng.normal(0, 0.2, 2))
+            placed[figure] = {node: at + shift for node, at in nodes.items()}
+        made.append(replace(one, sheets=(placed,)))
+    assert found("press", made) == {}
+
+
+@pytest.mark.parametrize("step_mm", [0.5, 0.1])
+@pytest.mark.parametrize("name", ["pump", "press"])
+def test_measured_values_of_independent_students_are_not_alike(name, step_mm):
+    made = [measured(drawing(name, 1, seed), seed, step_mm) for seed in range(100)]
+    assert found(name, made) == {}
+
+
+@pytest.mark.parametrize("step_mm", [0.5, 0.1, 0.01])
+def test_values_that_are_exact_are_no_evidence_though_all_have_them(step_mm, monkeypatch):
+    monkeypatch.setitem(classes.HANDS, "perfect", PERFECT)
+    made = [measured(drawing("press", 1, seed, "perfect"), seed, step_mm, 0.0) for seed in range(30)]
+    assert all(one.numbers == other.numbers for one, other in pairwise(made))
+    assert found("press", made) == {}
+
+
+def test_positions_of_one_student_are_not_held_against_each_other():
+    one = drawing("press", 1, 0)
+    again = replace(scanned(one, 1), variant=replace(one.variant, position=2))
+    assert found("press", [scanned(one, 0), again]) == {}
+
+
+# Copies -------------------------------------------------------------------------------------------
+
+
+def share_found(name, made, copy_of):
+    hits = 0
+    for k in range(COPIES):
+        copy = copy_of(k)
+        hits += frozenset({made[k].student_id, copy.student_id}) in found(name, [*made, copy])
+    return hits / COPIES
+
+
+@pytest.mark.parametrize(("hand", "least"), [("careful", 0.5), ("typical", 0.75)])
+def test_a_drawing_scanned_twice_is_found_in_a_class_of_one_variant(hand, least):
+    made = scanned_class("pump", 30, hand)
+    again = share_found("pump", made, lambda k: scanned(drawing("pump", 1, k, hand), 5000 + k, "copy"))
+    assert again >= least
+
+
+def test_a_drawing_under_another_number_is_found_and_named_so():
+    made = scanned_class("pump", 30, variants="different")
+    variants = load_assignment("pump").variants()
+
+    def copy_of(k):
+        again = scanned(drawing("pump", k, k), 6000 + k, "copy")
+        return replace(again, variant=variants[(k + 7) % len(variants)])
+
+    assert share_found("pump", made, copy_of) >= 0.75
+    (one,) = found("pump", [*made, copy_of(0)]).values()
+    assert "other_number" in one.why
+    assert one.measure < 0.001
+
+
+def test_a_traced_drawing_with_small_errors_of_its_own_is_found():
+    made = scanned_class("pump", 30)
+
+    def copy_of(k):
+        return scanned(drawing("pump", 1, k), 7000 + k, "copy", moved_mm=0.15)
+
+    assert share_found("pump", made, copy_of) >= 0.75
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_copied_values_are_found_with_one_or_two_changed(count):
+    made = [measured(drawing("pump", 1, seed), seed) for seed in range(30)]
+    assert share_found("pump", made, lambda k: changed(made[k], k, count)) == 1.0
+
+
+def test_three_who_copied_each_other_are_one_entry():
+    made = scanned_class("pump", 20, variants="different")
+    ring = [scanned(drawing("pump", 3, 3), 8000 + k, f"ring{k}") for k in range(2)]
+    assert set(found("pump", [*made, *ring])) == {frozenset({"s3", "ring0", "ring1"})}
+
+
+def test_a_number_named_by_diagnosis_tells_whose_it_is_without_a_measure():
+    made = [measured(drawing("pump", k, k), k, directions=False) for k in range(4)]
+    slip = replace(made[0], student_id="slip", numbers={}, fits=(made[2].variant, 0.97))
+    (one,) = found("pump", [*made, slip]).values()
+    assert (set(one.students), one.why, one.measure) == ({"s2", "slip"}, ["other_number"], None)
+
+
+# Pictures -----------------------------------------------------------------------------------------
+
+
+def sheet_picture(seed, shift_px=0):
+    """A sheet with a frame that all have, and lines of its own."""
+    rng = np.random.default_rng(seed)
+    grey = np.full((297 * 2, 420 * 2), 255, np.uint8)
+    grey[20:24], grey[-24:-20], grey[:, 40:44] = 60, 60, 60
+    for _ in range(14):
+        (x, y), angle = rng.uniform((120, 120), (700, 460)), rng.uniform(0, np.pi)
+        along = np.arange(rng.integers(60, 200))
+        rows = np.clip(y + along * np.sin(angle) + shift_px, 0, 592).astype(int)
+        columns = np.clip(x + along * np.cos(angle), 0, 838).astype(int)
+        grey[rows, columns], grey[rows + 1, columns] = 80, 80
+    return grey
+
+
+def test_the_very_same_picture_is_found_though_it_lay_otherwise_and_nothing_was_read():
+    handed = [replace(drawing("pump", k, k), sheets=()) for k in range(12)]
+    pictures = [sheet_picture(k) for k in range(11)] + [sheet_picture(4, shift_px=1)]
+    maps = [[ink_map(grey, (420.0, 297.0))] for grey in pictures]
+    (one,) = found("pump", handed, maps).values()
+    assert (set(one.students), one.why) == ({"s4", "s11"}, ["same_picture"])
+
+
+def test_a_map_tells_where_the_ink_lies():
+    grey = np.full((594, 840), 255, np.uint8)
+    grey[100:105, 400:410] = 0
+    found_ink = ink_map(grey, (420.0, 297.0))
+    assert found_ink.shape == CELLS
+    assert np.argwhere(found_ink).tolist() == [[20, 80], [20, 81]]
+
+
+# The measure --------------------------------------------------------------------------------------
+
+
+def test_the_chance_of_a_cosine_is_that_of_a_random_direction():
+    rng = np.random.default_rng(5)
+    for dimensions in (3, 8, 20):
+        drawn = rng.normal(size=(200_000, dimensions))
+        cosine = drawn[:, 0] / np.linalg.norm(drawn, axis=1)
+        for limit in (0.0, 0.3, 0.6):
+            told = np.exp(log_chance(np.array(limit), np.array(float(dimensions))))
+            assert told == pytest.approx((cosine >= limit).mean(), rel=0.1, abs=2e-4)
+
+
+def test_chances_of_independent_hands_are_spread_as_chances_are():
+    """A share p of the pairs of independent hands has a chance under p, or fewer."""
+    handed = scanned_class("pump", 100)
+    told = like_drawings(load_assignment("pump"), handed)
+    log = told.log_hands[np.triu_indices(len(handed), 1)]
+    for chance in (0.1, 0.01, 0.001):
+        assert (log < np.log(chance)).mean() < 1.7 * chance
+
+
+def test_three_hundred_students_are_compared_in_less_than_a_second():
+    drawn = scanned_class("press", 300)
+    entered = [
+        replace(one, numbers=measured(drawing("press", 1, seed), seed).numbers)
+        for seed, one in enumerate(drawn)
+    ]
+    maps = [[np.zeros(CELLS, np.uint8)] for _ in entered]
+    start = time.process_time()
+    find_alike(load_assignment("press"), entered, maps)
+    assert time.process_time() - start < SECONDS
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3])
+def test_classes_of_any_size_are_compared(count):
+    assert found("pump", scanned_class("pump", 30)[:count]) == {}
