@@ -45,7 +45,10 @@ TABLES = {
     "GivenTable": "A datum told to the student, as label = value unit.",
     "RubricFile": "A rubric: what is judged, for how many points, and how far off it may be.",
     "ToleranceTable": "How far off full marks may be.",
-    "CriterionTable": "One for each thing judged: exactly one of vector, angular and scale.",
+    "HandTable": "A careful hand's errors, standard deviations of one act: tolerances are widened by what"
+    " they add up to.",
+    "WeightsTable": "What a section is worth, whatever the points within it add up to.",
+    "CriterionTable": "One for each thing judged: exactly one of vector, angular, scale and link.",
 }
 """What each table is; said above its first one."""
 
@@ -198,6 +201,8 @@ KEYS: dict[str, dict[str, Key]] = {
         "id": Key("the rubric's name"),
         "title": Key("what people read"),
         "tolerance": Key("limits"),
+        "hand": Key("the hand that they are widened for"),
+        "weights": Key("what sections are worth", "{ mechanism = 5, scales = 5, angular = 10 }"),
         "missing": Key("the verdict on what was not handed in: review, none or not_judged", '"review"'),
         "least_confidence": Key("a reading less certain than this goes to a person", "0.9"),
         "follow_through": Key("full marks for what follows rightly from an earlier mistake", "true"),
@@ -214,6 +219,27 @@ KEYS: dict[str, dict[str, Key]] = {
         "certain_errors": Key("standard errors of a scan's reading within which a person decides", "1.645"),
         "partial_factor": Key("up to so many times the limits", "2.0"),
         "partial_share": Key("there are so many of the points", "0.5"),
+        "bands": Key("in place of both, several steps", "[{ factor = 1.5, share = 0.75 }]"),
+    },
+    "Band": {
+        "factor": Key("up to so many times the limits"),
+        "share": Key("there is this share of the points"),
+    },
+    "HandTable": {
+        "angle_deg": Key("a line set along or across another", "0.3"),
+        "place_mm": Key("a length transferred, an arc opened", "0.25"),
+        "mark_mm": Key("a point marked", "0.1"),
+        "ruler_mm": Key("a length measured and entered", "0.2"),
+        "protractor_deg": Key("a direction measured and entered", "0.4"),
+        "sigmas": Key("so many standard deviations are allowed; 0: limits stay as they are", "4.0"),
+        "at_most": Key("no limit grows to more than so many times itself", "2.5"),
+    },
+    "WeightsTable": {
+        "mechanism": Key("links of the sketch", "5"),
+        "scales": Key("declared scales", "5"),
+        "velocity_plan": Key("vectors of the velocity plan", "40"),
+        "acceleration_plan": Key("vectors of the acceleration plan", "40"),
+        "angular": Key("angular velocities and accelerations", "10"),
     },
     "CriterionTable": {
         "id": Key("its name in the report"),
@@ -222,8 +248,10 @@ KEYS: dict[str, dict[str, Key]] = {
         "vector": Key("a vector, such as v_B, v_BA, a_BA_n", '"v_B"'),
         "angular": Key("or an angular quantity, such as omega_3", '"omega_3"'),
         "scale": Key("or a scale: kL, kv, ka", '"kL"'),
+        "link": Key("or a link of the sketch, such as AB", '"AB"'),
         "optional": Key("true: not judged where it was not handed in", "true"),
         "direction": Key("false: only the length counts", "true"),
+        "follow_through": Key("the rubric's, for this criterion alone", "true"),
         "tolerance": Key("limits for this criterion alone", "{ length_mm = 2.0 }"),
     },
 }

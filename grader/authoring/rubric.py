@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from grader.rubric import CriterionTable, RubricFile, ToleranceTable
+from grader.rubric import CriterionTable, HandTable, RubricFile, ToleranceTable
 from reference.authored import Text
 from reference.construction import Construction, Vector
 from reference.derivation import construction_of
@@ -12,14 +12,16 @@ POINTS = {"v": 2.0, "a": 2.0, "n": 2.0, "t": 1.0, "c": 2.0, "r": 1.0}
 """Of a velocity, of an acceleration, and of its parts."""
 POINTS_OF_RESULT = 3.0
 """Of velocity and acceleration of the joint that the mechanism is there for: the last group's."""
-POINTS_OF_SCALE, POINTS_OF_RATE, POINTS_OF_WAY = 1.0, 0.5, 0.5
-"""Of a scale, of an angular quantity, and of a vector that is one way of two to draw a plate's image."""
+POINTS_OF_SCALE, POINTS_OF_RATE, POINTS_OF_WAY, POINTS_OF_LINK = 1.0, 0.5, 0.5, 0.5
+"""Of a scale, of an angular quantity, of a vector that is one way of two to draw a plate's image, and of
+a link of the sketch."""
 
 SCALES = {
     "kL": ("Scale of lengths", "Scara lungimilor", "Масштаб длин"),
     "kv": ("Scale of velocities", "Scara vitezelor", "Масштаб скоростей"),
     "ka": ("Scale of accelerations", "Scara accelerațiilor", "Масштаб ускорений"),
 }
+LINK = ("Link {} on the sketch", "Elementul {} al schiței", "Звено {} на схеме")
 RATES = {
     "omega": (
         "Angular velocity of link {}",
@@ -49,9 +51,9 @@ RELATIVE_VELOCITY = ("Velocity of {}", "Viteza lui {}", "Скорость {}")
 
 
 def rubric_for(name: str, title: Text, mechanism: Mechanism, *, by_similarity: bool = False) -> RubricFile:
-    """A rubric that asks for the scales, every vector of both plans, and the angular quantities.
+    """A rubric that asks for the scales, the sketch's links, every vector of both plans, and angular ones.
 
-    What students may leave out without harm is optional: declared scales, angular quantities, and
+    What students may leave out without harm is optional: declared scales, links, angular quantities, and
     the vectors about both joints of a plate's base, whose third image may come by similarity.
     """
     construction = construction_of(mechanism, plate_by_similarity=by_similarity)
@@ -62,6 +64,7 @@ def rubric_for(name: str, title: Text, mechanism: Mechanism, *, by_similarity: b
         tolerance=ToleranceTable(
             length_mm=1.0, length_relative=0.02, direction_deg=1.5, across_mm=0.5, least_mm=3.0
         ),
+        hand=HandTable(sigmas=4.0, at_most=2.5),
         criterion=list(_criteria(mechanism, construction)),
     )
 
@@ -69,6 +72,9 @@ def rubric_for(name: str, title: Text, mechanism: Mechanism, *, by_similarity: b
 def _criteria(mechanism: Mechanism, construction: Construction) -> Iterator[CriterionTable]:
     for scale, words in SCALES.items():
         yield CriterionTable(id=scale, scale=scale, points=POINTS_OF_SCALE, optional=True, title=_text(words))  # type: ignore[arg-type]
+    for link in construction.links:
+        title = _text(tuple(text.format(link) for text in LINK))
+        yield CriterionTable(id=link, link=link, points=POINTS_OF_LINK, optional=True, title=title)
     for figure, rate in (("velocity_plan", "omega"), ("acceleration_plan", "epsilon")):
         for vector in construction.vectors_of(figure):
             yield _of_vector(mechanism, vector)
@@ -119,5 +125,5 @@ def _title(vector: Vector, mechanism: Mechanism) -> Text:
     return Text(en=words[0].format(whose[0]), ro=words[1].format(whose[1]), ru=words[2].format(whose[2]))
 
 
-def _text(words: tuple[str, str, str]) -> Text:
+def _text(words: tuple[str, ...]) -> Text:
     return Text(en=words[0], ro=words[1], ru=words[2])

@@ -62,9 +62,9 @@ def test_a_report_says_who_what_and_how_much():
     )
     assert (written.status, written.score, written.score_range, written.max_score) == (
         "graded",
-        40.0,
-        (40.0, 40.0),
-        40.0,
+        43.0,
+        (43.0, 40.0),
+        43.0,
     )
     by_id = {one.id: one for one in written.criteria}
     assert by_id["v_A"].feedback == "Corect."
@@ -100,7 +100,7 @@ def test_a_report_of_nothing_has_its_reason():
         "unreadable",
         None,
         None,
-        40.0,
+        43.0,
     )
     assert written.problems[0].file == "s07.png"
     jsonschema.validate(json.loads(written.model_dump_json()), schema("report"))

@@ -318,9 +318,22 @@ def test_a_crooked_plan_is_no_turned_one():
     assert found["v_D"] == "none"
 
 
-def test_another_assembly_costs_once_although_no_criterion_is_the_mechanism():
+def asking_for_no_link(task):
+    criteria = [one for one in task.rubric.criterion if one.link is None]
+    return with_rubric(task, criterion=criteria)
+
+
+def test_another_assembly_costs_the_link_that_is_drawn_so_and_nothing_else():
     reading = sheet(PUMP, mistakes=(Mistake("other_assembly", "D"),))
     comparison = compare(PUMP, Submission(readings=(reading,)))
+    assert [n for n, verdict in verdicts(comparison).items() if verdict in {"none", "partial"}] == ["CD"]
+    assert outcome_of(comparison, "v_D").verdict == outcome_of(comparison, "v_DC").verdict == "follow_through"
+
+
+def test_another_assembly_costs_once_although_no_criterion_is_the_mechanism():
+    task = asking_for_no_link(PUMP)
+    reading = sheet(task, mistakes=(Mistake("other_assembly", "D"),))
+    comparison = compare(task, Submission(readings=(reading,)))
     none = [name for name, verdict in verdicts(comparison).items() if verdict == "none"]
     assert none == ["v_D"]
     assert outcome_of(comparison, "v_DC").verdict == "follow_through"
