@@ -49,7 +49,7 @@ import numpy as np
 
 from grader.bench.judging_redrawn import SCALES
 from grader.bench.judging_students import ON_SHEETS, SOURCES, Source, Work
-from grader.bench.judging_values import LEAST_SINE, Computed, across, computed, exact_rates, length_of
+from grader.bench.judging_values import LEAST_SINE, Computed, across, computed, exact_rates
 from grader.judging import Submission
 from grader.rubric import CriterionTable, ToleranceTable
 from reference.construction import Construction, Vector, ancestors, evaluate
@@ -154,16 +154,24 @@ def _rate_due(work: Work, source: Source, criterion: CriterionTable, told: Compu
     if apart <= PLAIN:
         return "right"
     rate = work.construction.rates[name]
-    is_same_link = len({length_of(one, rate, 0.0) for one in (work.task.right, work.task.wrong)}) == 1
     # A sense that came out the other way cannot be told from lengths, nor without the own sketch; nothing
     # can of a vector that was not seen, or of one that runs along the link instead of across.
-    of_sketch = any(one.code in {"other_assembly", "other_variant"} for one in work.task.mistakes)
-    knows_sense = seen.directed.get(rate.vector, False) and (source in ON_SHEETS or not of_sketch)
+    codes = {one.code for one in work.task.mistakes}
+    sketch_seen = source in ON_SHEETS or not codes & {"other_assembly", "other_variant"}
+    knows_sense = seen.directed.get(rate.vector, False) and sketch_seen
     is_told = rate.vector in seen.directed and (knows_sense or value * exact > 0.0)
-    is_told &= abs(across(work, rate)) > LEAST_SINE
-    if not is_told or not is_same_link or abs(value) / per_mm < SHORT * tolerance.least_mm:
+    is_told &= abs(across(work, rate)) > LEAST_SINE and (rate.length in _lengths(work) or sketch_seen)
+    # Speeds taken for rev/min are in these values though the drawing does not show them.
+    is_told &= work.declares or "rpm_not_converted" not in codes
+    if not is_told or abs(value) / per_mm < SHORT * tolerance.least_mm:
         return "either"
     return "follows" if apart > CLEAR else "right"
+
+
+def _lengths(work: Work) -> set[str]:
+    """Lengths that are given, and the same in the data that the student took."""
+    right, taken = (one.parameters for one in (work.task.right, work.task.wrong))
+    return {name for name, value in right.items() if name in taken and float(value) == float(taken[name])}
 
 
 def _scale_due(work: Work, name: str) -> Due:
@@ -310,8 +318,10 @@ def _open_first_shown(work: Work, mistake: Mistake, due: dict[str, Due], moved: 
     vectors = work.construction.vectors
     if node is None or _shows_where_made(work, mistake, node, due):
         return
+    plan = work.construction.figures[mistake.at] if mistake.code == "figure_rotated" else ()
     for step in work.construction.steps:
-        if step.node == node or node not in ancestors(work.construction, [step.node]):
+        hangs_on_it = step in plan or node in ancestors(work.construction, [step.node])
+        if step.node == node or not hangs_on_it:
             continue
         here = [name for name in due if vectors[name].head == step.node and moved[name] > PLAIN]
         due.update(dict.fromkeys((name for name in here if due[name] in {"right", "follows"}), "either"))
