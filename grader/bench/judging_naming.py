@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.bench.judging_redrawn import Asked, is_same, meant, vectors_of
+from grader.bench.judging_rules import CLEAR, Seen, off
 from grader.bench.judging_students import ON_SHEETS, Source, Work
-from grader.bench.judging_truth import CLEAR, Seen, off
 from grader.outcomes import Mistake as Named
 from reference.construction import Construction
 from reference.mistakes import Mistake

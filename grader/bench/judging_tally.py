@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from grader.bench.judging_naming import Made, first_of, is_named, mistakes_due
+from grader.bench.judging_rules import Due, Seen
 from grader.bench.judging_students import SOURCES, Key, Source, Work
-from grader.bench.judging_truth import Due, Seen, verdicts_due
+from grader.bench.judging_truth import verdicts_due
 from grader.bench.judging_values import computed
 from grader.judging import Submission
 from grader.outcomes import Judgement, Mistake

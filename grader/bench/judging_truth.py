@@ -39,66 +39,21 @@ By code:
   either where the letters themselves are told beside nodes named by their lines.
 """
 
-import cmath
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from grader.bench.judging_redrawn import SCALES
-from grader.bench.judging_students import ON_SHEETS, SOURCES, Source, Work
-from grader.bench.judging_values import LEAST_SINE, Computed, across, computed, exact_rates
-from grader.judging import Submission
-from grader.rubric import CriterionTable, ToleranceTable
+from grader.bench.judging_rules import CLEAR, PLAIN, Due, Seen, off
+from grader.bench.judging_students import Source, Work
+from grader.bench.judging_values import computed, rate_due
+from grader.rubric import CriterionTable
 from reference.construction import Construction, Vector, ancestors, evaluate
 from reference.elements import Scaled, View
 from reference.geometry import ComplexArray
 from reference.mistakes import Drawing, Mistake, commit
 from reference.steps import Given, Pivot
-
-Due = Literal["right", "follows", "wrong", "either", "missed", "absent"]
-CLEAR, PLAIN = 2.5, 1.0
-"""Multiples of the rubric's tolerance beyond which it is clearly wrong, and up to which it is right."""
-SHORT = 1.5
-"""A value from a vector shorter than so many times the least to be judged may be taken for trivial."""
-
-
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """What the judge can see: the vectors, and whether their directions are known."""
-
-    directed: Mapping[str, bool]
-
-    @classmethod
-    def of(cls, handed_in: Submission) -> "Seen":
-        """From what was handed in."""
-        readings = [*handed_in.readings, *([handed_in.measured] if handed_in.measured else [])]
-        return cls(
-            {
-                name: vector.direction_deg is not None
-                for reading in readings
-                for figure in reading.figures.values()
-                for name, vector in figure.vectors.items()
-            }
-        )
-
-
-def off(drawn: complex, due: complex, tolerance: ToleranceTable, *, directed: bool) -> float:
-    """How far a vector is from another, in the rubric's plain tolerances; infinite where there is none."""
-    if not cmath.isfinite(due) or not cmath.isfinite(drawn):
-        return math.inf
-    allowed = max(tolerance.length_mm, tolerance.length_relative * abs(due))
-    far = abs(abs(drawn) - abs(due)) / allowed
-    if directed and min(abs(drawn), abs(due)) >= max(tolerance.least_mm, 1e-9):
-        across = math.degrees(math.atan(tolerance.across_mm / abs(due)))
-        turned = abs(math.degrees(math.remainder(cmath.phase(drawn) - cmath.phase(due), math.tau)))
-        far = max(far, turned / max(tolerance.direction_deg, across))
-    return far
-
-
-# Verdicts due -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,42 +91,10 @@ def verdicts_due(work: Work, source: Source, seen: Seen) -> dict[str, Due]:
         elif criterion.name == told.slip:
             found[criterion.id] = "wrong"
         elif criterion.angular:
-            found[criterion.id] = _rate_due(work, source, criterion, told, seen)
+            found[criterion.id] = rate_due(work, source, criterion, told, seen)
         else:
             found[criterion.id] = by_vector.get(criterion.name, "absent")
     return found
-
-
-def _rate_due(work: Work, source: Source, criterion: CriterionTable, told: Computed, seen: Seen) -> Due:
-    """Of a value rightly computed from the own drawing."""
-    name = criterion.name
-    if source not in SOURCES or name not in told.values:
-        return "absent"
-    exact, per_mm = exact_rates(work)[name]
-    tolerance, value = work.rubric.tolerance_of(criterion), told.values[name]
-    allowed = max(tolerance.length_mm, tolerance.length_relative * abs(exact) / per_mm) * per_mm
-    apart = abs(value - exact) / allowed
-    if apart <= PLAIN:
-        return "right"
-    rate = work.construction.rates[name]
-    # A sense that came out the other way cannot be told from lengths, nor without the own sketch; nothing
-    # can of a vector that was not seen, or of one that runs along the link instead of across.
-    codes = {one.code for one in work.task.mistakes}
-    sketch_seen = source in ON_SHEETS or not codes & {"other_assembly", "other_variant"}
-    knows_sense = seen.directed.get(rate.vector, False) and sketch_seen
-    is_told = rate.vector in seen.directed and (knows_sense or value * exact > 0.0)
-    is_told &= abs(across(work, rate)) > LEAST_SINE and (rate.length in _lengths(work) or sketch_seen)
-    # Speeds taken for rev/min are in these values though the drawing does not show them.
-    is_told &= work.declares or "rpm_not_converted" not in codes
-    if not is_told or abs(value) / per_mm < SHORT * tolerance.least_mm:
-        return "either"
-    return "follows" if apart > CLEAR else "right"
-
-
-def _lengths(work: Work) -> set[str]:
-    """Lengths that are given, and the same in the data that the student took."""
-    right, taken = (one.parameters for one in (work.task.right, work.task.wrong))
-    return {name for name, value in right.items() if name in taken and float(value) == float(taken[name])}
 
 
 def _scale_due(work: Work, name: str) -> Due:

@@ -11,7 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from grader.bench.judging_students import Work
+from grader.bench.judging_rules import CLEAR, PLAIN, SHORT, Due, Seen
+from grader.bench.judging_students import ON_SHEETS, SOURCES, Source, Work
+from grader.rubric import CriterionTable
 from reference.construction import AngularRate, evaluate
 from reference.geometry import cross
 from reference.mistakes import Drawing
@@ -136,3 +138,35 @@ def exact_rates(work: Work) -> dict[str, tuple[float, float]]:
         sense = math.copysign(1.0, float(cross(np.asarray(link), np.asarray(drawn))))
         found[name] = sense * abs(complex(drawn)) * per_mm, per_mm
     return found
+
+
+def rate_due(work: Work, source: Source, criterion: CriterionTable, told: Computed, seen: Seen) -> Due:
+    """Of a value rightly computed from the own drawing."""
+    name = criterion.name
+    if source not in SOURCES or name not in told.values:
+        return "absent"
+    exact, per_mm = exact_rates(work)[name]
+    tolerance, value = work.rubric.tolerance_of(criterion), told.values[name]
+    allowed = max(tolerance.length_mm, tolerance.length_relative * abs(exact) / per_mm) * per_mm
+    apart = abs(value - exact) / allowed
+    if apart <= PLAIN:
+        return "right"
+    rate = work.construction.rates[name]
+    # A sense that came out the other way cannot be told from lengths, nor without the own sketch; nothing
+    # can of a vector that was not seen, or of one that runs along the link instead of across.
+    codes = {one.code for one in work.task.mistakes}
+    sketch_seen = source in ON_SHEETS or not codes & {"other_assembly", "other_variant"}
+    knows_sense = seen.directed.get(rate.vector, False) and sketch_seen
+    is_told = rate.vector in seen.directed and (knows_sense or value * exact > 0.0)
+    is_told &= abs(across(work, rate)) > LEAST_SINE and (rate.length in _lengths(work) or sketch_seen)
+    # Speeds taken for rev/min are in these values though the drawing does not show them.
+    is_told &= work.declares or "rpm_not_converted" not in codes
+    if not is_told or abs(value) / per_mm < SHORT * tolerance.least_mm:
+        return "either"
+    return "follows" if apart > CLEAR else "right"
+
+
+def _lengths(work: Work) -> set[str]:
+    """Lengths that are given, and the same in the data that the student took."""
+    right, taken = (one.parameters for one in (work.task.right, work.task.wrong))
+    return {name for name, value in right.items() if name in taken and float(value) == float(taken[name])}

@@ -13,10 +13,11 @@ from grader.bench.judging_class import measure_class
 from grader.bench.judging_handed_in import submission
 from grader.bench.judging_naming import is_named, mistakes_due
 from grader.bench.judging_redrawn import Asked, meant, vectors_of
+from grader.bench.judging_rules import Seen, off
 from grader.bench.judging_students import SOURCES, Key, Work, student
 from grader.bench.judging_tables import judging_tables
 from grader.bench.judging_tally import ClassTime, JudgingFigures, Marked, Tally, Times, result_of, summed
-from grader.bench.judging_truth import Seen, off, verdicts_due
+from grader.bench.judging_truth import verdicts_due
 from grader.bench.judging_values import computed, exact_rates
 from grader.bench.plain_text import as_text
 from grader.judging import judge, task_of
