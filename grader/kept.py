@@ -52,7 +52,9 @@ def digest_of(parts: Iterable[object]) -> str:
     """A digest of what is told; the program's own version goes into it."""
     digest = hashlib.sha256(code_version().encode())
     for part in parts:
-        digest.update(repr(part).encode())
+        # Sets have another order in every process.
+        told = sorted(part) if isinstance(part, set | frozenset) else part
+        digest.update(repr(told).encode())
         digest.update(b"\0")
     return digest.hexdigest()
 

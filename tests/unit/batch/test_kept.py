@@ -1,18 +1,21 @@
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
 from grader import batch as batch_module
+from grader import jobs as jobs_module
 from grader import kept as kept_module
+from grader.alike import CELLS
 from grader.batch import Batch, grade
-from grader.kept import keep_looked, kept_looked, packed, unpacked
+from grader.kept import digest_of, keep_looked, keep_maps, kept_looked, kept_maps, packed, unpacked
 from grader.moved import told_standing
 from grader.picture import backdrop
 from grader.pipeline import Looked, Place, Seen, Work, documents_of
 from grader.plan_document import plan_document
-from grader.records import Figure, Page, Problem, Reading, ReadNode, ReadVector, Unread
+from grader.records import Figure, Page, Problem, Reading, ReadNode, ReadVector, Swapped, Unread
 from grader.rubric import load_rubric
 from reference.assignment import Variant, load_assignment
 from reference.plan import exact_plan
@@ -39,14 +42,14 @@ def drawn_exactly(n, off_mm=0.0):
 class Reader:
     """Stands for reading scans, and knows whose it has read."""
 
-    def __init__(self):
-        self.read = []
+    def __init__(self, off_mm=4.0):
+        self.read, self.off_mm = [], off_mm
 
     def __call__(self, work, _assignment, _rubric):
         self.read.append(work.student_id)
         looked = []
         for place in work.pages:
-            reading = drawn_exactly(work.variant.n, off_mm=4.0)
+            reading = drawn_exactly(work.variant.n, off_mm=self.off_mm)
             page = Page(place.name, place.page, np.full((60, 80), 255, np.uint8))
             (document,) = documents_of([Seen(place, page)], [reading], work.student_id)
             problems = (Problem("told", "something", place.name),)
@@ -221,3 +224,145 @@ def test_pictures_of_one_reading_are_never_found_beside_another(tmp_path, monkey
     with pytest.raises(OSError, match="no room"):
         keep_looked(tmp_path, "s1", "two", looked)
     assert kept_looked(tmp_path, "s1", "one") is None
+
+
+# Regrading ----------------------------------------------------------------------------------------
+
+
+def rubric_with(**changes):
+    """The rubric with some of its fields changed."""
+    return type(RUBRIC).model_validate({**RUBRIC.model_dump(exclude_unset=True), **changes})
+
+
+def criteria_with(**changes):
+    first, *others = RUBRIC.model_dump(exclude_unset=True)["criterion"]
+    return [{**first, **changes}, *others]
+
+
+CHANGES = {
+    "tolerance": {"length_mm": 5.0, "across_mm": 5.0, "bands": [{"factor": 1.5, "share": 0.4}]},
+    "hand": {"angle_deg": 0.6, "sigmas": 3.0},
+    "weights": {"velocity_plan": 30.0},
+    "missing": "none",
+    "least_confidence": 0.5,
+    "follow_through": False,
+    "least_followed_share": 0.4,
+    "criterion": criteria_with(points=7.0, follow_through=False, tolerance={"length_mm": 0.5}),
+}
+
+
+def test_every_field_of_a_rubric_is_among_the_changes():
+    assert CHANGES.keys() == type(RUBRIC).model_fields.keys() - {"schema_version", "id", "title"}
+
+
+def test_no_change_of_a_rubric_reads_a_scan_again_and_each_gives_what_a_fresh_run_gives(
+    class_folder, tmp_path, reader
+):
+    run(class_folder, tmp_path / "out")
+    for name, change in CHANGES.items():
+        reader.read.clear()
+        again = run(class_folder, tmp_path / "out", rubric_with(**{name: change}))
+        assert reader.read == [], name
+        fresh = run(class_folder, tmp_path / f"fresh {name}", rubric_with(**{name: change}))
+        assert again.reports == fresh.reports
+
+
+@pytest.mark.usefixtures("reader")
+def test_what_moved_names_the_criteria_and_the_rubric_as_the_why(class_folder, tmp_path):
+    out = tmp_path / "out"
+    first = run(class_folder, out)
+    again = run(class_folder, out, wider(RUBRIC))
+    for one in again.moved:
+        assert one.why == ["rubric"]
+        then = {c.id: c for c in next(r for r in first.reports if r.student_id == one.student_id).criteria}
+        now = {c.id: c for c in next(r for r in again.reports if r.student_id == one.student_id).criteria}
+        changed = {
+            name
+            for name in now
+            if (now[name].verdict, now[name].points) != (then[name].verdict, then[name].points)
+        }
+        assert {criterion.id for criterion in one.criteria} == changed != set()
+        for criterion in one.criteria:
+            assert (criterion.before, criterion.after) == (
+                then[criterion.id].verdict,
+                now[criterion.id].verdict,
+            )
+    told = json.loads((out / "results.json").read_text())["moved"][0]["criteria"][0]
+    assert {"id", "title", "before", "after", "points_before", "points_after"} == told.keys()
+
+
+@pytest.mark.usefixtures("reader")
+def test_a_criterion_that_is_new_or_dropped_is_told_against_nothing(class_folder, tmp_path):
+    run(class_folder, tmp_path / "out")
+    dropped = rubric_with(criterion=RUBRIC.model_dump(exclude_unset=True)["criterion"][1:])
+    name = RUBRIC.criterion[0].id
+    fewer = run(class_folder, tmp_path / "out", dropped)
+    assert all(any((c.id, c.after) == (name, None) for c in one.criteria) for one in fewer.moved)
+    more = run(class_folder, tmp_path / "out")
+    assert all(any((c.id, c.before) == (name, None) for c in one.criteria) for one in more.moved)
+
+
+@pytest.mark.usefixtures("reader")
+def test_a_new_scan_and_a_new_number_are_told_as_the_why(class_folder, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    run(class_folder, out)
+    monkeypatch.setattr(batch_module, "look", Reader(off_mm=12.0))
+    scan(class_folder / "s2.png", 150)
+    assert [(one.student_id, one.why) for one in run(class_folder, out).moved] == [("s2", ["submission"])]
+    roster(class_folder, s1=5, s2=9)
+    monkeypatch.setattr(batch_module, "look", Reader(off_mm=1.0))
+    assert [(one.student_id, one.why) for one in run(class_folder, out).moved] == [("s1", ["roster"])]
+    monkeypatch.setattr(kept_module, "code_version", lambda: "another")
+    monkeypatch.setattr(jobs_module, "code_version", lambda: "another")
+    monkeypatch.setattr(batch_module, "look", Reader(off_mm=30.0))
+    assert {cause for one in run(class_folder, out).moved for cause in one.why} == {"program"}
+
+
+@pytest.mark.usefixtures("reader")
+@pytest.mark.parametrize("damage", [b"", b"[]", b'{"common": 1, "own": 2}', b'{"own": {}}'])
+def test_a_damaged_note_of_inputs_leaves_the_why_open(class_folder, tmp_path, damage):
+    run(class_folder, tmp_path / "out")
+    (tmp_path / "out" / ".planmark" / "inputs.json").write_bytes(damage)
+    again = run(class_folder, tmp_path / "out", wider(RUBRIC))
+    assert again.moved
+    assert all(one.why == [] for one in again.moved)
+
+
+@pytest.mark.usefixtures("reader")
+def test_sheets_scanned_twice_are_told_beside_the_marks(class_folder, tmp_path):
+    """Whose ink lies alike is kept with the reading: a regrade finds the same."""
+    numbers = {}
+    for k in range(8):
+        scan(class_folder / f"t{k}.png", 20 * k + 11)
+        numbers[f"t{k}"] = 3 + k
+    roster(class_folder, s1=4, s2=9, **numbers)
+    first = run(class_folder, tmp_path / "out")
+    again = run(class_folder, tmp_path / "out", wider(RUBRIC))
+    assert again.alike == first.alike
+
+
+def test_swapped_letters_are_kept_with_a_reading():
+    reading = Reading({}, swapped=(Swapped("velocity_plan", "b", "c", 0.97),))
+    assert unpacked(json.loads(json.dumps(packed(reading)))).swapped == reading.swapped
+
+
+def test_ink_maps_come_back_and_damaged_ones_are_none(tmp_path):
+    page = Page("s1.png", 1, np.full((60, 80), 120, np.uint8))
+    behind = replace(backdrop(page, None), registered=True, page_mm=(420.0, 297.0))
+    (document,) = documents_of([Seen(Place(tmp_path / "s1.png", 1, "s1.png"), page)], [Reading({})], "s1")
+    keep_maps(tmp_path, "s1", [Looked(document, Reading({}), (), behind)])
+    (found,) = kept_maps(tmp_path, "s1")
+    assert found.shape == CELLS
+    (tmp_path / "s1.ink").write_bytes(b"no map")
+    assert kept_maps(tmp_path, "s1") == []
+    assert kept_maps(tmp_path, "nobody") == []
+
+
+def test_the_order_of_a_set_which_differs_between_processes_is_no_change():
+    class Backwards(frozenset):
+        def __iter__(self):
+            return reversed(list(super().__iter__()))
+
+    figures = {"mechanism", "velocity_plan", "acceleration_plan"}
+    assert digest_of([Backwards(figures)]) == digest_of([frozenset(figures)])
+    assert digest_of([frozenset(figures)]) != digest_of([frozenset({"mechanism"})])
