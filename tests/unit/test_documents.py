@@ -63,7 +63,7 @@ def test_a_report_says_who_what_and_how_much():
     assert (written.status, written.score, written.score_range, written.max_score) == (
         "graded",
         43.0,
-        (43.0, 40.0),
+        (43.0, 43.0),
         43.0,
     )
     by_id = {one.id: one for one in written.criteria}
