@@ -33,7 +33,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "Последнее изменение (оценка)",
     ),
     "feedback": (
-        "Feedback comments", "Comentarii feedback", "Feedback sub formă de comentarii",
+        "Feedback comments", "Comentarii de feedback", "Comentarii feedback", "Feedback sub formă de comentarii",
         "Отзыв в виде комментария", "Отзыв в виде комментариев",
     ),
 }  # fmt: skip
@@ -169,7 +169,7 @@ def open_worksheet(data: bytes, file: str) -> Worksheet:
     header = [table.value(0, column).strip() for column in range(len(table.rows[0]))]
     columns, faults = _columns(header)
     faults += list(_ragged(table))
-    sheet = Worksheet(table, columns, file)
+    sheet = Worksheet(table, {**_unnamed(table, columns), **columns}, file)
     if not faults:
         faults += list(_row_faults(sheet))
     if faults:
@@ -201,6 +201,28 @@ def _columns(header: list[str]) -> tuple[dict[str, int], list[str]]:
     if columns.get("feedback") == 0:
         faults.append("row 1: feedback comments stand in the first column, where Moodle drops them")
     return columns, faults
+
+
+def _unnamed(table: RawTable, columns: Mapping[str, int]) -> dict[str, int]:
+    """Columns of people that bear other names than those known, by what stands in them.
+
+    Full names follow the identifier, unless the worksheet is anonymous; addresses have an @.
+    """
+    others = [place for place in range(len(table.rows[0])) if place not in columns.values()]
+    found = {}
+    after = columns.get("identifier", -2) + 1
+    if after in others:
+        found["name"] = after
+    for place in others:
+        cells = [
+            table.value(row, place).strip()
+            for row in range(1, len(table.rows))
+            if place < len(table.rows[row])
+        ]
+        told = [cell for cell in cells if cell not in _EMPTY]
+        if told and all(re.fullmatch(r"[^@\s]+@[^@\s]+", cell) for cell in told):
+            found.setdefault("email", place)
+    return found
 
 
 def _ragged(table: RawTable) -> Iterator[str]:

@@ -132,6 +132,22 @@ def test_a_worksheet_downloaded_in_romanian_or_russian_is_understood():
     assert b",8.5,-" in filled_in(data, report("s01", 8.5)).content
 
 
+@pytest.mark.parametrize("feedback", ["Comentarii de feedback", "Comentarii feedback", "Feedback comments"])
+def test_columns_of_people_are_known_by_what_stands_in_them_where_their_names_are_not(feedback):
+    header = f"Identificator,Numele,Poșta,Notă,Notă maximă,Ultima modificare (nota),{feedback}"
+    data = worksheet(
+        'Participant 7,Ion Popescu,x@x.ro,,"10,00",-,',
+        'Participant 8,Ana Ionescu,ana@x.ro,,"10,00",-,',
+        header=header,
+    )
+    found = filled_in(data, report("s01", 8.5), report("s02", 6.0), comments={"s01": "<p>a</p>"})
+    assert found.written == ("s02",)
+    assert "another email" in found.not_found["s01"]
+    people = {"s01": Person(name="Ion Popescu")}
+    found = filled_in(data, report("s01", 8.5), people=people, comments={"s01": "<p>a</p>"})
+    assert b'x@x.ro,8.5,"10,00",-,<p>a</p>' in found.content
+
+
 @pytest.mark.parametrize(
     ("data", "told"),
     [
