@@ -52,13 +52,13 @@ def ink_map(scan: GreyImage, page_mm: tuple[float, float]) -> NDArray[np.uint8]:
     """
     found = np.zeros(CELLS, np.uint8)
     high, wide = scan.shape
+    if high < CELLS[0] or wide < CELLS[1]:
+        return found
     edges = [
         np.minimum((np.arange(cells + 1) * CELL_MM / size * pixels).astype(np.int64), pixels)
         for cells, size, pixels in ((CELLS[0], page_mm[1], high), (CELLS[1], page_mm[0], wide))
     ]
     rows, columns = (edge[:-1][np.diff(edge) > 0] for edge in edges)
-    if not len(rows) or not len(columns):
-        return found
     last = edges[0][len(rows)], edges[1][len(columns)]
     dark = 255 - scan[: last[0], : last[1]]
     sums = np.add.reduceat(np.add.reduceat(dark, rows, axis=0, dtype=np.int64), columns, axis=1)

@@ -23,6 +23,11 @@ def drawing(name, variant_index, seed, hand="typical", mistakes=()):
     """A student's sheet: figures placed freely, and the scales used."""
     assignment = load_assignment(name)
     variant = assignment.variants()[variant_index % len(assignment.variants())]
+    return any_drawing(assignment, variant, seed, hand, mistakes)
+
+
+def any_drawing(assignment, variant, seed, hand="typical", mistakes=()):
+    """A drawing of any assignment's variant."""
     rng = np.random.default_rng([seed, 7])
     student = Student(mistakes=mistakes)
     task = task_of(assignment, variant, student, rng)

@@ -11,9 +11,9 @@ from grader.alike import CELLS, find_alike, ink_map
 from grader.alike.drawings import like_drawings
 from grader.alike.hands import log_chance
 from grader.simulation import PERFECT
-from reference.assignment import load_assignment
+from reference.assignment import built_in, load_assignment
 from tests.unit.alike import classes
-from tests.unit.alike.classes import changed, drawing, measured, scanned, scanned_class
+from tests.unit.alike.classes import any_drawing, changed, drawing, measured, scanned, scanned_class
 
 SECONDS = 1.0
 COPIES = 12
@@ -217,3 +217,22 @@ def test_three_hundred_students_are_compared_in_less_than_a_second():
 @pytest.mark.parametrize("count", [0, 1, 2, 3])
 def test_classes_of_any_size_are_compared(count):
     assert found("pump", scanned_class("pump", 30)[:count]) == {}
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_any_assignment_and_any_reading_can_be_compared(name):
+    assignment = load_assignment(name)
+    rng = np.random.default_rng(3)
+    (variant, *_), handed = assignment.variants(), []
+    for k in range(12):
+        one = any_drawing(assignment, variant, k)
+        (figures,) = one.sheets
+        kept = {
+            figure: {node: at for node, at in nodes.items() if rng.random() < k / 10.0}
+            for figure, nodes in figures.items()
+            if rng.random() < 0.8
+        }
+        handed.append(
+            replace(one, sheets=(kept,), numbers={"v_A": 5.0 * k, "a_A_deg": 1.0, "odd_value": 2.0})
+        )
+    assert found(name, handed) == {}

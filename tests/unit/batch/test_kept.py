@@ -306,15 +306,15 @@ def test_a_criterion_that_is_new_or_dropped_is_told_against_nothing(class_folder
 def test_a_new_scan_and_a_new_number_are_told_as_the_why(class_folder, tmp_path, monkeypatch):
     out = tmp_path / "out"
     run(class_folder, out)
-    monkeypatch.setattr(batch_module, "look", Reader(off_mm=12.0))
+    monkeypatch.setattr(batch_module, "look", Reader(off_mm=0.0))
     scan(class_folder / "s2.png", 150)
     assert [(one.student_id, one.why) for one in run(class_folder, out).moved] == [("s2", ["submission"])]
     roster(class_folder, s1=5, s2=9)
-    monkeypatch.setattr(batch_module, "look", Reader(off_mm=1.0))
+    monkeypatch.setattr(batch_module, "look", Reader(off_mm=0.0))
     assert [(one.student_id, one.why) for one in run(class_folder, out).moved] == [("s1", ["roster"])]
     monkeypatch.setattr(kept_module, "code_version", lambda: "another")
     monkeypatch.setattr(jobs_module, "code_version", lambda: "another")
-    monkeypatch.setattr(batch_module, "look", Reader(off_mm=30.0))
+    monkeypatch.setattr(batch_module, "look", Reader(off_mm=4.0))
     assert {cause for one in run(class_folder, out).moved for cause in one.why} == {"program"}
 
 
@@ -347,7 +347,7 @@ def test_swapped_letters_are_kept_with_a_reading():
 
 
 def test_ink_maps_come_back_and_damaged_ones_are_none(tmp_path):
-    page = Page("s1.png", 1, np.full((60, 80), 120, np.uint8))
+    page = Page("s1.png", 1, np.full((600, 800), 120, np.uint8))
     behind = replace(backdrop(page, None), registered=True, page_mm=(420.0, 297.0))
     (document,) = documents_of([Seen(Place(tmp_path / "s1.png", 1, "s1.png"), page)], [Reading({})], "s1")
     keep_maps(tmp_path, "s1", [Looked(document, Reading({}), (), behind)])
