@@ -47,7 +47,8 @@ def _waiting(results: ResultsDocument) -> Iterator[str]:
         yield f"{one.file}{'' if one.page is None else f'#{one.page}'}: {one.message}"
     for wait in waiting(results):
         report = results.reports[wait.index]
-        about = f", {len(wait.criteria)} criteria, {wait.points:g} points" if wait.criteria else ""
+        count = f"{len(wait.criteria)} {'criterion' if len(wait.criteria) == 1 else 'criteria'}"
+        about = f", {count}, {wait.points:.4g} points at stake" if wait.criteria else ""
         problem = f"; {report.problems[0].message}" if report.problems else ""
         who = _who(report.student_id, report.position)
         yield f"{who}: {report.status.replace('_', ' ')}{about}{problem}"
