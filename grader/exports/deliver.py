@@ -162,6 +162,12 @@ KINDS: Mapping[tuple[str, str], _Kind] = {
 """By platform and what; a platform's first is what it is given where nothing is said."""
 
 
+_AGAIN = (
+    "this file was made before: if Moodle has it already, it skips what it holds, unless the worksheet was"
+    " downloaded afresh or the box for updating records is ticked at the upload"
+)
+
+
 def what_of(options: Options) -> str:
     """What is delivered; CallError for a target or a thing that there is not."""
     if options.to not in TARGETS:
@@ -195,13 +201,14 @@ def export(results: ResultsDocument, path: Path, options: Options) -> Delivery:
     if options.maximum is not None and not (math.isfinite(options.maximum) and options.maximum > 0.0):
         raise CallError("maximum", f"a grade's maximum is a positive number, not {options.maximum:g}")
     draft = kind.draft(results, options)
+    is_again = options.to == "moodle" and options.form is not None and what == "grades" and path.exists()
     if isinstance(draft.content, Mapping):
         if (options.to, what) == ("moodle", "feedback") and path.suffix.lower() != ".zip":
             raise CallError("archive_name", f"{path}: Moodle takes an archive; let its name end with .zip")
         write_files(path, draft.content)
     else:
         write_whole(path, draft.content)
-    notes = draft.notes
+    notes = (*draft.notes, *([_AGAIN] if is_again else []))
     if draft.withheld and not draft.written:
         notes = ("nobody has a grade yet: there is nothing to upload", *notes)
     notes = (*notes, *_alike(results, draft.written))

@@ -33,8 +33,8 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "Последнее изменение (оценка)",
     ),
     "feedback": (
-        "Feedback comments", "Comentarii de feedback", "Comentarii feedback", "Feedback sub formă de comentarii",
-        "Отзыв в виде комментария", "Отзыв в виде комментариев",
+        "Feedback comments", "Comentarii de feedback", "Comentarii feedback",
+        "Feedback sub formă de comentarii", "Отзыв в виде комментария", "Отзыв в виде комментариев",
     ),
 }  # fmt: skip
 """Moodle's column names in the languages in which worksheets are likely to be downloaded."""

@@ -115,6 +115,15 @@ def test_sheets_that_look_alike_are_told_before_their_grades_are_out(tmp_path):
     assert not any("alike" in note for note in delivery.notes)
 
 
+def test_a_worksheet_filled_in_again_is_told_to_be_skipped_by_moodle(tmp_path):
+    form = tmp_path / "w.csv"
+    form.write_text("Identifier,Grade,Last modified (grade)\nParticipant 1,,-\n")
+    options = Options(to="moodle", form=form, people={"s01": Person(participant=1)})
+    one = results(marked("s01", 5.0))
+    assert not any("made before" in note for note in export(one, tmp_path / "o.csv", options).notes)
+    assert any("made before" in note for note in export(one, tmp_path / "o.csv", options).notes)
+
+
 def found(rows, **students):
     return find(Rows.of(enumerate(rows, start=1)), {one: tuple(said) for one, said in students.items()}, "it")
 
