@@ -16,9 +16,9 @@ LEADER_FROM_MM = 3.0
 """A label farther than this from its arrow gets a thin line to it."""
 
 SHARES = (0.55, 0.4, 0.7, 0.25, 0.85)
-GAPS_MM = (1.2, 3.5, 7.0, 12.0, 18.0)
+GAPS_MM = (1.2, 3.5, 6.0, 9.0, 12.0, 16.0, 21.0, 27.0)
 """Where along an arrow and how far beside it a label may stand, the best first."""
-OVERLAP_COST = 4.0
+OVERLAP_COST = 16.0
 """Of a square millimetre on another label; a millimetre of distance costs a half,"""
 CROSSING_COST = 2.0
 """and a millimetre of another arrow under the label this much."""
