@@ -46,14 +46,14 @@ import numpy as np
 
 from grader.bench.judging_redrawn import SCALES
 from grader.bench.judging_rules import CLEAR, PLAIN, Due, Seen, off
-from grader.bench.judging_students import Source, Work
+from grader.bench.judging_students import ON_SHEETS, Source, Work
 from grader.bench.judging_values import computed, rate_due
 from grader.rubric import CriterionTable
 from reference.construction import Construction, Vector, ancestors, evaluate
 from reference.elements import Scaled, View
 from reference.geometry import ComplexArray
 from reference.mistakes import Drawing, Mistake, commit
-from reference.steps import Given, Pivot
+from reference.steps import ArcAndLine, Given, Pivot, TwoArcs
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ def verdicts_due(work: Work, source: Source, seen: Seen) -> dict[str, Due]:
     told = computed(work)
     for criterion in work.rubric.criterion:
         if criterion.scale:
-            found[criterion.id] = _scale_due(work, criterion.name)
+            found[criterion.id] = _scale_due(work, source, criterion.name, by_vector)
         elif criterion.name == told.slip:
             found[criterion.id] = "wrong"
         elif criterion.angular:
@@ -97,7 +97,8 @@ def verdicts_due(work: Work, source: Source, seen: Seen) -> dict[str, Due]:
     return found
 
 
-def _scale_due(work: Work, name: str) -> Due:
+def _scale_due(work: Work, source: Source, name: str, by_vector: Mapping[str, Due]) -> Due:
+    """Of a declared scale; missed where the hand was off in what the scale is told by."""
     if not work.declares:
         return "absent"
     codes = {one.code for one in work.task.mistakes}
@@ -105,7 +106,36 @@ def _scale_due(work: Work, name: str) -> Due:
         return "wrong" if name == "kv" else "either"
     if any(one.code == "scale_wrong" and one.at == name for one in work.task.mistakes):
         return "wrong"
-    return "either" if name in _scales_of_another(work) else "right"
+    if name in _scales_of_another(work):
+        return "either"
+    vectors = work.construction.vectors
+    tells = {one for one in by_vector if is_driven(work.construction, vectors[one].head)}
+    misses = any(vectors[one].scale == name and by_vector[one] == "missed" for one in tells)
+    is_sketch = name == "kL" and source in ON_SHEETS
+    return "missed" if misses or (is_sketch and _is_yardstick_off(work)) else "right"
+
+
+def _is_yardstick_off(work: Work) -> bool:
+    """Whether the crank, or the first link where a slider drives, is off on one of the sketches."""
+    right = evaluate(work.construction, work.task.right.parameters)
+    tail, head = _yardstick(work.construction)
+    sketches = [figure.nodes for sheet in work.sheets for figure in sheet.figures if tail in figure.nodes]
+    return any(
+        off(one[head] - one[tail], complex(right[head] - right[tail]), work.rubric.tolerance, directed=False)
+        > PLAIN
+        for one in sketches
+    )
+
+
+def _yardstick(construction: Construction) -> tuple[str, str]:
+    """The joints between which the scale of lengths is read off."""
+    for step in construction.figures["mechanism"]:
+        match step:
+            case Given(start=start, node=node):
+                return start, node
+            case TwoArcs(centres=(start, _), node=node) | ArcAndLine(centre=start, node=node):
+                return start, node
+    raise ValueError("no link of given length")
 
 
 def _scales_of_another(work: Work) -> set[str]:
