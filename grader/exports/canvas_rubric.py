@@ -3,10 +3,10 @@
 Canvas rounds a rubric's points to two decimals, and takes no byte order mark.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from grader.exports.comments import plain_comment
-from grader.exports.draft import Draft, document, json_text, ready, withheld
+from grader.exports.draft import Draft, document, json_text, withheld
 from grader.exports.faults import listed
 from grader.exports.grades import Grade
 from grader.exports.marks import Criterion, Mark, class_criteria, class_marks
@@ -59,40 +59,33 @@ def assessments(grades: Sequence[Grade], options: Options) -> Draft:
     marked = class_marks(grades, options)
     criteria = numbered(class_criteria(grades, options), options.criteria)
     numbers = {one.criterion: one.id for one in criteria}
-    course = options.course_id or ":course_id"
-    assignment = options.assignment_id or ":assignment_id"
-    path = f"/api/v1/courses/{course}/assignments/{assignment}/submissions"
-    told = {
-        user(grade, options): _told(grade, marks, numbers, options.lang_of(grade.student_id))
-        for grade, marks in marked
-    }
+    told = {user(grade, options): _told(grade, marks, numbers, options) for grade, marks in marked}
     if len(told) < len(marked):
         raise CallError("ids", "two students have the same number in Canvas (--ids)")
+    path = _path(options)
     calls = [
-        {
-            "student_id": grade.student_id,
-            "path": f"{path}/{who}",
-            "body": {
-                "submission": {"posted_grade": one["posted_grade"]},
-                "comment": {"text_comment": one["text_comment"]},
-                "rubric_assessment": one["rubric_assessment"],
-            },
-        }
+        {"student_id": grade.student_id, "path": f"{path}/{who}", "body": _body(one)}
         for (grade, _), (who, one) in zip(marked, told.items(), strict=True)
     ]
-    bulk = {"path": f"{path}/update_grades", "body": {"grade_data": told}}
     whole = {
-        "assignment": grades[0].reports[0].assignment, "criteria": criteria, "calls": calls, "bulk": bulk,
-    }  # fmt: skip
-    notes = [] if options.course_id and options.assignment_id else [
-        "the paths hold :course_id and :assignment_id: give --course-id and --assignment-id, or put them in"
-    ]  # fmt: skip
-    return Draft(
-        json_text(document(CanvasMarksDocument, whole, "the rubric's points")),
-        tuple(grade.student_id for grade in ready(grades)),
-        withheld=withheld(grades),
-        notes=tuple(notes),
-    )
+        "assignment": grades[0].reports[0].assignment,
+        "criteria": criteria,
+        "calls": calls,
+        "bulk": {"path": f"{path}/update_grades", "body": {"grade_data": told}},
+    }
+    text = json_text(document(CanvasMarksDocument, whole, "the rubric's points"))
+    written = tuple(grade.student_id for grade, _ in marked)
+    return Draft(text, written, withheld=withheld(grades), notes=(_PLACES,) if ":" in path else ())
+
+
+_PLACES = "the paths hold :course_id and :assignment_id: give --course-id and --assignment-id, or put them in"
+
+
+def _path(options: Options) -> str:
+    """Of the assignment's submissions, with Canvas's own placeholders for what is not told."""
+    course = options.course_id or ":course_id"
+    assignment = options.assignment_id or ":assignment_id"
+    return f"/api/v1/courses/{course}/assignments/{assignment}/submissions"
 
 
 def user(grade: Grade, options: Options) -> str:
@@ -100,11 +93,23 @@ def user(grade: Grade, options: Options) -> str:
     return options.person(grade.student_id).platform_id or f"sis_user_id:{grade.student_id}"
 
 
-def _told(grade: Grade, marks: Sequence[Mark], numbers: dict[str, str], lang: str) -> dict[str, object]:
+def _told(
+    grade: Grade, marks: Sequence[Mark], numbers: Mapping[str, str], options: Options
+) -> dict[str, object]:
+    """A student in the call for all."""
     return {
         "posted_grade": number(grade.score or 0.0),
-        "text_comment": plain_comment(grade.reports, lang),
+        "text_comment": plain_comment(grade.reports, options.lang_of(grade.student_id)),
         "rubric_assessment": {
             numbers[mark.criterion]: {"points": mark.points, "comments": mark.remark} for mark in marks
         },
+    }
+
+
+def _body(told: Mapping[str, object]) -> dict[str, object]:
+    """The same for a call of its own."""
+    return {
+        "submission": {"posted_grade": told["posted_grade"]},
+        "comment": {"text_comment": told["text_comment"]},
+        "rubric_assessment": told["rubric_assessment"],
     }
