@@ -159,6 +159,8 @@ class ToleranceDocument(Document):
     direction_deg: float | None = None
     value: float | None = None
     """Of scales, angular quantities and computed values, in the unit of what is expected."""
+    widened: bool = False
+    """Whether it is more than the rubric states, because a careful hand's small errors add up here."""
 
 
 class CriterionDocument(Document):

@@ -270,6 +270,7 @@ def _criterion(
             length_mm=outcome.tolerance.length_mm,
             direction_deg=outcome.tolerance.direction_deg,
             value=outcome.tolerance.value,
+            widened=outcome.tolerance.widened,
         ),
         confidence=outcome.confidence,
         mistake=outcome.mistake,
