@@ -336,9 +336,18 @@ def from_rate(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -
     own = evidence.vector(rate.vector)
     if own is None or own.length_mm < task.rubric.tolerance.least_mm:
         return None
-    right = task.rates[rate.name]
-    sense = math.copysign(1.0, right)
-    along = task.real[rate.vector]
-    if own.direction_rad is not None and along != 0:
-        sense *= math.copysign(1.0, math.cos(own.direction_rad - cmath.phase(along)))
-    return sense * own.length_mm * scale / own_length(task, evidence, rate)
+    return _sense(task, evidence, rate) * own.length_mm * scale / own_length(task, evidence, rate)
+
+
+def _sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
+    """+1 where the own vector turns its link counter-clockwise: the link as drawn where it was read."""
+    own, along = evidence.vector(rate.vector), task.real[rate.vector]
+    sense = math.copysign(1.0, task.rates[rate.name])
+    if own is None or own.direction_rad is None or along == 0:
+        return sense
+    plan = task.construction.figure_of(task.construction.vectors[rate.vector].head)
+    joints = evidence.sketches.get(plan, evidence.nodes)
+    tail, head = (joints.get(joint) for joint in rate.link)
+    if tail is not None and head is not None:
+        return math.copysign(1.0, math.sin(own.direction_rad - cmath.phase(head - tail)))
+    return sense * math.copysign(1.0, math.cos(own.direction_rad - cmath.phase(along)))

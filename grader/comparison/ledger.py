@@ -68,7 +68,12 @@ class Ledger:
         """The mark on the original data, or a better one on what follows from own earlier values."""
         exact = segment.drawn(self.used)
         found = original = Found(against(exact), exact)
-        if not original.mark.is_full and follows_through:
+        if not original.mark.is_full and not self.evidence.has_sheets:
+            # Of measured lengths no nearer test is surer than what a hand may miss of the whole.
+            reach = self.following.whole_reach(segment, exact)
+            whole = Found(against(exact, reach), exact, reach)
+            found = whole if whole.mark.is_full else original
+        if not found.mark.is_full and follows_through:
             found = self.at_followed_scale(segment, against, original)
         if not found.mark.is_full:
             own = self.from_own_nodes(segment, against, original, follows_through=follows_through)
