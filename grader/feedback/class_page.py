@@ -6,7 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from grader.documents import AlikeDocument, MovedDocument, ReportDocument, ResultsDocument, StandingDocument
+from grader.documents import (
+    AlikeDocument,
+    CriterionDocument,
+    MovedDocument,
+    ReportDocument,
+    ResultsDocument,
+    StandingDocument,
+)
 from grader.feedback import statistics
 from grader.feedback.charts import distribution_svg
 from grader.feedback.class_words import CAUSES, CHANCE, SIGNS
@@ -64,7 +71,10 @@ def index_page(
         waiting=[
             (who.link(one.index), one, results.reports[one.index]) for one in statistics.waiting(results)
         ],
-        scales=[(who.link(index), *told) for index, *told in statistics.wrong_scales(results)],
+        scales=[
+            (who.link(index), [_scale(one, speaker) for one in lost], refused)
+            for index, lost, refused in statistics.wrong_scales(results)
+        ],
         alike=[_alike(one, who, speaker) for one in results.alike],
         moved=[_moved(one, who, speaker) for one in results.moved],
         causes=_causes(results.moved),
@@ -141,6 +151,16 @@ def _rows(results: ResultsDocument, who: _Who, speaker: Tongue) -> list[dict[str
         }
         for index, report in enumerate(results.reports)
     ]
+
+
+def _scale(criterion: CriterionDocument, speaker: Tongue) -> str:
+    """A scale that was not right: what was declared, and what it is."""
+    told = [
+        f"{speaker.significant(one.value, 4)}\N{NO-BREAK SPACE}{speaker.unit(one.unit or '')}"
+        for one in (criterion.measured, criterion.expected)
+        if one.value is not None
+    ]
+    return f"{criterion.title}: {' ≠ '.join(told)}"
 
 
 # Sheets that look alike, and what moved -----------------------------------------------------------

@@ -137,15 +137,20 @@ def commonest(results: ResultsDocument) -> list[tuple[str, list[int]]]:
     return sorted(found.items(), key=lambda item: -len(item[1]))[:COMMONEST]
 
 
-def wrong_scales(results: ResultsDocument) -> list[tuple[int, list[str], list[str]]]:
+def wrong_scales(results: ResultsDocument) -> list[tuple[int, list[CriterionDocument], list[str]]]:
     """Reports (by index) whose scales were not right: the criteria lost, and the scales not understood."""
     found = []
     for index, report in enumerate(results.reports):
-        lost = [one.title for one in report.criteria if one.vector is None and one.verdict in _LOST]
+        lost = [one for one in report.criteria if _is_scale(one) and one.verdict in _LOST]
         refused = [f"{name} = {one.text}" for name, one in report.scales.items() if one.refused and one.text]
         if lost or refused:
             found.append((index, lost, refused))
     return found
+
+
+def _is_scale(criterion: CriterionDocument) -> bool:
+    """Whether a criterion asks for a scale: something per millimetre on paper."""
+    return criterion.vector is None and (criterion.expected.unit or "").endswith("/mm")
 
 
 # What waits ---------------------------------------------------------------------------------------

@@ -1,10 +1,25 @@
 """The class's page: everybody linked, everything that waits told, for classes of any size."""
 
-from grader.documents import ProblemDocument
+import time
+
+import pytest
+
+from grader.documents import (
+    AlikeDocument,
+    CriterionMovedDocument,
+    MovedDocument,
+    ProblemDocument,
+    ReadingDocument,
+    ReadSheets,
+    StandingDocument,
+)
 from grader.feedback import write_index
 from grader.feedback.class_page import folders_of, index_page
+from grader.i18n import LANGUAGES
 from tests.unit.feedback.parsed import Page
 from tests.unit.feedback.works import HOSTILE, criterion, report, results
+
+SECONDS = 1.0
 
 
 def test_the_index_links_every_report_where_it_is(tmp_path):
@@ -46,3 +61,88 @@ def test_the_same_problem_many_times_is_told_once_with_its_number():
 
 def test_an_empty_class_has_a_page():
     assert Page(index_page(results(), "ru")).open == []
+
+
+def in_class(count, **changes):
+    return [report(student_id=f"s{k:03d}", **changes) for k in range(count)]
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+@pytest.mark.parametrize("count", [0, 1, 3, 30])
+@pytest.mark.parametrize("state", ["graded", "needs_review", "missing", "unreadable"])
+def test_classes_of_any_size_and_state_have_a_page(count, state, lang):
+    score = 7.5 if state == "graded" else None
+    page = Page(index_page(results(*in_class(count, status=state, score=score)), lang))
+    assert page.open == []
+    assert page.text.count("/feedback.html") == 0
+    links = {attributes.get("href") for _tag, attributes in page.tags}
+    assert {f"s{k:03d}/feedback.html" for k in range(count)} <= links
+
+
+def told_alike(**changes):
+    fields = {"students": ["s001", "s002"], "positions": [None, None], "why": ["hand_errors"],
+              "measure": 0.00004, "share": 0.82, "compared": 31}  # fmt: skip
+    return AlikeDocument(**{**fields, **changes})
+
+
+def with_sheets(one):
+    read = ReadingDocument(source="a.jpg", page=1, student_id=one.student_id, sheet=None, figures={})
+    return one.model_copy(update={"reading": ReadSheets(sheets=[read])})
+
+
+def test_look_alikes_are_no_accusation_and_link_both_pictures():
+    made = results(*[with_sheets(one) for one in in_class(3)]).model_copy(update={"alike": [told_alike()]})
+    page = Page(index_page(made, "ru"))
+    assert "Это не обвинение" in page.text
+    assert "совпадение 82 %, сравнено: 31" in page.text
+    assert "0,00004" in page.text
+    links = {attributes.get("href") for _tag, attributes in page.tags}
+    assert {"s001/overlay.png", "s002/overlay.png"} <= links
+
+
+def test_a_number_that_is_anothers_has_no_measure():
+    alone = told_alike(why=["other_number"], measure=None, share=None, compared=0)
+    text = Page(index_page(results(*in_class(3)).model_copy(update={"alike": [alone]}), "en")).text
+    assert "drawn with the other's number" in text
+    assert "By chance" not in text
+
+
+def test_what_moved_tells_standing_criteria_and_why():
+    before = StandingDocument(status="needs_review", score=None, score_range=(5.0, 7.5))
+    after = StandingDocument(status="graded", score=7.5, score_range=(7.5, 7.5))
+    change = CriterionMovedDocument(
+        id="v_D", title="Vector v_D", before="review", after="full", points_after=2.5
+    )
+    moves = [
+        MovedDocument(student_id="s001", before=before, after=after, why=["rubric"], criteria=[change]),
+        MovedDocument(student_id="s777", before=before, after=None, why=["gone"]),
+    ]
+    text = Page(index_page(results(*in_class(3)).model_copy(update={"moved": moves}), "ro")).text
+    assert "baremul a fost schimbat (1)" in text
+    assert "s001 5–7,5 7,5 baremul a fost schimbat Vector v D : ? " in text
+    assert "✓ corect (2,5)" in text
+    assert "s777 5–7,5 – nu mai există" in text
+
+
+def test_students_who_made_a_common_mistake_are_named_and_the_many_unfold():
+    text = index_page(results(*in_class(30)), "en")
+    before = text.split("Students</h2>")[0]
+    assert "s011/feedback.html" in before
+    assert "and 18 more" in Page(text).text
+
+
+def test_several_positions_of_a_student_are_told_apart_everywhere():
+    reports = [
+        report(student_id="s1", position=k, status="needs_review", score=None, score_range=(k, 10.0))
+        for k in (1, 2)
+    ]
+    text = Page(index_page(results(*reports), "en")).text
+    assert text.index("s1, 1 9 1–10") < text.index("s1, 2 8 2–10")
+
+
+def test_three_hundred_students_have_their_page_in_less_than_a_second():
+    made = results(*in_class(300, status="needs_review", score=None, score_range=(5.0, 7.5)))
+    index_page(made, "en")
+    start = time.process_time()
+    index_page(made, "en")
+    assert time.process_time() - start < SECONDS

@@ -1,7 +1,20 @@
 """The class in figures."""
 
+import re
+
+from grader.documents import QuantityDocument, ScaleDocument
 from grader.feedback.charts import distribution_svg
-from grader.feedback.statistics import commonest, hardest, histogram, shares
+from grader.feedback.statistics import (
+    commonest,
+    followed,
+    hardest,
+    histogram,
+    open_shares,
+    shares,
+    spread,
+    waiting,
+    wrong_scales,
+)
 from grader.i18n import tongue
 from tests.unit.feedback.works import criterion, report, results
 
@@ -39,3 +52,51 @@ def test_a_mistake_made_twice_by_one_student_counts_once():
 
 def test_there_is_no_chart_without_scores():
     assert distribution_svg(results(), tongue("en")) == ""
+
+
+def test_what_waits_is_in_the_chart_at_the_middle_of_its_range():
+    waiting = report(score=None, status="needs_review", score_range=(2.0, 6.0))
+    assert open_shares(results(waiting, report(), report(status="missing", score=None))) == [0.4]
+    assert 'class="waits"' in distribution_svg(results(waiting), tongue("en"))
+
+
+def test_a_bar_is_as_high_as_its_count_beside_the_tallest():
+    made = results(*[report(score=9.5)] * 4, report(score=1.5))
+    heights = re.findall(r'class="final" [^>]*height="([\d.]+)"', distribution_svg(made, tongue("en")))
+    assert heights == ["20.0", "80.0"]
+
+
+def test_mean_and_median_are_of_final_scores_alone():
+    found = spread(results(report(score=2.0), report(score=4.0), report(score=9.0), report(score=None)))
+    assert (found.mean, found.median, found.least, found.largest) == (0.5, 0.4, 0.2, 0.9)
+    assert spread(results()) is None
+
+
+def test_that_comes_first_which_one_look_decides_most_of():
+    little = report(student_id="a", status="needs_review", score=None, score_range=(9.0, 10.0))
+    much = report(student_id="b", status="needs_review", score=None, score_range=(2.0, 8.0))
+    lost = report(student_id="c", status="unreadable", score=None, score_range=None, criteria=[])
+    found = waiting(results(little, report(), much, lost))
+    assert [(one.index, one.points) for one in found] == [(3, 10.0), (2, 6.0), (0, 1.0)]
+
+
+def test_follow_through_is_counted_by_points_students_and_criteria():
+    one = report(criteria=[criterion("v_B", "follow_through", 5.0), criterion("v_D", "follow_through", 2.0)])
+    two = report(criteria=[criterion("v_B", "follow_through", 5.0), criterion("v_D", "full", 5.0)])
+    found = followed(results(report(), one, two))
+    assert (found.points, found.reports) == (12.0, [1, 2])
+    assert found.criteria == [("Vector v_B", 2), ("Vector v_D", 1)]
+
+
+def test_scales_lost_or_not_understood_are_told_and_links_are_no_scales():
+    def about(name, verdict, unit):
+        quantity = QuantityDocument(value=0.05, unit=unit)
+        return criterion(name, verdict, 0.0).model_copy(update={"vector": None, "expected": quantity})
+
+    refused = {"ka": ScaleDocument(declared=None, used=1.0, assumed=True, text="bla", refused="why")}
+    one = report(criteria=[about("kv", "none", "(m/s)/mm"), about("AB", "none", None)], scales={})
+    two = report(criteria=[about("kv", "full", "(m/s)/mm")], scales=refused)
+    found = wrong_scales(results(report(), one, two))
+    assert [(index, [c.id for c in lost], text) for index, lost, text in found] == [
+        (1, ["kv"], []), (2, [], ["ka = bla"]),
+    ]  # fmt: skip
