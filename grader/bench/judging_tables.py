@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from grader.bench.judging_tally import ClassTime, Count, JudgingFigures, Result, Tally, Times, summed
+from grader.bench.judging_tally import ClassTime, Count, JudgingFigures, Result, Tally, Times, summed, where
 from grader.bench.plain_text import Table
 
 NOTHING = "-"
@@ -15,7 +15,7 @@ def judging_tables(figures: JudgingFigures) -> Iterator[Table]:
     results = figures.results
     yield _verdicts(results, ("source", "hand"), "Judging: verdicts")
     yield _verdicts(results, ("source", "assignment"), "Judging: verdicts by mechanism")
-    yield _names(results, ("source", "hand", "kind"), "Judging: the first mistake named")
+    yield _names(results, ("source", "hand"), "Judging: the first mistake named")
     yield _names(results, ("source", "assignment"), "Judging: the first mistake named, by mechanism")
     yield _codes(results)
     yield _instead(results)
@@ -39,25 +39,39 @@ def _verdicts(results: Sequence[Result], by: Sequence[str], title: str) -> Table
     ]  # fmt: skip
     rows = [
         [
-            *where, str(one.students), _of(one.false_charges), _of(one.false_credits), _percent(one.reviews),
+            *place, str(one.students), _of(one.false_charges), _of(one.false_credits), _percent(one.reviews),
             f"{_percent(one.followed)} of {one.followed.of}", _of(one.missed), _of(one.unpunished),
             _of(one.blank),
         ]
-        for where, one in summed(results, by).items()
+        for place, one in summed(results, by).items()
     ]  # fmt: skip
     return title, heads, rows
 
 
 def _names(results: Sequence[Result], by: Sequence[str], title: str) -> Table:
-    heads = [*by, "named", "as the surest", "only as a rival", "of", "wrong names", "right drawings accused"]
-    rows = [
-        [
-            *where, _percent(one.named), _percent(one.surest), _percent(one.rivals), str(one.named.of),
-            _of(one.misnamed), _of(one.accused),
-        ]
-        for where, one in summed(results, by).items()
+    """Singles, pairs and slips beside each other; in brackets what is named only as a rival of another."""
+    heads = [
+        *by, "one mistake", "the first of two", "as the surest of two", "a slip in computing",
+        "wrong names: one mistake", "two", "right drawings accused",
     ]  # fmt: skip
+    rows = []
+    for place in dict.fromkeys(where(one, by) for one in results):
+        here = [one for one in results if where(one, by) == place]
+        kinds = {kind: tally for (kind,), tally in summed(here, ("kind",)).items()}
+        right, single, pair, slip = (kinds.get(kind, Tally()) for kind in ("right", "single", "pair", "slip"))
+        rows.append(
+            [
+                *place, _named(single), _named(pair), _percent(pair.surest), _named(slip),
+                _of(single.misnamed), _of(pair.misnamed), _of(right.accused),
+            ]
+        )  # fmt: skip
     return title, heads, rows
+
+
+def _named(tally: Tally) -> str:
+    if not tally.named.of:
+        return NOTHING
+    return f"{_percent(tally.named)} (+ {_percent(tally.rivals)}) of {tally.named.of}"
 
 
 def _codes(results: Sequence[Result]) -> Table:

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -256,12 +256,13 @@ def summed(results: Iterable[Result], by: Sequence[str]) -> dict[tuple[str, ...]
     """Tallies by assignment, hand, kind or source."""
     tallies: dict[tuple[str, ...], Tally] = {}
     for result in results:
-        where: Mapping[str, str] = {
-            "assignment": result.key.assignment, "hand": result.key.hand, "kind": result.key.kind,
-            "source": result.source,
-        }  # fmt: skip
-        tallies.setdefault(tuple(where[name] for name in by), Tally()).add(result)
+        tallies.setdefault(where(result, by), Tally()).add(result)
     return tallies
+
+
+def where(result: Result, by: Sequence[str]) -> tuple[str, ...]:
+    """Where a result is counted."""
+    return tuple(result.source if name == "source" else str(getattr(result.key, name)) for name in by)
 
 
 @dataclass(slots=True)
@@ -282,8 +283,8 @@ class JudgingFigures:
         """One JSON object: sums by assignment, hand, kind and source, and every failure in one line."""
         by = ("assignment", "hand", "kind", "source")
         rows = [
-            {**dict(zip(by, where, strict=True)), **tally.as_json()}
-            for where, tally in summed(self.results, by).items()
+            {**dict(zip(by, place, strict=True)), **tally.as_json()}
+            for place, tally in summed(self.results, by).items()
         ]
         return {
             "rows": rows,
