@@ -14,6 +14,10 @@ from grader.scene import Picture
 
 SHEET = N_("the sheet")
 DETAIL = N_("a closer look")
+WHY_WIDENED = N_(
+    "Widened: small errors of a careful hand add up to more than the rubric's tolerance here, as they do where"
+    " lines meet at a small angle."
+)
 UNITS = N_(
     "Lengths are millimetres on paper; directions count counter-clockwise from the horizontal to the right."
 )
@@ -84,7 +88,7 @@ class Leaflet:
     """All of it, in the student's language.
 
     `tally` counts criteria by verdict, those there are; `not_required` names those that need not be handed
-    in and were not, at level `full` with what is right.
+    in and were not, at level `full` with what is right; `has_widened` says that some tolerance was widened.
     """
 
     speaker: Tongue
@@ -104,6 +108,7 @@ class Leaflet:
     sheets: tuple[Sheetful, ...]
     rows: tuple[Row, ...]
     not_required: tuple[Markup, ...]
+    has_widened: bool
     scales: tuple[ScaleRow, ...]
     pictures: tuple[Picture, ...]
 
@@ -139,6 +144,11 @@ class Leaflet:
         if look.kind != "detail" or not look.names:
             return said
         return Markup("{}: {}").format(said, Markup(", ").join(map(words.symbols, look.names)))
+
+    @property
+    def widening(self) -> str:
+        """Why a tolerance is wider than the rubric's; empty where none is."""
+        return self.speaker.gettext(WHY_WIDENED) if self.has_widened else ""
 
     @property
     def footer(self) -> str:

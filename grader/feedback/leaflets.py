@@ -16,6 +16,7 @@ from grader.i18n import N_, Tongue
 from grader.scene import Picture
 
 NUMBER, POSITION, PAGE = N_("number"), N_("position"), N_("page")
+WIDENED = N_("widened")
 AS_MEASURED = N_("drawn from the entered measurements")
 
 
@@ -56,6 +57,7 @@ def leaflet_of(
             for criterion in report.criteria
             if _is_left_out(criterion)
         ),
+        has_widened=level == "full" and any(one.tolerance.widened for one in report.criteria),
         scales=_scales(report, speaker, level, names),
         pictures=tuple(pictures),
     )
@@ -115,7 +117,8 @@ def _left_out(
 
 def _tolerance(criterion: CriterionDocument, speaker: Tongue) -> tuple[str, ...]:
     unit = criterion.expected.unit or criterion.measured.unit or ""
-    return tuple(quantities.tolerance(criterion.tolerance, unit, speaker))
+    told = quantities.tolerance(criterion.tolerance, unit, speaker)
+    return (*told, speaker.gettext(WIDENED)) if told and criterion.tolerance.widened else tuple(told)
 
 
 def _scales(

@@ -297,6 +297,9 @@ class _Story:
                 ]
                 rows.append(["", text(printed(row.said), 8, as_markup=True), *[""] * (len(widths) - 2)])
         yield Table(rows, colWidths=[one * mm for one in widths], style=style, repeatRows=1)
+        if self.leaflet.widening:
+            yield Spacer(1, 2 * mm)
+            yield text(self.leaflet.widening, 8, colour=SOFT)
         if self.leaflet.not_required:
             said = self.say(N_("Not handed in, and not required:"))
             named = ", ".join(printed(one) for one in self.leaflet.not_required)

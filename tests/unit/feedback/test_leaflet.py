@@ -1,6 +1,6 @@
 """What a student is told: mistakes first, each where it is seen, and what waits with its reason."""
 
-from grader.documents import MistakeDocument
+from grader.documents import MistakeDocument, ToleranceDocument
 from grader.feedback import About
 from grader.feedback.leaflets import leaflet_of
 from grader.i18n import tongue
@@ -82,3 +82,17 @@ def test_what_is_not_required_and_not_there_takes_one_line():
     assert [one.striptags() for one in told.not_required] == ["ω2 (1.670 m/s)"]
     hinted = leaflet(report(criteria=[omega], mistakes=[]), level="hint")
     assert [one.striptags() for one in hinted.not_required] == ["ω2"]
+
+
+def test_a_widened_tolerance_is_told_as_such_with_the_reason():
+    wider = criterion("v_B").model_copy(
+        update={"tolerance": ToleranceDocument(length_mm=2.4, direction_deg=3.0, widened=True)}
+    )
+    told = leaflet(report(criteria=[wider, criterion("v_A")], mistakes=[]))
+    assert [row.tolerance for row in told.rows] == [
+        ("±2.4\u00a0mm ±3.0°", "widened"),
+        ("±1.0\u00a0mm ±1.5°",),
+    ]
+    assert "small angle" in told.widening
+    assert leaflet(report(criteria=[wider], mistakes=[]), level="hint").widening == ""
+    assert leaflet(report(mistakes=[])).widening == ""
