@@ -10,7 +10,11 @@ from grader.bench.judging_assignments import assignment_named
 from grader.bench.judging_handed_in import submission
 from grader.bench.judging_students import Key, student
 from grader.bench.judging_tally import ClassTime
+from grader.judging import Submission, judge, task_of
+from grader.measurements import names_of, read_measurements
 from grader.records import Reading
+from grader.rubric import RubricFile
+from reference.assignment import Assignment
 
 MANY = 40
 """So many different students; the class repeats them under other names."""
@@ -23,11 +27,22 @@ def measure_class(rows: int, assignment: str = "pump") -> ClassTime:
         place = Path(folder)
         (place / "handed-in").mkdir()
         _write(place / "handed-in" / "class.csv", assignment, rows)
+        start = time.process_time()
+        _judge_all(place / "handed-in" / "class.csv", task, rubric)
+        judging = time.process_time() - start
         batch = Batch(task, rubric, place / "handed-in", place / "out", jobs=1)
         start, clock = time.process_time(), time.perf_counter()
         results = grade(batch, _silent)
         spent, passed = time.process_time() - start, time.perf_counter() - clock
-    return ClassTime(assignment, rows, len(results.reports), spent, passed)
+    return ClassTime(assignment, rows, len(results.reports), judging, spent, passed)
+
+
+def _judge_all(path: Path, assignment: Assignment, rubric: RubricFile) -> None:
+    """The file read and every line of it judged, nothing written."""
+    for line in read_measurements(path, names_of(assignment)):
+        variant = assignment.variant(line.n, line.position)
+        handed_in = Submission(measured=line.reading, values=line.values, declared=line.scales)
+        judge(task_of(assignment, rubric, variant), handed_in)
 
 
 def _silent(what: str, done: int, of: int) -> None:

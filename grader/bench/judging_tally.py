@@ -155,11 +155,18 @@ class Times:
 
 @dataclass(frozen=True, slots=True)
 class ClassTime:
-    """Seconds for a class's file of measurements, from reading it to pages and results written."""
+    """Seconds for a class's file of measurements.
+
+    Attributes
+    ----------
+    judging_s : of the processor, to read the file and judge every line
+    processor_s, wall_s : for all that `planmark grade` does with it, to pages and results written
+    """
 
     assignment: str
     rows: int
     graded: int
+    judging_s: float
     processor_s: float
     wall_s: float
 

@@ -271,7 +271,7 @@ def test_credit_given_for_what_follows_is_counted_of_all_that_follows():
 
 def test_the_benchmark_measures_as_many_steps_as_it_says_and_tells_all_of_it(monkeypatch):
     monkeypatch.setattr(judging, "HANDS", ("careful",))
-    timed = ClassTime("pump", 50, 50, 1.0, 1.1)
+    timed = ClassTime("pump", 50, 50, 0.5, 1.0, 1.1)
     bench = JudgingBench(
         students=1, assignments=("engine",), whole_class=lambda rows: replace(timed, rows=rows)
     )
