@@ -94,6 +94,7 @@ def overlay(
     reading: Reading | None,
     vectors: Mapping[str, Vector],
     outcomes: Mapping[str, Outcome],
+    links: Mapping[str, tuple[str, str]] | None = None,
     *,
     show_expected: bool = False,
 ) -> Picture:
@@ -104,13 +105,16 @@ def overlay(
     reading : None where the page could not be read: the scan alone is shown
     vectors : the construction's vectors, which say from what node to what node each goes
     outcomes : by vector name; read vectors without an outcome are shown as not judged
+    links : the joints of the mechanism's links by name; those with an outcome are shown
     show_expected : whether wrong vectors have the expected one ghosted in
     """
     scan = behind.scan
     height, width = scan.shape
     scene = Scene(behind.page_mm)
     if behind.registered and reading is not None:
-        scene = scene_of(behind.page_mm, reading, vectors, outcomes, show_expected=show_expected)
+        scene = scene_of(
+            behind.page_mm, reading, vectors, outcomes, show_expected=show_expected, links=links or {}
+        )
     painted = paint(scan, scene)
     png = _encode(".png", painted, [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION])
     return Picture(behind.source, behind.page, png, _smallest(scan), width, height, scene)
@@ -211,7 +215,8 @@ def paint(scan: GreyImage, scene: Scene) -> ColourImage:
         brush.dot(dot)
     blended = np.asarray(cv2.addWeighted(brush.image, OPACITY, image, 1.0 - OPACITY, 0.0), dtype=np.uint8)
     labels = _Brush(blended, px_per_mm)
-    for label in labels_of(scene.arrows, (0.0, 0.0, *scene.page_mm)):
+    named = [arrow for arrow in scene.arrows if arrow.is_named]
+    for label in labels_of(named, (0.0, 0.0, *scene.page_mm)):
         labels.label(label)
     return labels.image
 
@@ -232,7 +237,8 @@ class _Brush:
         if arrow.length < LEAST_ARROW_MM:
             return
         self.line(arrow.tail, arrow.neck(), colour, ARROW_WIDTH_MM[arrow.verdict], arrow.dash)
-        self.fill(arrow.head(), colour)
+        if not arrow.is_link:
+            self.fill(arrow.head(), colour)
 
     def ghost(self, ghost: Ghost) -> None:
         self.line(ghost.tail, ghost.tip, _bgr(GHOST_COLOUR), GHOST_WIDTH_MM, GHOST_DASH_MM)

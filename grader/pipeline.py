@@ -32,7 +32,7 @@ from grader.scene import Picture
 from grader.scene_measured import measured_picture
 from grader.sheet import rectify, straighten
 from reference.assignment import Assignment, Scales, Variant
-from reference.construction import Vector
+from reference.construction import Construction
 from reference.derivation import construction_of
 from reference.errors import InputFileError, MechanismError
 from reference.mechanism import Crank
@@ -191,7 +191,7 @@ def mark_looked(
             assignment, rubric, work.variant or Variant(), work.student_id,
             "unreadable" if work.pages or work.measured else "missing", problems=problems, sheets=documents,
         )  # fmt: skip
-        return Marked(work, report, _pictures(looked, {}, None, show_expected=with_ghosts))
+        return Marked(work, report, _pictures(looked, None, None, show_expected=with_ghosts))
     task, judgement, declared = judged
     names = assignment.file.names
     report = report_of(
@@ -208,7 +208,7 @@ def mark_looked(
     )
     report = _with_sources(report, declared.sources)
     report = with_mistakes_told(report, judgement, assignment, task.variant, work.lang, level)
-    pictures = _pictures(looked, task.construction.vectors, judgement, show_expected=with_ghosts)
+    pictures = _pictures(looked, task.construction, judgement, show_expected=with_ghosts)
     return Marked(work, report, pictures or _as_measured(work, task, judgement, show_expected=with_ghosts))
 
 
@@ -376,14 +376,15 @@ def _measuring_problems(work: Work) -> tuple[Problem, ...]:
 
 def _pictures(
     looked: Sequence[Looked],
-    vectors: Mapping[str, Vector],
+    construction: Construction | None,
     judgement: Judgement | None,
     *,
     show_expected: bool,
 ) -> tuple[Picture, ...]:
     outcomes = {} if judgement is None else {outcome.name: outcome for outcome in judgement.outcomes}
+    vectors, links = ({}, {}) if construction is None else (construction.vectors, construction.links)
     return tuple(
-        overlay(one.backdrop, one.reading, vectors, outcomes, show_expected=show_expected)
+        overlay(one.backdrop, one.reading, vectors, outcomes, links, show_expected=show_expected)
         for one in looked
         if one.backdrop is not None
     )

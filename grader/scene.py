@@ -71,7 +71,10 @@ NODE_COLOUR = "#24303c"
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """A named vector as read; `verdict` is `not_judged` where the rubric does not ask for it."""
+    """A named vector as read; `verdict` is `not_judged` where the rubric does not ask for it.
+
+    A link of the mechanism has no head (`is_link`), and its name stands beside it only where it is not right.
+    """
 
     name: str
     figure: str
@@ -79,6 +82,12 @@ class Arrow:
     tip: XY
     verdict: str
     doubtful: bool
+    is_link: bool = False
+
+    @property
+    def is_named(self) -> bool:
+        """Whether its mark and name are shown."""
+        return not self.is_link or self.verdict != "full"
 
     @property
     def length(self) -> float:
@@ -94,6 +103,8 @@ class Arrow:
 
     def neck(self, size: float = 1.0) -> XY:
         """Where the shaft ends and the head begins."""
+        if self.is_link:
+            return self.tip
         head = min(ARROWHEAD_MM[0] * size, 0.45 * self.length)
         share = 1.0 - head / self.length if self.length > 0.0 else 1.0
         return between(self.tail, self.tip, share)
@@ -163,6 +174,9 @@ class Picture:
     scene: Scene
 
 
+_NO_LINKS: Mapping[str, tuple[str, str]] = {}
+
+
 def scene_of(
     page_mm: XY,
     reading: Reading,
@@ -170,9 +184,10 @@ def scene_of(
     outcomes: Mapping[str, Outcome],
     *,
     show_expected: bool,
+    links: Mapping[str, tuple[str, str]] = _NO_LINKS,
 ) -> Scene:
-    """The scene of one sheet's reading; `outcomes` by vector name."""
-    arrows = list(_arrows(reading, vectors, outcomes))
+    """The scene of one sheet's reading; `outcomes` by the vector's or link's name."""
+    arrows = [*_arrows(reading, vectors, outcomes), *_links(reading, links, outcomes)]
     dots = tuple(
         Dot(name, _xy(node.at), node.confidence < LEAST_SURE, figure=kind)
         for kind, figure in reading.figures.items()
@@ -206,6 +221,21 @@ def _arrows(
             tail, tip = _xy(figure.nodes[ends.tail].at), _xy(figure.nodes[ends.head].at)
             doubtful = verdict == "review" or read.confidence < LEAST_SURE
             yield Arrow(name, kind, tail, tip, verdict, doubtful)
+
+
+def _links(
+    reading: Reading, links: Mapping[str, tuple[str, str]], outcomes: Mapping[str, Outcome]
+) -> Iterator[Arrow]:
+    """The links of the sketch that were judged."""
+    sketch = reading.figures.get(MECHANISM)
+    for name, (tail, head) in links.items():
+        outcome = outcomes.get(name)
+        if sketch is None or outcome is None or tail not in sketch.nodes or head not in sketch.nodes:
+            continue
+        if outcome.verdict != "not_judged":
+            ends = (_xy(sketch.nodes[tail].at), _xy(sketch.nodes[head].at))
+            doubtful = outcome.verdict == "review"
+            yield Arrow(name, MECHANISM, *ends, outcome.verdict, doubtful, is_link=True)
 
 
 def _ghosts(arrows: list[Arrow], outcomes: Mapping[str, Outcome]) -> Iterator[Ghost]:

@@ -101,7 +101,7 @@ def looks_at(picture: Picture, index: int, names: Mapping[str, str] = _NO_NAMES)
         }
         return [_plan(scene, index, figure, box, names) for figure, box in boxes.items()]
     whole = (0.0, 0.0, *scene.page_mm)
-    named = [arrow for arrow in scene.arrows if arrow.figure not in close_ups]
+    named = [arrow for arrow in scene.arrows if arrow.figure not in close_ups and arrow.is_named]
     layers = _layers(scene, whole, WHOLE_SIZE_PER_MM, named, names)
     return [
         Look("sheet", index, whole, layers, tuple(arrow.name for arrow in named)),
@@ -257,7 +257,8 @@ def _arrow(arrow: Arrow, size: float) -> Iterator[Shape]:
     dash = tuple(length * size for length in arrow.dash or ())
     width = ARROW_WIDTH_MM[arrow.verdict] * size
     yield Stroke(arrow.tail, arrow.neck(size), width, colour, dash)
-    yield Area(arrow.head(size), colour)
+    if not arrow.is_link:
+        yield Area(arrow.head(size), colour)
 
 
 def _ground(label: Label) -> Shape:

@@ -283,3 +283,27 @@ def test_a_label_far_from_its_arrow_has_a_leader_to_it():
         _start, end = label.leader
         middle = [0.45 * a + 0.55 * b for a, b in zip(label.arrow.tail, label.arrow.tip, strict=True)]
         assert end == pytest.approx(middle)
+
+
+# Links ---------------------------------------------------------------------------------------------
+
+
+def sketch_scene(verdict):
+    nodes = {
+        name: ReadNode(complex(x, -y), np.eye(2) * 0.01, 0.99)
+        for name, (x, y) in {"O1": (100.0, 200.0), "A": (160.0, 200.0)}.items()
+    }
+    drawn = Reading({"mechanism": Figure(nodes, {})})
+    links = {"O1A": ("O1", "A"), "AB": ("A", "B")}
+    return scene_of(PAGE_MM, drawn, {}, {"O1A": outcome("O1A", verdict)}, show_expected=True, links=links)
+
+
+def test_links_that_were_judged_are_marked_on_the_sketch():
+    (link,) = sketch_scene("none").arrows
+    assert (link.name, link.verdict, link.is_link, link.is_named) == ("O1A", "none", True, True)
+    assert (link.tail, link.tip) == ((100.0, 200.0), (160.0, 200.0))
+
+
+def test_right_links_have_no_name_and_what_is_not_judged_no_line():
+    assert not sketch_scene("full").arrows[0].is_named
+    assert sketch_scene("not_judged").arrows == ()
