@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from grader.exports.draft import Draft, document, ready, withheld
 from grader.exports.faults import listed, not_as_meant
-from grader.exports.finding import Evidence, Found, Rows, find
+from grader.exports.finding import Evidence, Found, Rows, find, held_already
 from grader.exports.grades import Grade, Person, rescaled
 from grader.exports.options import Options
 from grader.exports.raw_csv import RawTable, parse
@@ -147,9 +147,10 @@ def fill(data: bytes, file: str, grades: Sequence[Grade], options: Options) -> D
     told = ready(grades)
     here = {one.student_id: options.person(one.student_id) for one in grades}
     found = _whose(book, {**options.people, **here})
+    held = {row: cell for row in book.people if (cell := book.grade(row)) not in _NO_GRADE}
     meant, missing = _put(book, told, found, rescale=options.rescale)
     written = tuple(one.student_id for one in told if one.student_id not in missing)
-    book.notes.extend(found.notes_on(written))
+    book.notes.extend((*found.notes_on(written), *held_already(withheld(grades), found, held)))
     filled = book.table.text().encode("utf-8")
     again = _open(filled, file, options)
     if any(number(_amount(again.grade(row)) or 0.0) != score for row, score in meant.items()):

@@ -60,6 +60,12 @@ class Found:
         return [f"found by name alone, look whether they are these: {', '.join(doubtful)}"]
 
 
+def held_already(withheld: Iterable[str], found: Found, cells: Mapping[int, str]) -> list[str]:
+    """Who is withheld and has a grade there all the same; `cells` are the grades that stand in rows."""
+    held = [f"{one} ({cells[found.rows[one]]})" for one in withheld if cells.get(found.rows.get(one, -1))]
+    return [f"withheld, and a grade is there already, which stays: {', '.join(held)}"] if held else []
+
+
 def find(rows: Rows, students: Mapping[str, Evidence], table: str) -> Found:
     """The row of each student in a table; `table` is its name in words.
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from grader.exports.draft import Draft, ready, withheld
 from grader.exports.faults import listed, not_as_meant
-from grader.exports.finding import Evidence, Found, Rows, find
+from grader.exports.finding import Evidence, Found, Rows, find, held_already
 from grader.exports.grades import Grade, Person, rescaled
 from grader.exports.options import Options
 from grader.exports.raw_csv import RawTable, parse
@@ -116,11 +116,12 @@ def fill(
     told = ready(grades)
     here = {one.student_id: options.person(one.student_id) for one in grades}
     found = sheet.whose({**options.people, **here})
+    held = {row: cell for row in sheet.people if (cell := sheet.value(row, "grade")) not in _EMPTY}
     meant, missing = _put(sheet, told, found, comments, rescale=options.rescale)
     written = tuple(one.student_id for one in told if one.student_id not in missing)
     filled = sheet.table.text().encode("utf-8")
     _check(filled, file, meant)
-    notes = (*sheet.notes, *found.notes_on(written))
+    notes = (*sheet.notes, *found.notes_on(written), *held_already(withheld(grades), found, held))
     return Draft(filled, written, withheld=withheld(grades), not_found=missing, notes=notes)
 
 
@@ -128,7 +129,7 @@ def _put(
     sheet: Worksheet, grades: Sequence[Grade], found: Found, comments: Mapping[str, str], *, rescale: bool
 ) -> tuple[dict[int, str], dict[str, str]]:
     """Put grades and comments into their cells: what stands in which row then, and why others have none."""
-    meant, missing, replaced = dict[int, str](), dict[str, str](), 0
+    meant, missing, replaced, said = dict[int, str](), dict[str, str](), 0, 0
     for grade in grades:
         student, row = grade.student_id, found.rows.get(grade.student_id)
         if row is None or sheet.is_locked(row):
@@ -140,9 +141,12 @@ def _put(
             replaced += before not in _EMPTY
             sheet.table.put(row, sheet.columns["grade"], meant[row])
         if "feedback" in sheet.columns and student in comments:
+            said += sheet.value(row, "feedback") not in {"", comments[student]}
             sheet.table.put(row, sheet.columns["feedback"], comments[student])
     if "feedback" not in sheet.columns:
         sheet.notes.append("the worksheet has no column for feedback comments: only grades are filled in")
+    if said:
+        sheet.notes.append(f"{said} comment(s) that Moodle holds already are replaced")
     if replaced:
         sheet.notes.append(
             f"{replaced} grade(s) that Moodle holds already are changed: it skips them unless the box for"

@@ -96,6 +96,12 @@ def test_who_is_not_there_or_shares_a_row_is_told(tmp_path):
     assert "nobody in the gradebook has" in delivery.not_found["s09"]
 
 
+def test_a_grade_that_canvas_holds_for_a_withheld_student_stays_and_is_told(tmp_path):
+    delivery, text = filled(tmp_path, report("S-02", None, status="needs_review"))
+    assert text == EXPORTED
+    assert "withheld, and a grade is there already, which stays: S-02 (6.00)" in delivery.notes
+
+
 @pytest.mark.parametrize("cell", ["EX", "ex", "N/A"])
 def test_excused_students_are_left(tmp_path, cell):
     text = EXPORTED.replace('2",3,,55', f'2",3,{cell},55')

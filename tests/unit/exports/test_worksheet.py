@@ -82,6 +82,23 @@ def test_what_waits_for_a_person_stays_blank():
     assert [row["Grade"] for row in rows(found.content)] == ["5", ""]
 
 
+def test_a_grade_that_moodle_holds_for_a_withheld_student_stays_and_is_told():
+    data = worksheet(line(101, grade="3.00"), line(102, "Ana Ionescu", "ana@x.ro"))
+    waiting = report("s01", None, status="needs_review"), report("s02", None, status="missing")
+    found = filled_in(data, *waiting)
+    assert found.content == data
+    assert found.notes == ("withheld, and a grade is there already, which stays: s01 (3.00)",)
+
+
+def test_comments_that_moodle_holds_already_are_replaced_and_told():
+    data = worksheet(line(101) + "well done", line(102, "Ana Ionescu", "ana@x.ro"))
+    comments = {"s01": "<p>a</p>", "s02": "<p>b</p>"}
+    found = filled_in(data, report("s01", 5.0), report("s02", 5.0), comments=comments)
+    assert found.notes == ("1 comment(s) that Moodle holds already are replaced",)
+    again = filled_in(found.content, report("s01", 5.0), report("s02", 5.0), comments=comments)
+    assert again.notes == ()
+
+
 def test_students_are_found_by_address_before_name():
     data = worksheet(line(101, "Ana Ionescu", "ion@x.ro"), line(102, "Ion Popescu", "ana@x.ro"))
     found = filled_in(data, report("s01", 5.0), report("s02", 6.0))
