@@ -169,7 +169,7 @@ class CriterionDocument(Document):
     id: str
     title: str
     vector: str | None
-    """The vector or angular quantity judged; null for a scale."""
+    """The vector or angular quantity judged; null for a scale and a link."""
     points: float | None
     """Null while under review, and where not judged."""
     max_points: float
@@ -183,6 +183,13 @@ class CriterionDocument(Document):
     feedback: str = ""
     reasons: list[str] = []
     """Codes of what the verdict rests on, most important first."""
+    link: str | None = None
+    """The link of the mechanism judged."""
+
+    @property
+    def drawn(self) -> str:
+        """The vector, angular quantity or link judged; empty for a scale."""
+        return self.vector or self.link or ""
 
 
 class RivalDocument(Document):

@@ -276,6 +276,7 @@ def _criterion(
         mistake=outcome.mistake,
         feedback=feedback,
         reasons=[reason.code for reason in outcome.reasons],
+        link=outcome.name if outcome.name not in {"kL", "kv", "ka"} and not is_vector else None,
     )
 
 
