@@ -25,20 +25,7 @@ def guide(grades: Sequence[Grade], options: Options) -> Draft:
     Raises CallError where nothing says which assignment, and where it has a guide already: saving
     another would delete it with everybody's points.
     """
-    place = place_of(options.criteria) if options.criteria else Place(None, None, ())
-    cmid, context_id = options.cmid or place.cmid, options.context_id or place.context_id
-    if cmid is None or context_id is None:
-        raise CallError(
-            "place_needed",
-            "which assignment? Give Moodle's answer to core_grading_get_definitions (--criteria),"
-            " or --cmid and --context-id",
-        )
-    if place.criteria:
-        raise CallError(
-            "guide_exists",
-            f"{options.criteria}: the assignment has a marking guide already, and saving another would"
-            " delete it with everybody's points; delete it in Moodle first if that is meant",
-        )
+    cmid, context_id = _free_place(options)
     made = int(options.moment.timestamp())
     criteria = class_criteria(grades, options)
     definition = {
@@ -55,6 +42,31 @@ def guide(grades: Sequence[Grade], options: Options) -> Draft:
         "arguments": {"areas": [{"cmid": cmid, "contextid": context_id, "definitions": [definition]}]},
     }
     return Draft(json_text(document(MoodleRubricDocument, told, "the marking guide")), ())
+
+
+def _free_place(options: Options) -> tuple[int, int]:
+    """The numbers of the activity and its context; CallError where they are not told or a form is there."""
+    place = place_of(options.criteria) if options.criteria else Place(None, None, ())
+    cmid, context_id = options.cmid or place.cmid, options.context_id or place.context_id
+    if cmid is None or context_id is None:
+        raise CallError(
+            "place_needed",
+            "which assignment? Give Moodle's answer to core_grading_get_definitions (--criteria),"
+            " or --cmid and --context-id",
+        )
+    if place.method not in ("", "guide"):
+        raise CallError(
+            "guide_exists",
+            f"{options.criteria}: the assignment is graded by '{place.method}', and saving a guide would put"
+            " that aside; choose 'Marking guide' or 'Simple direct grading' in Moodle first",
+        )
+    if place.criteria:
+        raise CallError(
+            "guide_exists",
+            f"{options.criteria}: the assignment has a marking guide already, and saving another would"
+            " delete it with everybody's points; delete it in Moodle first if that is meant",
+        )
+    return cmid, context_id
 
 
 def _criterion(order: int, one: Criterion) -> dict[str, object]:

@@ -98,11 +98,12 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """An activity as Moodle tells it: its numbers, and the criteria of its marking guide."""
+    """An activity as Moodle tells it: its numbers, how it is graded, the criteria of its marking guide."""
 
     cmid: int | None
     context_id: int | None
     criteria: tuple[Known, ...]
+    method: str = ""
 
 
 def place_of(path: Path) -> Place:
@@ -113,7 +114,9 @@ def place_of(path: Path) -> Place:
         raise InputFileError(
             "criteria", f"{path}: is not Moodle's answer to core_grading_get_definitions for one activity"
         )
-    return Place(_whole(areas[0].get("cmid")), _whole(areas[0].get("contextid")), tuple(_told(told)))
+    area = areas[0]
+    method = area.get("activemethod") or ""
+    return Place(_whole(area.get("cmid")), _whole(area.get("contextid")), tuple(_told(told)), str(method))
 
 
 def numbered(criteria: Sequence[Criterion], path: Path) -> list[PlatformCriterion]:

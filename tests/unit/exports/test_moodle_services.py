@@ -110,6 +110,12 @@ def test_a_guide_is_never_written_over_another(tmp_path, answer):
     assert not (tmp_path / "out.json").exists()
 
 
+def test_another_way_of_grading_is_never_put_aside(tmp_path, answer):
+    with pytest.raises(CallError, match="graded by 'rubric'"):
+        moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=answer(activemethod="rubric"))
+    moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=answer(activemethod=None))
+
+
 @pytest.mark.parametrize("told", ["[]", "{}", '{"areas": []}', '{"areas": [1]}', '{"areas": [{}, {}]}', "x"])
 def test_an_answer_that_is_not_moodles_is_refused(tmp_path, told):
     path = tmp_path / "definitions.json"
