@@ -32,9 +32,10 @@ WAITING: dict[str, str] = {
     "written_disagrees": N_("the drawing and the length written on the sheet differ"),
     "scale_assumed": N_("no scale was declared, and the drawing follows another than the assignment's own"),
     "scale_off": N_("the declared scale does not fit the drawing"),
+    "follows": N_("it hangs on what is still open"),
     "": N_("open"),
 }
-"""Why a person must look, by the code of the reason; the first that a criterion has counts."""
+"""Why a person must look, by the code of the reason; the first of these that a criterion has counts."""
 
 
 def actions_of(
@@ -74,9 +75,14 @@ def actions_of(
 
 
 def _first_figure(criteria: Sequence[CriterionDocument]) -> set[str]:
-    """The vectors of the plan in which the first of them is."""
-    vectors = [one.vector for one in criteria if one.vector]
-    return {vector for vector in vectors if vector[0] == vectors[0][0]}
+    """The vectors or links of the figure in which the first of them is."""
+    drawn = [one for one in criteria if one.drawn]
+    return {one.drawn for one in drawn if _kind(one) == _kind(drawn[0])}
+
+
+def _kind(criterion: CriterionDocument) -> str:
+    """``v`` or ``a`` by the plan in which a vector is; empty for a link."""
+    return (criterion.vector or "")[:1]
 
 
 def _action(
@@ -87,11 +93,11 @@ def _action(
     names: Mapping[str, str],
 ) -> Action:
     titles = {criterion.id: criterion.title for criterion in report.criteria}
-    vectors = {criterion.id: criterion.vector for criterion in report.criteria}
+    vectors = {criterion.id: criterion.drawn for criterion in report.criteria}
     off = {
         criterion.id for criterion in report.criteria if criterion.verdict in {"none", "partial", "review"}
     }
-    concerned = {vectors[one] or "" for one in mistake.explains if one in off}
+    concerned = {vectors[one] for one in mistake.explains if one in off}
     alternatives = [_title(mistake.code, mistake.at, mistake.detail, speaker)]
     for rival in mistake.rivals:
         title = _title(rival.code, rival.at, rival.detail, speaker)
@@ -121,8 +127,8 @@ def waiting_of(report: ReportDocument, speaker: Tongue, names: Mapping[str, str]
     groups: dict[str, list[Markup]] = {}
     for criterion in report.criteria:
         if criterion.verdict == "review":
-            why = next((code for code in criterion.reasons if code in WAITING), "")
-            named = criterion.vector or criterion.id
+            why = next((code for code in WAITING if code in criterion.reasons), "")
+            named = criterion.drawn or criterion.id
             groups.setdefault(why, []).append(words.symbols(names.get(named, named)))
     return tuple(Waiting(speaker.gettext(WAITING[why]), tuple(one)) for why, one in groups.items())
 
@@ -131,7 +137,7 @@ def waiting_looks(
     report: ReportDocument, pictures: Sequence[Picture], names: Mapping[str, str]
 ) -> tuple[Look, ...]:
     """A closer look at some of what waits, vectors that lie together in one."""
-    open_ones = [one.vector for one in report.criteria if one.verdict == "review" and one.vector]
+    open_ones = [one.drawn for one in report.criteria if one.verdict == "review" and one.drawn]
     found: list[Look] = []
     shown: set[str] = set()
     for name in open_ones:

@@ -15,8 +15,8 @@ from grader.scene import Picture
 SHEET = N_("the sheet")
 DETAIL = N_("a closer look")
 WHY_WIDENED = N_(
-    "Widened: small errors of a careful hand add up to more than the rubric's tolerance here, as they do where"
-    " lines meet at a small angle."
+    "Widened: small errors of a careful hand add up to more than the rubric's tolerance here, as they do"
+    " where lines meet at a small angle."
 )
 UNITS = N_(
     "Lengths are millimetres on paper; directions count counter-clockwise from the horizontal to the right."

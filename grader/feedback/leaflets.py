@@ -82,7 +82,7 @@ def _tally(report: ReportDocument) -> tuple[tuple[str, int], ...]:
 
 def _row(criterion: CriterionDocument, speaker: Tongue, level: Level, names: Mapping[str, str]) -> Row:
     full = level == "full"
-    named = criterion.vector or ""
+    named = criterion.drawn
     is_told = named and named not in criterion.title
     said = criterion.feedback if criterion.feedback != speaker.gettext(N_("Right.")) else ""
     return Row(
@@ -109,7 +109,7 @@ def _is_left_out(criterion: CriterionDocument) -> bool:
 def _left_out(
     criterion: CriterionDocument, speaker: Tongue, level: Level, names: Mapping[str, str]
 ) -> Markup:
-    named = criterion.vector or criterion.id
+    named = criterion.drawn or criterion.id
     name = words.symbols(names.get(named, named))
     value = quantities.told(criterion.expected, speaker)[-1:] if level == "full" else []
     return Markup("{} ({})").format(name, *value) if value else name

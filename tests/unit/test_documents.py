@@ -86,7 +86,9 @@ def test_a_report_under_review_has_no_score_but_a_range():
 def test_a_mistake_is_in_the_report_with_what_it_explains():
     made = measured(PUMP, mistakes=(Mistake("wrong_link", "b", 1, other=("C", "D")),))
     written = report(PUMP, made)
-    assert [(one.code, one.at, one.detail) for one in written.mistakes] == [("wrong_link", "b", "other = CD")]
+    assert [(one.code, one.at, one.detail) for one in written.mistakes] == [
+        ("wrong_link", "b", "other = CD, from = o, link = O2B")
+    ]
     rotated = measured(PUMP, mistakes=(Mistake("figure_rotated", "velocity_plan", quarters=1),))
     assert report(PUMP, rotated).mistakes[0].detail == "degrees = 90"
 

@@ -1,9 +1,12 @@
 """What a student is told: mistakes first, each where it is seen, and what waits with its reason."""
 
+from dataclasses import replace
+
 from grader.documents import MistakeDocument, ToleranceDocument
 from grader.feedback import About
 from grader.feedback.leaflets import leaflet_of
 from grader.i18n import tongue
+from grader.scene import Arrow
 from tests.unit.feedback.works import criterion, picture, report
 
 
@@ -96,3 +99,22 @@ def test_a_widened_tolerance_is_told_as_such_with_the_reason():
     assert "small angle" in told.widening
     assert leaflet(report(criteria=[wider], mistakes=[]), level="hint").widening == ""
     assert leaflet(report(mistakes=[])).widening == ""
+
+
+def test_a_link_that_is_off_is_shown_on_the_sketch():
+    link = criterion("v_B", "none", 0.0).model_copy(
+        update={"vector": None, "link": "O1A", "title": "Link O1A"}
+    )
+    sketched = picture()
+    arrow = Arrow("O1A", "mechanism", (200.0, 200.0), (250.0, 220.0), "none", doubtful=False, is_link=True)
+    sketched = replace(sketched, scene=replace(sketched.scene, arrows=(*sketched.scene.arrows, arrow)))
+    (action,) = leaflet(report(criteria=[link], mistakes=[]), [sketched]).actions
+    assert action.look.names == ("O1A",)
+
+
+def test_what_hangs_on_something_open_says_so_unless_there_is_a_better_reason():
+    hangs = criterion("v_C", "review", None).model_copy(update={"reasons": ["follows", "too_long"]})
+    near = criterion("v_D", "review", None).model_copy(update={"reasons": ["follows", "near_limit"]})
+    waiting = leaflet(report(criteria=[hangs, near], mistakes=[])).waiting
+    assert waiting[0].why == "it hangs on what is still open"
+    assert waiting[1].why.startswith("so near the limit")
