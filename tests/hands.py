@@ -8,9 +8,11 @@ from functools import cache
 
 import numpy as np
 
-from grader.comparison import Task, task_of
+from grader.comparison import Submission, Task, task_of
 from grader.records import Figure, Reading, ReadNode, ReadVector
 from grader.rubric import rubric_of
+from grader.simulation import Hand
+from grader.simulation.hand import slips
 from reference.assignment import load_assignment
 from reference.construction import evaluate
 from reference.mistakes import Drawing, Mistake, commit
@@ -125,3 +127,57 @@ def sheet(
             vectors[vector.name] = ReadVector(length, 1.4 * se_mm, degrees, se_deg, confidence)
         found[figure] = Figure(read, vectors)
     return Reading(found)
+
+
+# Hands that err -----------------------------------------------------------------------------------
+
+SOURCES = ("sheet", "directions", "lengths")
+RULER_MM, PROTRACTOR_DEG = 0.5, 1.0
+"""To which a student reads a length and a direction."""
+
+
+def drawn_by(
+    task: Task, hand: Hand, lot: np.random.Generator, mistakes: tuple[Mistake, ...] = ()
+) -> dict[str, complex]:
+    """All nodes as a hand draws them, with some mistakes followed through."""
+    drawing = Drawing(task.construction, task.parameters)
+    for mistake in mistakes:
+        drawing = commit(mistake, drawing)
+    for _ in range(20):
+        errors = slips(drawing.construction, hand, lot)
+        found = evaluate(drawing.construction, drawing.parameters, errors=errors)
+        nodes = {name: complex(np.ravel(place)[0]) for name, place in found.items()}
+        if all(cmath.isfinite(place) for place in nodes.values()):
+            return nodes
+    raise ValueError("the drawing does not close with this hand")
+
+
+def handed_in(task: Task, nodes: Mapping[str, complex], source: str) -> Submission:
+    """Drawn nodes as a sheet that was read, or as measured with ruler and protractor or the ruler alone."""
+    declared = {
+        name: f"{value!r} {unit}"
+        for (name, value), unit in zip(
+            rule_scales(task).items(), ("m/mm", "(m/s)/mm", "(m/s2)/mm"), strict=True
+        )
+    }
+    exact = drawn_nodes(task)
+    moved = {name: nodes[name] - exact[name] for name in nodes}
+    read = sheet(task, moved=moved)
+    if source == "sheet":
+        return Submission(readings=(read,), declared=declared)
+    figures = {}
+    for plan in task.construction.poles:
+        vectors = {
+            name: _measured_by_hand(one, with_direction=source == "directions")
+            for name, one in read.figures[plan].vectors.items()
+        }
+        figures[plan] = Figure({}, vectors)
+    return Submission(measured=Reading(figures), declared=declared)
+
+
+def _measured_by_hand(one: ReadVector, *, with_direction: bool) -> ReadVector:
+    length = round((one.length_mm or 0.0) / RULER_MM) * RULER_MM
+    if not with_direction or one.direction_deg is None or not length:
+        return ReadVector(length, 0.0, None, None, 1.0)
+    turned = round(one.direction_deg / PROTRACTOR_DEG) * PROTRACTOR_DEG % 360.0
+    return ReadVector(length, 0.0, turned, 0.0, 1.0)

@@ -9,10 +9,11 @@ import pytest
 
 from grader.comparison import Submission, compare, task_of
 from grader.records import Figure, Reading, ReadNode, ReadVector, Unread
-from grader.rubric import CriterionTable, HandTable, load_rubric
+from grader.rubric import CriterionTable, load_rubric
 from reference.assignment import load_assignment
 from reference.mistakes import Mistake
 from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
+from tests.unit.comparison.rubrics import with_criterion, with_rubric, without_hand
 
 PUMP = task_for("pump", 7)
 PRESS = task_for("press", position=1)
@@ -34,20 +35,6 @@ def codes(outcome):
 
 def lost(comparison):
     return [one.criterion for one in comparison.outcomes if one.verdict not in {"full", "not_judged"}]
-
-
-def with_rubric(task, **change):
-    return replace(task, rubric=task.rubric.model_copy(update=change))
-
-
-def with_criterion(task, name, **change):
-    criteria = [one.model_copy(update=change) if one.id == name else one for one in task.rubric.criterion]
-    return with_rubric(task, criterion=criteria)
-
-
-def without_hand(task):
-    """The same rubric with its tolerances as they stand, widened for nobody's hand."""
-    return with_rubric(task, hand=HandTable(sigmas=0.0))
 
 
 BARE = without_hand(PUMP)

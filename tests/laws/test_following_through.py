@@ -1,0 +1,110 @@
+"""What follows rightly from a mistake is credited, and the mistake costs; pairs of mistakes too."""
+
+import contextlib
+from collections import Counter
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from grader.comparison import compare
+from grader.comparison.marking import direction_tolerance, length_tolerance
+from grader.simulation import PERFECT, TYPICAL
+from reference.mistakes import Drawing, affected, single_mistakes
+from tests.hands import SOURCES, drawn_by, drawn_nodes, handed_in, task_for
+
+CREDITED = {"full", "follow_through"}
+LARGEST_MM = 350.0
+"""Larger than that no plan is drawn."""
+CLEAR = 3.0
+"""Tolerances by which a vector is off so that the mistake must cost something."""
+CASES = [
+    ("pump", 7, None), ("pump", 24, None), ("press", None, 1), ("press", None, 3), ("engine", 7, None),
+    ("shaper", 9, None), ("piston", 10, None),
+]  # fmt: skip
+LEAST_SINGLE = {"sheet": 0.99, "directions": 0.99, "lengths": 0.98}
+LEAST_PAIR = {"sheet": 0.98, "directions": 0.98, "lengths": 0.96}
+MISTAKES, PAIRS = 9, 6
+"""Drawn by lot for each case and source."""
+
+
+def mistakes_of(task):
+    """Every mistake in one step of the plans that can be drawn on paper."""
+    drawing = Drawing(task.construction, task.parameters)
+    for figure in task.construction.poles:
+        for mistake in single_mistakes(drawing, figure):
+            if mistake.code in {"scale_wrong", "rpm_not_converted", "figure_rotated"}:
+                continue
+            with contextlib.suppress(ValueError):
+                nodes = drawn_nodes(task, mistakes=(mistake,))
+                if all(np.isfinite(node) and abs(node) < LARGEST_MM for node in nodes.values()):
+                    yield mistake
+
+
+def is_trivial(task, nodes, vector):
+    """Next to nothing is left of it, so that nothing can be credited for it."""
+    right, own = drawn_nodes(task), nodes
+    sizes = [abs(places[vector.head] - places[vector.tail]) for places in (own, right)]
+    return sizes[0] < max(1.3 * task.rubric.least_followed_share * sizes[1], task.rubric.tolerance.least_mm)
+
+
+def followed(task, mistakes, hand, lot, source):
+    """Of the vectors that follow from mistakes, how many are credited, and how many wait for a person."""
+    nodes = drawn_by(task, hand, lot, mistakes)
+    wrong = {mistake.at for mistake in mistakes}
+    moved = frozenset().union(*(affected(one, task.construction) for one in mistakes)) - wrong
+    vectors = task.construction.vectors
+    for outcome in compare(task, handed_in(task, nodes, source)).outcomes:
+        vector = vectors.get(outcome.name)
+        if vector is None or vector.head not in moved or outcome.verdict == "not_judged":
+            continue
+        if not is_trivial(task, nodes, vector):
+            yield outcome.verdict in CREDITED or outcome.verdict == "review"
+
+
+def is_clear(task, mistake):
+    """Whether a vector that ends where the mistake was made is clearly off."""
+    right, wrong = drawn_nodes(task), drawn_nodes(task, mistakes=(mistake,))
+    table = task.rubric.tolerance
+    for vector in task.construction.vectors.values():
+        exact, own = (places[vector.head] - places[vector.tail] for places in (right, wrong))
+        if vector.head != mistake.at or abs(exact) < table.least_mm or abs(own) < table.least_mm:
+            continue
+        turn = direction_tolerance(table, abs(exact)) or 0.0
+        if abs(abs(own) - abs(exact)) > CLEAR * length_tolerance(table, abs(exact)):
+            return True
+        if abs(np.degrees(np.angle(own / exact))) > CLEAR * turn:
+            return True
+    return False
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_what_follows_from_one_mistake_is_credited_and_the_mistake_costs(source):
+    lot, found = np.random.default_rng(11), Counter()
+    for case in CASES:
+        task = task_for(*case)
+        every = list(mistakes_of(task))
+        for mistake in (every[index] for index in lot.permutation(len(every))[:MISTAKES]):
+            for hand in (PERFECT, TYPICAL):
+                with contextlib.suppress(ValueError):
+                    found.update(followed(task, (mistake,), hand, lot, source))
+            if source == "sheet" and is_clear(task, mistake):
+                outcomes = compare(
+                    task, handed_in(task, drawn_nodes(task, mistakes=(mistake,)), source)
+                ).outcomes
+                assert {one.verdict for one in outcomes} & {"none", "partial", "review"}, mistake
+    assert found[True] >= LEAST_SINGLE[source] * found.total(), found
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_what_follows_from_two_mistakes_is_credited(source):
+    lot, found = np.random.default_rng(12), Counter()
+    for case in CASES:
+        task = task_for(*case)
+        pairs = [pair for pair in combinations(mistakes_of(task), 2) if pair[0].at != pair[1].at]
+        for index in lot.permutation(len(pairs))[:PAIRS]:
+            with contextlib.suppress(ValueError):
+                nodes = drawn_nodes(task, mistakes=pairs[index])
+                if all(np.isfinite(node) and abs(node) < LARGEST_MM for node in nodes.values()):
+                    found.update(followed(task, pairs[index], PERFECT, lot, source))
+    assert found[True] >= LEAST_PAIR[source] * found.total(), found
