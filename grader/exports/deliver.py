@@ -209,6 +209,8 @@ def export(results: ResultsDocument, path: Path, options: Options) -> Delivery:
     else:
         write_whole(path, draft.content)
     notes = (*draft.notes, *([_AGAIN] if is_again else []))
+    if what == "feedback":
+        notes = (f"{path.stat().st_size / 1e6:.1f} MB: the site's upload limit must allow it", *notes)
     if draft.withheld and not draft.written:
         notes = ("nobody has a grade yet: there is nothing to upload", *notes)
     notes = (*notes, *_alike(results, draft.written))

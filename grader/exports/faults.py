@@ -18,6 +18,12 @@ def listed(faults: Sequence[str]) -> str:
     return "".join(lines)
 
 
+def in_a_row(names: Sequence[str]) -> str:
+    """Names in one line, the first of many."""
+    more = f" and {len(names) - MOST} more" if len(names) > MOST else ""
+    return ", ".join(names[:MOST]) + more
+
+
 def faults_of(error: ValidationError) -> list[str]:
     """What a model found wrong, with the path in the document."""
     return [f"{_path(one['loc'])}: {_plain(one['msg'])}" for one in error.errors()]

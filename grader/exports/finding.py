@@ -5,6 +5,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from grader.exports.faults import in_a_row
+
 Evidence = Sequence[tuple[str, str]]
 """Columns and what would stand there, the strongest first; an empty text is no evidence."""
 NAMES = frozenset({"name", "name turned"})
@@ -57,13 +59,13 @@ class Found:
         doubtful = [student for student in self.by_name if student in set(written)]
         if not doubtful:
             return []
-        return [f"found by name alone, look whether they are these: {', '.join(doubtful)}"]
+        return [f"found by name alone, look whether they are these: {in_a_row(doubtful)}"]
 
 
 def held_already(withheld: Iterable[str], found: Found, cells: Mapping[int, str]) -> list[str]:
     """Who is withheld and has a grade there all the same; `cells` are the grades that stand in rows."""
     held = [f"{one} ({cells[found.rows[one]]})" for one in withheld if cells.get(found.rows.get(one, -1))]
-    return [f"withheld, and a grade is there already, which stays: {', '.join(held)}"] if held else []
+    return [f"withheld, and a grade is there already, which stays: {in_a_row(held)}"] if held else []
 
 
 def find(rows: Rows, students: Mapping[str, Evidence], table: str) -> Found:

@@ -44,14 +44,12 @@ def feedback_files(grades: Sequence[Grade], options: Options, worksheet: bytes |
         )
     if missing and not files:
         raise CallError("nothing_to_export", f"no student has a number in Moodle{listed(_lines(missing))}")
-    weight = sum(file.stat().st_size for file in files.values()) / 1e6
     return Draft(
         files,
         tuple(grade.student_id for grade in told if grade.student_id in numbers),
         withheld=withheld(grades),
         not_found=missing,
         notes=(
-            f"{weight:.1f} MB: the site's upload limit must allow it",
             "upload grades before feedback files: they make Moodle take a worksheet for outdated",
             *notes,
         ),

@@ -8,7 +8,7 @@ import pytest
 from grader.documents import AlikeDocument
 from grader.exports import Options, Person, export, usual_name
 from grader.exports.deliver import KINDS
-from grader.exports.faults import MOST, listed
+from grader.exports.faults import MOST, in_a_row, listed
 from grader.exports.finding import Rows, find
 from grader.files import OutputError
 from reference.errors import CallError
@@ -97,6 +97,8 @@ def test_a_long_list_of_faults_ends_with_how_many_more():
     lines = listed([f"s{one}: wrong" for one in range(MOST + 30)]).splitlines()
     assert len(lines) == MOST + 2
     assert lines[-1] == "  and 30 more"
+    assert in_a_row(["a", "b"]) == "a, b"
+    assert in_a_row(MOST * ["a"] + ["b", "c"]).endswith("a and 2 more")
 
 
 def test_names_are_found_however_their_accents_are_written():
