@@ -1,0 +1,85 @@
+"""What students get back: levels, ghosts and print, as an instructor asks for them, and a student at home."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from grader.cli.checking import check_measured
+from grader.cli.grading import grade_folder
+from reference.errors import CallError
+
+SAMPLE = Path(__file__).parents[2] / "samples" / "pump" / "s08.json"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """One student's measurements, one of them far off."""
+    where = tmp_path / "folder"
+    where.mkdir()
+    measured = json.loads(SAMPLE.read_text(encoding="utf-8"))
+    measured["segments_mm"]["v_BA"] *= 1.31
+    (where / "s08.json").write_text(json.dumps(measured), encoding="utf-8")
+    return where
+
+
+def test_print_ghosts_and_levels_are_as_asked_for(planmark, folder, tmp_path):
+    ran = planmark("grade", folder, "--assignment", "pump", "--out", "marks", "--jobs", 1)
+    assert ran.returncode in {0, 1}, ran.stderr
+    student = tmp_path / "marks" / "s08"
+    assert {path.name for path in student.iterdir()} == {"feedback.html", "report.json"}
+    page = (student / "feedback.html").read_text(encoding="utf-8")
+    (expected,) = {
+        f"{one['expected']['length_mm']:.1f}"
+        for one in json.loads((student / "report.json").read_text(encoding="utf-8"))["criteria"]
+        if one["vector"] == "v_BA"
+    }
+    ghost = 'class="line ghost"'
+    assert f"{expected}\u00a0mm" in page
+    assert ghost in page
+
+    again = planmark(
+        "grade", folder, "--assignment", "pump", "--out", "marks", "--jobs", 1, "--pdf", "--no-ghosts"
+    )
+    assert again.returncode == ran.returncode
+    assert (student / "feedback.pdf").read_bytes().startswith(b"%PDF")
+    page = (student / "feedback.html").read_text(encoding="utf-8")
+    assert f"{expected}\u00a0mm" in page
+    assert ghost not in page
+
+    planmark("grade", folder, "--assignment", "pump", "--out", "marks", "--jobs", 1, "--level", "hint")
+    assert not (student / "feedback.pdf").exists()
+    page = (student / "feedback.html").read_text(encoding="utf-8")
+    assert f"{expected}\u00a0mm" not in page
+    assert ghost not in page
+
+
+def test_a_level_that_there_is_not_is_refused_before_anything_is_written(folder, tmp_path):
+    out = tmp_path / "marks"
+    with pytest.raises(CallError, match="symbol, hint, full"):
+        grade_folder(folder, "pump", out, roster=None, pages_per_student=None, jobs=1, lang="en", level="all")
+    assert not out.exists()
+
+
+def test_a_student_gets_a_page_of_values_measured_at_home(planmark, folder, tmp_path):
+    for name in ("mine.html", "mine.pdf"):
+        ran = planmark("check", "pump", "--measured", folder / "s08.json", "--page", name, "--lang", "ru")
+        assert ran.returncode == 1, ran.stderr
+    page = (tmp_path / "mine.html").read_text(encoding="utf-8")
+    assert re.search(r"<svg[^>]* class=.sheet.|<svg class=.sheet.", page)
+    assert "План скоростей" in page
+    assert (tmp_path / "mine.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize("name", ["mine.doc", "mine"])
+def test_a_page_of_another_kind_is_refused(folder, name):
+    with pytest.raises(CallError, match=r"\.html or \.pdf"):
+        check_measured("pump", None, None, folder / "s08.json", "en", "hint", Path(name))
+
+
+def test_one_page_is_of_one_student(tmp_path):
+    page = tmp_path / "mine.html"
+    with pytest.raises(CallError, match="holds 2"):
+        check_measured("pump", None, None, SAMPLE.with_name("measurements.csv"), "en", "hint", page)
+    assert not page.exists()
