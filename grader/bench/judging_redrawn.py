@@ -36,13 +36,14 @@ def with_mistakes(right: Drawing, mistakes: Sequence[Mistake]) -> Drawing:
 
 
 def vectors_of(right: Drawing, mistakes: Sequence[Mistake]) -> dict[str, complex]:
-    """Every vector in millimetres, under the names written beside it. Raises ValueError as above."""
+    """Every vector and link, mm, under the names written beside them. Raises ValueError as above."""
     drawing = with_mistakes(right, mistakes)
     nodes = evaluate(drawing.construction, drawing.parameters)
     swaps = [(one.other[0], one.other[1]) for one in mistakes if one.code == "labels_swapped"]
     named = relabelled({name: complex(place) for name, place in nodes.items()}, swaps)
-    vectors = right.construction.vectors
-    return {name: named[one.head] - named[one.tail] for name, one in vectors.items()}
+    vectors = {name: (one.tail, one.head) for name, one in right.construction.vectors.items()}
+    ends = {**vectors, **right.construction.links}
+    return {name: named[head] - named[tail] for name, (tail, head) in ends.items()}
 
 
 def relabelled(nodes: Mapping[str, complex], swaps: Sequence[tuple[str, str]]) -> dict[str, complex]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from grader.judging import Submission
+from grader.records import MECHANISM
 from grader.rubric import ToleranceTable
 
 Due = Literal["right", "follows", "wrong", "either", "missed", "absent"]
@@ -18,22 +19,24 @@ SHORT = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What the judge can see: the vectors, and whether their directions are known."""
+    """What the judge can see: the vectors and links, and whether their directions are known."""
 
     directed: Mapping[str, bool]
 
     @classmethod
-    def of(cls, handed_in: Submission) -> "Seen":
-        """From what was handed in."""
+    def of(cls, handed_in: Submission, links: Mapping[str, tuple[str, str]]) -> "Seen":
+        """From what was handed in; a link is seen where both of its joints are."""
         readings = [*handed_in.readings, *([handed_in.measured] if handed_in.measured else [])]
-        return cls(
-            {
-                name: vector.direction_deg is not None
-                for reading in readings
-                for figure in reading.figures.values()
-                for name, vector in figure.vectors.items()
-            }
-        )
+        joints = {
+            joint for one in readings if MECHANISM in one.figures for joint in one.figures[MECHANISM].nodes
+        }
+        vectors = {
+            name: vector.direction_deg is not None
+            for reading in readings
+            for figure in reading.figures.values()
+            for name, vector in figure.vectors.items()
+        }
+        return cls({**vectors, **{name: True for name, ends in links.items() if joints.issuperset(ends)}})
 
 
 def off(drawn: complex, due: complex, tolerance: ToleranceTable, *, directed: bool) -> float:

@@ -108,7 +108,7 @@ def _named(mistake: Mistake) -> str:
 
 def result_of(work: Work, source: Source, handed_in: Submission, judgement: Judgement) -> Result:
     """A judgement held against the truth."""
-    seen = Seen.of(handed_in)
+    seen = Seen.of(handed_in, work.construction.links)
     due = verdicts_due(work, source, seen)
     marked = tuple(Marked(one.criterion, due[one.criterion], one.verdict) for one in judgement.outcomes)
     made = mistakes_due(work, source, seen)

@@ -19,12 +19,12 @@ By code:
 - `sense_reversed`, `normal_reversed`, `normal_missing`, `normal_from_absolute`, `arithmetic`,
   `parallel_for_perpendicular`, `wrong_link`, `wrong_intersection`, `image_mirrored`: the vectors that
   end in the node of the changed step, as above; what is drawn from it follows.
-- `other_variant`: the driven link's own vectors, held against the exact plan, the first of them to be
-  charged, the others either (the same mistake again); all else by the student's own nodes, where only
-  data that differ (lengths, guides) make a step wrong. Where the driven link's speed differs too, a
-  declared scale looks wrong instead: then either for scale and vector.
-- `other_assembly`: only the sketch is wrong, and no criterion asks for it: either verdict for the
-  vectors of the first node that shows it, the rest follows.
+- `other_variant`: the crank as sketched, where the sketch is seen and asked for; else the driven link's
+  first vector, held against the exact plan. Its other vectors are either (the same mistake again), all
+  else is by the student's own nodes, where only data that differ (lengths, guides) make a step wrong.
+  Where the driven link's speed differs too, a declared scale looks wrong instead: then either.
+- `other_assembly`: the links of the joint that lies on the wrong side. Where no criterion asks for them,
+  or no sketch is seen, either verdict for the vectors of the first node that shows it; the rest follows.
 - `figure_rotated`: the driven link's vector of that plan; the rest is drawn rightly in the turned plan.
 - `scale_wrong`: the criterion of the scale where one was declared; the vectors are right by the scale
   that they follow. Undeclared it may be the student's choice: either for the driven link's vector of that
@@ -39,61 +39,40 @@ By code:
   either where the letters themselves are told beside nodes named by their lines.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
-import numpy as np
-
+from grader.bench.judging_forms import Forms, Held, cranks_of, ends_of, is_driven
 from grader.bench.judging_redrawn import SCALES
 from grader.bench.judging_rules import CLEAR, PLAIN, Due, Seen, off
 from grader.bench.judging_students import ON_SHEETS, Source, Work
 from grader.bench.judging_values import computed, rate_due
 from grader.rubric import CriterionTable
 from reference.construction import Construction, Vector, ancestors, evaluate
-from reference.elements import Scaled, View
 from reference.geometry import ComplexArray
-from reference.mistakes import Drawing, Mistake, commit
+from reference.mistakes import Mistake
 from reference.steps import ArcAndLine, Given, Pivot, TwoArcs
-
-
-@dataclass(frozen=True, slots=True)
-class _Forms:
-    """One vector in all its forms, complex mm; `named` as it is handed in."""
-
-    named: complex
-    drawn: complex
-    due: complex
-    made: complex
-    exact: complex
-    told: complex
-    """The exact one at the scales that the student meant to follow."""
 
 
 def verdicts_due(work: Work, source: Source, seen: Seen) -> dict[str, Due]:
     """What is due to each criterion of the rubric, by its id."""
-    found: dict[str, Due] = {}
-    forms = _forms(work, source)
-    by_vector: dict[str, Due] = {}
-    moved: dict[str, float] = {}
-    for criterion in work.rubric.criterion:
-        name = criterion.name
-        if criterion.vector and name in seen.directed and name in forms:
-            by_vector[name] = _due(work, source, criterion, forms[name], seen)
-            directed = seen.directed[name] and criterion.direction
-            one, tolerance = forms[name], work.rubric.tolerance_of(criterion)
-            moved[name] = off(one.due, one.told, tolerance, directed=directed)
+    held = Held.of(work, source)
+    drawn = _Drawn(work, source, seen)
+    drawn.judge(held.links())
+    data_charged = any(drawn.due.get(name) == "wrong" for name in cranks_of(work.construction))
+    drawn.judge(held.vectors(data_charged=data_charged), data_charged=data_charged)
     for mistake in work.task.mistakes:
-        _open_first_shown(work, mistake, by_vector, moved)
-    told = computed(work)
+        drawn.open_first_shown(mistake)
+    told, found = computed(work), {}
     for criterion in work.rubric.criterion:
         if criterion.scale:
-            found[criterion.id] = _scale_due(work, source, criterion.name, by_vector)
+            found[criterion.id] = _scale_due(work, source, criterion.name, drawn.due)
         elif criterion.name == told.slip:
             found[criterion.id] = "wrong"
         elif criterion.angular:
             found[criterion.id] = rate_due(work, source, criterion, told, seen)
         else:
-            found[criterion.id] = by_vector.get(criterion.name, "absent")
+            found[criterion.id] = drawn.due.get(criterion.name, "absent")
     return found
 
 
@@ -109,7 +88,7 @@ def _scale_due(work: Work, source: Source, name: str, by_vector: Mapping[str, Du
     if name in _scales_of_another(work):
         return "either"
     vectors = work.construction.vectors
-    tells = {one for one in by_vector if is_driven(work.construction, vectors[one].head)}
+    tells = {one for one in by_vector if one in vectors and is_driven(work.construction, vectors[one].head)}
     misses = any(vectors[one].scale == name and by_vector[one] == "missed" for one in tells)
     is_sketch = name == "kL" and source in ON_SHEETS
     return "missed" if misses or (is_sketch and _is_yardstick_off(work)) else "right"
@@ -138,6 +117,10 @@ def _yardstick(construction: Construction) -> tuple[str, str]:
     raise ValueError("no link of given length")
 
 
+def _between(nodes: Mapping[str, ComplexArray], vector: Vector) -> complex:
+    return complex(nodes[vector.head]) - complex(nodes[vector.tail])
+
+
 def _scales_of_another(work: Work) -> set[str]:
     """Scales at which another student's driven link looks as if only the scale was wrong."""
     if not any(one.code == "other_variant" for one in work.task.mistakes):
@@ -152,144 +135,112 @@ def _scales_of_another(work: Work) -> set[str]:
     }
 
 
-def _due(work: Work, source: Source, criterion: CriterionTable, forms: _Forms, seen: Seen) -> Due:
-    tolerance = work.rubric.tolerance_of(criterion)
-    directed = seen.directed[criterion.name] and criterion.direction
-    vector = work.construction.vectors[criterion.name]
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    """What is due to each vector and link that was drawn, and how far it is moved from the exact one.
 
-    def apart(one: complex, other: complex) -> float:
-        return off(one, other, tolerance, directed=directed)
+    Attributes
+    ----------
+    due, moved : by name; `moved` in tolerances
+    """
 
-    if _touches_swap(work, vector):
-        if work.by_letters(source):
+    work: Work
+    source: Source
+    seen: Seen
+    due: dict[str, Due] = field(default_factory=dict)
+    moved: dict[str, float] = field(default_factory=dict)
+
+    def judge(self, forms: Mapping[str, tuple[Forms, ...]], *, data_charged: bool = False) -> None:
+        """Every criterion of these names; two sketches of which only one is missed by hand are missed."""
+        for criterion in self.work.rubric.criterion:
+            name = criterion.name
+            if name not in forms or name not in self.seen.directed:
+                continue
+            verdicts = {self._due(criterion, one, data_charged=data_charged) for one in forms[name]}
+            by_hand: Due = "missed" if verdicts <= {"right", "follows", "missed"} else "either"
+            self.due[name] = verdicts.pop() if len(verdicts) == 1 else by_hand
+            self.moved[name] = max(self._off(criterion, one.due, one.told) for one in forms[name])
+
+    def _off(self, criterion: CriterionTable, one: complex, other: complex) -> float:
+        directed = self.seen.directed[criterion.name] and criterion.direction
+        return off(one, other, self.work.rubric.tolerance_of(criterion), directed=directed)
+
+    def _due(self, criterion: CriterionTable, forms: Forms, *, data_charged: bool) -> Due:
+        tolerance, name = self.work.rubric.tolerance_of(criterion), criterion.name
+
+        def apart(one: complex, other: complex) -> float:
+            return self._off(criterion, one, other)
+
+        if _touches_swap(self.work, name):
+            if self.work.by_letters(self.source):
+                return "either"
+            nearest = min(apart(forms.named, forms.due), apart(forms.named, forms.exact))
+            return "wrong" if nearest > CLEAR else "right" if nearest < PLAIN else "either"
+        changed = apart(forms.made, forms.due)
+        by_hand = min(apart(forms.drawn, one) for one in (forms.due, forms.exact, forms.told))
+        if changed > CLEAR:
+            is_open = by_hand < PLAIN or _is_charged_before(self.work, name, data_charged=data_charged)
+            return "either" if is_open else "wrong"
+        if changed > PLAIN or _is_scale_unknown(self.work, name):
             return "either"
-        nearest = min(apart(forms.named, forms.due), apart(forms.named, forms.exact))
-        return "wrong" if nearest > CLEAR else "right" if nearest < PLAIN else "either"
-    changed = apart(forms.made, forms.due)
-    by_hand = min(apart(forms.drawn, one) for one in (forms.due, forms.exact, forms.told))
-    if changed > CLEAR:
-        return "either" if by_hand < PLAIN or _is_charged_before(work, vector) else "wrong"
-    if changed > PLAIN or _is_scale_unknown(work, vector):
-        return "either"
-    if by_hand > PLAIN:
-        return "missed"
-    moved = apart(forms.due, forms.told)
-    least = max(tolerance.least_mm, work.rubric.least_followed_share * abs(forms.told))
-    if moved > PLAIN and abs(forms.due) < least:
-        return "either"
-    return "follows" if moved > CLEAR else "right"
+        if by_hand > PLAIN:
+            return "missed"
+        moved = apart(forms.due, forms.told)
+        least = max(tolerance.least_mm, self.work.rubric.least_followed_share * abs(forms.told))
+        if moved > PLAIN and abs(forms.due) < least:
+            return "either"
+        return "follows" if moved > CLEAR else "right"
+
+    def open_first_shown(self, mistake: Mistake) -> None:
+        """Where a mistake does not show at its own node: either verdict up to the first that shows it."""
+        construction = self.work.construction
+        node = _node_of(construction, mistake)
+        if node is None or self._shows_where_made(mistake, node):
+            return
+        ends = ends_of(construction)
+        plan = construction.figures[mistake.at] if mistake.code == "figure_rotated" else ()
+        for step in construction.steps:
+            hangs_on_it = step in plan or node in ancestors(construction, [step.node])
+            if step.node == node or not hangs_on_it:
+                continue
+            here = [name for name in self.due if ends[name][1] == step.node and self.moved[name] > PLAIN]
+            open_ones = [name for name in here if self.due[name] in {"right", "follows"}]
+            self.due.update(dict.fromkeys(open_ones, "either"))
+            if any(self.moved[name] > CLEAR for name in here):
+                return
+
+    def _shows_where_made(self, mistake: Mistake, node: str) -> bool:
+        """Whether it is charged at its own node; another student's data at the driven link's vectors."""
+        ends = ends_of(self.work.construction)
+        if any(one == "wrong" and ends[name][1] == node for name, one in self.due.items()):
+            return True
+        driven = {name for name in self.due if is_driven(self.work.construction, ends[name][1])}
+        of_another = mistake.code == "other_variant"
+        return of_another and any(self.due[name] in {"wrong", "either"} for name in driven)
 
 
-def _touches_swap(work: Work, vector: Vector) -> bool:
-    return any({vector.tail, vector.head} & set(pair) for pair in work.swaps())
+def _touches_swap(work: Work, name: str) -> bool:
+    return any(set(ends_of(work.construction)[name]) & set(pair) for pair in work.swaps())
 
 
-def _is_charged_before(work: Work, vector: Vector) -> bool:
-    """Of another student's data: charged at the first vector of the driven link, or at its scale."""
-    if not any(one.code == "other_variant" for one in work.task.mistakes):
+def _is_charged_before(work: Work, name: str, *, data_charged: bool) -> bool:
+    """Of another student's data: charged at the crank, the driven link's first vector, or at its scale."""
+    vectors = work.construction.vectors
+    of_another = any(one.code == "other_variant" for one in work.task.mistakes)
+    if not of_another or name not in vectors or not is_driven(work.construction, vectors[name].head):
         return False
-    vectors = work.construction.vectors.values()
-    first = next(one for one in vectors if is_driven(work.construction, one.head))
-    is_later = is_driven(work.construction, vector.head) and vector.head != first.head
-    return is_later or (work.declares and vector.scale in _scales_of_another(work))
+    first = next(one for one in vectors.values() if is_driven(work.construction, one.head))
+    by_scale = work.declares and vectors[name].scale in _scales_of_another(work)
+    return data_charged or vectors[name].head != first.head or by_scale
 
 
-def _is_scale_unknown(work: Work, vector: Vector) -> bool:
+def _is_scale_unknown(work: Work, name: str) -> bool:
     """The driven link's vector, drawn at a scale that nobody declared and the rule does not give."""
     wrong = {one.at for one in work.task.mistakes if one.code == "scale_wrong"}
-    return not work.declares and vector.scale in wrong and is_driven(work.construction, vector.head)
-
-
-def is_driven(construction: Construction, node: str) -> bool:
-    """Whether a node of a plan is laid off from the data alone: the driven link's."""
-    step = construction.step(node)
-    return isinstance(step, Given) and isinstance(step.length, Scaled)
-
-
-def _forms(work: Work, source: Source) -> dict[str, _Forms]:
-    """Every vector in its forms."""
-    task = work.task
-    right = _at_scales_followed(task.right, task.mistakes)
-    following = right
-    for mistake in task.mistakes:
-        if mistake.code == "figure_rotated":
-            following = commit(mistake, following)
-    exact = evaluate(right.construction, right.parameters)
-    told = evaluate(right.construction, task.right.parameters)
-    of_another = any(one.code == "other_variant" for one in task.mistakes)
-    forms = {}
-    for figure in right.construction.poles:
-        own = work.own(figure)
-        named = work.named(own, source)
-        vectors = right.construction.vectors_of(figure)
-        heads = {vector.head for vector in vectors}
-        driven = {head for head in heads if is_driven(right.construction, head)}
-        due_at = {head: _head(right if head in driven else following, own, head) for head in heads}
-        made_at = {head: _head(task.wrong, own, head) for head in heads}
-        for vector in vectors:
-            tail = own[vector.tail]
-            of_data = vector.head in driven and of_another
-            forms[vector.name] = _Forms(
-                named=named[vector.head] - named[vector.tail],
-                drawn=own[vector.head] - tail,
-                due=_between(exact, vector) if of_data else due_at[vector.head] - tail,
-                made=made_at[vector.head] - tail,
-                exact=_between(exact, vector),
-                told=_between(told, vector),
-            )
-    return forms
-
-
-def _at_scales_followed(right: Drawing, mistakes: Sequence[Mistake]) -> Drawing:
-    """The right drawing at the scales that the student's follows.
-
-    Of rev/min taken for rad/s the drawing knows nothing: its speeds and its scales are both too large.
-    """
-    for mistake in mistakes:
-        if mistake.code == "scale_wrong" and mistake.at in SCALES:
-            right = commit(mistake, right)
-    return right
-
-
-def _head(drawing: Drawing, own: Mapping[str, complex], head: str) -> complex:
-    """A node as a drawing makes it from the student's own nodes before it."""
-    nodes = {name: np.asarray(place) for name, place in own.items()}
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return complex(drawing.construction.step(head).place(View(nodes, drawing.parameters)))
-
-
-def _between(nodes: Mapping[str, ComplexArray], vector: Vector) -> complex:
-    return complex(nodes[vector.head]) - complex(nodes[vector.tail])
-
-
-def _open_first_shown(work: Work, mistake: Mistake, due: dict[str, Due], moved: Mapping[str, float]) -> None:
-    """Where a mistake does not show at its own node, either verdict up to the first node that shows it.
-
-    Arguments: `moved` is how far what is due lies from the exact vector, in tolerances.
-    """
-    node = _node_of(work.construction, mistake)
-    vectors = work.construction.vectors
-    if node is None or _shows_where_made(work, mistake, node, due):
-        return
-    plan = work.construction.figures[mistake.at] if mistake.code == "figure_rotated" else ()
-    for step in work.construction.steps:
-        hangs_on_it = step in plan or node in ancestors(work.construction, [step.node])
-        if step.node == node or not hangs_on_it:
-            continue
-        here = [name for name in due if vectors[name].head == step.node and moved[name] > PLAIN]
-        due.update(dict.fromkeys((name for name in here if due[name] in {"right", "follows"}), "either"))
-        if any(moved[name] > CLEAR for name in here):
-            return
-
-
-def _shows_where_made(work: Work, mistake: Mistake, node: str, due: Mapping[str, Due]) -> bool:
-    """Whether it is charged at its own node; another student's data at the driven link's vectors."""
-    construction = work.construction
-    heads = {name: construction.vectors[name].head for name in due}
-    if mistake.code == "other_variant":
-        driven = {name for name, head in heads.items() if is_driven(construction, head)}
-        return any(due[name] in {"wrong", "either"} for name in driven)
-    return any(one == "wrong" and heads[name] == node for name, one in due.items())
+    vector = work.construction.vectors.get(name)
+    if vector is None or work.declares or vector.scale not in wrong:
+        return False
+    return is_driven(work.construction, vector.head)
 
 
 def _node_of(construction: Construction, mistake: Mistake) -> str | None:

@@ -50,7 +50,7 @@ def drawn(name, *mistakes, n=None, position=None, declares=True, letters=False, 
 
 def due(work, source="nodes"):
     """What is due to each criterion, and the mistakes."""
-    seen = Seen.of(submission(work, source))
+    seen = Seen.of(submission(work, source), work.construction.links)
     return verdicts_due(work, source, seen), mistakes_due(work, source, seen), seen
 
 
@@ -145,22 +145,29 @@ def test_a_wrong_scale_is_due_a_charge_itself_and_none_of_its_vectors():
     assert not made[0].visible
 
 
-def test_a_wrong_assembly_may_be_charged_where_the_plan_first_shows_it():
-    found, _, _ = due(drawn("press", Mistake("other_assembly", "D"), position=1))
-    assert group(found, "either") >= {"v_D", "v_DC"}
-    assert not group(found, "wrong")
-    assert found["a_DC_n"] == "follows"
+def test_a_wrong_assembly_is_charged_on_the_sketch_or_else_where_the_plan_first_shows_it():
+    work = drawn("press", Mistake("other_assembly", "D"), position=1)
+    found, _, _ = due(work)
+    assert group(found, "wrong") == {"CD"}
+    assert found["v_DC"] == found["a_DC_n"] == "follows"
+    unseen, _, _ = due(work, "directions")
+    assert group(unseen, "either") >= {"v_D", "v_DC"}
+    assert not group(unseen, "wrong")
+    assert unseen["CD"] == "absent"
+    assert unseen["a_DC_n"] == "follows"
 
 
-def test_of_another_students_data_the_driven_link_is_charged_and_the_rest_follows():
-    mistake = next(
-        meant_of("press", Named("other_variant", "mechanism", (), 1.0, {"position": 3}), position=1)
-    )
-    found, made, _ = due(drawn("press", mistake, position=1))
-    assert group(found, "wrong") == {"v_A"}
-    assert found["a_A"] == "either"
-    assert found["v_B"] == found["v_D"] == "follows"
+def test_of_another_students_data_the_crank_is_charged_or_else_the_first_vector_and_the_rest_follows():
+    named = Named("other_variant", "mechanism", (), 1.0, {"position": 3})
+    work = drawn("press", next(meant_of("press", named, position=1)), position=1)
+    found, made, _ = due(work)
+    assert group(found, "wrong") == {"O1A"}
+    assert found["v_A"] == found["v_B"] == found["v_D"] == "follows"
     assert made[0].visible
+    unseen, _, _ = due(work, "directions")
+    assert group(unseen, "wrong") == {"v_A"}
+    assert unseen["a_A"] == "either"
+    assert unseen["v_B"] == unseen["v_D"] == "follows"
 
 
 def test_letters_swapped_are_wrong_in_every_vector_of_both_unless_told_as_letters():
@@ -213,7 +220,7 @@ def meant_of(name, named, n=None, position=None):
 def test_two_mistakes_that_draw_the_same_count_as_each_other():
     turned = Mistake("figure_rotated", "velocity_plan", quarters=2)
     work = drawn("press", turned, position=1)
-    seen = Seen.of(submission(work, "nodes"))
+    seen = Seen.of(submission(work, "nodes"), work.construction.links)
     right = work.task.right
     both = [vectors_of(right, [one]) for one in (turned, Mistake("sense_reversed", "a"))]
     assert all(abs(both[0][name] - both[1][name]) < ROUNDING_MM for name in both[0])
@@ -225,7 +232,7 @@ def test_two_mistakes_that_draw_the_same_count_as_each_other():
 def test_a_mistake_that_differs_only_in_direction_is_as_good_in_lengths_alone():
     made = Mistake("image_mirrored", "c")
     work = drawn("engine", Mistake("sense_reversed", "a"), n=3)
-    seen = Seen.of(submission(work, "lengths"))
+    seen = Seen.of(submission(work, "lengths"), {})
     named = Named("figure_rotated", "velocity_plan", (), 0.9, {"degrees": 90.0})
     assert is_named(work, "lengths", seen, work.task.mistakes[0], named)
     assert not is_named(work, "lengths", seen, made, Named("sense_reversed", "b", (), 0.9))
