@@ -19,6 +19,8 @@ USUAL_SHARE = 0.45
 LARGEST_SHARE = 0.7
 """Errors of a hand that count as independent, as a share of all; a class tells its own."""
 LEAST_CLASS = 10
+RARE = -9.0
+"""Log of the chance below which two placements make it worth to hold each against the other's variant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,7 @@ class LikeDrawings:
     log_chance : natural logarithm of the chance that independent hands come so near; 0 where not compared
     log_hands, log_places : what errors of the hand and places on the sheet give alone
     cosine, count : agreement of the errors, and how many there are
-    pairs : compared
+    pairs : of different students
     fits : the variant of the class that a drawing fits though it is not the own, and how far off it is, mm
     """
 
@@ -52,8 +54,8 @@ def like_drawings(assignment: Assignment, handed: Sequence[Handed]) -> LikeDrawi
     figures = (MECHANISM, *construction.poles)
     drawn = drawn_of(handed, {one: [step.node for step in construction.figures[one]] for one in figures})
     fits = fitting(assignment, handed, drawn)
-    rows = [Row(k, one.variant) for k, one in enumerate(handed)]
-    rows += [Row(k, found[0]) for k, found in enumerate(fits) if found is not None]
+    places = place_chance(drawn)
+    rows = _rows(handed, fits, places)
     hands = hands_of(assignment, handed, drawn, rows)
     together = _together(rows, handed)
     found = agreement(hands, _share(hands.errors, together))
@@ -64,16 +66,32 @@ def like_drawings(assignment: Assignment, handed: Sequence[Handed]) -> LikeDrawi
         (found.cosine, found.count),
     )
     compared = _by_student(rows, len(handed), np.where(together, -1.0, 0.0), ())[0] < 0.0
-    places = np.where(compared, place_chance(drawn), 0.0)
+    places = np.where(compared, places, 0.0)
+    people = np.array([one.student_id for one in handed])
     return LikeDrawings(
         log_chance=np.where(compared, _both(log_hands, places), 0.0),
         log_hands=log_hands,
         log_places=places,
         cosine=cosine,
         count=count,
-        pairs=int(compared.sum()) // 2,
+        pairs=int((people[:, None] != people[None, :]).sum()) // 2,
         fits=fits,
     )
+
+
+def _rows(
+    handed: Sequence[Handed], fits: Sequence[tuple[Variant, float] | None], places: FloatArray
+) -> list[Row]:
+    """Each drawing against its own variant, against those that it fits, and that of whose places it has."""
+    rows = dict.fromkeys(Row(k, one.variant) for k, one in enumerate(handed))
+    rows |= dict.fromkeys(Row(k, found[0]) for k, found in enumerate(fits) if found is not None)
+    known = {one.variant for one in handed}
+    rows |= dict.fromkeys(
+        Row(k, one.fits[0]) for k, one in enumerate(handed) if one.fits is not None and one.fits[0] in known
+    )
+    if len(handed) > 1:
+        rows |= dict.fromkeys(Row(int(j), handed[i].variant) for i, j in np.argwhere(places < RARE))
+    return list(rows)
 
 
 def _together(rows: Sequence[Row], handed: Sequence[Handed]) -> NDArray[np.bool_]:

@@ -138,7 +138,8 @@ def _choices(both: FloatArray, equal: FloatArray) -> FloatArray:
 
 
 def _table(assignment: Assignment, handed: Sequence[Handed]) -> _Table:
-    variants = [one.fits[0] if one.fits else one.variant for one in handed]
+    known = {one.variant for one in handed}
+    variants = [one.fits[0] if one.fits and one.fits[0] in known else one.variant for one in handed]
     exact, added = _exact(assignment, handed, variants)
     names = list(exact)
     lengths = np.array([[one.numbers.get(name, np.nan) for name in names] for one in handed])

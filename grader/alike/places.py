@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grader.alike.nodes import Drawn
 from grader.records import FloatArray, IntArray
@@ -59,20 +60,27 @@ def _shift(at: ComplexArray) -> ComplexArray:
 def _chance(apart: FloatArray, freedom: IntArray) -> FloatArray:
     """Log chances, by the densest ring about each placement that the class shows."""
     chance = np.zeros(apart.shape)
-    upper = np.triu(np.ones(apart.shape, bool), 1)
     for dimensions in (2, 4):
-        of_these = freedom == dimensions
-        pairs = int((of_these & upper).sum())
-        if pairs < LEAST_PAIRS:
+        of_these = (freedom == dimensions) & ~np.eye(len(apart), dtype=bool)
+        if of_these.sum() < 2 * LEAST_PAIRS:
             continue
+        pairs = np.maximum(_without_both(of_these), 1.0)
         found = np.full(apart.shape, -np.inf)
         for ring in RINGS_MM:
-            inside = int((of_these & upper & (apart <= ring)).sum())
-            # The pair itself is no evidence on how others place their figures.
-            others = np.maximum(inside - (apart <= ring), 1.0 if ring == RINGS_MM[-1] else 0.0)
+            others = _without_both(of_these & (apart <= ring))
+            if ring == RINGS_MM[-1]:
+                others = np.maximum(others, 1.0)
+            nearer = dimensions * np.log(np.minimum(apart / ring, 1.0))
             with np.errstate(divide="ignore"):
-                found = np.maximum(
-                    found, np.log(others / pairs) + dimensions * np.log(np.minimum(apart / ring, 1.0))
-                )
+                found = np.maximum(found, np.log(others / pairs) + nearer)
         chance = np.where(of_these, np.clip(found, -np.log(TRUSTED * pairs), 0.0), chance)
     return chance
+
+
+def _without_both(near: NDArray[np.bool_]) -> FloatArray:
+    """(students, students) how many pairs there are among all others than these two.
+
+    The pair itself is no evidence on how others place their figures, nor is a third copy of its sheet.
+    """
+    each = near.sum(axis=1)
+    return np.asarray(np.maximum(near.sum() / 2.0 - each[:, None] - each[None, :] + near, 0.0))
