@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from grader.comparison import Comparison, Submission, Task, compare, task_of
+from grader.comparison.evidence import Evidence
 from grader.diagnosis import LEAST_CONFIDENCE, Case, diagnose
 from grader.documents import (
     CriterionDocument,
@@ -26,11 +27,12 @@ from grader.records import Problem
 from grader.rubric import RubricFile
 from grader.scoring import score
 from reference.assignment import Assignment, Variant
-from reference.elements import Parameters
+from reference.elements import Coriolis, Normal, Parameters
 from reference.geometry import ComplexArray
 from reference.hand import Skill, trace
 from reference.mistakes import Drawing
-from reference.replay import Seen
+from reference.replay import Seen, Spread, Work
+from reference.steps import Given
 
 __all__ = ["Submission", "Task", "judge", "report_of", "task_of", "unjudged_report"]
 
@@ -100,7 +102,7 @@ def _case(task: Task, comparison: Comparison) -> Case:
     lost = [one for one in comparison.outcomes if one.verdict in LOST]
     return Case(
         drawing=Drawing(task.construction, parameters),
-        seen=_seen(task, comparison, parameters, skill),
+        work=Work(tuple(_seen(task, comparison, parameters, skill)), comparison.evidence.sketches),
         lost={one.name: one.criterion for one in lost if one.name in vectors},
         assignment=task.assignment,
         variant=task.variant,
@@ -129,7 +131,7 @@ def _seen(task: Task, comparison: Comparison, parameters: Parameters, skill: Ski
     evidence, construction = comparison.evidence, task.construction
     given = {*construction.poles.values(), *task.ground}
     seen = [
-        Seen(name, None, place, _spread(NOTHING, LEAST_MISS_MM))
+        Seen(name, None, place, _missed_by(task, evidence, name))
         for name, place in evidence.nodes.items()
         if name not in given
     ]
@@ -149,10 +151,52 @@ def _seen(task: Task, comparison: Comparison, parameters: Parameters, skill: Ski
     return seen
 
 
+def _missed_by(task: Task, evidence: Evidence, node: str) -> Spread:
+    """How far a node may be missed by being read, or by the measurements that lead to it."""
+    vectors = [one for one in task.construction.vectors.values() if one.head == node]
+    hand = task.rubric.hand
+    rows: list[ComplexArray] = [NOTHING]
+    each_mm = LEAST_MISS_MM if evidence.has_sheets else hand.ruler_mm
+    for vector in vectors[:1]:
+        drawn = evidence.vector(vector.name)
+        along = None if drawn is None else drawn.as_complex
+        if along and not evidence.has_sheets:
+            # Both ends of a step are measured.
+            turned = 1j * along * math.radians(hand.protractor_deg)
+            rows.append(
+                math.sqrt(2.0) * np.array([hand.ruler_mm * along / abs(along), turned], np.complex128)
+            )
+        if along:
+            share = _computed_within(task, evidence, node, math.sqrt(2.0) * each_mm)
+            rows.append(np.array([along * share], np.complex128))
+    return _spread(np.concatenate(rows), LEAST_MISS_MM)
+
+
+def _computed_within(task: Task, evidence: Evidence, node: str, each_mm: float) -> float:
+    """The relative error of a component that is computed from velocities as they were read or measured."""
+    sources: tuple[tuple[str, str, float], ...]
+    match task.construction.step(node):
+        case Given(length=Normal(tail=tail, head=head)):
+            sources = ((tail, head, 2.0),)
+        case Given(length=Coriolis(slide=slide, turn=turn)):
+            sources = ((*slide, 1.0), (*turn, 1.0))
+        case _:
+            return 0.0
+    ends = {
+        name: place for one in sources for name in one[:2] if (place := evidence.nodes.get(name)) is not None
+    }
+    errors = [
+        power * each_mm / max(abs(ends[head] - ends[tail]), each_mm)
+        for tail, head, power in sources
+        if tail in ends and head in ends
+    ]
+    return math.hypot(*errors)
+
+
 NOTHING: ComplexArray = np.zeros(0, np.complex128)
 
 
-def _spread(moved: ComplexArray, least_mm: float) -> tuple[float, float, float]:
+def _spread(moved: ComplexArray, least_mm: float) -> Spread:
     """What independent errors make of an end together: variance along x, covariance, variance along y."""
     x, y = moved.real, moved.imag
     return float(x @ x) + least_mm**2, float(x @ y), float(y @ y) + least_mm**2

@@ -22,7 +22,7 @@ from reference.assignment import Assignment, Variant
 from reference.hand import Skill
 from reference.mistakes import Drawing
 from reference.parameters import parameters_of
-from reference.replay import RARITY, Account, Root, Seen, replay
+from reference.replay import RARITY, Account, Root, Work, replay
 
 LEAST_CONFIDENCE = 0.6
 """An explanation less certain than this is not told."""
@@ -32,7 +32,8 @@ BEYOND_DOUBT = 20.0
 """A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
 LEAST_WRONG = 0.06
 """A scale off by a smaller share than this is nobody's mistake by name: a hand may draw so."""
-HANDS = (0.6, 1.0, 1.6, 2.5, 4.0)
+USUAL = 1.0
+HANDS = (0.6, USUAL, 1.6, 2.5, 4.0)
 """The hands supposed, as multiples of a usual one's standard deviations."""
 
 
@@ -43,7 +44,7 @@ class Case:
     Attributes
     ----------
     drawing : how it should have been drawn, at the scales declared
-    seen : what was drawn
+    work : what was drawn
     lost : the vectors that lost points, or may lose some, with their criteria
     assignment, variant : whose plan it should be
     skill : of a usual hand
@@ -53,7 +54,7 @@ class Case:
     """
 
     drawing: Drawing
-    seen: Sequence[Seen]
+    work: Work
     lost: Mapping[str, str]
     assignment: Assignment
     variant: Variant
@@ -68,24 +69,25 @@ def diagnose(case: Case) -> tuple[Mistake, ...]:
     if not case.lost and not case.followed:
         return ()
     roots = [Root(), *_other_scales(case)]
-    accounts = replay(case.drawing, case.seen, roots, case.skill, cares=HANDS)
+    accounts = replay(case.drawing, case.work, roots, case.skill, cares=HANDS)
     innocent = _innocent(accounts)
     if accounts and not _is_clear(accounts, case):
-        accounts = _looked_into(case, roots, accounts[0].care, accounts)
+        accounts = _looked_into(case, roots, accounts)
     if not accounts or innocent - accounts[0].cost < BEYOND_DOUBT:
         return ()
     return told(accounts, case, LEAST_CONFIDENCE)
 
 
-def _looked_into(
-    case: Case, roots: Sequence[Root], care: float, accounts: Sequence[Account]
-) -> list[Account]:
-    """The accounts with mistakes of the whole drawing among them, and with guesses at what was not seen."""
-    whole = [*roots, *_of_the_whole(case)]
-    found = replay(case.drawing, case.seen, whole, case.skill, cares=(care,), blind=True) or [*accounts]
+def _looked_into(case: Case, roots: Sequence[Root], accounts: Sequence[Account]) -> list[Account]:
+    """The accounts with mistakes of the whole drawing among them, and with guesses at what was not seen.
+
+    A careless hand is also taken for a usual one that has made some mistake.
+    """
+    whole, cares = [*roots, *_of_the_whole(case)], sorted({accounts[0].care, min(accounts[0].care, USUAL)})
+    found = replay(case.drawing, case.work, whole, case.skill, cares=cares, blind=True) or [*accounts]
     for swap in _swaps(case.drawing, found[0]):
-        root, seen = Root((swap,), cost=RARITY[swap.code]), _renamed(case.seen, swap.other)
-        found += replay(case.drawing, seen, [root], case.skill, cares=(care,))
+        root, work = Root((swap,), cost=RARITY[swap.code]), _renamed(case.work, swap.other)
+        found += replay(case.drawing, work, [root], case.skill, cares=cares)
     return sorted(found, key=lambda account: account.cost)
 
 
@@ -95,12 +97,13 @@ def _innocent(accounts: Sequence[Account]) -> float:
 
 
 def _is_clear(accounts: Sequence[Account], case: Case) -> bool:
-    """Whether one account at most supposes one mistake, at a step that was seen, and explains the rest."""
-    if not accounts or accounts[0].unexplained or len(accounts[0].made) > 1:
+    """Whether a usual hand made everything rightly, or one mistake at a step with everything seen."""
+    best = accounts[0]
+    if best.unexplained or len(best.made) > 1 or best.care > USUAL:
         return False
-    if not accounts[0].made:
+    if not best.made:
         return True
-    seen = {one.node for one in case.seen}
+    seen = {one.node for one in case.work.seen}
     given = {*case.drawing.construction.poles.values()}
     return all(
         step.node in seen or step.node in given or not step.needs for step in case.drawing.construction.steps
@@ -165,10 +168,11 @@ def _swaps(drawing: Drawing, account: Account) -> Iterator[operators.Mistake]:
                 yield operators.Mistake("labels_swapped", pair[0], other=pair)
 
 
-def _renamed(seen: Sequence[Seen], pair: tuple[str, ...]) -> list[Seen]:
-    """What was seen, under the right names where two letters were swapped."""
+def _renamed(work: Work, pair: tuple[str, ...]) -> Work:
+    """What was drawn, under the right names where two letters were swapped."""
     other = {pair[0]: pair[1], pair[1]: pair[0]}
-    return [
+    seen = (
         replace(one, node=other.get(one.node, one.node), tail=other.get(one.tail or "", one.tail))
-        for one in seen
-    ]
+        for one in work.seen
+    )
+    return replace(work, seen=tuple(seen))

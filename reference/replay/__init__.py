@@ -12,7 +12,8 @@ for hands of every care.
 - `ways`: the ways to make one step
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections import ChainMap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,11 +23,11 @@ from reference.geometry import ComplexArray, FloatArray
 from reference.hand import Skill
 from reference.mistakes import Drawing, Mistake
 from reference.replay.costs import AT_MOST, RARITY, SUSPECT, WITHIN
-from reference.replay.sight import Seen, Sight, Spread, by_node, seen_later
+from reference.replay.sight import Seen, Sight, Spread, Work, by_node, seen_later
 from reference.replay.ways import Bench, Ways, repertoire_of
 from reference.steps import Given, Step
 
-__all__ = ["RARITY", "Account", "Root", "Seen", "Spread", "replay"]
+__all__ = ["RARITY", "Account", "Root", "Seen", "Spread", "Work", "replay"]
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
@@ -75,7 +76,7 @@ class Account:
 
 def replay(
     drawing: Drawing,
-    seen: Iterable[Seen],
+    work: Work,
     roots: Sequence[Root],
     skill: Skill,
     *,
@@ -91,16 +92,17 @@ def replay(
     cares : the hands supposed, as multiples of its standard deviations
     blind : mistakes are also tried at steps of which what was seen tells no place, one to an account
     """
-    construction, told = drawing.construction, by_node(drawing.construction, seen)
+    construction, told = drawing.construction, by_node(drawing.construction, work.seen)
     branches = _open(drawing, roots, cares)
     needed = seen_later(construction, told)
     repertoire = repertoire_of(construction, skill)
     with np.errstate(all="ignore"):
         for figure, steps in construction.figures.items():
+            sketch = {name: np.asarray(place) for name, place in work.sketches.get(figure, {}).items()}
             for step in steps:
                 if step.node in needed:
-                    here = told.get(step.node, ())
-                    bench = Bench(branches.nodes, branches.known, branches.sight(here, figure), repertoire)
+                    here, nodes = told.get(step.node, ()), ChainMap(sketch, branches.nodes)
+                    bench = Bench(nodes, branches.known, branches.sight(here, figure), repertoire)
                     branches.go_on(step, figure, here, _ways(step, bench, branches.is_blind, blind=blind))
     return branches.accounts()
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -39,6 +39,20 @@ class Seen:
     value: complex
     spread: Spread
     has_direction: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What somebody drew.
+
+    Attributes
+    ----------
+    seen : its nodes and vectors
+    sketches : by plan, the mechanism's joints as drawn beside it, where that is a sketch of its own
+    """
+
+    seen: tuple[Seen, ...]
+    sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
 
 
 def by_node(construction: Construction, seen: Iterable[Seen]) -> dict[str, tuple[Seen, ...]]:

@@ -61,8 +61,6 @@ def test_a_line_along_a_guide_is_told_apart_from_one_across_a_link():
     assert "instead of along the guide" in mistake_feedback(along, "en")
     assert "line" not in across.detail
     assert "perpendicular to DE instead of to O2A3" in mistake_feedback(across, "en")
-    report = report_of(SHAPER, found(Mistake("wrong_link", "a3", 1, other=("D", "E")), "sheet"), "s01")
-    assert "along the guide" in feedback_page(report, (), "en")
 
 
 def test_no_mistake_is_offered_that_changes_nothing():
