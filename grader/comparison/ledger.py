@@ -1,7 +1,7 @@
 """What earlier mistakes have cost, and what may follow through from them."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from grader.comparison.evidence import Evidence
@@ -67,53 +67,45 @@ class Ledger:
     def best(self, segment: Segment, against: Against, *, follows_through: bool) -> Found:
         """The mark on the original data, or a better one on what follows from own earlier values."""
         exact = segment.drawn(self.used)
-        found = original = Found(against(exact), exact)
-        if not original.mark.is_full and not self.evidence.has_sheets:
-            # Of measured lengths no nearer test is surer than what a hand may miss of the whole.
-            reach = self.following.whole_reach(segment, exact)
-            whole = Found(against(exact, reach), exact, reach)
-            found = whole if whole.mark.is_full else original
-        if not found.mark.is_full and follows_through:
-            found = self.at_followed_scale(segment, against, original)
+        found = Found(against(exact), exact)
         if not found.mark.is_full:
-            own = self.from_own_nodes(segment, against, original, follows_through=follows_through)
-            found = own if found is original or own.mark.is_better(found.mark) else found
+            reach = self.following.whole_reach(segment, exact)
+            found = Found(against(exact, reach), exact, reach)
         if not found.mark.is_full and follows_through:
-            for one in self.following.expectations(segment):
-                if not self.following.is_trivial(segment, one.vector):
-                    found = self.the_better(found, one, against)
+            found = self.followed_through(segment, against, found)
         self.remember(segment.head, found.mark)
         if found.is_followed and found.mark.is_full:
             self.inherited.add(segment.head)
         return found
 
-    def at_followed_scale(self, segment: Segment, against: Against, original: Found) -> Found:
-        """The mark at the scale that the drawing follows, where that is not the one used."""
-        one = self.following.at_followed_scale(segment)
-        return original if one is None else self.the_better(original, one, against)
+    def followed_through(self, segment: Segment, against: Against, original: Found) -> Found:
+        """The best of what follows: from the scale drawn at, from own nodes, from anything else."""
+        found, following = original, self.following
+        at_scale = following.at_followed_scale(segment)
+        if at_scale is not None:
+            found = self.the_better(found, at_scale, against)
+        if not found.mark.is_full:
+            found = self.from_own_nodes(segment, against, found, original)
+        if not found.mark.is_full:
+            for one in following.expectations(segment):
+                if not following.is_trivial(segment, one.vector):
+                    found = self.the_better(found, one, against)
+        return found
 
-    def from_own_nodes(
-        self, segment: Segment, against: Against, original: Found, *, follows_through: bool
-    ) -> Found:
-        """The mark with what a hand may miss, from the nodes that it started from where they are known."""
-        exact = original.expected
-        one = self.following.from_nodes(segment, self.used) if follows_through else None
-        if one is None or not one.relies_on:
-            reach = self.following.whole_reach(segment, exact)
-            return Found(against(exact, reach), exact, reach)
+    def from_own_nodes(self, segment: Segment, against: Against, found: Found, original: Found) -> Found:
+        """The mark by the nodes that this step started from, where they are known."""
+        one = self.following.from_nodes(segment, self.used)
+        if not one.relies_on:
+            return found
         if self.wrong(one.relies_on):
-            reach = self.following.whole_reach(segment, exact)
-            whole = Found(against(exact, reach), exact, reach)
-            is_trivial = whole.mark.is_full or self.following.is_trivial(segment, one.vector)
-            return whole if is_trivial else self.the_better(whole, one, against)
+            is_trivial = self.following.is_trivial(segment, one.vector)
+            return found if is_trivial else self.the_better(found, one, against)
         # Every earlier step is within what a hand may miss: this step alone counts.
-        alone = against(exact, one.reach, one.se)
         mark = against(one.vector, one.reach, one.se)
-        if not mark.is_better(alone):
-            return Found(alone, exact, one.reach)
-        reach = self.following.whole_reach(segment, exact)
-        reasons = () if mark.is_full else alone.reasons
-        return Found(Mark(mark.share, mark.worst, mark.best, reasons), exact, reach)
+        if not mark.is_better(found.mark):
+            return found
+        reasons = () if mark.is_full else original.mark.reasons
+        return replace(original, mark=Mark(mark.share, mark.worst, mark.best, reasons))
 
     def the_better(self, found: Found, one: Expectation, against: Against) -> Found:
         """What was found so far, or what follows where that leaves more."""

@@ -1,0 +1,128 @@
+"""What holds for every score."""
+
+import cmath
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from grader.comparison import Submission, compare
+from grader.feedback import criterion_feedback
+from grader.judging import judge
+from grader.outcomes import Outcome, Quantity, Tolerance
+from grader.records import Figure, Reading, ReadNode
+from grader.rubric import RubricFile, WeightsTable
+from grader.scoring import score
+from reference.mistakes import Mistake
+from tests.hands import sheet, task_for
+from tests.unit.comparison.rubrics import with_rubric
+
+PUMP = task_for("pump", 7)
+NODES = [step.node for plan in PUMP.construction.poles for step in PUMP.construction.figures[plan][1:]]
+FEW = 12
+nodes = st.sampled_from(NODES)
+angles = st.floats(-3.14, 3.14)
+verdicts = st.sampled_from(["full", "follow_through", "partial", "none", "not_judged", "review"])
+
+
+def total(task, reading):
+    found = judge(task, Submission(readings=(reading,))).score
+    return found.low, found.high
+
+
+@given(nodes, angles, st.lists(st.floats(0.1, 12.0), min_size=3, max_size=3))
+@settings(max_examples=FEW, deadline=None)
+def test_without_following_through_a_score_never_rises_when_a_node_gets_worse(node, angle, distances):
+    task = with_rubric(PUMP, follow_through=False)
+    away = [distance * cmath.exp(1j * angle) for distance in sorted(distances)]
+    scores = [total(task, sheet(task, moved={node: by})) for by in (0j, *away)]
+    assert [low for low, _ in scores] == sorted((low for low, _ in scores), reverse=True)
+    assert [high for _, high in scores] == sorted((high for _, high in scores), reverse=True)
+
+
+@given(st.dictionaries(nodes, st.complex_numbers(max_magnitude=30.0), max_size=4))
+@settings(max_examples=FEW, deadline=None)
+def test_with_following_through_a_score_is_never_lower_than_without_nor_above_full_marks(moved):
+    reading = sheet(PUMP, moved=moved)
+    (low, high), (strict_low, strict_high) = (
+        total(PUMP, reading),
+        total(with_rubric(PUMP, follow_through=False), reading),
+    )
+    assert strict_low <= low + 1e-9
+    assert strict_high <= high + 1e-9
+    assert high <= PUMP.rubric.max_score
+
+
+def shifted(reading, by):
+    """Each figure somewhere else on the paper, its pole with it."""
+    figures = {
+        name: Figure(
+            {
+                node: ReadNode(one.at + by[name], one.cov, one.confidence)
+                for node, one in figure.nodes.items()
+            },
+            figure.vectors,
+        )
+        for name, figure in reading.figures.items()
+    }
+    return Reading(figures)
+
+
+places = st.complex_numbers(max_magnitude=200.0)
+
+
+@given(
+    st.fixed_dictionaries(dict.fromkeys(("mechanism", "velocity_plan", "acceleration_plan"), places)), nodes
+)
+@settings(max_examples=FEW, deadline=None)
+def test_the_same_drawing_elsewhere_on_the_paper_with_other_poles_has_the_same_mark(by, node):
+    reading = sheet(PUMP, moved={node: 5.0 + 3.0j}, mistakes=(Mistake("normal_missing", "n_B"),))
+    assert total(PUMP, shifted(reading, by)) == pytest.approx(total(PUMP, reading))
+
+
+@given(st.randoms(use_true_random=False), nodes)
+@settings(max_examples=FEW, deadline=None)
+def test_the_order_of_criteria_does_not_matter(lot, node):
+    reading = sheet(PUMP, moved={node: 4.0 - 4.0j})
+    criteria = list(PUMP.rubric.criterion)
+    lot.shuffle(criteria)
+    mixed = with_rubric(PUMP, criterion=criteria)
+    found, other = (compare(task, Submission(readings=(reading,))).outcomes for task in (PUMP, mixed))
+    assert {one.criterion: one for one in found} == {one.criterion: one for one in other}
+
+
+@pytest.mark.parametrize("language", ["en", "ro", "ru"])
+def test_languages_only_say_the_verdicts(language):
+    reading = sheet(PUMP, moved={"b": 6.0 + 0j})
+    outcomes = judge(PUMP, Submission(readings=(reading,))).outcomes
+    told = [criterion_feedback(one, language, "full", PUMP.assignment.file.names) for one in outcomes]
+    assert all(told)
+    assert outcomes == judge(PUMP, Submission(readings=(reading,))).outcomes
+
+
+def outcome(criterion, verdict):
+    ends = ("none", "full") if verdict == "review" else (verdict, verdict)
+    return Outcome(criterion.id, criterion.name, verdict, Quantity(), Quantity(), Tolerance(), 1.0, (), ends)
+
+
+@given(
+    st.lists(verdicts, min_size=len(PUMP.rubric.criterion), max_size=len(PUMP.rubric.criterion)), st.data()
+)
+def test_weights_give_a_section_what_they_say_and_missing_ones_are_scaled(found, data):
+    weights = {
+        section: data.draw(st.floats(0.5, 50.0))
+        for section in PUMP.rubric.sections
+        if data.draw(st.booleans())
+    }
+    rubric: RubricFile = PUMP.rubric.model_copy(update={"weights": WeightsTable(**weights)})
+    for section, weight in weights.items():
+        own = [rubric.points[one.id] for one in rubric.criterion if one.section == section]
+        assert sum(own) == pytest.approx(weight)
+    outcomes = [outcome(one, verdict) for one, verdict in zip(rubric.criterion, found, strict=True)]
+    counted = score(rubric, outcomes)
+    assert 0.0 <= counted.low <= counted.high <= rubric.max_score * (1.0 + 1e-9)
+    judged = [one for one in found if one != "not_judged"]
+    if judged and set(judged) <= {"full", "follow_through"}:
+        assert counted.total == pytest.approx(rubric.max_score)
+    if judged and set(judged) == {"none"}:
+        assert counted.total == 0.0
