@@ -57,14 +57,8 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Draft:
     if faults:
         raise CallError("gradebook", f"Canvas would misread this; nothing was written{listed(faults)}")
     rows = [_row(grade, options) for grade in told]
-    possible = {row.possible for row in rows} or {options.maximum or grades[0].max_score}
-    if len(possible) > 1:
-        raise CallError(
-            "maximum_differs",
-            f"students' maxima differ ({', '.join(f'{one:g}' for one in sorted(possible))}): choose a"
-            " position, or give --maximum and --rescale",
-        )
-    table = [["    " + _POINTS, "", "", "", "", number(possible.pop())]]
+    possible = options.maximum or grades[0].max_score
+    table = [["    " + _POINTS, "", "", "", "", number(possible)]]
     table += [[row.name, row.id, row.sis_user_id, row.login, "", row.grade] for row in rows]
     notes = ["Canvas sets the assignment's points possible to those of the file's second row"]
     if not _NUMBERED.fullmatch(item):

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -22,7 +22,7 @@ from grader.exports import (
 from grader.exports.archive import write_files
 from grader.exports.comments import comment
 from grader.exports.draft import Draft, ready
-from grader.exports.faults import faults_of, listed
+from grader.exports.faults import faults_of, in_a_row, listed
 from grader.exports.grades import Grade, grades_of
 from grader.exports.options import TARGETS, Options
 from grader.exports.summary import criteria_text, summary_text
@@ -93,10 +93,35 @@ _MAXIMUM = frozenset({"maximum", "rescale"})
 def _of_grades(
     draft: Callable[[list[Grade], Options], Draft],
 ) -> Callable[[ResultsDocument, Options], Draft]:
-    """A draft of results by one of grades."""
-    return lambda results, options: draft(
-        grades_of(results, position=options.position, combine=options.combine), options
-    )
+    """A draft of results by one of grades; who has no such position is withheld, too."""
+
+    def of_results(results: ResultsDocument, options: Options) -> Draft:
+        grades = grades_of(results, position=options.position, combine=options.combine)
+        _check_maxima(grades, options)
+        drafted = draft(grades, options)
+        here = {grade.student_id for grade in grades}
+        others = dict.fromkeys(
+            (one.student_id for one in results.reports if one.student_id not in here),
+            f"has no position {options.position}",
+        )
+        return replace(drafted, withheld={**drafted.withheld, **others})
+
+    return of_results
+
+
+def _check_maxima(grades: Sequence[Grade], options: Options) -> None:
+    """Points out of 10 and out of 20 are no column of one gradebook; CallError unless all are converted."""
+    maxima: dict[float, list[str]] = {}
+    for grade in ready(grades):
+        maxima.setdefault(round(grade.max_score, 6), []).append(grade.student_id)
+    is_converted = options.rescale and (options.maximum is not None or options.form is not None)
+    if len(maxima) > 1 and not is_converted and what_of(options) != "feedback":
+        told = [f"{most:g}: {in_a_row(students)}" for most, students in sorted(maxima.items())]
+        raise CallError(
+            "maximum_differs",
+            "students' maxima differ: choose one position, combine them by mean, or convert all to one"
+            f" maximum (--maximum and --rescale, where the platform is given grades){listed(told)}",
+        )
 
 
 def _table(text: Callable[[ResultsDocument], str]) -> Callable[[ResultsDocument, Options], Draft]:

@@ -355,8 +355,12 @@ def test_points_that_do_not_add_up_to_the_score_are_refused(tmp_path, rubric):
 
 
 def test_students_marked_by_other_criteria_are_refused(tmp_path, rubric):
+    other = marked("s02", 5.0, 2.5)
+    other = other.model_copy(
+        update={"criteria": [one.model_copy(update={"id": f"x_{one.id}"}) for one in other.criteria]}
+    )
     with pytest.raises(InputFileError, match="s02: other criteria or points than s01"):
-        points(tmp_path, rubric, marked("s01", 5.0, 2.5), marked("s02", 5.0))
+        points(tmp_path, rubric, marked("s01", 5.0, 2.5), other)
 
 
 def test_titles_in_several_languages_are_one_criterion(tmp_path, rubric):

@@ -126,6 +126,13 @@ def test_a_worksheet_filled_in_again_is_told_to_be_skipped_by_moodle(tmp_path):
     assert any("made before" in note for note in export(one, tmp_path / "o.csv", options).notes)
 
 
+def test_who_has_no_such_position_is_told(tmp_path):
+    two = results(marked("s01", 5.0, position=1), marked("s02", 5.0, position=2))
+    delivery = export(two, tmp_path / "o.csv", Options(to="moodle", position=2))
+    assert delivery.written == ("s02",)
+    assert delivery.withheld == {"s01": "has no position 2"}
+
+
 def found(rows, **students):
     return find(Rows.of(enumerate(rows, start=1)), {one: tuple(said) for one, said in students.items()}, "it")
 

@@ -59,7 +59,7 @@ def test_a_files_name_is_for_one_student(tmp_path):
     gradescope(tmp_path / "results.json", *CLASS)
     assert json.loads((tmp_path / "results.json").read_bytes())["score"] == 11.25
     with pytest.raises(CallError, match=r"2 files; name a \.zip, or a folder"):
-        gradescope(tmp_path / "other.json", *CLASS, marked("s09", 5.0))
+        gradescope(tmp_path / "other.json", *CLASS, marked("s09", 5.0, 5.0, 5.0))
     assert not (tmp_path / "other.json").exists()
 
 

@@ -77,8 +77,11 @@ def test_a_gradebook_with_names_apart_is_filled_in(tmp_path):
 
 def test_maxima_that_differ_have_no_one_row_of_points(tmp_path):
     two = results(report("s01", 5.0), report("s02", 5.0, max_score=20.0))
-    with pytest.raises(CallError, match=r"maxima differ \(10, 20\)"):
-        export(two, tmp_path / "o.csv", Options(to="canvas"))
+    for to in ("canvas", "moodle", "lti", "gradescope"):
+        with pytest.raises(CallError, match=r"(?s)maxima differ.*10: s01\n  20: s02"):
+            export(two, tmp_path / "o.csv", Options(to=to))
+    with pytest.raises(CallError, match="maxima differ"):
+        export(two, tmp_path / "o.csv", Options(to="moodle", rescale=True))
     with pytest.raises(CallError, match="--rescale"):
         export(two, tmp_path / "o.csv", Options(to="canvas", maximum=10.0))
     export(two, tmp_path / "o.csv", Options(to="canvas", maximum=10.0, rescale=True))
