@@ -34,7 +34,8 @@ STATE_MARKS = {"graded": "✓", "needs_review": "?", "unreadable": "✗", "missi
 _GREEK = {"omega": "ω", "epsilon": "ε"}
 _NAME = re.compile(
     r"\b(?:(?P<vector>[vank])_(?P<points>[A-Z][A-Za-z0-9]{0,7})(?:_(?P<part>[ntcr])\b)?"
-    r"|(?P<rate>omega|epsilon)_(?P<link>\w{1,4})|(?P<letter>[kμ])(?P<scale>[Llva])\b)"
+    r"|(?P<rate>omega|epsilon)_(?P<link>\w{1,4})|(?P<letter>[kμ])(?P<scale>[Llva])\b"
+    r"|O(?P<pivot>[0-9])(?=[A-Z]?\b))"
 )
 
 
@@ -52,6 +53,8 @@ def _symbol(found: re.Match[str]) -> Markup:
     if found["vector"]:
         part = Markup("<sup>{}</sup>").format(found["part"]) if found["part"] else Markup("")
         return Markup("<i>{}</i><sub>{}</sub>{}").format(found["vector"], found["points"], part)
+    if found["pivot"]:
+        return Markup("O<sub>{}</sub>").format(found["pivot"])
     if found["rate"]:
         return Markup("<i>{}</i><sub>{}</sub>").format(_GREEK[found["rate"]], found["link"])
     return Markup("<i>{}</i><sub>{}</sub>").format(found["letter"], found["scale"])

@@ -19,6 +19,8 @@ from grader.feedback.words import symbols
         ("omega_3", "<i>ω</i><sub>3</sub>"),
         ("epsilon_2", "<i>ε</i><sub>2</sub>"),
         ("kL", "<i>k</i><sub>L</sub>"),
+        ("along O2B", "along O<sub>2</sub>B"),
+        ("from O1", "from O<sub>1</sub>"),
         ("μv", "<i>μ</i><sub>v</sub>"),
         ("the end of v_A.", "the end of <i>v</i><sub>A</sub>."),
     ],
@@ -27,7 +29,7 @@ def test_names_are_set_with_their_indices(text, shown):
     assert symbols(text) == shown
 
 
-@pytest.mark.parametrize("text", ["vase", "kv2", "a_b", "nova_A", "skL", "omega"])
+@pytest.mark.parametrize("text", ["vase", "kv2", "a_b", "nova_A", "skL", "omega", "A3", "CO2", "O2x"])
 def test_other_words_are_left_alone(text):
     assert symbols(text) == text
 
