@@ -1,6 +1,6 @@
 """What earlier mistakes have cost, and what may follow through from them."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -169,14 +169,10 @@ class Ledger:
 
     def wrong(self, relies_on: frozenset[str]) -> frozenset[str]:
         """What is wrong of the nodes and scales relied on: off, and not judged to be within tolerance."""
-        return frozenset(self._wrong(relies_on))
-
-    def _wrong(self, relies_on: frozenset[str]) -> Iterator[str]:
+        blamed = relies_on & (self.charged | self.inherited)
+        open_ones = relies_on - blamed - self.cleared
         nodes = self.following.names(self.following.own(self.used)) | self.evidence.nodes.keys()
-        for name in relies_on:
-            is_cleared = name in self.cleared and name not in self.inherited
-            if name in self.charged or not (is_cleared or (name in nodes and not self.is_off(name))):
-                yield name
+        return blamed | {name for name in open_ones if name not in nodes or self.is_off(name)}
 
     def allowed(self, relies_on: frozenset[str], mark: Mark) -> Mark:
         """Credit for following only where the earlier mistake has been charged; else it is charged here."""

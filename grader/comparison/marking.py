@@ -2,7 +2,6 @@
 
 import cmath
 import math
-from dataclasses import replace
 
 from grader.comparison.evidence import DrawnVector
 from grader.comparison.limits import ALL_RIGHT, Limit, Mark, mark
@@ -47,7 +46,7 @@ def widened(plain: Tolerance, expected_mm: float, reach: Spread, at_most: float 
         turned = math.degrees(math.atan2(reach.across, expected_mm))
         direction = max(plain_deg, min(turned, at_most * plain_deg))
     is_wider = length_mm > plain_mm or direction != plain_deg
-    return replace(plain, length_mm=length_mm, direction_deg=direction, widened=is_wider)
+    return Tolerance(length_mm, direction, widened=is_wider)
 
 
 def mark_vector(

@@ -23,7 +23,6 @@ BETTER_BY = 3
 """So many more vectors a wrong mechanism must explain."""
 LEAST_SHARE = 0.6
 """Of the measured vectors that it explains."""
-BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +58,11 @@ def other_sketch(
 
 @dataclass(frozen=True, slots=True)
 class _Plans:
-    """What one construction makes of one or several variants' data: vectors (variants,), millimetres."""
+    """What one construction makes of one or several variants' data: (vectors, variants), millimetres."""
 
     construction: Construction
     parameters: Parameters
-    vectors: Mapping[str, ComplexArray]
+    vectors: ComplexArray
 
     def sketch(self, index: int) -> Sketch:
         """One of them, as plans may have been drawn for it."""
@@ -88,10 +87,8 @@ def _tried(task: Task, scales: Mapping[str, float]) -> list[tuple[str, _Plans]]:
 
 def _plans(construction: Construction, parameters: Parameters) -> _Plans:
     nodes = evaluate(construction, parameters)
-    vectors = {
-        name: np.ravel(nodes[one.head] - nodes[one.tail]) for name, one in construction.vectors.items()
-    }
-    return _Plans(construction, parameters, vectors)
+    vectors = [np.ravel(nodes[one.head] - nodes[one.tail]) for one in construction.vectors.values()]
+    return _Plans(construction, parameters, np.array(np.broadcast_arrays(*vectors)))
 
 
 def _other_assemblies(construction: Construction) -> list[Construction]:
@@ -133,19 +130,13 @@ def _fitting(
     task: Task, plans: _Plans, known: Mapping[str, DrawnVector]
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
     """How many of the vectors lie within twice their tolerance, by variant."""
-    fits = [_fits(task, plans.vectors[name], one) for name, one in known.items()]
-    return np.asarray(sum(fit.astype(np.int64) for fit in np.broadcast_arrays(*fits)))
-
-
-def _fits(task: Task, meant: ComplexArray, drawn: DrawnVector) -> BoolArray:
-    table = task.rubric.tolerance
-    size = np.abs(meant)
+    rows = [row for row, name in enumerate(plans.construction.vectors) if name in known]
+    drawn = [known[name] for name in plans.construction.vectors if name in known]
+    meant, table = plans.vectors[rows], task.rubric.tolerance
+    size, length = np.abs(meant), np.array([[one.length_mm] for one in drawn])
     allowed = 2.0 * np.maximum(table.length_mm, table.length_relative * size)
-    near = np.abs(size - drawn.length_mm) <= allowed
-    if drawn.direction_rad is not None:
-        turned = np.abs(np.angle(meant * np.exp(-1j * drawn.direction_rad)))
-        across = np.maximum(
-            math.radians(2.0 * table.direction_deg), 2.0 * table.across_mm / np.maximum(size, 1e-9)
-        )
-        near &= turned <= across
-    return np.asarray(near)
+    along = np.array([[np.nan if one.direction_rad is None else one.direction_rad] for one in drawn])
+    turned = np.abs(np.angle(meant * np.exp(-1j * along)))
+    within = np.maximum(math.radians(table.direction_deg), table.across_mm / np.maximum(size, 1e-9))
+    fits = (np.abs(size - length) <= allowed) & ~(turned > 2.0 * within)
+    return np.asarray(fits.sum(axis=0))
