@@ -25,6 +25,7 @@ class Forms:
     named : as it is handed in, under the names that stand beside its ends
     drawn : as the hand drew it
     due : as its step rightly makes it from the student's own nodes before it
+    due_as_named : the same from the nodes under the names that stand beside them
     made : as the mistaken step makes it from the same nodes
     exact, told : by the exact plan, at the scales that the drawing follows, and at those it is meant to
     """
@@ -32,6 +33,7 @@ class Forms:
     named: complex
     drawn: complex
     due: complex
+    due_as_named: complex
     made: complex
     exact: complex
     told: complex
@@ -106,6 +108,7 @@ class Held:
         heads = {head for _, head in ends.values()}
         driven = {head for head in heads if is_driven(construction, head)}
         due_at = {head: _head(self.right if head in driven else self.following, own, head) for head in heads}
+        named_at = due_at if named == own else {head: _head(self.following, named, head) for head in heads}
         made_at = {head: _head(self.work.task.wrong, own, head) for head in heads}
         forms = {}
         for name, (tail, head) in ends.items():
@@ -114,6 +117,7 @@ class Held:
                 named=named[head] - named[tail],
                 drawn=own[head] - own[tail],
                 due=exactly if of_data and head in driven else due_at[head] - own[tail],
+                due_as_named=named_at[head] - named[tail],
                 made=made_at[head] - own[tail],
                 exact=exactly,
                 told=complex(told[head] - told[tail]),

@@ -11,7 +11,7 @@ import numpy as np
 from grader.bench.judging_naming import Made, first_of, is_named, mistakes_due
 from grader.bench.judging_rules import Due, Seen
 from grader.bench.judging_students import SOURCES, Key, Source, Work
-from grader.bench.judging_truth import verdicts_due
+from grader.bench.judging_truth import charged_once, verdicts_due
 from grader.bench.judging_values import computed
 from grader.judging import Submission
 from grader.outcomes import Judgement, Mistake
@@ -110,7 +110,9 @@ def result_of(work: Work, source: Source, handed_in: Submission, judgement: Judg
     """A judgement held against the truth."""
     seen = Seen.of(handed_in, work.construction.links)
     due = verdicts_due(work, source, seen)
-    marked = tuple(Marked(one.criterion, due[one.criterion], one.verdict) for one in judgement.outcomes)
+    said = {one.criterion: one.verdict for one in judgement.outcomes}
+    due = charged_once(work, due, said)
+    marked = tuple(Marked(name, due[name], verdict) for name, verdict in said.items())
     made = mistakes_due(work, source, seen)
     told = computed(work)
     if told.slip is not None and source in SOURCES:

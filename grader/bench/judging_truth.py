@@ -8,7 +8,7 @@ drawing follows (*exact*). They are compared by the rubric's plain tolerances, w
 - *wrong*: made is off due by more than 2.5 tolerances. It is to be charged: ``none`` or ``partial``.
 - *right*, or *follows* where due is off the exact by more than 2.5 tolerances: made is within one
   tolerance of due. It is to be credited, as full or as following.
-- *either*: between the two; what was wrongly made and came out right; what follows from a mistake so
+- *either*: between the two; what was wrongly made and came out nearly right; what follows from a mistake so
   far that next to nothing is left of it (the rubric's guard against trivial follow-through); the
   first vectors that show a mistake which no criterion shows where it was made.
 - *missed*: rightly meant, and off by more than the plain tolerance by the hand alone. Either verdict is
@@ -26,9 +26,9 @@ By code:
 - `other_assembly`: the links of the joint that lies on the wrong side. Where no criterion asks for them,
   or no sketch is seen, either verdict for the vectors of the first node that shows it; the rest follows.
 - `figure_rotated`: the driven link's vector of that plan; the rest is drawn rightly in the turned plan.
-- `scale_wrong`: the criterion of the scale where one was declared; the vectors are right by the scale
-  that they follow. Undeclared it may be the student's choice: either for the driven link's vector of that
-  plan, and nothing that must be named.
+- `scale_wrong`: the criterion of the scale where one was declared, or in its place the driven link's
+  vector; all else is right by the scale that it follows. Undeclared it may be the student's choice:
+  either for the driven link's vector of that plan, and nothing that must be named.
 - `rpm_not_converted`: velocities and scales are both too large, so the drawing is right: the declared
   kv is wrong, ka either (the same mistake again). Undeclared, nothing shows.
 - `vector_missing`: nothing to judge; to credit it in full is wrong where it is not optional.
@@ -36,7 +36,8 @@ By code:
   whatever was drawn; either where what was handed in does not tell the sense. A *slip* in computing one
   value is wrong there and nowhere else.
 - `labels_swapped`: the vectors that begin or end in the two nodes, as named against as they should be;
-  either where the letters themselves are told beside nodes named by their lines.
+  either where they follow from the nodes as named, and where the letters themselves are told beside
+  nodes named by their lines.
 """
 
 from collections.abc import Mapping
@@ -73,6 +74,25 @@ def verdicts_due(work: Work, source: Source, seen: Seen) -> dict[str, Due]:
             found[criterion.id] = rate_due(work, source, criterion, told, seen)
         else:
             found[criterion.id] = drawn.due.get(criterion.name, "absent")
+    return found
+
+
+def charged_once(work: Work, due: Mapping[str, Due], said: Mapping[str, str]) -> dict[str, Due]:
+    """A plan at a wrong scale is as well charged at the driven link's vector, from which the rest follows.
+
+    Arguments: `said` is the judge's verdict by criterion.
+    """
+    found = dict(due)
+    for scale in (one for one in work.rubric.criterion if one.scale and due[one.id] == "wrong"):
+        first = [
+            one.id
+            for one in work.rubric.criterion
+            if one.vector
+            and work.construction.vectors[one.vector].scale == scale.scale
+            and is_driven(work.construction, work.construction.vectors[one.vector].head)
+        ]
+        if said[scale.id] == "full" and any(said[name] in {"none", "partial"} for name in first):
+            found.update(dict.fromkeys([scale.id, *first], "either"))
     return found
 
 
@@ -175,11 +195,13 @@ class _Drawn:
             if self.work.by_letters(self.source):
                 return "either"
             nearest = min(apart(forms.named, forms.due), apart(forms.named, forms.exact))
+            if apart(forms.named, forms.due_as_named) <= CLEAR and nearest > PLAIN:
+                return "either"
             return "wrong" if nearest > CLEAR else "right" if nearest < PLAIN else "either"
         changed = apart(forms.made, forms.due)
         by_hand = min(apart(forms.drawn, one) for one in (forms.due, forms.exact, forms.told))
         if changed > CLEAR:
-            is_open = by_hand < PLAIN or _is_charged_before(self.work, name, data_charged=data_charged)
+            is_open = by_hand <= CLEAR or _is_charged_before(self.work, name, data_charged=data_charged)
             return "either" if is_open else "wrong"
         if changed > PLAIN or _is_scale_unknown(self.work, name):
             return "either"
