@@ -1,7 +1,7 @@
 """A leaflet as an A4 document for the printer: the same content as the page for the screen."""
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from xml.sax.saxutils import escape
 
@@ -23,12 +23,10 @@ from reportlab.platypus import (
 
 from grader.answer_sheet.words import BOLD, REGULAR, embed_fonts
 from grader.feedback import words
-from grader.feedback.leaflet import Action, Leaflet, Row, Sheetful
+from grader.feedback.leaflet import Action, Leaflet, Sheetful
 from grader.feedback.looks import Look
 from grader.feedback.printed_pieces import (
     BADGE_MM,
-    INK,
-    LINE,
     PLAIN,
     SOFT,
     Badge,
@@ -37,6 +35,7 @@ from grader.feedback.printed_pieces import (
     table,
     text,
 )
+from grader.feedback.printed_tables import criteria_table, scales_table
 from grader.feedback.sentences import OR, RIVALS
 from grader.i18n import N_
 from grader.plan_pdf import ink
@@ -259,84 +258,28 @@ class _Story:
         ]
 
     def criteria(self) -> Iterator[Flowable]:
-        """The table of criteria: a row each, and what is to be said below it."""
-        if not self.leaflet.rows:
+        """The table of criteria, and what is to be said of all of it."""
+        leaflet = self.leaflet
+        if not leaflet.rows:
             return
         yield CondPageBreak(50 * mm)
         yield from self.heading(N_("Criteria"))
-        full = self.leaflet.shows_expected
-        titles = [
-            N_("Criterion"),
-            N_("Measured"),
-            *([N_("Expected"), N_("Tolerance")] if full else []),
-            N_("Points"),
-        ]
-        widths = [6.0, 72.0, 30.0, 30.0, 29.0, 15.0] if full else [6.0, 100.0, 46.0, 30.0]
-        head = [
-            "",
-            *(text(self.say(title), 7.5, BOLD, colour=SOFT, right=title == titles[-1]) for title in titles),
-        ]
-        rows: list[Sequence[object]] = [head]
-        style: list[tuple[object, ...]] = [
-            *PLAIN,
-            ("BOTTOMPADDING", (0, 0), (-1, -1), 1.6),
-            ("TOPPADDING", (0, 0), (-1, -1), 2.2),
-            ("RIGHTPADDING", (1, 0), (1, -1), 6),
-            ("FONT", (2, 1), (-1, -1), REGULAR, 8.5, 11.2),
-            ("TEXTCOLOR", (2, 1), (-1, -1), ink(INK)),
-            ("TEXTCOLOR", (-2, 1), (-2, -1), ink(SOFT if full else INK)),
-            ("ALIGN", (-1, 0), (-1, -1), "RIGHT"),
-        ]
-        for row in self.leaflet.rows:
-            style.append(("LINEABOVE", (0, len(rows)), (-1, len(rows)), 0.4, ink(LINE)))
-            rows.append(self.row(row, full=full))
-            if row.said:
-                style += [
-                    ("SPAN", (1, len(rows)), (-1, len(rows))),
-                    ("NOSPLIT", (0, len(rows) - 1), (-1, len(rows))),
-                ]
-                rows.append(["", text(printed(row.said), 8, as_markup=True), *[""] * (len(widths) - 2)])
-        yield Table(rows, colWidths=[one * mm for one in widths], style=style, repeatRows=1)
-        if self.leaflet.widening:
+        yield criteria_table(leaflet)
+        if leaflet.widening:
             yield Spacer(1, 2 * mm)
-            yield text(self.leaflet.widening, 8, colour=SOFT)
-        if self.leaflet.not_required:
+            yield text(leaflet.widening, 8, colour=SOFT)
+        if leaflet.not_required:
             said = self.say(N_("Not handed in, and not required:"))
-            named = ", ".join(printed(one) for one in self.leaflet.not_required)
+            named = ", ".join(printed(one) for one in leaflet.not_required)
             yield Spacer(1, 2 * mm)
             yield text(f"{escape(said)} {named}", 8, colour=SOFT, as_markup=True)
 
-    def row(self, row: Row, *, full: bool) -> list[object]:
-        """A criterion's cells."""
-        colour = COLOURS[row.verdict]
-        name = f' <font color="{SOFT}">{printed(row.name)}</font>' if row.name else ""
-        verdict = f'<font color="{colour}">{escape(row.verdict_told)}</font>'
-        title = f'<font name="{BOLD}">{printed(row.title)}</font>{name} {verdict}'
-        cells: list[object] = [Badge(row.verdict), text(title, 8.5, as_markup=True)]
-        columns = [row.measured, *([row.expected, row.tolerance] if full else [])]
-        return [*cells, *("\n".join(column) for column in columns), f"{row.points} / {row.most}"]
-
     def scales(self) -> Iterator[Flowable]:
         """The scales as declared and as used."""
-        if not self.leaflet.scales:
-            return
-        yield CondPageBreak(30 * mm)
-        yield from self.heading(N_("Scales"))
-        full = self.leaflet.shows_expected
-        titles = [N_("Scale"), N_("Declared"), *([N_("Used for marking")] if full else [])]
-        rows = [[text(self.say(title), 7.5, BOLD, colour=SOFT) for title in titles]]
-        for scale in self.leaflet.scales:
-            declared = "  ·  ".join([scale.declared, *scale.remarks])
-            used = f"{scale.used}  ({self.say(N_('assumed'))})" if scale.assumed else scale.used
-            told = [text(printed(scale.name), 8.5, as_markup=True), text(declared, 8.5)]
-            rows.append([*told, text(used, 8.5)] if full else told)
-        style = [
-            *PLAIN,
-            ("LINEABOVE", (0, 1), (-1, -1), 0.4, ink(LINE)),
-            ("TOPPADDING", (0, 0), (-1, -1), 2),
-        ]
-        widths = [20.0, 102.0, 60.0] if full else [20.0, 162.0]
-        yield Table(rows, colWidths=[one * mm for one in widths], style=style)
+        if self.leaflet.scales:
+            yield CondPageBreak(30 * mm)
+            yield from self.heading(N_("Scales"))
+            yield scales_table(self.leaflet)
 
     def heading(self, title: str) -> Iterator[Flowable]:
         """A heading that does not stand alone at a page's foot."""

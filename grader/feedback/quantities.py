@@ -12,7 +12,9 @@ def told(quantity: QuantityDocument, speaker: Tongue) -> list[str]:
     if quantity.length_mm is not None:
         drawn.append(speaker.quantity(quantity.length_mm, 1, "mm"))
     if quantity.direction_deg is not None:
-        drawn.append(f"∠\N{NO-BREAK SPACE}{speaker.number(quantity.direction_deg, 1)}°")
+        # 359.96 is written as 0.0, not as 360.0.
+        rounded = round(quantity.direction_deg, 1) % 360.0
+        drawn.append(f"∠\N{NO-BREAK SPACE}{speaker.number(rounded, 1)}°")
     parts = [" ".join(drawn)] if drawn else []
     if quantity.value is not None:
         unit = speaker.unit(quantity.unit or "")
