@@ -81,14 +81,23 @@ def diagnose(case: Case) -> tuple[Mistake, ...]:
 def _looked_into(case: Case, roots: Sequence[Root], accounts: Sequence[Account]) -> list[Account]:
     """The accounts with mistakes of the whole drawing among them, and with guesses at what was not seen.
 
-    A careless hand is also taken for a usual one that has made some mistake.
+    A careless hand is also taken for a usual one that has made some mistake. What one mistake explains,
+    places and all, is not sought in the whole drawing.
     """
-    whole, cares = [*roots, *_of_the_whole(case)], sorted({accounts[0].care, min(accounts[0].care, USUAL)})
-    found = replay(case.drawing, case.work, whole, case.skill, cares=cares, blind=True) or [*accounts]
+    best = accounts[0]
+    if not _is_explained(best) or not all(one.has_direction for one in case.work.seen):
+        roots = [*roots, *_of_the_whole(case)]
+    cares = sorted({best.care, min(best.care, USUAL)})
+    found = replay(case.drawing, case.work, roots, case.skill, cares=cares, blind=True) or [*accounts]
     for swap in _swaps(case.drawing, found[0]):
         root, work = Root((swap,), cost=RARITY[swap.code]), _renamed(case.work, swap.other)
         found += replay(case.drawing, work, [root], case.skill, cares=cares)
     return sorted(found, key=lambda account: account.cost)
+
+
+def _is_explained(account: Account) -> bool:
+    """Whether a usual hand and one mistake at most explain everything."""
+    return not account.unexplained and len(account.made) <= 1 and account.care <= USUAL
 
 
 def _innocent(accounts: Sequence[Account]) -> float:
@@ -97,15 +106,13 @@ def _innocent(accounts: Sequence[Account]) -> float:
 
 
 def _is_clear(accounts: Sequence[Account], case: Case) -> bool:
-    """Whether a usual hand made everything rightly, or one mistake at a step with everything seen."""
+    """Whether a usual hand made everything rightly, or one mistake with everything seen."""
     best = accounts[0]
-    if best.unexplained or len(best.made) > 1 or best.care > USUAL:
+    if not _is_explained(best):
         return False
-    if not best.made:
-        return True
     seen = {one.node for one in case.work.seen}
     given = {*case.drawing.construction.poles.values()}
-    return all(
+    return not best.made or all(
         step.node in seen or step.node in given or not step.needs for step in case.drawing.construction.steps
     )
 

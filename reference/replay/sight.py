@@ -157,10 +157,9 @@ class Sight:
         is_long = lengths > TINY
         along = np.where(is_long, vectors / np.maximum(lengths, TINY), 0.0)
         wanted = np.array([abs(one.value) for one in self.seen])[:, None]
-        pull = np.sum(along * (wanted - lengths), axis=0)
-        xx = np.sum(along.real**2, axis=0) + STIFFNESS
-        yy = np.sum(along.imag**2, axis=0) + STIFFNESS
-        xy = np.sum(along.real * along.imag, axis=0)
+        pull = (along * (wanted - lengths)).sum(axis=0)
+        x, y = along.real, along.imag
+        xx, yy, xy = (x * x).sum(axis=0) + STIFFNESS, (y * y).sum(axis=0) + STIFFNESS, (x * y).sum(axis=0)
         x, y = pull.real, pull.imag
         return np.asarray(((yy * x - xy * y) + 1j * (xx * y - xy * x)) / (xx * yy - xy**2))
 
