@@ -9,8 +9,9 @@ from grader.comparison.evidence import Evidence, Submission, gather
 from grader.comparison.ledger import Ledger, open_ledger
 from grader.comparison.rates import rate
 from grader.comparison.scales import settle
-from grader.comparison.segments import segment, value_alone
+from grader.comparison.segments import segment
 from grader.comparison.task import Task, unit_of
+from grader.comparison.values import value_alone
 from grader.outcomes import Outcome, Quantity, Tolerance, UsedScale
 from grader.rubric import CriterionTable
 

@@ -63,6 +63,8 @@ class Ledger:
     inherited: set[str] = field(default_factory=set)
     doubtful: set[str] = field(default_factory=set)
     known_off: dict[str, bool] = field(default_factory=dict)
+    factors: dict[str, float | None] = field(default_factory=dict)
+    """By scale, the factor by which all values are off, where that was looked for."""
 
     def best(self, segment: Segment, against: Against, *, follows_through: bool) -> Found:
         """The mark on the original data, or a better one on what follows from own earlier values."""

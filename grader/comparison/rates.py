@@ -7,6 +7,7 @@ from grader.comparison.ledger import Ledger
 from grader.comparison.limits import the_better
 from grader.comparison.marking import length_tolerance, mark_value, tolerances, widened
 from grader.comparison.task import Segment, unit_of
+from grader.comparison.values import common_factor
 from grader.outcomes import Outcome, Quantity, Reason, Tolerance
 from grader.rubric import CriterionTable
 
@@ -31,7 +32,12 @@ def rate(ledger: Ledger, criterion: CriterionTable) -> Outcome:
     ledger.remember(name, mark)
     follows = task.rubric.follows_through(criterion)
     own = from_rate(task, ledger.evidence, turned, scale) if follows and not mark.is_full else None
+    factor = common_factor(ledger, segment.scale)
+    if own is None and factor is not None and follows and not mark.is_full:
+        own = right
     if own is not None:
+        # Values that are all off by one factor give an angular one off by it, too.
+        own = own if factor is None else min(own, own * factor, key=lambda one: abs(one - value))
         limit = length_tolerance(table, abs(own) / per_mm) * per_mm
         candidate = ledger.allowed(
             frozenset({segment.head}), mark_value(value, own, limit, limit, table, unit)

@@ -1,15 +1,14 @@
 """A vector or a link as drawn, with the value computed from it."""
 
 from grader.comparison import verdicts
-from grader.comparison.absent import absent
 from grader.comparison.evidence import DrawnVector
 from grader.comparison.following import NO_SPREAD
 from grader.comparison.ledger import Found, Ledger
 from grader.comparison.limits import FULL, Mark, left_open, the_worse
-from grader.comparison.marking import length_tolerance, mark_value, mark_vector, tolerances, widened
-from grader.comparison.task import unit_of
+from grader.comparison.marking import mark_vector, tolerances, widened
+from grader.comparison.values import mark_of_value
 from grader.comparison.written import held_against_written
-from grader.outcomes import Outcome, Quantity, Tolerance
+from grader.outcomes import Outcome, Tolerance
 from grader.rubric import CriterionTable
 from reference.hand import Spread
 
@@ -28,7 +27,7 @@ def segment(ledger: Ledger, criterion: CriterionTable, drawn: DrawnVector) -> Ou
     value, wrong_value = drawn.length_mm * scale, None
     if one.name in ledger.evidence.values:
         value = ledger.evidence.values[one.name]
-        wrong_value = _wrong_value(ledger, criterion, abs(value), found, drawn)
+        wrong_value = mark_of_value(ledger, criterion, abs(value), found, drawn)
     is_arithmetic = wrong_value is not None and mark.share == FULL
     if wrong_value is not None:
         mark = the_worse(mark, wrong_value)
@@ -78,57 +77,3 @@ def _allowed(criterion: CriterionTable, ledger: Ledger, found: Found, *, with_di
     if found.reach is NO_SPREAD:
         return plain
     return widened(plain, size, found.reach, ledger.task.rubric.hand.at_most)
-
-
-# Values -------------------------------------------------------------------------------------------
-
-
-def _wrong_value(
-    ledger: Ledger, criterion: CriterionTable, value: float, found: Found, drawn: DrawnVector
-) -> Mark | None:
-    """The mark on a computed value; None where it is right, or right by the student's drawing."""
-    one, table = ledger.task.segments[criterion.name], ledger.task.tolerance(criterion)
-    scale = ledger.used[one.scale]
-    marks = []
-    for right in (abs(one.real), abs(found.expected) * scale, drawn.length_mm * scale):
-        allowed = length_tolerance(table, right / scale) * scale
-        marks.append(mark_value(value, right, allowed, allowed, table, unit_of(one.name)))
-    best = marks[0]
-    for mark in marks[1:]:
-        best = mark if mark.is_better(best) else best
-    return None if best.is_full else best
-
-
-def value_alone(ledger: Ledger, criterion: CriterionTable) -> Outcome:
-    """A vector of which only the computed value was handed in, or nothing."""
-    one, values = ledger.task.segments[criterion.name], ledger.evidence.values
-    scale = ledger.used[one.scale]
-    if one.name not in values:
-        exact = one.drawn(ledger.used)
-        return absent(ledger, criterion, verdicts.expected_quantity(one.name, exact, scale, 0.0))
-    value, unit = abs(values[one.name]), unit_of(one.name)
-
-    def allowed(expected: complex, reach: Spread) -> Tolerance:
-        plain = tolerances(ledger.task.tolerance(criterion), abs(expected), with_direction=False)
-        if reach is NO_SPREAD:
-            return Tolerance(value=(plain.length_mm or 0.0) * scale)
-        wider = widened(plain, abs(expected), reach, ledger.task.rubric.hand.at_most)
-        return Tolerance(value=(wider.length_mm or 0.0) * scale, widened=wider.widened)
-
-    def against(expected: complex, reach: Spread = NO_SPREAD, se: Spread = NO_SPREAD) -> Mark:
-        del se
-        limit, table = allowed(expected, reach).value or 0.0, ledger.task.tolerance(criterion)
-        plain = length_tolerance(table, abs(expected)) * scale
-        return mark_value(value, abs(expected) * scale, limit, plain, table, unit)
-
-    follows = ledger.task.rubric.follows_through(criterion)
-    found = ledger.best(one, against, follows_through=follows)
-    measured, right = Quantity(value=values[one.name], unit=unit), abs(found.expected) * scale
-    return verdicts.outcome(
-        criterion,
-        found.mark,
-        measured,
-        Quantity(value=right, unit=unit),
-        allowed(found.expected, found.reach),
-        followed=found.is_followed,
-    )

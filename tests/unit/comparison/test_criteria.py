@@ -211,10 +211,29 @@ def test_a_wrong_value_beside_a_right_drawing_is_arithmetic():
     value = abs(PUMP.real["v_D"])
     comparison = compare(PUMP, Submission(measured=measured(PUMP), values={"v_D": 1.3 * value}))
     outcome = outcome_of(comparison, "v_D")
-    assert outcome.verdict == "none"
+    assert outcome.verdict == "partial"
     assert outcome.mistake == "arithmetic"
     assert codes(outcome)[0] == "value_too_large"
     assert outcome.measured.value == pytest.approx(1.3 * value)
+
+
+@pytest.mark.parametrize("factor", [2.0, 30.0 / math.pi, 0.1])
+@pytest.mark.parametrize("segments", [True, False], ids=["with segments", "values alone"])
+def test_a_factor_in_all_values_costs_once(factor, segments):
+    names = [name for name, vector in PUMP.construction.vectors.items() if vector.scale == "kv"]
+    values = {name: factor * abs(PUMP.real[name]) for name in names}
+    values |= {f"omega_{k}": factor * PUMP.rates[f"omega_{k}"] for k in (2, 3, 4)}
+    reading = measured(PUMP) if segments else without(measured(PUMP), *names)
+    found = verdicts(compare(PUMP, Submission(measured=reading, values=values)))
+    off = [name for name in values if found[name] in {"none", "partial"}]
+    assert len(off) == 1
+    assert off[0] in names
+
+
+def test_two_values_off_by_one_factor_are_two_slips():
+    values = {name: 2.0 * abs(PUMP.real[name]) for name in ("v_B", "v_D")}
+    found = verdicts(compare(PUMP, Submission(measured=measured(PUMP), values=values)))
+    assert found["v_B"] == found["v_D"] == "partial"
 
 
 def test_a_value_right_by_the_own_wrong_drawing_costs_nothing_more():
