@@ -21,6 +21,7 @@ class Handed:
     numbers : entered lengths (mm), ``NAME_deg`` directions and ``NAME_value`` SI values
     used : scales used for marking, real units per millimetre; empty where marking came to none
     fits : the variant that diagnosis says was drawn instead, with its confidence, or None
+    printed : whether it is drawn on printed answer sheets, that say where poles are best put
     excused : nodes and vectors at which a mistake was named: what is off there is no hand's error
     """
 
@@ -31,6 +32,7 @@ class Handed:
     used: Mapping[str, float] = field(default_factory=dict)
     fits: tuple[Variant, float] | None = None
     excused: frozenset[str] = frozenset()
+    printed: bool = False
 
     @property
     def key(self) -> tuple[str, int | None]:
@@ -55,6 +57,7 @@ def handed_in(report: ReportDocument, variant: Variant, measured: Measurements |
         used={name: one.used for name, one in report.scales.items() if one.used},
         fits=_fits(variant, report),
         excused=frozenset(mistake.at for mistake in report.mistakes),
+        printed=any(one.sheet is not None and one.sheet.method == "markers" for one in report.reading.sheets),
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.alike.nodes import Drawn
-from grader.records import FloatArray, IntArray
+from grader.records import MECHANISM, FloatArray, IntArray
 from reference.geometry import ComplexArray
 
 NEAR_MM = 0.5
@@ -23,8 +23,11 @@ TRUSTED = 3000.0
 """So many times the class's pairs the rarest placement may be: rarer ones no class can vouch for."""
 
 
-def place_chance(drawn: Mapping[str, Drawn]) -> FloatArray:
+def place_chance(drawn: Mapping[str, Drawn], printed: NDArray[np.bool_], variant: IntArray) -> FloatArray:
     """Log of the chance that two placements come so near, for every two students; 0 where not known.
+
+    Arguments: which students drew on a `printed` sheet, whose crosses say for each variant where poles
+    are best put: there the sketch alone is placed freely. `variant` is each student's, as a number.
 
     What one figure is shifted by, from one student's sheet to another's, is held against the shift of
     the next: it does not matter how the sheets lay in the scanner.
@@ -35,11 +38,18 @@ def place_chance(drawn: Mapping[str, Drawn]) -> FloatArray:
     for first, second in combinations(drawn, 2):
         together = drawn[first].sheet == drawn[second].sheet
         between = np.abs(shifts[first] - shifts[second])
-        known = np.isfinite(between) & together[:, None] & together[None, :]
+        free = np.ones(len(printed), bool) if MECHANISM in {first, second} else ~printed
+        known = np.isfinite(between) & together[:, None] & together[None, :] & free[:, None] & free[None, :]
         apart = np.maximum(apart, np.where(known, between, 0.0))
         freedom += 2 * known
-    # Of three figures' distances two are free.
-    return _chance(np.maximum(apart, NEAR_MM), np.minimum(freedom, 2 * (len(drawn) - 1)))
+    # Of three figures' distances two are free, beside prescribed poles one.
+    most = np.where(printed[:, None] | printed[None, :], 2, 2 * (len(drawn) - 1))
+    freedom = np.minimum(freedom, most)
+    apart = np.maximum(apart, NEAR_MM)
+    same = variant[:, None] == variant[None, :]
+    # Those of one variant may have more in common than all.
+    chance = _chance(apart, freedom)
+    return np.where(same, np.maximum(chance, _chance(apart, freedom, same)), chance)
 
 
 def _shift(at: ComplexArray) -> ComplexArray:
@@ -57,11 +67,15 @@ def _shift(at: ComplexArray) -> ComplexArray:
     return shift
 
 
-def _chance(apart: FloatArray, freedom: IntArray) -> FloatArray:
-    """Log chances, by the densest ring about each placement that the class shows."""
-    chance = np.zeros(apart.shape)
+def _chance(apart: FloatArray, freedom: IntArray, among: NDArray[np.bool_] | None = None) -> FloatArray:
+    """Log chances, by the densest ring about each placement that the class (or some pairs of it) shows.
+
+    Too few pairs show nothing: 0 for the whole class, no objection (-inf) for some pairs of it.
+    """
+    chance = np.zeros(apart.shape) if among is None else np.full(apart.shape, -np.inf)
     for dimensions in (2, 4):
         of_these = (freedom == dimensions) & ~np.eye(len(apart), dtype=bool)
+        of_these &= True if among is None else among
         if of_these.sum() < 2 * LEAST_PAIRS:
             continue
         pairs = np.maximum(_without_both(of_these), 1.0)

@@ -236,3 +236,22 @@ def test_any_assignment_and_any_reading_can_be_compared(name):
             replace(one, sheets=(kept,), numbers={"v_A": 5.0 * k, "a_A_deg": 1.0, "odd_value": 2.0})
         )
     assert found(name, handed) == {}
+
+
+@pytest.mark.parametrize("printed", [False, True])
+def test_crosses_for_poles_that_are_each_variants_own_make_nobody_alike(printed):
+    """Two students of each variant, both with their poles on the crosses of their printed sheets."""
+    made = []
+    for seed in range(60):
+        one = scanned(drawing("pump", seed // 2, seed, "careful"), seed)
+        (sheet,) = one.sheets
+        rng = np.random.default_rng([seed, 31])
+        crosses = np.random.default_rng([seed // 2, 33])
+        placed = {}
+        for figure, nodes in sheet.items():
+            pole = next(iter(drawing("pump", seed // 2, seed, "careful").sheets[0][figure].values()))
+            cross = complex(*crosses.normal(200.0, 20.0, 2)) + complex(*rng.normal(0.0, 0.2, 2))
+            shift = 0.0 if figure == "mechanism" and printed else cross - pole
+            placed[figure] = {node: at + shift for node, at in nodes.items()}
+        made.append(replace(one, sheets=(placed,), printed=printed))
+    assert found("pump", made) == {}
