@@ -53,12 +53,16 @@ _TONES = np.array(
     dtype=np.uint8,
 )
 """What is shown for each share of the paper's brightness, 0..255."""
+PNG_COMPRESSION = 1
 _FEW_TONES = np.array([17 * round(tone / 17) for tone in range(256)], dtype=np.uint8)
 """Sixteen tones: pencil and ink look the same, and a PNG is half a JPEG."""
+_FLAT_PNG = [
+    cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE,
+]  # fmt: skip
+"""Of pictures that are white for the most part."""
 OPACITY = 0.82
 FRACTION_BITS = 4
 JPEG_QUALITY = 78
-PNG_COMPRESSION = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,22 +119,15 @@ def overlay(
         scene = scene_of(
             behind.page_mm, reading, vectors, outcomes, show_expected=show_expected, links=links or {}
         )
-    painted = paint(scan, scene)
-    png = _encode(".png", painted, [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION])
-    return Picture(behind.source, behind.page, png, _smallest(scan), width, height, scene)
+    plain = _grey(cv2.LUT(scan, _FEW_TONES))
+    png = _encode(".png", paint(plain, scene), _FLAT_PNG)
+    return Picture(behind.source, behind.page, png, _smaller(scan, plain), width, height, scene)
 
 
-def _smallest(scan: GreyImage) -> bytes:
+def _smaller(scan: GreyImage, plain: GreyImage) -> bytes:
     """A cleaned scan as a small file: pencil on white paper needs few tones, a photo's shades many."""
     jpeg = _encode(".jpg", scan, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    options = [
-        cv2.IMWRITE_PNG_COMPRESSION,
-        PNG_COMPRESSION,
-        cv2.IMWRITE_PNG_STRATEGY,
-        cv2.IMWRITE_PNG_STRATEGY_RLE,
-    ]
-    png = _encode(".png", _grey(cv2.LUT(scan, _FEW_TONES)), options)
-    return min(jpeg, png, key=len)
+    return min(jpeg, _encode(".png", plain, _FLAT_PNG), key=len)
 
 
 def stored(behind: Backdrop) -> bytes:
