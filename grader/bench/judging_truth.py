@@ -82,14 +82,14 @@ def charged_once(work: Work, due: Mapping[str, Due], said: Mapping[str, str]) ->
 
     Arguments: `said` is the judge's verdict by criterion.
     """
-    found = dict(due)
+    found, vectors = dict(due), work.construction.vectors
     for scale in (one for one in work.rubric.criterion if one.scale and due[one.id] == "wrong"):
         first = [
             one.id
             for one in work.rubric.criterion
-            if one.vector
-            and work.construction.vectors[one.vector].scale == scale.scale
-            and is_driven(work.construction, work.construction.vectors[one.vector].head)
+            if (vector := vectors.get(one.name)) is not None
+            and vector.scale == scale.scale
+            and is_driven(work.construction, vector.head)
         ]
         if said[scale.id] == "full" and any(said[name] in {"none", "partial"} for name in first):
             found.update(dict.fromkeys([scale.id, *first], "either"))

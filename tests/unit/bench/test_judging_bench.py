@@ -145,6 +145,26 @@ def test_a_wrong_scale_is_due_a_charge_itself_and_none_of_its_vectors():
     assert not made[0].visible
 
 
+def test_a_wrong_scale_may_be_charged_at_the_vector_from_which_its_plan_follows_instead():
+    mistake = Mistake("scale_wrong", "kv", factor=2.0)
+    there = result([mistake], kv="full", v_A="none")
+    neither = result([mistake], kv="full", v_A="full")
+    dues = [{one.criterion: one.due for one in marked.criteria} for marked in (there, neither)]
+    assert (dues[0]["kv"], dues[0]["v_A"]) == ("either", "either")
+    assert (dues[1]["kv"], dues[1]["v_A"]) == ("wrong", "follows")
+
+
+def test_a_plates_image_by_similarity_has_fewer_vectors_than_the_rubric_asks_for():
+    keys = (Key("pump", "careful", "single", seed) for seed in range(200))
+    works = (student(key) for key in keys)
+    work = next(
+        one for one in works if "a_CA_n" not in one.construction.vectors
+        and one.declares and any(made.code == "scale_wrong" for made in one.task.mistakes)
+    )  # fmt: skip
+    (found, *_) = judged(work.key, sources=("nodes",))
+    assert {one.criterion: one.due for one in found.criteria}["a_CA_n"] == "absent"
+
+
 def test_a_wrong_assembly_is_charged_on_the_sketch_or_else_where_the_plan_first_shows_it():
     work = drawn("press", Mistake("other_assembly", "D"), position=1)
     found, _, _ = due(work)
