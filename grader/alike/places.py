@@ -87,7 +87,8 @@ def _chance(apart: FloatArray, freedom: IntArray, among: NDArray[np.bool_] | Non
             nearer = dimensions * np.log(np.minimum(apart / ring, 1.0))
             with np.errstate(divide="ignore"):
                 found = np.maximum(found, np.log(others / pairs) + nearer)
-        chance = np.where(of_these, np.clip(found, -np.log(TRUSTED * pairs), 0.0), chance)
+        least = -np.log(TRUSTED * pairs) if among is None else -np.inf
+        chance = np.where(of_these, np.clip(found, least, 0.0), chance)
     return chance
 
 
