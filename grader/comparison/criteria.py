@@ -14,6 +14,7 @@ from grader.comparison.task import Task, unit_of
 from grader.comparison.values import value_alone
 from grader.outcomes import Outcome, Quantity, Tolerance, UsedScale
 from grader.rubric import CriterionTable
+from reference.mistakes import Drawing
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +28,14 @@ class Comparison:
     evidence: Evidence
 
 
-def compare(task: Task, submission: Submission) -> Comparison:
-    """Mark every criterion of the task's rubric."""
+def compare(task: Task, submission: Submission, drawn_for: Drawing | None = None) -> Comparison:
+    """Mark every criterion of the task's rubric.
+
+    Arguments: `drawn_for` is the wrong mechanism that the plans were drawn for, where that is known.
+    """
     evidence = gather(task, submission)
     settled = settle(task, evidence, submission.declared)
-    ledger = open_ledger(task, evidence, settled)
+    ledger = open_ledger(task, evidence, settled, drawn_for)
     found = {criterion.id: _outcome(ledger, criterion) for criterion in _in_order(task, tuple(settled))}
     return Comparison(
         outcomes=tuple(found[criterion.id] for criterion in task.rubric.criterion),

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from grader.comparison.evidence import Evidence
-from grader.comparison.own import Nodes, known, own_nodes, with_own_lengths
+from grader.comparison.own import Nodes, known, own_nodes
 from grader.comparison.sketches import Sketch, other_sketch
 from grader.comparison.task import SCALE_NAMES, Segment, Task
 from grader.records import MECHANISM
@@ -85,10 +85,9 @@ class Following:
         return self.named_nodes[id(own)]
 
     def right(self, scales: Mapping[str, float]) -> Sketch:
-        """The right mechanism, at the scale that its sketch has where that was read."""
-        return Sketch(
-            "right", self.task.construction, self.task.at(with_own_lengths(self.task, self.evidence, scales))
-        )
+        """The right mechanism, its sketch at the scale that it follows."""
+        drawn = {**scales, "kL": self.followed["kL"]}
+        return Sketch("right", self.task.construction, self.task.at(drawn))
 
     def traced(
         self, scales: Mapping[str, float], sketch: Sketch | None = None, *, by_similarity: bool = False

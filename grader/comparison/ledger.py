@@ -8,12 +8,13 @@ from grader.comparison.evidence import Evidence
 from grader.comparison.following import NO_SPREAD, Expectation, Following, scaled
 from grader.comparison.limits import FULL, NONE, Mark, the_better
 from grader.comparison.marking import length_tolerance
-from grader.comparison.own import with_own_lengths
 from grader.comparison.scales import Scale, followed_scales, used_scales
+from grader.comparison.sketches import Sketch
 from grader.comparison.task import Segment, Task
 from grader.outcomes import Reason
 from grader.records import MECHANISM
 from reference.hand import Spread, spread
+from reference.mistakes import Drawing
 
 
 class Against(Protocol):
@@ -33,10 +34,18 @@ class Found:
     is_followed: bool = False
 
 
-def open_ledger(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> "Ledger":
-    """The ledger of a submission before anything is marked."""
+def open_ledger(
+    task: Task, evidence: Evidence, settled: Mapping[str, Scale], drawn_for: Drawing | None = None
+) -> "Ledger":
+    """The ledger of a submission before anything is marked.
+
+    Arguments: `drawn_for` is the wrong mechanism that the plans were drawn for, where that is known.
+    """
     used, followed = used_scales(settled), followed_scales(settled)
-    ledger = Ledger(task, evidence, settled, used, followed, Following(task, evidence, used, followed))
+    following = Following(task, evidence, used, followed)
+    if drawn_for is not None:
+        following.sketch.append(Sketch("told", drawn_for.construction, drawn_for.parameters))
+    ledger = Ledger(task, evidence, settled, used, followed, following)
     # What was drawn contradicts a scale that nobody declared, or that nobody understood.
     ledger.doubtful.update(name for name, scale in settled.items() if scale.other and scale.used.assumed)
     return ledger
@@ -153,7 +162,7 @@ class Ledger:
             return False
         exact = task.nodes(self.used)[node]
         if task.construction.figure_of(node) == MECHANISM:
-            exact *= self.used["kL"] / with_own_lengths(task, self.evidence, self.used)["kL"]
+            exact *= self.used["kL"] / self.followed["kL"]
         off = own - exact
         if abs(off) <= length_tolerance(task.rubric.tolerance, abs(exact)):
             return False

@@ -49,13 +49,6 @@ def _by_figure(task: Task, places: Mapping[str, Own]) -> dict[str, dict[str, Own
     return found
 
 
-def with_own_lengths(task: Task, evidence: Evidence, scales: Mapping[str, float]) -> dict[str, float]:
-    """The scales, with kL as the sketch was really drawn where that was read."""
-    if task.yardstick is None or evidence.yardstick_mm is None:
-        return dict(scales)
-    return {**scales, "kL": task.yardstick.length_m / evidence.yardstick_mm[0]}
-
-
 def known(nodes: Nodes) -> frozenset[str]:
     """The names of all own nodes."""
     return frozenset(

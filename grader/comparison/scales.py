@@ -151,6 +151,16 @@ def _fitting(task: Task, evidence: Evidence, name: str, scale: float) -> int:
     )
 
 
+def _links_at(task: Task, evidence: Evidence, scale: float) -> int:
+    """How many links beside the yardstick have the right length at a scale of lengths."""
+    yardstick = None if task.yardstick is None else {task.yardstick.tail, task.yardstick.head}
+    return sum(
+        _fits(evidence.drawn[name], abs(task.segments[name].real) / scale, task.rubric.tolerance)
+        for name, ends in task.construction.links.items()
+        if name in evidence.drawn and set(ends) != yardstick
+    )
+
+
 def _fits(drawn: DrawnVector, expected_mm: float, tolerance: ToleranceTable) -> bool:
     is_telling = expected_mm > tolerance.length_mm and drawn.length_mm > tolerance.length_mm
     return is_telling and abs(drawn.length_mm - expected_mm) <= length_tolerance(tolerance, expected_mm)
@@ -198,7 +208,8 @@ def _followed_instead(
         return None
     other = witness[0] / witness[1]
     if name == "kL":
-        return other
+        # A crank drawn too long beside links that are right is a wrong crank, no wrong scale.
+        return None if _links_at(task, evidence, declared) > _links_at(task, evidence, other) else other
     # Where nothing else tells, a drawing that follows the rule tells that the declaration does not.
     follows_rule = rule is not None and _is_witnessed(task, evidence, name, rule)
     return other if follows_rule else _contradiction(task, evidence, name, declared)

@@ -5,7 +5,7 @@ import pytest
 from grader.comparison import Submission, compare, task_of
 from grader.rubric import load_rubric
 from reference.assignment import library, load_assignment
-from tests.hands import changed, measured, rule_scales, sheet, task_for, without
+from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
 
 TASK = task_for("pump", 7)
 RULE = rule_scales(TASK)
@@ -155,3 +155,30 @@ def test_a_bare_number_counts_where_the_assignment_says_its_unit(tmp_path):
     task = task_of(assignment, load_rubric("pump"), assignment.variant(7))
     comparison = compare(task, Submission(measured=measured(task), declared={"kv": f"{RULE['kv']!r}"}))
     assert comparison.scales["kv"].declared == pytest.approx(RULE["kv"], rel=ROUNDING)
+
+
+def test_a_crank_drawn_too_long_beside_right_links_is_a_wrong_crank_and_no_wrong_scale():
+    crank = drawn_nodes(TASK)["A"] - drawn_nodes(TASK)["O1"]
+    reading = sheet(TASK, moved={"A": 0.12 * crank})
+    comparison = compare(TASK, Submission(readings=(reading,), declared=declared()))
+    assert outcome_of(comparison, "kL").verdict == "full"
+    assert outcome_of(comparison, "O1A").verdict == "none"
+    assert outcome_of(comparison, "O2B").verdict == "full"
+
+
+def test_links_are_not_judged_where_no_sketch_was_read():
+    comparison = compare(TASK, Submission(measured=measured(TASK)))
+    assert {one.verdict for one in comparison.outcomes if one.name in TASK.construction.links} == {
+        "not_judged"
+    }
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 30.0])
+def test_a_links_direction_counts_in_the_assignments_frame(turn_deg):
+    right = compare(TASK, Submission(readings=(sheet(TASK, turn_deg=turn_deg),)))
+    assert {outcome_of(right, name).verdict for name in TASK.construction.links} == {"full"}
+    astray = drawn_nodes(TASK)["D"] + 6.0j
+    reading = sheet(TASK, turn_deg=turn_deg, moved={"D": astray - drawn_nodes(TASK)["D"]})
+    found = compare(TASK, Submission(readings=(reading,)))
+    assert outcome_of(found, "CD").verdict == "none"
+    assert outcome_of(found, "AB").verdict == "full"
