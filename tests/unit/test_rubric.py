@@ -2,7 +2,7 @@
 
 import pytest
 
-from grader.rubric import check_rubric, load_rubric, rubric_of
+from grader.rubric import ToleranceTable, check_rubric, load_rubric, rubric_of
 from reference.assignment import built_in, library, load_assignment
 from reference.derivation import construction_of
 from reference.errors import AuthoredFileError, CallError
@@ -57,6 +57,22 @@ def test_what_needs_accelerations_is_known(rubric, text):
             "1",
         ),
         ("criterion = []\n", r"$.criterion", "at least 1"),
+        (criterion('vector = "v_A"\nlink = "AB"'), r"$.criterion[0]", "exactly one of"),
+        ("[weights]\nangular = 5\n" + criterion('vector = "v_A"'), r"$.weights.angular", "no criterion"),
+        ("[weights]\nsketch = 5\n" + criterion('vector = "v_A"'), r"$.weights.sketch", "known"),
+        ("[weights]\nscales = 0\n" + criterion('scale = "kv"'), r"$.weights.scales", "greater than 0"),
+        ("[hand]\nat_most = 0.5\n" + criterion('vector = "v_A"'), r"$.hand.at_most", "1"),
+        (
+            "[tolerance]\nbands = [{ factor = 2, share = 0.5 }, { factor = 1.5, share = 0.2 }]\n"
+            + criterion('vector = "v_A"'),
+            r"$.tolerance",
+            "rising factors and falling shares",
+        ),
+        (
+            "[tolerance]\npartial_share = 0.5\nbands = []\n" + criterion('vector = "v_A"'),
+            r"$.tolerance",
+            "one or the other",
+        ),
     ],
 )
 def test_a_fault_is_told_with_its_path(rubric, text, where, what):
@@ -67,11 +83,44 @@ def test_a_fault_is_told_with_its_path(rubric, text, where, what):
 
 
 def test_names_that_the_mechanism_does_not_have_are_faults(rubric):
-    found = rubric(criterion('vector = "v_X"') + criterion('angular = "omega_9"', "w"))
+    found = rubric(
+        criterion('vector = "v_X"') + criterion('angular = "omega_9"', "w") + criterion('link = "AD"', "l")
+    )
     assignment = load_assignment("pump")
     construction = construction_of(assignment.mechanism(assignment.variants()[:1]))
     faults = [finding.path for finding in check_rubric(found, construction)]
-    assert faults == ["$.criterion[0].vector", "$.criterion[1].angular"]
+    assert faults == ["$.criterion[0].vector", "$.criterion[1].angular", "$.criterion[2].link"]
+
+
+def test_weights_scale_the_points_of_a_section_and_leave_the_others(rubric):
+    found = rubric(
+        "[weights]\nvelocity_plan = 10\n"
+        + criterion('vector = "v_A"')
+        + criterion('vector = "v_B"', "v_B").replace("1.0", "3.0")
+        + criterion('link = "AB"', "AB")
+    )
+    assert found.points == {"v_A": 2.5, "v_B": 7.5, "AB": 1.0}
+    assert found.max_score == 11.0
+    assert [one.section for one in found.criterion] == ["velocity_plan", "velocity_plan", "mechanism"]
+
+
+def test_bands_give_several_steps_and_none_all_or_nothing(rubric):
+    steps = "[{ factor = 1.5, share = 0.75 }, { factor = 3, share = 0.25 }]"
+    found = rubric(f"[tolerance]\nbands = {steps}\n" + criterion('vector = "v_A"')).tolerance
+    assert found.all_bands == ((1.5, 0.75), (3.0, 0.25))
+    assert found.farthest == 3.0
+    assert ToleranceTable().all_bands == ((2.0, 0.5),)
+    assert ToleranceTable(bands=[]).all_bands == ()
+    assert ToleranceTable(bands=[]).farthest == 1.0
+
+
+def test_a_criterion_may_follow_through_or_not_whatever_the_rubric_says(rubric):
+    found = rubric(
+        "follow_through = false\n"
+        + criterion('vector = "v_A"\nfollow_through = true')
+        + criterion('vector = "v_B"', "v_B")
+    )
+    assert [found.follows_through(one) for one in found.criterion] == [True, False]
 
 
 def test_an_assignment_with_a_rubric_of_another_mechanism_is_refused(tmp_path):

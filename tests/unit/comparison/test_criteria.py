@@ -9,7 +9,7 @@ import pytest
 
 from grader.comparison import Submission, compare, task_of
 from grader.records import Figure, Reading, ReadNode, ReadVector, Unread
-from grader.rubric import CriterionTable, load_rubric
+from grader.rubric import Band, CriterionTable, ToleranceTable, load_rubric
 from reference.assignment import load_assignment
 from reference.mistakes import Mistake
 from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
@@ -135,6 +135,40 @@ def test_the_printed_table_of_the_press_is_right():
     assert lost(comparison) == []
     assert {one.criterion for one in comparison.outcomes if one.verdict == "full"} == {
         "kL", "kv", "ka", *segments}  # fmt: skip
+
+
+def test_bands_give_their_shares():
+    bands = [Band(factor=1.5, share=0.75), Band(factor=3.0, share=0.25)]
+    task = with_rubric(BARE, tolerance=ToleranceTable(bands=bands))
+    reading = measured(task)
+    length = reading.figures["acceleration_plan"].vectors["a_BA_t"].length_mm
+    for off_mm, share in ((0.9, 1.0), (1.4, 0.75), (2.9, 0.25), (3.1, 0.0)):
+        longer = changed(reading, "a_BA_t", length_mm=length + off_mm)
+        assert outcome_of(compare(task, Submission(measured=longer)), "a_BA_t").shares == (share, share)
+
+
+def test_a_tolerance_is_wider_where_small_errors_add_up_and_says_so():
+    reading = measured(PUMP, directions=False)
+    length = reading.figures["acceleration_plan"].vectors["a_D"].length_mm
+    allowed = outcome_of(compare(PUMP, Submission(measured=reading)), "a_D").tolerance
+    assert not allowed.widened
+    longer = changed(reading, "a_D", length_mm=length + 1.5 * allowed.length_mm)
+    outcome = outcome_of(compare(PUMP, Submission(measured=longer)), "a_D")
+    assert outcome.verdict == "full"
+    assert outcome.tolerance.widened
+    assert 1.5 * allowed.length_mm < outcome.tolerance.length_mm
+    assert outcome.tolerance.length_mm <= PUMP.rubric.hand.at_most * allowed.length_mm * (1.0 + ROUNDING)
+
+
+def test_what_a_careful_hand_may_miss_beyond_that_goes_to_a_person():
+    task = task_for("pump-230", 29)
+    reading = measured(task, directions=False)
+    length = reading.figures["acceleration_plan"].vectors["a_D"].length_mm
+    longer = changed(reading, "a_D", length_mm=length + 10.0)
+    outcome = outcome_of(compare(task, Submission(measured=longer)), "a_D")
+    assert (outcome.verdict, codes(outcome)[0]) == ("review", "hand_may_miss")
+    gone = changed(reading, "a_D", length_mm=length + 40.0)
+    assert outcome_of(compare(task, Submission(measured=gone)), "a_D").verdict == "none"
 
 
 # What standard errors leave open ------------------------------------------------------------------
