@@ -40,7 +40,10 @@ __all__ = ["Submission", "Task", "judge", "report_of", "task_of", "unjudged_repo
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission)
-    mistakes = diagnose(_case(task, comparison))
+    diagnosis = diagnose(_case(task, comparison))
+    if diagnosis.drawn_for is not None and not comparison.evidence.has_sketch:
+        comparison = compare(task, submission, diagnosis.drawn_for)
+    mistakes = diagnosis.mistakes
     mistakes = (*mistakes, *_swaps_seen(task, submission, mistakes), *_not_drawn(task, comparison))
     outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))

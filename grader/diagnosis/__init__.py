@@ -28,6 +28,9 @@ LEAST_CONFIDENCE = 0.6
 """An explanation less certain than this is not told."""
 FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
+CERTAIN = 0.9
+"""From this confidence on what follows from a wrong mechanism is credited."""
+OF_THE_MECHANISM = frozenset({"other_assembly", "other_variant"})
 BEYOND_DOUBT = 20.0
 """A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
 LEAST_WRONG = 0.06
@@ -64,18 +67,47 @@ class Case:
     scale_criteria: Mapping[str, str] = field(default_factory=dict)
 
 
-def diagnose(case: Case) -> tuple[Mistake, ...]:
-    """The mistakes that explain what was lost, in the order of construction; none where nothing does."""
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What explains a drawing.
+
+    Attributes
+    ----------
+    mistakes : those that explain what was lost, in the order of construction; none where nothing does
+    drawn_for : the wrong mechanism that the plans were drawn for, None where it is right or not certain
+    """
+
+    mistakes: tuple[Mistake, ...] = ()
+    drawn_for: Drawing | None = None
+
+
+def diagnose(case: Case) -> Diagnosis:
+    """The mistakes of the simplest account that fits, where a right drawing would not be believed."""
     if not case.lost and not case.followed:
-        return ()
+        return Diagnosis()
     roots = [Root(), *_other_scales(case)]
     accounts = replay(case.drawing, case.work, roots, case.skill, cares=HANDS)
     innocent = _innocent(accounts)
     if accounts and not _is_clear(accounts, case):
         accounts = _looked_into(case, roots, accounts)
     if not accounts or innocent - accounts[0].cost < BEYOND_DOUBT:
-        return ()
-    return told(accounts, case, LEAST_CONFIDENCE)
+        return Diagnosis()
+    mistakes = told(accounts, case, LEAST_CONFIDENCE)
+    return Diagnosis(mistakes, _drawn_for(case.drawing, accounts[0], mistakes))
+
+
+def _drawn_for(drawing: Drawing, account: Account, mistakes: Sequence[Mistake]) -> Drawing | None:
+    """The mechanism with the mistakes in it that it was certainly drawn with."""
+    sure = {(one.code, one.at) for one in mistakes if one.confidence >= CERTAIN}
+    of_the_mechanism = [
+        one for one in account.made if one.code in OF_THE_MECHANISM and (one.code, one.at) in sure
+    ]
+    for one in of_the_mechanism:
+        if one.code == "other_variant":
+            drawing = Drawing(drawing.construction, {**drawing.parameters, **one.parameters})
+        else:
+            drawing = operators.commit(one, drawing)
+    return drawing if of_the_mechanism else None
 
 
 def _looked_into(case: Case, roots: Sequence[Root], accounts: Sequence[Account]) -> list[Account]:
@@ -158,7 +190,9 @@ def _other_variants(case: Case) -> Iterator[Root]:
     for index, variant in enumerate(variants):
         if variant != case.variant and table:
             parameters = {name: np.asarray(value[index]) for name, value in table.items()}
-            other = operators.Mistake("other_variant", "mechanism", n=variant.n, position=variant.position)
+            other = operators.Mistake(
+                "other_variant", "mechanism", n=variant.n, position=variant.position, parameters=parameters
+            )
             yield Root((other,), parameters, cost=RARITY["other_variant"])
 
 
