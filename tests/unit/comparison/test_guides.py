@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from grader.comparison import Submission, compare
-from grader.comparison.following import own_length
+from grader.comparison.rates import own_length
 from grader.judging import judge
 from grader.measurements import names_of
 from grader.records import Figure, Reading
