@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from grader.comparison import Comparison, Submission, Task, compare, task_of
+from grader.comparison import Comparison, Sketch, Submission, Task, compare, task_of
 from grader.comparison.evidence import Evidence
 from grader.diagnosis import LEAST_CONFIDENCE, Case, diagnose
 from grader.documents import (
@@ -41,8 +41,11 @@ def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission)
     diagnosis = diagnose(_case(task, comparison))
-    if diagnosis.drawn_for is not None and not comparison.evidence.has_sketch:
-        comparison = compare(task, submission, diagnosis.drawn_for)
+    if diagnosis.drawn and diagnosis.wrong and not comparison.evidence.has_sheets:
+        # No sheet shows what was drawn: the diagnosis tells what measured vectors follow from.
+        drawn = diagnosis.drawn
+        drawn_by = Sketch("told", drawn.construction, drawn.parameters, diagnosis.wrong)
+        comparison = compare(task, submission, drawn_by)
     mistakes = diagnosis.mistakes
     mistakes = (*mistakes, *_swaps_seen(task, submission, mistakes), *_not_drawn(task, comparison))
     outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)

@@ -19,6 +19,7 @@ reasons (`grader.outcomes`); nothing here speaks a human language.
 
 from grader.comparison.criteria import Comparison, compare
 from grader.comparison.evidence import Submission
+from grader.comparison.sketches import Sketch
 from grader.comparison.task import Task, task_of
 
-__all__ = ["Comparison", "Submission", "Task", "compare", "task_of"]
+__all__ = ["Comparison", "Sketch", "Submission", "Task", "compare", "task_of"]

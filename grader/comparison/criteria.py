@@ -10,11 +10,11 @@ from grader.comparison.ledger import Ledger, open_ledger
 from grader.comparison.rates import rate
 from grader.comparison.scales import settle
 from grader.comparison.segments import segment
+from grader.comparison.sketches import Sketch
 from grader.comparison.task import Task, unit_of
 from grader.comparison.values import value_alone
 from grader.outcomes import Outcome, Quantity, Tolerance, UsedScale
 from grader.rubric import CriterionTable
-from reference.mistakes import Drawing
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +28,14 @@ class Comparison:
     evidence: Evidence
 
 
-def compare(task: Task, submission: Submission, drawn_for: Drawing | None = None) -> Comparison:
+def compare(task: Task, submission: Submission, drawn_by: Sketch | None = None) -> Comparison:
     """Mark every criterion of the task's rubric.
 
-    Arguments: `drawn_for` is the wrong mechanism that the plans were drawn for, where that is known.
+    Arguments: `drawn_by` is what the plans were drawn by instead, where that is known.
     """
     evidence = gather(task, submission)
     settled = settle(task, evidence, submission.declared)
-    ledger = open_ledger(task, evidence, settled, drawn_for)
+    ledger = open_ledger(task, evidence, settled, drawn_by)
     found = {criterion.id: _outcome(ledger, criterion) for criterion in _in_order(task, tuple(settled))}
     return Comparison(
         outcomes=tuple(found[criterion.id] for criterion in task.rubric.criterion),

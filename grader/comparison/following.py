@@ -17,7 +17,6 @@ from grader.comparison.evidence import Evidence
 from grader.comparison.own import Nodes, known, own_nodes
 from grader.comparison.sketches import Sketch, other_sketch
 from grader.comparison.task import SCALE_NAMES, Segment, Task
-from grader.records import MECHANISM
 from reference.construction import AngularRate
 from reference.elements import Coriolis, Normal
 from reference.geometry import ComplexArray
@@ -164,9 +163,9 @@ class Following:
                 yield self.from_nodes(segment, self.followed, by_similarity=True)
             yield from self.from_vectors(segment, self.used)
             sketch = self.other_sketch()
-            if sketch is not None:
+            if sketch is not None and segment.head not in sketch.wrong:
                 one = self.from_nodes(segment, self.followed, sketch)
-                yield replace(one, relies_on=one.relies_on | wrong | {MECHANISM})
+                yield replace(one, relies_on=one.relies_on | wrong | sketch.wrong)
             if wrong:
                 for one in (
                     self.from_nodes(segment, self.followed),
@@ -175,7 +174,7 @@ class Following:
                     yield replace(one, relies_on=one.relies_on | wrong)
 
     def other_sketch(self) -> Sketch | None:
-        """The wrong mechanism that the plans were drawn for, where no sketch was read."""
+        """What the plans were drawn by instead, where that is told or no sketch was read."""
         if not self.sketch:
             self.sketch.append(other_sketch(self.task, self.evidence, (self.used, self.followed)))
         return self.sketch[0]

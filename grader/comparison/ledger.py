@@ -14,7 +14,6 @@ from grader.comparison.task import Segment, Task
 from grader.outcomes import Reason
 from grader.records import MECHANISM
 from reference.hand import Spread, spread
-from reference.mistakes import Drawing
 
 
 class Against(Protocol):
@@ -35,16 +34,16 @@ class Found:
 
 
 def open_ledger(
-    task: Task, evidence: Evidence, settled: Mapping[str, Scale], drawn_for: Drawing | None = None
+    task: Task, evidence: Evidence, settled: Mapping[str, Scale], drawn_by: Sketch | None = None
 ) -> "Ledger":
     """The ledger of a submission before anything is marked.
 
-    Arguments: `drawn_for` is the wrong mechanism that the plans were drawn for, where that is known.
+    Arguments: `drawn_by` is what the plans were drawn by instead, where that is known.
     """
     used, followed = used_scales(settled), followed_scales(settled)
     following = Following(task, evidence, used, followed)
-    if drawn_for is not None:
-        following.sketch.append(Sketch("told", drawn_for.construction, drawn_for.parameters))
+    if drawn_by is not None:
+        following.sketch.append(drawn_by)
     ledger = Ledger(task, evidence, settled, used, followed, following)
     # What was drawn contradicts a scale that nobody declared, or that nobody understood.
     ledger.doubtful.update(name for name, scale in settled.items() if scale.other and scale.used.assumed)
@@ -71,12 +70,15 @@ class Ledger:
     cleared: set[str] = field(default_factory=set)
     inherited: set[str] = field(default_factory=set)
     doubtful: set[str] = field(default_factory=set)
+    shown: set[str] = field(default_factory=set)
+    """What the criterion being marked is the first to show: it is charged there, and followed after it."""
     known_off: dict[str, bool] = field(default_factory=dict)
     factors: dict[str, float | None] = field(default_factory=dict)
     """By scale, the factor by which all values are off, where that was looked for."""
 
     def best(self, segment: Segment, against: Against, *, follows_through: bool) -> Found:
         """The mark on the original data, or a better one on what follows from own earlier values."""
+        self.charge_shown()
         exact = segment.drawn(self.used)
         found = Found(against(exact), exact)
         if not found.mark.is_full:
@@ -84,10 +86,17 @@ class Ledger:
             found = Found(against(exact, reach), exact, reach)
         if not found.mark.is_full and follows_through:
             found = self.followed_through(segment, against, found)
-        self.remember(segment.head, found.mark)
+        self.charge_shown()
+        if not (found.mark.is_full and self.is_hidden(segment)):
+            self.remember(segment.head, found.mark)
         if found.is_followed and found.mark.is_full:
             self.inherited.add(segment.head)
         return found
+
+    def charge_shown(self) -> None:
+        """What the last criterion was the first to show has cost something from now on."""
+        self.charged.update(self.shown)
+        self.shown.clear()
 
     def followed_through(self, segment: Segment, against: Against, original: Found) -> Found:
         """The best of what follows: from the scale drawn at, from own nodes, from anything else."""
@@ -169,6 +178,11 @@ class Ledger:
         reach = scaled(spread(task.traced(self.used).nodes[node].moved, off), task.rubric.hand.sigmas)
         return abs(off) > reach.along
 
+    def is_hidden(self, segment: Segment) -> bool:
+        """Whether a length alone is right of a vector that later lengths show to be laid off wrongly."""
+        drawn = self.evidence.vector(segment.name)
+        return drawn is not None and drawn.direction_rad is None and self.is_off(segment.head)
+
     def own_place(self, node: str) -> complex | None:
         """An own node as read or measured, or as lengths lead to it."""
         if node in self.evidence.nodes:
@@ -194,7 +208,7 @@ class Ledger:
         if wrong & self.doubtful:
             return Mark(NONE, NONE, mark.best, mark.reasons)
         if mark.is_full:
-            self.charged.update(wrong)
+            self.shown.update(wrong)
         return Mark(NONE, NONE, NONE, mark.reasons)
 
     def remember(self, name: str, mark: Mark) -> None:

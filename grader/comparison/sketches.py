@@ -12,6 +12,7 @@ import numpy as np
 
 from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.task import SCALE_NAMES, Task
+from grader.records import MECHANISM
 from reference.construction import Construction, evaluate
 from reference.elements import Parameters
 from reference.errors import PlanmarkError
@@ -27,11 +28,15 @@ LEAST_SHARE = 0.6
 
 @dataclass(frozen=True, slots=True)
 class Sketch:
-    """What plans may have been drawn by: a construction with its parameters, under a name of its own."""
+    """What plans may have been drawn by: a construction with its parameters, under a name of its own.
+
+    `wrong` are the nodes at which its steps are wrong ones, or the mechanism.
+    """
 
     name: str
     construction: Construction
     parameters: Parameters
+    wrong: frozenset[str] = frozenset({MECHANISM})
 
 
 def other_sketch(

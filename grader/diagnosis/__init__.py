@@ -17,6 +17,7 @@ import numpy as np
 
 from grader.diagnosis.telling import SCALES, told
 from grader.outcomes import Mistake
+from grader.records import MECHANISM
 from reference import mistakes as operators
 from reference.assignment import Assignment, Variant
 from reference.hand import Skill
@@ -29,8 +30,9 @@ LEAST_CONFIDENCE = 0.6
 FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
 CERTAIN = 0.9
-"""From this confidence on what follows from a wrong mechanism is credited."""
-OF_THE_MECHANISM = frozenset({"other_assembly", "other_variant"})
+"""From this confidence on what follows from a mistake that nothing else shows is credited."""
+NO_STEPS = frozenset({"scale_wrong", "labels_swapped", "figure_rotated"})
+"""Mistakes that change no step: what follows from them is told by the scales and by the drawing."""
 BEYOND_DOUBT = 20.0
 """A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
 LEAST_WRONG = 0.06
@@ -74,11 +76,13 @@ class Diagnosis:
     Attributes
     ----------
     mistakes : those that explain what was lost, in the order of construction; none where nothing does
-    drawn_for : the wrong mechanism that the plans were drawn for, None where it is right or not certain
+    drawn : the drawing with those mistakes in it that are certain, and
+    wrong : the nodes at which it is wrong, or the mechanism; none where it is the right one
     """
 
     mistakes: tuple[Mistake, ...] = ()
-    drawn_for: Drawing | None = None
+    drawn: Drawing | None = None
+    wrong: frozenset[str] = frozenset()
 
 
 def diagnose(case: Case) -> Diagnosis:
@@ -93,21 +97,21 @@ def diagnose(case: Case) -> Diagnosis:
     if not accounts or innocent - accounts[0].cost < BEYOND_DOUBT:
         return Diagnosis()
     mistakes = told(accounts, case, LEAST_CONFIDENCE)
-    return Diagnosis(mistakes, _drawn_for(case.drawing, accounts[0], mistakes))
-
-
-def _drawn_for(drawing: Drawing, account: Account, mistakes: Sequence[Mistake]) -> Drawing | None:
-    """The mechanism with the mistakes in it that it was certainly drawn with."""
     sure = {(one.code, one.at) for one in mistakes if one.confidence >= CERTAIN}
-    of_the_mechanism = [
-        one for one in account.made if one.code in OF_THE_MECHANISM and (one.code, one.at) in sure
-    ]
-    for one in of_the_mechanism:
+    certain = [one for one in accounts[0].made if one.code not in NO_STEPS and (one.code, one.at) in sure]
+    joints = {step.node for step in case.drawing.construction.figures[MECHANISM]}
+    wrong = {MECHANISM if one.at in joints or one.code == "other_variant" else one.at for one in certain}
+    return Diagnosis(mistakes, _with(certain, case.drawing), frozenset(wrong))
+
+
+def _with(mistakes: Sequence[operators.Mistake], drawing: Drawing) -> Drawing:
+    """A drawing with mistakes in it, at its own scales."""
+    for one in mistakes:
         if one.code == "other_variant":
             drawing = Drawing(drawing.construction, {**drawing.parameters, **one.parameters})
         else:
             drawing = operators.commit(one, drawing)
-    return drawing if of_the_mechanism else None
+    return drawing
 
 
 def _looked_into(case: Case, roots: Sequence[Root], accounts: Sequence[Account]) -> list[Account]:

@@ -68,8 +68,11 @@ def by_node(construction: Construction, seen: Iterable[Seen]) -> dict[str, tuple
 
 
 def seen_later(construction: Construction, seen: Mapping[str, tuple[Seen, ...]]) -> frozenset[str]:
-    """The nodes that were seen, or that something seen is made from or reckoned from."""
+    """The nodes that were seen, or that something seen is made from or reckoned from, rightly or wrongly."""
     wanted = set(seen) | {one.tail for ones in seen.values() for one in ones if one.tail is not None}
+    # A wrong line may be taken by any link, and through a pole.
+    wanted.update(step.node for step in construction.figures["mechanism"])
+    wanted.update(construction.poles.values())
     for step in reversed(construction.steps):
         if step.node in wanted:
             wanted.update(step.needs)
