@@ -14,6 +14,7 @@ from grader.comparison.task import Segment, Task
 from grader.outcomes import Reason
 from grader.records import MECHANISM
 from reference.hand import Spread, spread
+from reference.steps import Given
 
 
 class Against(Protocol):
@@ -56,6 +57,7 @@ class Ledger:
 
     What relies on a wrong node or scale may follow through only when that mistake has cost something:
     `charged` holds those. `cleared` holds the nodes that were judged and are within their tolerance,
+    `by_length` those of them of which later lengths may show that they were laid off the wrong way,
     `inherited` those that are right only as they follow from something charged, `doubtful` the nodes
     and scales whose verdict is open.
     """
@@ -68,6 +70,7 @@ class Ledger:
     following: Following
     charged: set[str] = field(default_factory=set)
     cleared: set[str] = field(default_factory=set)
+    by_length: set[str] = field(default_factory=set)
     inherited: set[str] = field(default_factory=set)
     doubtful: set[str] = field(default_factory=set)
     shown: set[str] = field(default_factory=set)
@@ -87,8 +90,9 @@ class Ledger:
         if not found.mark.is_full and follows_through:
             found = self.followed_through(segment, against, found)
         self.charge_shown()
-        if not (found.mark.is_full and self.is_hidden(segment)):
-            self.remember(segment.head, found.mark)
+        self.remember(segment.head, found.mark)
+        if self.is_by_length(segment):
+            self.by_length.add(segment.head)
         if found.is_followed and found.mark.is_full:
             self.inherited.add(segment.head)
         return found
@@ -178,10 +182,11 @@ class Ledger:
         reach = scaled(spread(task.traced(self.used).nodes[node].moved, off), task.rubric.hand.sigmas)
         return abs(off) > reach.along
 
-    def is_hidden(self, segment: Segment) -> bool:
-        """Whether a length alone is right of a vector that later lengths show to be laid off wrongly."""
+    def is_by_length(self, segment: Segment) -> bool:
+        """Whether only the length is known of a vector that is laid off: its sense may be wrong."""
         drawn = self.evidence.vector(segment.name)
-        return drawn is not None and drawn.direction_rad is None and self.is_off(segment.head)
+        is_laid_off = isinstance(self.task.construction.step(segment.head), Given)
+        return is_laid_off and drawn is not None and drawn.direction_rad is None
 
     def own_place(self, node: str) -> complex | None:
         """An own node as read or measured, or as lengths lead to it."""
@@ -195,7 +200,7 @@ class Ledger:
     def wrong(self, relies_on: frozenset[str]) -> frozenset[str]:
         """What is wrong of the nodes and scales relied on: off, and not judged to be within tolerance."""
         blamed = relies_on & (self.charged | self.inherited)
-        open_ones = relies_on - blamed - self.cleared
+        open_ones = relies_on - blamed - (self.cleared - self.by_length)
         nodes = self.following.names(self.following.own(self.used)) | self.evidence.nodes.keys()
         return blamed | {name for name in open_ones if name not in nodes or self.is_off(name)}
 

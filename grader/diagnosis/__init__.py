@@ -142,15 +142,19 @@ def _innocent(accounts: Sequence[Account]) -> float:
 
 
 def _is_clear(accounts: Sequence[Account], case: Case) -> bool:
-    """Whether a usual hand made everything rightly, or one mistake with everything seen."""
-    best = accounts[0]
+    """Whether a usual hand made everything rightly, or one mistake at a step whose beginnings were seen.
+
+    What goes wrong in a mechanism that nobody saw shows in more than one step.
+    """
+    best, construction = accounts[0], case.drawing.construction
     if not _is_explained(best):
         return False
-    seen = {one.node for one in case.work.seen}
-    given = {*case.drawing.construction.poles.values()}
-    return not best.made or all(
-        step.node in seen or step.node in given or not step.needs for step in case.drawing.construction.steps
-    )
+    if not best.made:
+        return True
+    places = {one.node for one in case.work.seen if one.has_direction} | {*construction.poles.values()}
+    joints = {step.node for step in construction.figures[MECHANISM]}
+    step = next((one for one in construction.steps if one.node == best.made[0].at), None)
+    return step is not None and places.issuperset({step.node, *step.needs} - joints)
 
 
 # Mistakes of the whole drawing --------------------------------------------------------------------
