@@ -20,6 +20,9 @@ from grader.quantities import EXAMPLES, ByRule, ParsedScale, Refused, parse_scal
 from grader.rubric import ToleranceTable
 from reference.hand import spread
 
+TELLING = 2
+"""So many vectors of the right length tell a scale as well as the crank's does."""
+
 
 @dataclass(frozen=True, slots=True)
 class Scale:
@@ -105,7 +108,9 @@ def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Sca
     if name == "kL":
         witness = _witness(task, evidence, name)
         if witness is not None:
-            return witness[0] / witness[1]
+            # A crank that agrees with the scale proposed was drawn at that one, a little off.
+            proposed = task.rule_scales["kL"]
+            return proposed if _is_witnessed(task, evidence, name, proposed) else witness[0] / witness[1]
     key = ("rule", *known.items())
     if key not in task.memory:
         found = task.assignment.scales([task.variant], **known)
@@ -125,6 +130,8 @@ def _witness(task: Task, evidence: Evidence, name: str) -> tuple[float, float, f
     vector = f"{name[1]}_{task.pin}"
     drawn = evidence.vector(vector)
     if drawn is None or drawn.length_mm <= 0.0 or not task.real.get(vector):
+        return None
+    if drawn.confidence < task.rubric.least_confidence:
         return None
     return abs(task.real[vector]), drawn.length_mm, drawn.se_mm
 
@@ -178,6 +185,9 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
     is_rule = abs(scale.used - rule) <= tolerance.scale_relative * rule
     witness = _witness(task, evidence, name)
     if witness is None:
+        if _is_unseen(task, evidence, name, scale.used):
+            why = f"{name[1]}_{task.pin}, which tells it, was not read for certain"
+            return Scale(scale, None, Mark(NONE, NONE, FULL, (Reason("unread", {"reason": why}),)))
         return Scale(scale, None, mark([]) if is_rule else None)
     other = _followed_instead(task, evidence, name, scale.used, None if is_rule else rule)
     if other is None:
@@ -194,6 +204,12 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
         reason=Reason("scale_off", told),
     )
     return Scale(scale, other, mark([limit]))
+
+
+def _is_unseen(task: Task, evidence: Evidence, name: str, scale: float) -> bool:
+    """Whether a plan is on a sheet whose crank's vector was not read, and nothing else tells its scale."""
+    plan = [v.name for v in task.construction.vectors.values() if v.scale == name]
+    return any(one in evidence.drawn for one in plan) and _fitting(task, evidence, name, scale) < TELLING
 
 
 def _followed_instead(

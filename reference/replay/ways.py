@@ -173,11 +173,15 @@ class Bench:
         errors = self.repertoire.errors(step) if self.sight.tells_place else {}
         view = View(self.nodes, self.known, errors)
         if not errors:
-            return np.array([np.broadcast_to(one, (self.count,)) for one in _places(steps, view)]), None
+            return np.array([_shaped(one, (self.count,)) for one in _places(steps, view)]), None
         mark = view.error(step.node, 0, "x") + 1j * view.error(step.node, 0, "y")
         shape = (len(mark) if np.ndim(mark) else 1, self.count)
-        place = np.array([np.broadcast_to(one, shape) for one in _places(steps, view)]) + mark
+        place = np.array([_shaped(one, shape) for one in _places(steps, view)]) + mark
         return place[:, 0], (place[:, 1:] - place[:, :1]) / SMALL
+
+
+def _shaped(place: ComplexArray, shape: tuple[int, ...]) -> ComplexArray:
+    return place if place.shape == shape else np.broadcast_to(place, shape)
 
 
 def _places(steps: Sequence[Step], view: View) -> Iterator[ComplexArray]:
