@@ -12,7 +12,6 @@ from grader.feedback import About, Level, write_feedback, write_index
 from grader.files import make_folder, write_whole
 from grader.folder import submissions, told_name
 from grader.jobs import Job, alike_of_run, folders_of, inputs_of_run
-from grader.judging import unjudged_report
 from grader.kept import (
     digest_of,
     forget_surveys,
@@ -27,6 +26,7 @@ from grader.ownership import Unmatched, assign_pages
 from grader.parallel import in_parallel
 from grader.pipeline import Looked, Work, asked_of, look, mark_looked
 from grader.records import Problem
+from grader.reports import unjudged_report
 from grader.roster import Roster, read_roster
 from grader.rubric import RubricFile
 from grader.survey import Survey

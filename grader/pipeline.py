@@ -17,7 +17,7 @@ from grader.documents import ReadingDocument, ReportDocument
 from grader.feedback import Level, criterion_feedback, with_mistakes_told
 from grader.ink import find_ink
 from grader.intake import is_blank, page_of
-from grader.judging import Submission, Task, judge, report_of, task_of, unjudged_report
+from grader.judging import Submission, Task, judge, task_of
 from grader.letters import find_letters, written_scales
 from grader.letters.lengths import written_lengths
 from grader.measurements import Measurements
@@ -27,6 +27,7 @@ from grader.quantities import ByRule, Declared, parse_scale
 from grader.reading import read_figures
 from grader.reading_document import reading_document
 from grader.records import MECHANISM, Box, Ink, Page, Problem, Reading, Sheet, Written
+from grader.reports import report_of, unjudged_report
 from grader.rubric import RubricFile
 from grader.scene import Picture
 from grader.scene_measured import measured_picture

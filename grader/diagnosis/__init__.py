@@ -9,21 +9,22 @@ measured by its own carelessness: a drawing that is right is never accused.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
+from grader.diagnosis.case import Case
 from grader.diagnosis.telling import SCALES, told
 from grader.outcomes import Mistake
 from grader.records import MECHANISM
 from reference import mistakes as operators
-from reference.assignment import Assignment, Variant
-from reference.hand import Skill
 from reference.mistakes import Drawing
 from reference.parameters import parameters_of
 from reference.replay import RARITY, Account, Root, Work, replay
+
+__all__ = ["LEAST_CONFIDENCE", "Case", "Diagnosis", "diagnose"]
 
 LEAST_CONFIDENCE = 0.6
 """An explanation less certain than this is not told."""
@@ -40,33 +41,6 @@ LEAST_WRONG = 0.06
 USUAL = 1.0
 HANDS = (0.6, USUAL, 1.6, 2.5, 4.0)
 """The hands supposed, as multiples of a usual one's standard deviations."""
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A drawing to explain.
-
-    Attributes
-    ----------
-    drawing : how it should have been drawn, at the scales declared
-    work : what was drawn
-    lost : the vectors that lost points, or may lose some, with their criteria
-    assignment, variant : whose plan it should be
-    skill : of a usual hand
-    followed : scales that the drawing follows although others were declared
-    assumed : scales that nobody declared
-    scale_criteria : the criterion of each scale that lost
-    """
-
-    drawing: Drawing
-    work: Work
-    lost: Mapping[str, str]
-    assignment: Assignment
-    variant: Variant
-    skill: Skill
-    followed: Mapping[str, float] = field(default_factory=dict)
-    assumed: frozenset[str] = frozenset()
-    scale_criteria: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

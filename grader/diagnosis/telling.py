@@ -1,14 +1,13 @@
 """From accounts of a drawing to the mistakes that are told: how sure, what they explain, what rivals them."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Protocol
+from collections.abc import Sequence
 
+from grader.diagnosis.case import Case
 from grader.outcomes import Mistake
 from reference import mistakes as operators
 from reference.construction import Construction
 from reference.elements import Along, Line
-from reference.mistakes import Drawing
 from reference.replay import Account
 from reference.steps import Step, TwoLines
 
@@ -28,23 +27,7 @@ SCALES = frozenset({"kL", "kv", "ka"})
 Key = tuple[str, str]
 
 
-class Explained(Protocol):
-    """What is asked of a case."""
-
-    @property
-    def drawing(self) -> Drawing:
-        """The right one."""
-
-    @property
-    def lost(self) -> Mapping[str, str]:
-        """Criteria that lost, by vector."""
-
-    @property
-    def scale_criteria(self) -> Mapping[str, str]:
-        """Criteria of scales that lost."""
-
-
-def told(accounts: Sequence[Account], case: Explained, least: float) -> tuple[Mistake, ...]:
+def told(accounts: Sequence[Account], case: Case, least: float) -> tuple[Mistake, ...]:
     """The mistakes of the likeliest account that are sure enough, in the order of construction."""
     if not accounts:
         return ()
@@ -111,7 +94,7 @@ def _in_order(made: Sequence[operators.Mistake], construction: Construction) -> 
     return sorted(made, key=lambda one: order.index(one.at) if one.at in order else -1)
 
 
-def _explained(account: Account, case: Explained) -> dict[operators.Mistake, list[str]]:
+def _explained(account: Account, case: Case) -> dict[operators.Mistake, list[str]]:
     """Which of the criteria lost each mistake explains: the nearest one before it in the construction."""
     construction = case.drawing.construction
     made = _in_order(account.made, construction)
@@ -150,7 +133,7 @@ def _is_about(mistake: operators.Mistake, scale: str) -> bool:
 
 def _record(
     operator: operators.Mistake,
-    case: Explained,
+    case: Case,
     explains: tuple[str, ...],
     confidence: float,
     rivals: tuple[Mistake, ...] = (),

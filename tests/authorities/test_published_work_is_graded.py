@@ -64,8 +64,7 @@ def task(mechanism: dict, size_mm: float = FIGURE_MM):
     rubric = rubric_for("case", rough.file.title, rough.mechanism(variants))
     real = task_of(rough, rubric, variants[0]).real
     scales = [
-        max(abs(vector) for name, vector in real.items() if name.startswith(kind)) / size_mm
-        for kind in "va"
+        max(abs(vector) for name, vector in real.items() if name.startswith(kind)) / size_mm for kind in "va"
     ]
     return task_of(assignment_of(mechanism, *scales), rubric, variants[0])
 

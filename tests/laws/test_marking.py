@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from grader.comparison import Submission
 from grader.documents import schema
-from grader.judging import judge, report_of
+from grader.judging import judge
 from grader.records import Figure, Reading, ReadVector
+from grader.reports import report_of
 from reference.mistakes import Mistake
 from tests.hands import changed, drawn_nodes, measured, sheet, task_for
 

@@ -16,8 +16,9 @@ from grader.documents import (
     schema,
     schema_names,
 )
-from grader.judging import judge, report_of, unjudged_report
+from grader.judging import judge
 from grader.records import Problem
+from grader.reports import report_of, unjudged_report
 from reference.errors import CallError
 from reference.mistakes import Mistake
 from tests.hands import changed, measured, task_for

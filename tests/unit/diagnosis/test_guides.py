@@ -6,7 +6,8 @@ from grader.comparison import Submission
 from grader.feedback import criterion_feedback, mistake_feedback
 from grader.feedback.mistakes import words_of
 from grader.feedback.pages import feedback_page
-from grader.judging import judge, report_of
+from grader.judging import judge
+from grader.reports import report_of
 from reference.mistakes import Drawing, Mistake, single_mistakes
 from tests.hands import measured, sheet, task_for
 

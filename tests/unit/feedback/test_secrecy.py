@@ -11,8 +11,9 @@ from grader.feedback.leaflets import leaflet_of
 from grader.feedback.pages import page_of
 from grader.feedback.printed import pdf_of
 from grader.i18n import LANGUAGES, tongue
-from grader.judging import Submission, judge, report_of, task_of
+from grader.judging import Submission, judge, task_of
 from grader.records import Figure, Reading, ReadVector
+from grader.reports import report_of
 from grader.rubric import rubric_of
 from grader.scene_measured import measured_picture
 from reference.assignment import load_assignment
