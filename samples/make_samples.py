@@ -38,8 +38,19 @@ from reference.assignment import Assignment, load_assignment
 QUIET = Scan(dpi=150.0, dpi_tag=150.0, noise=1.0, tint_grain=0.5, jpeg_quality=62, dust=8)
 """A good flatbed, frugal with bytes."""
 COPY = replace(QUIET, mode="bilevel", container="tif", dpi=300.0, dpi_tag=300.0, device="copier", dust=30)
-PHOTO = replace(QUIET, device="phone", mode="colour", dpi=170.0, dpi_tag=72.0, tilt_deg=4.0, lens_k1=0.012,
-                shading=0.15, shadow=0.15, bed=(128, 96, 66), skew_deg=1.0)
+PHOTO = replace(
+    QUIET,
+    device="phone",
+    mode="colour",
+    dpi=170.0,
+    dpi_tag=72.0,
+    tilt_deg=4.0,
+    lens_k1=0.012,
+    shading=0.15,
+    shadow=0.15,
+    bed=(128, 96, 66),
+    skew_deg=1.0,
+)
 WRITTEN_ONLY = replace(QUIET, dpi=20.0, dpi_tag=20.0)
 """For students who hand in numbers: the drawing stays at home."""
 ROMANIAN = PageStyle(letter_mm=4.2)
@@ -95,10 +106,18 @@ PUMP = [
 ]
 PRESS = [
     Pupil(1, 1, told("fine pencil", TWO, QUIET, RUSSIAN), 31, SCANS | CSV),
-    Pupil(2, 2, told("ink", TWO, replace(COPY, container="png", dpi=200.0, dpi_tag=200.0),
-                     RUSSIAN_FORM), 32),
-    Pupil(3, 3, told("soft pencil", Student(sheets=2, mistakes=("wrong_link",)),
-                     replace(QUIET, quarter_turns=2), RUSSIAN), 33),
+    Pupil(2, 2, told("ink", TWO, replace(COPY, container="png", dpi=200.0, dpi_tag=200.0), RUSSIAN_FORM), 32),
+    Pupil(
+        3,
+        3,
+        told(
+            "soft pencil",
+            Student(sheets=2, mistakes=("wrong_link",)),
+            replace(QUIET, quarter_turns=2),
+            RUSSIAN,
+        ),
+        33,
+    ),
     Pupil(4, 5, told("fine pencil", TWO, WRITTEN_ONLY, RUSSIAN), 34, CSV),
     Pupil(5, 0, told("fine pencil", TWO, WRITTEN_ONLY, RUSSIAN), 35, CSV),
 ]
@@ -186,8 +205,13 @@ def variant_columns(sheets: list[SimulatedSheet]) -> dict[str, Any]:
 def roster_line(pupil: Pupil, sheets: list[SimulatedSheet]) -> dict[str, Any]:
     """The student's line of the roster."""
     scales = scales_of(sheets) if pupil.hands_in else dict.fromkeys(UNITS, "")
-    return {"student_id": pupil.student_id, "name": f"Student {pupil.number}", **variant_columns(sheets),
-            **scales, "scans": ""}
+    return {
+        "student_id": pupil.student_id,
+        "name": f"Student {pupil.number}",
+        **variant_columns(sheets),
+        **scales,
+        "scans": "",
+    }
 
 
 def measured_line(pupil: Pupil, sheets: list[SimulatedSheet]) -> dict[str, Any]:
@@ -215,8 +239,12 @@ def write_json(path: Path, line: dict[str, Any]) -> None:
     lengths = {name: value for name, value in line.items() if name not in taken and not name.endswith("_deg")}
     directions = {name.removesuffix("_deg"): value for name, value in line.items() if name.endswith("_deg")}
     document: dict[str, Any] = {
-        "student_id": line["student_id"], "n": line["n"], "scales": {name: line[name] for name in UNITS},
-        "segments_mm": lengths, "directions_deg": directions, "values": {},
+        "student_id": line["student_id"],
+        "n": line["n"],
+        "scales": {name: line[name] for name in UNITS},
+        "segments_mm": lengths,
+        "directions_deg": directions,
+        "values": {},
     }
     path.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
