@@ -7,7 +7,9 @@ its pole). It is data, a directed acyclic graph, and one evaluator answers every
 - the exact plan: `evaluate(construction, parameters)`, every node an array over variants;
 - follow-through: the same with the student's nodes in `given` instead of the computed ones;
 - a mistake: the same with a changed step or parameter (`reference.mistakes`);
-- a hand: the same with `errors` on lines, lengths and arcs; its derivative is the tolerance;
+- a diagnosis: the same step by step beside what was drawn, right and wrong ways (`reference.replay`);
+- a hand: the same with `errors` on lines, lengths and arcs; its derivative is the tolerance
+  (`reference.hand`);
 - only what is needed: `wanted` names the nodes asked for, ancestors alone are evaluated.
 """
 
