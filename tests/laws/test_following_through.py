@@ -48,8 +48,27 @@ def is_trivial(task, nodes, vector):
     return sizes[0] < max(1.3 * task.rubric.least_followed_share * sizes[1], task.rubric.tolerance.least_mm)
 
 
+def is_hidden(task, nodes, wrong):
+    """Whether lengths alone show nothing where a mistake was made: it costs where it shows first."""
+    right = drawn_nodes(task)
+    for vector in task.construction.vectors.values():
+        if vector.head in wrong:
+            exact, own = (abs(places[vector.head] - places[vector.tail]) for places in (right, nodes))
+            if abs(own - exact) > length_tolerance(task.rubric.tolerance, exact):
+                return False
+    return True
+
+
 def followed(task, mistakes, hand, lot, source):
-    """Of the vectors that follow from mistakes, how many are credited, and how many wait for a person."""
+    """Of the vectors that follow from mistakes, which are credited or wait for a person."""
+    found = list(_followed(task, mistakes, hand, lot, source))
+    nodes = drawn_nodes(task, mistakes=mistakes)
+    if source == "lengths" and False in found and is_hidden(task, nodes, {one.at for one in mistakes}):
+        found.remove(False)
+    return found
+
+
+def _followed(task, mistakes, hand, lot, source):
     nodes = drawn_by(task, hand, lot, mistakes)
     wrong = {mistake.at for mistake in mistakes}
     moved = frozenset().union(*(affected(one, task.construction) for one in mistakes)) - wrong
