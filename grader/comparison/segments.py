@@ -4,7 +4,7 @@ from grader.comparison import verdicts
 from grader.comparison.evidence import DrawnVector
 from grader.comparison.following import NO_SPREAD
 from grader.comparison.ledger import Found, Ledger
-from grader.comparison.limits import FULL, Mark, left_open, the_worse
+from grader.comparison.limits import ALL_RIGHT, FULL, Mark, left_open, the_worse
 from grader.comparison.marking import mark_vector, tolerances, widened
 from grader.comparison.values import mark_of_value
 from grader.comparison.written import held_against_written
@@ -65,9 +65,19 @@ class _against:  # noqa: N801 - used as a function
             found = mark_vector(drawn, expected, widened(plain, size, reach, self.at_most), table, se)
             if not found.is_full:
                 by_hand = mark_vector(drawn, expected, widened(plain, size, reach), table, se)
-                found = left_open(found, by_hand)
+                found = left_open(found, ALL_RIGHT if _is_boundless(reach, size) else by_hand)
         found = held_against_written(found, drawn, self.written, table, self.least)
         return verdicts.with_confidence(found, drawn.confidence, self.least)
+
+
+BOUNDLESS_MM, BOUNDLESS_SHARE = 20.0, 0.5
+"""A reach of so much, and of such a share of the vector: there errors no longer grow in proportion, and a
+hand may miss by anything."""
+
+
+def _is_boundless(reach: Spread, size_mm: float) -> bool:
+    """Whether lines cross so badly that nothing tells how far a careful hand may miss."""
+    return max(reach.along, reach.across) > max(BOUNDLESS_MM, BOUNDLESS_SHARE * size_mm)
 
 
 def _allowed(criterion: CriterionTable, ledger: Ledger, found: Found, *, with_direction: bool) -> Tolerance:
