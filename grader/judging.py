@@ -16,8 +16,9 @@ def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission)
     diagnosis = diagnose(case_of(task, comparison))
-    if diagnosis.drawn and diagnosis.wrong and not comparison.evidence.has_sheets:
-        # No sheet shows what was drawn: the diagnosis tells what measured vectors follow from.
+    is_turned = bool(diagnosis.wrong & task.construction.poles.keys())
+    if diagnosis.drawn and diagnosis.wrong and (is_turned or not comparison.evidence.has_sheets):
+        # Where no sheet shows what was drawn, or a plan is turned, diagnosis tells what follows from what.
         drawn = diagnosis.drawn
         drawn_by = Sketch("told", drawn.construction, drawn.parameters, diagnosis.wrong)
         comparison = compare(task, submission, drawn_by)

@@ -32,8 +32,8 @@ FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
 CERTAIN = 0.9
 """From this confidence on what follows from a mistake that nothing else shows is credited."""
-NO_STEPS = frozenset({"scale_wrong", "labels_swapped", "figure_rotated"})
-"""Mistakes that change no step: what follows from them is told by the scales and by the drawing."""
+NO_STEPS = frozenset({"scale_wrong", "labels_swapped"})
+"""Mistakes that change no step: what follows from them is told by the scales and by the letters."""
 BEYOND_DOUBT = 20.0
 """A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
 LEAST_WRONG = 0.06
