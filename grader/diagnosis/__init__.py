@@ -135,7 +135,11 @@ def _is_clear(accounts: Sequence[Account], case: Case) -> bool:
 
 
 def _other_scales(case: Case) -> Iterator[Root]:
-    """The drawing at the scales that it follows, where others were declared."""
+    """The drawing at the scales that it follows, where others were declared.
+
+    A plan may be drawn to another scale throughout, or start from a crank's vector that is, while what is
+    computed from it is computed at the scale declared.
+    """
     factors = {
         name: float(case.drawing.parameters[name]) / followed for name, followed in case.followed.items()
     }
@@ -147,7 +151,14 @@ def _other_scales(case: Case) -> Iterator[Root]:
     if not made:
         return
     scales = {name: np.asarray(followed) for name, followed in case.followed.items()}
-    yield Root(made, scales, cost=RARITY["scale_wrong"] + FURTHER_SCALE * (len(made) - 1))
+    starts = {
+        name: value * factor
+        for name, value in case.drawing.parameters.items()
+        for scale, factor in factors.items()
+        if name.startswith(f"{scale[1]}_")
+    }
+    for parameters in (scales, starts):
+        yield Root(made, parameters, cost=RARITY["scale_wrong"] + FURTHER_SCALE * (len(made) - 1))
 
 
 def _of_the_whole(case: Case) -> Iterator[Root]:

@@ -8,8 +8,9 @@ from grader.comparison import Submission, task_of
 from grader.judging import judge
 from grader.rubric import rubric_of
 from reference.assignment import library, load_assignment
+from reference.construction import evaluate
 from reference.mistakes import Mistake
-from tests.hands import changed, measured, rule_scales, sheet, task_for
+from tests.hands import SOURCES, changed, handed_in, measured, rule_scales, sheet, task_for
 
 PUMP = task_for("pump", 7)
 PRESS = task_for("press", position=1)
@@ -126,3 +127,14 @@ def test_variants_that_do_not_assemble_are_passed_over(tmp_path):
     task = task_of(assignment, rubric_of(assignment), assignment.variant(None, 1))
     reading = measured(task, mistakes=(Mistake("normal_reversed", "n_B"),))
     assert codes(judge(task, Submission(measured=reading))) == ["normal_reversed"]
+
+
+@pytest.mark.parametrize("task", [PUMP, task_for("press", position=5)], ids=["pump", "press"])
+@pytest.mark.parametrize("source", SOURCES)
+def test_a_plan_started_at_another_scale_than_declared_is_one_wrong_scale(task, source):
+    # v_A too short by a quarter, and everything drawn and computed from that rightly.
+    known = {**task.parameters, "v_A": 0.75 * task.parameters["v_A"]}
+    nodes = {name: complex(place) for name, place in evaluate(task.construction, known).items()}
+    judgement = judge(task, handed_in(task, nodes, source))
+    assert [(one.code, one.at) for one in judgement.mistakes] == [("scale_wrong", "kv")]
+    assert {one.name for one in judgement.outcomes if one.verdict in {"none", "partial"}} == {"kv"}
