@@ -1,7 +1,7 @@
 """A folder of submissions: survey, owners, marking in parallel, results. One bad file stops nothing."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -12,31 +12,30 @@ from grader.feedback import About, Level, write_feedback, write_index
 from grader.files import make_folder, write_whole
 from grader.folder import submissions, told_name
 from grader.jobs import Job, alike_of_run, folders_of, inputs_of_run
-from grader.kept import (
-    digest_of,
-    forget_surveys,
-    keep_looked,
-    keep_maps,
-    kept_looked,
-    survey_kept,
-)
+from grader.kept import digest_of, keep_looked, keep_maps, kept_looked
 from grader.measurements import names_of
 from grader.moved import earlier, moved, note_inputs, noted_inputs
 from grader.ownership import Unmatched, assign_pages
-from grader.parallel import in_parallel
 from grader.pipeline import Looked, Work, asked_of, look, mark_looked
 from grader.records import Problem
 from grader.reports import unjudged_report
 from grader.roster import Roster, read_roster
 from grader.rubric import RubricFile
-from grader.survey import Survey
+from grader.survey import Progress, Survey, survey_folder
+from grader.workers import ENDED, Limits, Pool, Workers
 from grader.works import works_of
 from reference.assignment import Assignment, Variant
-from reference.errors import CallError
+from reference.errors import CallError, PlanmarkError
 
 KEPT_FOLDER = ".planmark"
-Progress = Callable[[str, int, int], None]
-"""Told what is being done, how many are done, and of how many."""
+_PASSING = "file_changed"
+"""A problem that the next run need not have: nothing that has it is cached."""
+
+
+class InterruptedRunError(PlanmarkError):
+    """A run was interrupted; what it marked is there."""
+
+    exit_status = 130
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +47,7 @@ class Batch:
     folder, out : where the submissions are, and where results go
     roster : path of the roster, or None (a `roster.csv` in the folder is taken)
     pages_per_student : pages of each student in one class file, blank ones not counted
-    jobs : processes
+    jobs, limits : worker processes, and what a file or a sheet may take in one
     lang, level : of feedback, where the roster does not say
     with_ghosts : whether pictures show expected vectors beside wrong ones, at level `full`
     with_pdf : whether each student's feedback is written for the printer, too
@@ -61,31 +60,44 @@ class Batch:
     roster: Path | None = None
     pages_per_student: int | None = None
     jobs: int = 1
+    limits: Limits = field(default_factory=Limits)
     lang: str = "en"
     level: Level = "full"
     with_ghosts: bool = True
     with_pdf: bool = False
 
 
-def grade(batch: Batch, progress: Progress) -> ResultsDocument:
+def grade(batch: Batch, progress: Progress, workers: Pool | None = None) -> ResultsDocument:
     """Grade all that was handed in, and write the reports, pages and results.
 
+    Arguments: `workers` are made as the batch says where they are not given.
+
     Raises CallError for a folder that is not there or holds nothing, AuthoredFileError for a roster
-    with faults, OutputError where results cannot be written.
+    with faults, OutputError where results cannot be written, InterruptedRunError for an interrupt.
     """
     roster = _roster(batch)
     files = _files(batch)
     if not files and roster is None:
         raise _nothing(batch)
     make_folder(batch.out)
-    surveys = _surveys(batch, files, progress)
+    if workers is not None:
+        return _graded(batch, roster, files, progress, workers)
+    with Workers(batch.jobs, batch.limits, __name__) as pool:
+        return _graded(batch, roster, files, progress, pool)
+
+
+def _graded(
+    batch: Batch, roster: Roster | None, files: Sequence[Path], progress: Progress, workers: Pool
+) -> ResultsDocument:
+    notes = batch.out / KEPT_FOLDER
+    names = names_of(batch.assignment)
+    surveys = survey_folder(files, batch.folder, names, workers, progress, notes / "surveys")
     works, unmatched = _works(batch, roster, files, surveys)
     if not works and not unmatched:
         raise _nothing(batch)
     before = earlier(batch.out / "results.json", batch.assignment.id)
-    jobs = _jobs(batch, works, surveys)
-    reports = _marked(batch, jobs, progress)
-    notes = batch.out / KEPT_FOLDER
+    jobs = _jobs(batch, works)
+    reports = _marked(batch, jobs, progress, workers)
     inputs = inputs_of_run(batch.assignment, batch.rubric, jobs, surveys)
     results = ResultsDocument(
         assignment=batch.assignment.id,
@@ -122,22 +134,6 @@ def _files(batch: Batch) -> list[Path]:
     return submissions(batch.folder, batch.roster, passed_over=(batch.out,))
 
 
-def _surveys(batch: Batch, files: Sequence[Path], progress: Progress) -> list[Survey]:
-    names = names_of(batch.assignment)
-    found: dict[int, Survey] = {}
-    notes = batch.out / KEPT_FOLDER / "surveys"
-    calls = [(path, told_name(path, batch.folder), names, notes) for path in files]
-    for index, result in in_parallel(survey_kept, calls, batch.jobs):
-        if isinstance(result, Problem):
-            told = UnmatchedDocument(file=calls[index][1], code=result.code, message=result.message)
-            found[index] = Survey(refused=told)
-        else:
-            found[index] = result
-        progress("looking", len(found), len(calls))
-    forget_surveys(notes, {one.digest for one in found.values()})
-    return [found[index] for index in range(len(files))]
-
-
 def _works(
     batch: Batch, roster: Roster | None, files: Sequence[Path], surveys: Sequence[Survey]
 ) -> tuple[list[Work], list[UnmatchedDocument]]:
@@ -153,8 +149,7 @@ def _works(
     )
     paths = {told_name(path, batch.folder): path for path in files}
     works, strangers = works_of(batch.assignment, roster, ownership, measured, paths, batch.lang)
-    broken = {source: why for one in surveys for source, why in one.broken.items()}
-    unmatched = [_unmatched(one, broken.get(one.source)) for one in ownership.unmatched]
+    unmatched = [_unmatched(one) for one in ownership.unmatched]
     told = [
         UnmatchedDocument(file=one.file or "", code=one.code, message=one.message)
         for one in ownership.problems
@@ -163,49 +158,88 @@ def _works(
     return works, [*refused, *unmatched, *strangers, *told]
 
 
-def _unmatched(one: Unmatched, broken: str | None) -> UnmatchedDocument:
-    told = one.problem.message if broken is None else f"{one.problem.message}; {broken}"
-    return UnmatchedDocument(file=one.source.file, page=one.source.page, code=one.problem.code, message=told)
+def _unmatched(one: Unmatched) -> UnmatchedDocument:
+    broken = one.source.problem
+    message = one.problem.message if broken is None else f"{one.problem.message}; {broken.message}"
+    return UnmatchedDocument(
+        file=one.source.file, page=one.source.page, code=one.problem.code, message=message
+    )
 
 
 # Marking ------------------------------------------------------------------------------------------
 
 
-def _jobs(batch: Batch, works: Sequence[Work], surveys: Sequence[Survey]) -> list[Job]:
-    """The works with digests of what they depend on; a file of many pages is looked at once."""
-    content = {source.file: one.digest for one in surveys for source in one.pages}
+def _jobs(batch: Batch, works: Sequence[Work]) -> list[Job]:
+    """The works with digests of what they depend on."""
     assignment = (batch.assignment.file.model_dump_json(), batch.assignment.mechanism_file.model_dump_json())
     read = digest_of((*assignment, *asked_of(batch.assignment, batch.rubric)))
     marked = digest_of(
         (*assignment, batch.rubric.model_dump_json(), batch.level, batch.with_ghosts, batch.with_pdf)
     )
-    jobs = []
-    for work, folder in zip(works, folders_of(works), strict=True):
-        pages = [(place.name, place.page, content.get(place.name, "")) for place in work.pages]
-        declared = sorted(work.declared.items())
-        reading_key = digest_of((read, work.student_id, work.variant, declared, pages))
-        key = digest_of((marked, reading_key, replace(work, pages=())))
-        jobs.append(Job(work, folder, reading_key, key))
-    return jobs
+    return [_job(work, folder, (read, marked)) for work, folder in zip(works, folders_of(works), strict=True)]
 
 
-def _marked(batch: Batch, jobs: Sequence[Job], progress: Progress) -> list[ReportDocument]:
+def _job(work: Work, folder: str, depends: tuple[str, str]) -> Job:
+    """A submission's job; `depends` are digests of what all readings, and all marks, depend on."""
+    read, marked = depends
+    pages = [(place.name, place.page, place.digest, place.problem) for place in work.pages]
+    reading_key = digest_of((read, work.student_id, work.variant, sorted(work.declared.items()), pages))
+    key = digest_of((marked, reading_key, replace(work, pages=())))
+    return Job(work, folder, reading_key, key)
+
+
+def _marked(batch: Batch, jobs: Sequence[Job], progress: Progress, workers: Pool) -> list[ReportDocument]:
     """Reports in the order of the jobs; each with its files written."""
-    reports: dict[int, ReportDocument] = {}
-    waiting: list[int] = []
-    for index, job in enumerate(jobs):
-        known = _known(batch, job)
-        if known is None:
-            waiting.append(index)
-        else:
-            reports[index] = known
+    reports = {index: known for index, job in enumerate(jobs) if (known := _known(batch, job)) is not None}
     progress("marking", len(reports), len(jobs))
-    calls = [(batch, jobs[index]) for index in waiting]
-    for number, result in in_parallel(_mark_one, calls, batch.jobs):
-        index = waiting[number]
-        reports[index] = _failed(batch, jobs[index], result) if isinstance(result, Problem) else result
-        progress("marking", len(reports), len(jobs))
+    waiting = [(index, job) for index, job in enumerate(jobs) if index not in reports]
+    try:
+        for index, report in _marked_anew(batch, waiting, workers):
+            reports[index] = report
+            progress("marking", len(reports), len(jobs))
+    except KeyboardInterrupt as error:
+        kept = f"{len(reports)} of {len(jobs)} submissions are marked and kept in {batch.out}"
+        raise InterruptedRunError("interrupted", f"interrupted; {kept}; the same command goes on") from error
     return [reports[index] for index in range(len(jobs))]
+
+
+def _marked_anew(
+    batch: Batch, jobs: Sequence[tuple[int, Job]], workers: Pool
+) -> Iterator[tuple[int, ReportDocument]]:
+    """Reports as they come, with the jobs' numbers.
+
+    A job that ended its worker is marked without the pages that do so alone.
+    """
+    ended: list[tuple[int, Job, Problem]] = []
+    sheets = [len(job.work.pages) for _, job in jobs]
+    for number, result in workers.run(_mark_one, [(batch, job) for _, job in jobs], sheets):
+        index, job = jobs[number]
+        if not isinstance(result, Problem):
+            yield index, result
+        elif result.code in ENDED and job.work.pages:
+            ended.append((index, job, result))
+        else:
+            yield index, _failed(batch, job, result)
+    again = [(batch, _without(job, problem, batch, workers)) for _, job, problem in ended]
+    for number, result in workers.run(_mark_one, again):
+        index, job, problem = ended[number]
+        yield index, _failed(batch, job, problem) if isinstance(result, Problem) else result
+
+
+def _without(job: Job, problem: Problem, batch: Batch, workers: Pool) -> Job:
+    """The job with the problem at those of its pages that end a worker alone."""
+    pages = job.work.pages
+    calls = [(batch, replace(job.work, pages=(page,), measured=None)) for page in pages]
+    alone = dict(workers.run(_look_only, calls)) if len(pages) > 1 else {0: problem}
+    marked = tuple(
+        replace(page, problem=replace(result, file=page.name)) if isinstance(result, Problem) else page
+        for page, result in ((page, alone[index]) for index, page in enumerate(pages))
+    )
+    return _job(replace(job.work, pages=marked), job.folder, (job.reading_key, job.key))
+
+
+def _look_only(batch: Batch, work: Work) -> None:
+    look(work, batch.assignment, batch.rubric)
 
 
 def _mark_one(batch: Batch, job: Job) -> ReportDocument:
@@ -219,7 +253,8 @@ def _mark_one(batch: Batch, job: Job) -> ReportDocument:
         with_pdf=batch.with_pdf,
     )  # fmt: skip
     write_whole(where / "report.json", marked.report.model_dump_json(indent=2))
-    write_whole(_key_file(batch, job), job.key)
+    if not any(problem.code == _PASSING for problem in marked.report.problems):
+        write_whole(_key_file(batch, job), job.key)
     return marked.report
 
 
@@ -236,7 +271,8 @@ def _looked(batch: Batch, job: Job) -> Sequence[Looked]:
     if kept is not None:
         return kept
     looked = look(job.work, batch.assignment, batch.rubric)
-    if looked:
+    passing = any(problem.code == _PASSING for page in looked for problem in page.problems)
+    if looked and not passing:
         keep_looked(folder, job.name, job.reading_key, looked)
         keep_maps(folder, job.name, looked)
     return looked

@@ -60,7 +60,7 @@ def inputs_of_run(
         "rubric": rubric.model_dump_json(),
         "program": code_version(),
     }
-    content = {source.file: one.digest for one in surveys for source in one.pages}
+    content = {source.file: source.digest for one in surveys for source in one.pages}
     return inputs_of(authored, [job.work for job in jobs], [job.folder for job in jobs], content)
 
 

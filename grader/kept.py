@@ -1,4 +1,4 @@
-"""What an earlier run found out and a later one need not: surveys of files, and readings of pages.
+"""What an earlier run read and a later one need not read again.
 
 Everything is kept beside the results, in small files that are written whole, each with a digest of
 all that it depends on: the file's content, the assignment, the code that reads. What does not
@@ -8,8 +8,8 @@ match, or cannot be understood, is found out again.
 import hashlib
 import json
 import zlib
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,12 +20,9 @@ from numpy.typing import NDArray
 from grader.alike import CELLS, ink_map
 from grader.documents import ReadingDocument
 from grader.files import write_whole
-from grader.measurements import Names
-from grader.ownership import PageSource
 from grader.picture import Backdrop, restored, stored
 from grader.pipeline import Looked
 from grader.records import Figure, Identity, Problem, Reading, ReadNode, ReadVector, Swapped, Unread, Written
-from grader.survey import MEASUREMENT_TYPES, Survey, survey
 
 RECORDS: Mapping[str, type] = {
     one.__name__: one
@@ -108,42 +105,6 @@ def unpacked(data: Any) -> Any:  # noqa: ANN401 - as above
     if kind == "mapping":
         return {key: unpacked(one) for key, one in data["items"]}
     return RECORDS[kind](**{name: unpacked(one) for name, one in data.items() if name != "record"})
-
-
-# Surveys ------------------------------------------------------------------------------------------
-
-
-def survey_kept(path: Path, name: str, names: Names, folder: Path) -> Survey:
-    """What a file holds, as noted in a folder by an earlier run that saw the same content, else seen now."""
-    if path.suffix.lower() in MEASUREMENT_TYPES:
-        return survey(path, name, names)
-    digest = file_digest(path)
-    note = folder / f"{digest}.json"
-    try:
-        told = json.loads(note.read_bytes()) if digest else {}
-        if told.get("code") == code_version():
-            pages = [(bool(blank), unpacked(identity)) for blank, identity in told["pages"]]
-            return Survey(
-                tuple(
-                    PageSource(name, number, len(pages), identity=identity, blank=blank)
-                    for number, (blank, identity) in enumerate(pages, start=1)
-                ),
-                digest=digest,
-            )
-    except (OSError, KeyError, TypeError, ValueError, AttributeError):
-        pass
-    found = replace(survey(path, name, names), digest=digest)
-    if digest and found.pages and not found.broken:
-        told = [[source.blank, packed(source.identity)] for source in found.pages]
-        write_whole(note, json.dumps({"code": code_version(), "pages": told}))
-    return found
-
-
-def forget_surveys(folder: Path, digests: Collection[str]) -> None:
-    """Drop the notes on files that are not handed in any more."""
-    for note in folder.glob("*.json"):
-        if note.stem not in digests:
-            note.unlink(missing_ok=True)
 
 
 # Readings -----------------------------------------------------------------------------------------

@@ -44,6 +44,8 @@ class PageSource:
     file, page, pages : the file's name in its folder, the page from 1, how many pages the file has
     blank : nobody drew on it
     identity : from its QR code, or None
+    digest : of the file's content, empty where it is not known
+    problem : why the page cannot be used, or None
     """
 
     file: str
@@ -51,6 +53,8 @@ class PageSource:
     pages: int
     blank: bool = False
     identity: Identity | None = None
+    digest: str = ""
+    problem: Problem | None = None
 
     def __str__(self) -> str:
         return self.file if self.pages == 1 else f"{self.file}#{self.page}"

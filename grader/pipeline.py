@@ -44,11 +44,19 @@ ZONE_SLACK_MM = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A page of a file, from 1; `name` is the file as the user knows it."""
+    """A page of a file, from 1; `name` is the file as the user knows it.
+
+    Attributes
+    ----------
+    digest : of the content that the page's owner was found in, empty where it is not known
+    problem : why the page cannot be used, where that is known already: then it is not opened
+    """
 
     path: Path
     page: int
     name: str
+    digest: str = ""
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,6 +237,8 @@ def see(place: Place, figures: Collection[str] = ()) -> Seen:
     Arguments: of a printed sheet, only the zones of these `figures` are looked at; all of it by default.
     """
     timing: dict[str, float] = {}
+    if place.problem is not None:
+        return Seen(place, problems=(place.problem,))
     try:
         with _timed(timing, "decode"):
             page = replace(page_of(place.path, place.page), source=place.name)

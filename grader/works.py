@@ -6,7 +6,7 @@ from pathlib import Path, PurePath
 
 from grader.documents import UnmatchedDocument
 from grader.measurements import Measurements
-from grader.ownership import How, Owned, Ownership, student_of_name
+from grader.ownership import How, Owned, Ownership, PageSource, student_of_name
 from grader.pipeline import Place, Work
 from grader.records import Problem
 from grader.roster import STUDENT_ID, Roster, RosterRow
@@ -110,9 +110,7 @@ def _work(assignment: Assignment, key: Key, one: _Gathered, paths: Mapping[str, 
     for extra in one.measured[1:]:
         told = f"{extra.source}: further measurements of {student_id} are not counted, only those of"
         problems.append(Problem("measurements_twice", f"{told} {one.measured[0].source}", extra.source))
-    pages = tuple(
-        Place(paths[owned.source.file], owned.source.page, owned.source.file) for owned in one.owned
-    )
+    pages = tuple(_place(owned.source, paths) for owned in one.owned)
     return Work(
         student_id=student_id,
         variant=variant,
@@ -123,6 +121,10 @@ def _work(assignment: Assignment, key: Key, one: _Gathered, paths: Mapping[str, 
         name=row.name,
         problems=tuple(problems),
     )
+
+
+def _place(source: PageSource, paths: Mapping[str, Path]) -> Place:
+    return Place(paths[source.file], source.page, source.file, source.digest, source.problem)
 
 
 def _agreed(name: str, values: Iterable[int | None], problems: list[Problem]) -> int | None:

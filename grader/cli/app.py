@@ -1,7 +1,7 @@
 """The application: its commands, and what becomes of errors.
 
 Exit status: 0 all done; 1 done, but something needs a person; 2 the call or an authored file is
-wrong; 3 a mechanism does not assemble or is singular; 5 a file cannot be written.
+wrong; 3 a mechanism does not assemble or is singular; 5 a file cannot be written; 130 interrupted.
 """
 
 import sys
@@ -24,6 +24,9 @@ class Commands(TyperGroup):
         except PlanmarkError as error:
             typer.secho(f"planmark: {error.message}", err=True, fg="red")
             ctx.exit(error.exit_status)
+        except KeyboardInterrupt:
+            typer.secho("planmark: interrupted; every file that was written is whole", err=True, fg="red")
+            ctx.exit(130)
 
 
 app = typer.Typer(

@@ -11,6 +11,7 @@ from grader.documents import CalibrationDocument
 from grader.files import write_whole
 from grader.intake import count_pages
 from grader.records import Unread
+from grader.workers import Limits, Workers, result_of
 
 _FIT = "printer and scanner are fit for grading"
 
@@ -19,9 +20,10 @@ def calibrate_scans(scans: Sequence[Path], svg: Path | None, *, as_json: bool) -
     """Tell what scans of the calibration page say; whether anything is to be done."""
     found: list[CalibrationDocument] = []
     unread = False
-    for path in scans:
-        for page in range(1, count_pages(path) + 1):
-            one = calibrate(path, page)
+    with Workers(1, Limits(), __name__) as workers:
+        pages = [(path, page + 1) for path in scans for page in range(result_of(workers, count_pages, path))]
+        for path, page in pages:
+            one = result_of(workers, calibrate, path, page)
             if isinstance(one, Unread):
                 unread = True
                 typer.echo(f"{path.name}, page {page}: {one.reason}", err=True)

@@ -168,13 +168,20 @@ def grade(
     pdf: Annotated[
         bool, typer.Option("--pdf/--no-pdf", help="Write each student's feedback.pdf, to be printed, too.")
     ] = False,
+    time_limit: Annotated[
+        float, typer.Option("--time-limit", min=1.0, help="Seconds that a file or a sheet may take.")
+    ] = 60.0,
+    memory_limit: Annotated[
+        int, typer.Option("--memory-limit", min=300, help="Megabytes that a file or a sheet may take.")
+    ] = 1500,
 ) -> None:
     """Grade a folder of scans (JPEG, PNG, TIFF, PDF) and measurement files (CSV, JSON)."""
     from grader.cli.grading import grade_folder
+    from grader.workers import Limits
 
     open_ends = grade_folder(
         folder, assignment, out, roster=roster, pages_per_student=pages_per_student, jobs=jobs, lang=lang,
-        level=level, with_ghosts=ghosts, with_pdf=pdf,
+        limits=Limits(time_limit, memory_limit), level=level, with_ghosts=ghosts, with_pdf=pdf,
     )  # fmt: skip
     raise typer.Exit(1 if open_ends else 0)
 

@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from grader.batch import Batch, grade, needs_person
-from grader.batch import Progress as Tell
 from grader.cli.telling import tell_class
 from grader.documents import ReadingDocument
 from grader.i18n import LANGUAGES
@@ -20,6 +19,8 @@ from grader.pipeline import Place, Seen, documents_of, read, see
 from grader.rubric import rubric_of
 from grader.samples_folder import samples_folder
 from grader.selfcheck import LEVELS, Level
+from grader.survey import Progress as Tell
+from grader.workers import Limits, Workers, result_of
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, InputFileError
 
@@ -33,6 +34,7 @@ def grade_folder(
     pages_per_student: int | None,
     jobs: int | None,
     lang: str,
+    limits: Limits | None = None,
     level: str = "full",
     with_ghosts: bool = True,
     with_pdf: bool = False,
@@ -45,8 +47,8 @@ def grade_folder(
     assignment = load_assignment(name)
     rubric = rubric_of(assignment)
     batch = Batch(
-        assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1, lang,
-        wanted, with_ghosts, with_pdf,
+        assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1,
+        limits or Limits(), lang, wanted, with_ghosts, with_pdf,
     )  # fmt: skip
     with progress() as tell:
         results = grade(batch, tell)
@@ -99,16 +101,22 @@ def read_scans(
     """Read pages without grading; whether anything is doubtful or unread."""
     assignment = load_assignment(name)
     variant = _variant(assignment, n, position)
-    seen = [see(place) for path in scans for place in _places(path)]
-    readings = read(seen, assignment, variant, {}, rubric_of(assignment).vectors)
-    documents = documents_of(seen, readings, None)
-    documents = [_identified(document, one) for document, one in zip(documents, seen, strict=True)]
+    with Workers(1, Limits(), __name__) as workers:
+        places = [place for path in scans for place in result_of(workers, _places, path)]
+        documents = result_of(workers, _read, places, assignment, variant, sheets=len(places))
     if as_json:
         typer.echo(json.dumps([document.model_dump(mode="json") for document in documents], indent=2))
     else:
         for document in documents:
             _print_reading(document)
     return any(not document.figures or document.unread or _doubtful(document) for document in documents)
+
+
+def _read(places: Sequence[Place], assignment: Assignment, variant: Variant | None) -> list[ReadingDocument]:
+    seen = [see(place) for place in places]
+    readings = read(seen, assignment, variant, {}, rubric_of(assignment).vectors)
+    documents = documents_of(seen, readings, None)
+    return [_identified(document, one) for document, one in zip(documents, seen, strict=True)]
 
 
 def _variant(assignment: Assignment, n: int | None, position: int | None) -> Variant | None:

@@ -1,26 +1,28 @@
 """``planmark sheet`` and ``planmark match``."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import typer
 
 from grader.answer_sheet import make_calibration, make_sheets
-from grader.batch import Progress
 from grader.cli.grading import check_language, progress
-from grader.contact_sheet import contact_sheet, thumbnail
+from grader.contact_sheet import Thumbnail, contact_sheet, thumbnail
 from grader.files import write_whole
-from grader.folder import submissions
+from grader.folder import submissions, told_name
 from grader.intake import page_of
 from grader.lint import lint, suggestions
 from grader.matching import SURE, draft_csv, suggest
 from grader.measurements import names_of
 from grader.ownership import PageSource
 from grader.pipeline import Place, see
-from grader.records import FloatArray
+from grader.records import FloatArray, Problem
 from grader.roster import read_roster
 from grader.rubric import rubric_of
-from grader.survey import survey
+from grader.survey import survey_folder
+from grader.workers import Limits, Workers
 from reference.assignment import Variant, load_assignment
 from reference.errors import CallError, InputFileError
 
@@ -87,23 +89,32 @@ def draft_matches(
     if not folder.is_dir():
         raise CallError("folder_missing", f"{folder}: there is no such folder")
     assignment, roster = load_assignment(name), read_roster(roster_file)
-    names = names_of(assignment)
-    files = {path.relative_to(folder).as_posix(): path for path in submissions(folder, roster_file, (out,))}
-    sources = [source for file, path in files.items() for source in survey(path, file, names).pages]
-    draft = suggest(sources, roster, assignment, pages_per_student=pages_per_student)
-    loose = [one.source for one in draft.suggestions if not one.sure]
-    with progress() as tell:
-        strokes = dict(_strokes(loose, files, tell))
-    draft = suggest(sources, roster, assignment, look=strokes.get, pages_per_student=pages_per_student)
+    paths = submissions(folder, roster_file, (out,))
+    files = {told_name(path, folder): path for path in paths}
+    with (
+        progress() as tell,
+        tempfile.TemporaryDirectory() as notes,
+        Workers(os.cpu_count() or 1, Limits(), __name__) as workers,
+    ):
+        surveys = survey_folder(paths, folder, names_of(assignment), workers, tell, Path(notes))
+        sources = [source for found in surveys for source in found.pages]
+        draft = suggest(sources, roster, assignment, pages_per_student=pages_per_student)
+        loose = [one.source for one in draft.suggestions if not one.sure]
+        strokes: dict[PageSource, FloatArray] = {}
+        for done, (index, ends) in enumerate(workers.run(_strokes, _calls(loose, files)), start=1):
+            if not isinstance(ends, Problem | None):
+                strokes[loose[index]] = ends
+            tell("reading", done, len(loose))
+        draft = suggest(sources, roster, assignment, look=strokes.get, pages_per_student=pages_per_student)
+        shown = [one.source for one in draft.suggestions]
+        thumbnails = dict(workers.run(_thumbnail, _calls(shown, files)))
     entries = []
-    for suggestion in draft.suggestions:
-        source = suggestion.source
-        try:
-            page = page_of(files[source.file], source.page)
-        except InputFileError as error:
-            typer.echo(f"{source}: {error.message}", err=True)
-            continue
-        entries.append((suggestion, thumbnail(page.grey)))
+    for index, suggestion in enumerate(draft.suggestions):
+        picture = thumbnails[index]
+        if isinstance(picture, Problem):
+            typer.echo(f"{suggestion.source}: {picture.message}", err=True)
+        else:
+            entries.append((suggestion, picture))
     sheet = out.with_suffix(".html")
     write_whole(out, draft_csv(roster, draft))
     write_whole(sheet, contact_sheet(entries, lang))
@@ -115,12 +126,20 @@ def draft_matches(
     return open_ends > 0
 
 
-def _strokes(
-    sources: Sequence[PageSource], files: Mapping[str, Path], tell: Progress
-) -> Iterator[tuple[PageSource, FloatArray]]:
-    """The strokes drawn on each page, sheet millimetres, where there are any to be had."""
-    for done, source in enumerate(sources, start=1):
-        ink = see(Place(files[source.file], source.page, source.file)).ink
-        if ink is not None:
-            yield source, ink.strokes.ends
-        tell("reading", done, len(sources))
+def _calls(sources: Sequence[PageSource], files: Mapping[str, Path]) -> list[tuple[Place]]:
+    return [
+        (Place(files[source.file], source.page, source.file, source.digest, source.problem),)
+        for source in sources
+    ]
+
+
+def _strokes(place: Place) -> FloatArray | None:
+    """(n, 2, 2) strokes drawn on a page, sheet millimetres; None where there are none to be had."""
+    ink = see(place).ink
+    return None if ink is None else ink.strokes.ends
+
+
+def _thumbnail(place: Place) -> Thumbnail:
+    if place.problem is not None:
+        raise InputFileError(place.problem.code, place.problem.message)
+    return thumbnail(page_of(place.path, place.page).grey)

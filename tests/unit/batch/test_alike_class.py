@@ -8,6 +8,7 @@ from grader.batch import Batch, grade
 from grader.cli.telling import tell_class
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
+from tests.inline import Inline
 from tests.unit.alike.classes import changed, drawing, measured
 
 PRESS = load_assignment("press")
@@ -31,7 +32,7 @@ def results(tmp_path):
     made = [measured(drawing("press", 1, seed), seed) for seed in range(8)]
     for one in [*made, changed(made[3], 3, 2)]:
         handed_in(tmp_path / "in", one.student_id, one.numbers)
-    return grade(Batch(PRESS, RUBRIC, tmp_path / "in", tmp_path / "out"), lambda *_: None)
+    return grade(Batch(PRESS, RUBRIC, tmp_path / "in", tmp_path / "out"), lambda *_: None, Inline())
 
 
 def test_copied_values_are_told_in_results_on_the_page_and_in_the_terminal(results, tmp_path, capsys):
@@ -50,7 +51,7 @@ def test_copied_values_are_told_in_results_on_the_page_and_in_the_terminal(resul
 def test_a_regrade_tells_criteria_and_why_in_the_terminal(results, tmp_path, capsys):
     tolerance = RUBRIC.tolerance.model_copy(update={"length_mm": 0.1, "length_relative": 0.0})
     strict = RUBRIC.model_copy(update={"tolerance": tolerance})
-    again = grade(Batch(PRESS, strict, tmp_path / "in", tmp_path / "out"), lambda *_: None)
+    again = grade(Batch(PRESS, strict, tmp_path / "in", tmp_path / "out"), lambda *_: None, Inline())
     assert again.alike == results.alike
     tell_class(again, tmp_path / "out")
     said = capsys.readouterr().out

@@ -8,8 +8,9 @@ import pytest
 from grader import batch as batch_module
 from grader import jobs as jobs_module
 from grader import kept as kept_module
+from grader import survey as survey_module
 from grader.alike import CELLS
-from grader.batch import Batch, grade
+from grader.batch import Batch, InterruptedRunError, grade
 from grader.kept import digest_of, keep_looked, keep_maps, kept_looked, kept_maps, packed, unpacked
 from grader.moved import told_standing
 from grader.picture import backdrop
@@ -19,6 +20,7 @@ from grader.records import Figure, Page, Problem, Reading, ReadNode, ReadVector,
 from grader.rubric import load_rubric
 from reference.assignment import Variant, load_assignment
 from reference.plan import exact_plan
+from tests.inline import Inline
 
 PUMP = load_assignment("pump")
 RUBRIC = load_rubric("pump-velocity")
@@ -86,7 +88,7 @@ def roster(folder, **numbers):
 
 
 def run(folder, out, rubric=RUBRIC, progress=lambda *_: None):
-    return grade(Batch(PUMP, rubric, folder, out), progress)
+    return grade(Batch(PUMP, rubric, folder, out), progress, Inline())
 
 
 def wider(rubric):
@@ -155,11 +157,11 @@ def test_a_file_with_other_content_is_read_again_and_one_only_touched_is_not(cla
 def test_pages_are_surveyed_once(class_folder, tmp_path, monkeypatch):
     seen = []
 
-    def noted(path, name, names, survey=kept_module.survey):
-        seen.append(name)
-        return survey(path, name, names)
+    def noted(path, source, look_at=survey_module.look_at):
+        seen.append(source.file)
+        return look_at(path, source)
 
-    monkeypatch.setattr(kept_module, "survey", noted)
+    monkeypatch.setattr(survey_module, "look_at", noted)
     run(class_folder, tmp_path / "out")
     assert seen == ["s1.png", "s2.png"]
     scan(class_folder / "s2.png", 150)
@@ -173,7 +175,7 @@ def test_an_interrupted_run_goes_on_where_it_was(class_folder, tmp_path, reader)
         if what == "marking" and done == 1:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(InterruptedRunError, match="1 of 2 submissions are marked"):
         run(class_folder, tmp_path / "out", progress=interrupt)
     assert reader.read == ["s1"]
     results = run(class_folder, tmp_path / "out")

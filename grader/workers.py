@@ -1,0 +1,215 @@
+"""One function over many inputs in worker processes; a crash, a time or memory limit costs one input only."""
+
+import contextlib
+import importlib
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from multiprocessing.process import BaseProcess
+from types import TracebackType
+from typing import Any, Protocol, Self, TypeVar
+
+import psutil
+from pebble import ProcessExpired, ProcessPool
+from pebble.pool.process import WORKERS_NAME
+
+from grader.records import Problem
+from reference.errors import InputFileError, PlanmarkError
+
+Result = TypeVar("Result")
+
+ENDED = frozenset({"crashed", "too_slow", "too_much_memory"})
+"""Problems for which a call is tried once more, alone: another sheet may have taken time or memory."""
+_WATCH_S = 0.05
+"""Between two looks at the workers' memory: a worker fills at most some 100 MB in this time."""
+_STALLED_S = 30.0
+"""Past every time limit without any result: a worker was killed while it took its task, which is lost."""
+_MEGABYTE = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What one file or sheet may take: seconds, and megabytes of memory."""
+
+    seconds: float = 60.0
+    memory_mb: int = 1500
+
+
+class Pool(Protocol):
+    """What runs calls."""
+
+    def run(
+        self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
+    ) -> Iterator[tuple[int, Result | Problem]]:
+        """Results as they come, each with its index; a failure is a Problem in the place of its result."""
+        ...
+
+
+def result_of(pool: Pool, function: Callable[..., Result], *call: object, sheets: int = 1) -> Result:
+    """What one call gives; raises InputFileError for the Problem in its place."""
+    ((_, result),) = pool.run(function, [call], [sheets])
+    if isinstance(result, Problem):
+        raise InputFileError(result.code, result.message)
+    return result
+
+
+class Workers:
+    """Worker processes that end with their parent; to be used in a `with` statement.
+
+    Arguments
+    ---------
+    jobs : number of processes
+    module : imported by each worker before its first task, so that no time limit pays for it
+    """
+
+    def __init__(self, jobs: int, limits: Limits, module: str = __name__) -> None:
+        self._jobs, self._limits, self._module = jobs, limits, module
+        self._pool: ProcessPool | None = None
+        self._over_memory: set[int] = set()
+        self._closed = threading.Event()
+
+    def __enter__(self) -> Self:
+        threading.Thread(target=self._watch_memory, daemon=True).start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._closed.set()
+        self._end_pool()
+
+    def run(
+        self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
+    ) -> Iterator[tuple[int, Result | Problem]]:
+        """As `Pool.run`; calls that end their worker are tried once more at the end, one at a time.
+
+        Arguments
+        ---------
+        sheets : of each call, which multiply the time limit; 1 where not given
+        """
+        seconds = [self._limits.seconds] * len(calls)
+        for index, count in enumerate(sheets):
+            seconds[index] *= max(1, count)
+        tasks = [(function, *call) for call in calls]
+        again: list[int] = []
+        for index, result in self._finished(tasks, seconds, range(len(calls))):
+            if isinstance(result, Problem) and result.code in ENDED:
+                again.append(index)
+            else:
+                yield index, result
+        for index in sorted(again):
+            yield from self._finished(tasks, seconds, [index])
+
+    def _finished(
+        self, tasks: Sequence[tuple[Any, ...]], seconds: Sequence[float], indices: Iterable[int]
+    ) -> Iterator[tuple[int, Any]]:
+        """Results of the chosen tasks; a pool that breaks is made anew for what is left of them."""
+        left = set(indices)
+        tries = 2
+        while left and tries:
+            tries -= 1
+            pool = self._started_pool()
+            futures: dict[Future[Any], int] = {
+                pool.schedule(guarded, tasks[index], timeout=seconds[index]): index for index in sorted(left)
+            }
+            longest = max(seconds[index] for index in left)
+            while futures:
+                ended, _ = wait(futures, longest + _STALLED_S, FIRST_COMPLETED)
+                results = [(futures.pop(future), self._result(future)) for future in ended]
+                if not ended or any(result is None for _, result in results):
+                    self._end_pool()
+                    futures.clear()
+                for index, result in results:
+                    if result is not None:
+                        left.discard(index)
+                        tries = 2
+                        yield index, result
+        for index in sorted(left):
+            yield index, Problem("crashed", "the process that worked on it ended; grade again")
+
+    def _result(self, future: "Future[Any]") -> Any:  # noqa: ANN401 - whatever the function returns
+        """A finished call's result or Problem; None where the pool broke under it."""
+        try:
+            return future.result()
+        except TimeoutError:
+            return Problem(
+                "too_slow", f"took more than {self._limits.seconds:g} s; {_ADVICE}, or raise --time-limit"
+            )
+        except ProcessExpired as error:
+            if error.pid in self._over_memory:
+                return self._too_much_memory()
+            return Problem("crashed", f"the program crashed on it (exit code {error.exitcode}); {_ADVICE}")
+        except MemoryError:
+            return self._too_much_memory()
+        except BrokenProcessPool:
+            return None
+
+    def _too_much_memory(self) -> Problem:
+        asked = f"needs more than {self._limits.memory_mb} MB of memory"
+        return Problem("too_much_memory", f"{asked}; {_ADVICE}, or raise --memory-limit")
+
+    def _started_pool(self) -> ProcessPool:
+        if self._pool is None:
+            context = multiprocessing.get_context("spawn")
+            self._pool = ProcessPool(
+                self._jobs, initializer=_start, initargs=(self._module,), context=context
+            )
+        return self._pool
+
+    def _end_pool(self) -> None:
+        """Kill the workers, whatever they do: a polite end would wait for native code."""
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            for worker in _workers():
+                worker.kill()
+            pool.stop()  # type: ignore[no-untyped-call]
+            pool.join()
+
+    def _watch_memory(self) -> None:
+        limit = self._limits.memory_mb * _MEGABYTE
+        while not self._closed.wait(_WATCH_S):
+            for worker in _workers():
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    if psutil.Process(worker.pid).memory_info().rss > limit:
+                        self._over_memory.add(worker.pid or 0)
+                        worker.kill()
+
+
+_ADVICE = "scan or export it again"
+
+
+def _workers() -> list[BaseProcess]:
+    """The pool's processes that live."""
+    return [child for child in multiprocessing.active_children() if child.name == WORKERS_NAME]
+
+
+def _start(module: str) -> None:
+    """Prepare a worker: end with the parent, one thread for OpenCV, the work's module imported."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    import cv2  # noqa: PLC0415 - only in worker processes
+
+    cv2.setNumThreads(1)
+    importlib.import_module(module)
+
+
+def _end_with(parent: BaseProcess) -> None:
+    parent.join()
+    os._exit(1)
+
+
+def guarded(function: Callable[..., Result], *call: object) -> Result | Problem:
+    """The function's result, or the Problem that stopped it: one bad file never stops the rest."""
+    try:
+        return function(*call)
+    except MemoryError:
+        raise
+    except PlanmarkError as error:
+        return Problem(error.code, error.message)
+    except Exception as error:  # noqa: BLE001 - whatever a hostile file brings about stays with that file
+        return Problem("internal_error", f"could not be processed ({type(error).__name__}: {error})")

@@ -1,0 +1,60 @@
+"""What the workers of the tests do."""
+
+import ctypes
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+
+from reference.errors import InputFileError
+
+
+def doubled(number):
+    return 2 * number
+
+
+def crashes(_):
+    ctypes.string_at(0)
+
+
+def sleeps(seconds):
+    time.sleep(seconds)
+    return seconds
+
+
+def fills_memory(_):
+    blocks = []
+    while True:
+        blocks.append(np.ones(2_000_000))
+
+
+def asks_for_too_much(_):
+    raise MemoryError
+
+
+def is_killed(_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def is_refused(name):
+    raise InputFileError("image_damaged", f"{name}: the image is damaged")
+
+
+def has_a_bug(_):
+    raise ZeroDivisionError("no such luck")
+
+
+def crashes_once(path):
+    """Dies on its first call, and answers on the second."""
+    path = Path(path)
+    if path.exists():
+        return "answered"
+    path.touch()
+    os.kill(os.getpid(), signal.SIGKILL)
+    return None
+
+
+def does(name, argument):
+    return globals()[name](argument)

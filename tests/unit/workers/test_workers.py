@@ -1,0 +1,123 @@
+"""One call that breaks its process, or its limits, costs nothing but itself."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import psutil
+import pytest
+
+from grader.records import Problem
+from grader.workers import Limits, Workers, result_of
+from reference.errors import InputFileError
+from tests.unit.workers import calls
+
+LIMITS = Limits(seconds=2.0, memory_mb=400)
+ROOT = Path(__file__).parents[3]
+
+
+def codes(jobs, work):
+    """What each call gives: its result, or the code of its problem."""
+    with Workers(jobs, LIMITS, calls.__name__) as workers:
+        results = dict(workers.run(calls.does, work))
+    assert sorted(results) == list(range(len(work)))
+    return [
+        results[index].code if isinstance(results[index], Problem) else results[index]
+        for index in range(len(work))
+    ]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_breaks_a_process_or_a_limit_costs_that_call_alone(jobs):
+    broken = {
+        "crashes": "crashed",
+        "is_killed": "crashed",
+        "fills_memory": "too_much_memory",
+        "asks_for_too_much": "too_much_memory",
+        "is_refused": "image_damaged",
+        "has_a_bug": "internal_error",
+    }
+    work = [pair for name in broken for pair in ((name, 1), ("doubled", 21))]
+    assert codes(jobs, work) == [answer for code in broken.values() for answer in (code, 42)]
+
+
+def test_what_takes_too_long_is_ended_though_it_would_go_on_for_minutes():
+    assert codes(1, [("sleeps", 600), ("doubled", 1)]) == ["too_slow", 2]
+
+
+def test_a_call_of_several_sheets_has_the_time_of_all_of_them():
+    with Workers(1, Limits(seconds=1.0), calls.__name__) as workers:
+        assert result_of(workers, calls.sleeps, 1.5, sheets=3) == 1.5
+        with pytest.raises(InputFileError, match="more than 1 s"):
+            result_of(workers, calls.sleeps, 600)
+
+
+def test_a_call_that_ended_its_process_is_tried_once_more(tmp_path):
+    path = tmp_path / "tried"
+    assert codes(1, [("crashes_once", str(path))]) == ["answered"]
+
+
+def test_processes_killed_at_any_moment_lose_no_call():
+    """Also between two calls, and while one is handed over."""
+    dice, stop = random.Random(7), threading.Event()
+
+    def kill():
+        while not stop.wait(dice.uniform(0.2, 2.5)):
+            for child in dice.sample(found := psutil.Process().children(), min(1, len(found))):
+                if "resource_tracker" not in " ".join(child.cmdline()):
+                    child.kill()
+
+    killer = threading.Thread(target=kill)
+    with Workers(2, LIMITS, calls.__name__) as workers:
+        killer.start()
+        results = dict(workers.run(calls.sleeps, [(0.02,)] * 200))
+        stop.set()
+        killer.join()
+    assert sorted(results) == list(range(200))
+    answered = [result for result in results.values() if result == 0.02]
+    assert len(answered) >= 198  # two strokes of bad luck on one call are told as its crash
+    assert all(result == 0.02 or result.code == "crashed" for result in results.values())
+
+
+PARENT = """
+from grader.workers import Limits, Workers
+from tests.unit.workers import calls
+if __name__ == "__main__":
+    with Workers(2, Limits(), calls.__name__) as workers:
+        for index, _ in workers.run(calls.sleeps, [(0.01,), (0.01,), (600,), (600,)]):
+            print(index, flush=True)
+"""
+
+
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_the_processes_end_with_their_parent(tmp_path, sent):
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(  # noqa: S603 - this very Python
+        [sys.executable, str(script)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=env
+    ) as parent:
+        for _ in range(2):
+            parent.stdout.readline()
+        children = psutil.Process(parent.pid).children(recursive=True)
+        assert len(children) >= 2
+        parent.send_signal(sent)
+        parent.wait(timeout=30)
+    _, alive = psutil.wait_procs(children, timeout=30)
+    assert not alive
+
+
+def test_the_pool_closes_at_once_though_its_processes_are_busy():
+    with Workers(1, Limits(), calls.__name__) as workers:
+        result_of(workers, calls.doubled, 1)
+        running = workers.run(calls.sleeps, [(0.01,), (600,)])
+        assert next(running) == (0, 0.01)
+        children = psutil.Process().children()
+        processes = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+        assert processes
+    _, alive = psutil.wait_procs(processes, timeout=30)
+    assert not alive
