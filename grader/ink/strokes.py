@@ -4,12 +4,13 @@ from dataclasses import fields
 
 import numpy as np
 
-from grader.ink.bundles import distances, refined, rejoined
+from grader.ink.bundles import PROBES, distances, refined, rejoined
 from grader.ink.centreline import Fitted, Pen, fit_centre
 from grader.ink.components import Components
 from grader.ink.darkness import split_by_darkness
 from grader.ink.ending import coverage, find_ends, through_bands
 from grader.ink.joining import Pieces, join
+from grader.ink.pairs import near_pairs, parts
 from grader.ink.regions import Field, to_mm
 from grader.ink.seeds import PX_PER_MM, Seeds
 from grader.pixels import BoolArray, Flat
@@ -107,13 +108,20 @@ def distinct(fitted: Fitted, unit: float, covered_share: float = 1.0) -> BoolArr
     keep = np.zeros(len(fitted), dtype=bool)
     if len(fitted) == 0:
         return keep
-    off = distances(fitted.ends)
+    inner = 0.6 * fitted.width
+    first, second = near_pairs(fitted.ends, fitted.ends, max(_SAME_MM * unit, float(inner.max())))
+    off = np.concatenate(
+        [distances(fitted.ends, first[part], second[part]) for part in parts(len(first), PROBES)]
+    )
     along = np.asarray((off < _SAME_MM * unit).all(axis=1))
-    inside = np.asarray(off < 0.6 * fitted.width)
+    inside = np.asarray(off < inner[second, None])
     short = fitted.length < _SHORT_MM * unit
+    start = np.searchsorted(first, np.arange(len(fitted) + 1))
     for row in np.argsort(-fitted.length):
-        covered = short[row] and inside[row][:, keep].any(axis=1).mean() > covered_share
-        keep[row] = not covered and not along[row][keep].any()
+        others = slice(start[row], start[row + 1])
+        kept = keep[second[others]]
+        covered = short[row] and inside[others][kept].any(axis=0).mean() > covered_share
+        keep[row] = not covered and not along[others][kept].any()
     return keep
 
 
