@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.ink.centreline import Fitted, Pen, lone_width, mean_of, moved, put, standard_errors
-from grader.ink.pairs import Rows, near_pairs, parts
-from grader.pixels import BoolArray, Cuts, Flat, Float32Array, cut_across, robust_lines
+from grader.ink.pairs import Rows, near_pairs
+from grader.pixels import BoolArray, Cuts, Flat, Float32Array, cut_across, parts, robust_lines
 from grader.records import FloatArray
 
 PROBES = 13

@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.ink.pairs import near_pairs, parts
-from grader.pixels import BoolArray, Cuts, Flat, Lines, cut_across, robust_lines
+from grader.ink.pairs import near_pairs
+from grader.pixels import BoolArray, Cuts, Flat, Lines, cut_across, parts, robust_lines
 from grader.records import FloatArray
 
 _REACH_MM = 0.8

@@ -1,28 +1,18 @@
 """Pairs of segments near each other, so that nothing is computed for every two strokes of a sheet."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from grader.pixels import parts
 from grader.records import FloatArray
 
 _SLACK_PX = 1.0
 """Callers compare in single precision: pairs at the limit are in."""
-_VALUES = 1 << 20
-"""Values of one array of a part: 8 MB of doubles."""
 _NEIGHBOURHOOD = 256
 """Pairs of samples around one segment, at most as a rule."""
 
 Rows = NDArray[np.intp]
-
-
-def parts(count: int, each: int) -> Iterator[slice]:
-    """Slices of `count` rows of `each` values: the memory of a computation in parts is bounded."""
-    rows = max(1, _VALUES // max(each, 1))
-    for start in range(0, count, rows):
-        yield slice(start, min(start + rows, count))
 
 
 def near_pairs(ends: FloatArray, others: FloatArray, reach_px: float) -> tuple[Rows, Rows]:

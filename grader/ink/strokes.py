@@ -10,10 +10,10 @@ from grader.ink.components import Components
 from grader.ink.darkness import split_by_darkness
 from grader.ink.ending import coverage, find_ends, through_bands
 from grader.ink.joining import Pieces, join
-from grader.ink.pairs import near_pairs, parts
+from grader.ink.pairs import near_pairs
 from grader.ink.regions import Field, to_mm
 from grader.ink.seeds import PX_PER_MM, Seeds
-from grader.pixels import BoolArray, Flat
+from grader.pixels import BoolArray, Flat, parts
 from grader.records import FloatArray, Sheet, Strokes
 
 _OFF_MM = 0.25

@@ -19,6 +19,8 @@ LEAST_EDGE_MM = 8.0
 OVERRUN_MM = 25.0
 PROPOSING_EDGES = 4
 SHORT_LIST = 60
+PAIRS = 1 << 13
+"""Of segments and strokes compared at a time: their arrays stay in a processor's own cache."""
 SPECK_MM = 2.0
 """Shorter edges have no direction to speak of."""
 
@@ -138,8 +140,9 @@ def _scores(expected: Expected, lines: Lines, proposed: FloatArray, edges: Seque
 def best_support(lines: Lines, tail: ComplexArray, head: ComplexArray, sigma: FloatArray) -> FloatArray:
     """How well the best stroke lies under each segment, 0..1. Arguments: segments (m,), sigma mm (m,)."""
     support = np.zeros(len(tail))
-    for first in range(0, len(tail), 512):
-        part = slice(first, first + 512)
+    rows = max(1, PAIRS // max(1, len(lines)))
+    for first in range(0, len(tail), rows):
+        part = slice(first, first + rows)
         from_start = (tail[part, None] - lines.start) * np.conj(lines.along)
         to_end = (head[part, None] - lines.start) * np.conj(lines.along)
         off2 = from_start.imag**2 + to_end.imag**2
