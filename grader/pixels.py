@@ -162,11 +162,15 @@ def cut_across(
     """
     samples = count * (2 * _ACROSS_STEPS + 1)
     cuts = [
-        _cut_part(flat, ends[part], count, reach_px, (capture_px[part], None if level is None else level[part]))
+        _cut_part(
+            flat, ends[part], count, reach_px, (capture_px[part], None if level is None else level[part])
+        )
         for part in parts(len(ends), samples)
     ] or [Cuts(*np.zeros((4, 0, count)))]
-    return cuts[0] if len(cuts) == 1 else Cuts(
-        *(np.concatenate([getattr(one, name.name) for one in cuts]) for name in fields(Cuts))
+    return (
+        cuts[0]
+        if len(cuts) == 1
+        else Cuts(*(np.concatenate([getattr(one, name.name) for one in cuts]) for name in fields(Cuts)))
     )
 
 

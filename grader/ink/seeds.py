@@ -144,8 +144,8 @@ def _band_width(mask: GreyImage, edges: FloatArray) -> tuple[FloatArray, FloatAr
     normal = np.column_stack([direction[:, 1], -direction[:, 0]])
     points = edges[:, None, 0] + share[None, :, None] * (edges[:, None, 1] - edges[:, None, 0])
     depth = np.arange(1.0, _WIDEST_PX + 1.0)
-    inner = np.empty(points.shape[:2])
-    for part in parts(len(edges), 2 * inner.shape[1] * len(depth)):
+    inner = np.empty((len(edges), len(share)))
+    for part in parts(len(edges), 2 * len(share) * len(depth)):
         inner[part] = _run(mask, points[part], normal[part], depth)
     return normal, np.median(inner, axis=1) + 1.0
 

@@ -14,7 +14,7 @@ from grader.ink.pairs import near_pairs
 from grader.ink.regions import Field, to_mm
 from grader.ink.seeds import PX_PER_MM, Seeds
 from grader.pixels import BoolArray, Flat, parts
-from grader.records import FloatArray, Sheet, Strokes
+from grader.records import FloatArray, Sheet, Strokes, Unread
 
 _OFF_MM = 0.25
 """Pieces this near to one line are of it; strokes further apart are told apart."""
@@ -24,6 +24,11 @@ _FITTED_GAP_MM = 3.5
 """Gaps of dashed lines, and of lines that stop at a joint's circle and go on behind it."""
 _LEAST_DASHED_MM = 7.0
 _LEAST_MM = 1.0
+_MOST_STROKES = 6000
+"""On a sheet: drawings of a class have up to 530 before fitting, real ones on A3 covered with ink 2,100,
+and 5,300 where the lines of 1 mm squared paper are all taken for strokes."""
+_RUNS_OF_STROKE = 8
+"""Straight runs of border per stroke: 2 to 7 were counted on scans of drawings, squared paper and text."""
 _LEAST_SUPPORT = 0.3
 _SAME_MM = 0.2
 _SHORT_MM = 6.0
@@ -34,13 +39,26 @@ _SE_MERGED_MM = 2.5
 """Ends err by this much, measured on simulated students: lines run on along their neighbours."""
 
 
-def find_strokes(flat: Flat, seeds: Seeds, components: Components, field: Field) -> Strokes:
-    """Straight strokes in the field, in sheet millimetres."""
+def find_strokes(flat: Flat, seeds: Seeds, components: Components, field: Field) -> Strokes | Unread:
+    """Straight strokes in the field, in sheet mm; false where they are more than a drawing has."""
     full = (seeds.ends + 0.5) / field.scale - 0.5
     usable = field.holds(to_mm(field.sheet, full.mean(axis=1))) & ~components.mark[components.of_seed]
+    least = int(usable.sum()) // _RUNS_OF_STROKE
+    if least > _MOST_STROKES:
+        return _too_many(least)
     pieces = _lines(full, seeds, components, usable, field.scale)
+    if len(pieces.width) > _MOST_STROKES:
+        return _too_many(len(pieces.width))
     fitted, merged = _settled(flat, pieces, field.sheet.px_per_mm, seeds.pen_px / field.scale)
     return _records(flat, fitted, merged, field.sheet)
+
+
+def _too_many(count: int) -> Unread:
+    reason = (
+        f"it has about {count:,} straight strokes, a drawing a few hundred: a photo, a printed pattern, or"
+        " a picture with its tones inverted? Scan the sheet in greyscale, on plain or lightly squared paper"
+    )
+    return Unread("ink", reason)
 
 
 def take(strokes: Strokes, which: BoolArray) -> Strokes:

@@ -266,7 +266,8 @@ def _in_line(single: Lines) -> tuple[IntArray, IntArray]:
     pairs = [np.zeros((0, 2), dtype=np.int64)]
     for start in range(0, len(long), PART):
         some = long[start : start + PART]
-        pairs.append(np.argwhere(_continues(single, some, long)) + [start, 0])
+        first, second = np.nonzero(_continues(single, some, long))
+        pairs.append(np.column_stack([start + first, second]))
     first, second = np.concatenate(pairs).T
     length = single.length[long]
     keep = (length[first] != length[second]) | (first < second)
