@@ -124,9 +124,8 @@ def _beside_another(
     span = fitted.ends[:, 1] - fitted.ends[:, 0]
     u = span / np.maximum(fitted.length, 1e-9)[:, None]
     limit = fitted.width + _BAND_OFF_MM * px_per_mm
-    first, second = near_pairs(
-        np.stack([tips, tips], axis=1), fitted.ends, _LEAST_BAND_MM * px_per_mm + float(limit.max(initial=0.0))
-    )
+    reach = _LEAST_BAND_MM * px_per_mm + float(limit.max(initial=0.0))
+    first, second = near_pairs(np.stack([tips, tips], axis=1), fitted.ends, reach)
     beside = rows[first] != second
     for way in (-1.0, 0.5):
         at = tips + way * _LEAST_BAND_MM * px_per_mm * outward

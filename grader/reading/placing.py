@@ -21,6 +21,8 @@ PROPOSING_EDGES = 4
 SHORT_LIST = 60
 PAIRS = 1 << 13
 """Of segments and strokes compared at a time: their arrays stay in a processor's own cache."""
+FARTHEST_SQUARED = 1500.0
+"""Of sigma: the fit of a stroke so far off is zero, its exponential is less than the smallest number."""
 SPECK_MM = 2.0
 """Shorter edges have no direction to speak of."""
 
@@ -149,11 +151,12 @@ def best_support(lines: Lines, tail: ComplexArray, head: ComplexArray, sigma: Fl
         low = np.minimum(from_start.real, to_end.real)
         high = np.maximum(from_start.real, to_end.real)
         shared = np.minimum(high, lines.length) - np.maximum(low, 0.0)
-        span = np.maximum(high - low, 1e-6)
-        true_span = np.abs(head[part] - tail[part])[:, None]
-        share = np.clip(shared / np.maximum(true_span, span), 0.0, 1.0)
-        fit = np.exp(-0.5 * off2 / sigma[part, None] ** 2) * share
-        support[part] = fit.max(axis=1, initial=0.0)
+        at = np.nonzero((shared > 0.0) & (off2 < FARTHEST_SQUARED * sigma[part, None] ** 2))
+        span = np.maximum(high[at] - low[at], 1e-6)
+        true_span = np.abs(head[part] - tail[part])[at[0]]
+        share = np.clip(shared[at] / np.maximum(true_span, span), 0.0, 1.0)
+        fit = np.exp(-0.5 * off2[at] / sigma[part][at[0]] ** 2) * share
+        np.maximum.at(support[part], at[0], fit)
     return support
 
 
