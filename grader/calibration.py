@@ -56,7 +56,10 @@ def calibrate(path: Path, number: int = 1) -> CalibrationDocument | Unread:
     linear = _linear(mm, px)
     scanned = sheet.lens is None and linear.rms_mm < _PHOTO_MM
     straight_page, straight_sheet = straighten(page, sheet)
-    strokes = find_ink(straight_page, straight_sheet).strokes.ends
+    ink = find_ink(straight_page, straight_sheet)
+    if isinstance(ink, Unread):
+        return ink
+    strokes = ink.strokes.ends
     known = calibration_segments()
     found = _matched(known, strokes)
     segments = _segments(known, found)

@@ -26,7 +26,7 @@ from grader.picture import Backdrop, backdrop, overlay
 from grader.quantities import ByRule, Declared, parse_scale
 from grader.reading import read_figures
 from grader.reading_document import reading_document
-from grader.records import MECHANISM, Box, Ink, Page, Problem, Reading, Sheet, Written
+from grader.records import MECHANISM, Box, Ink, Page, Problem, Reading, Sheet, Unread, Written
 from grader.reports import report_of, unjudged_report
 from grader.rubric import RubricFile
 from grader.scene import Picture
@@ -258,8 +258,12 @@ def see(place: Place, figures: Collection[str] = ()) -> Seen:
     ink = None
     with _timed(timing, "ink"):
         if boxes is None or boxes:
-            ink = find_ink(page, sheet, boxes)
-            ink = replace(ink, letters=find_letters(ink, boxes))
+            drawn = find_ink(page, sheet, boxes)
+            if isinstance(drawn, Unread):
+                message = f"{place.name}: page {place.page} is no drawing: {drawn.reason}"
+                problem = Problem("page_not_a_drawing", message, place.name)
+                return Seen(place, page, sheet, problems=(problem,), timing_ms=timing)
+            ink = replace(drawn, letters=find_letters(drawn, boxes))
         written = written_scales(page, sheet)
     problems = tuple(replace(problem, file=place.name) for problem in sheet.problems)
     return Seen(place, page, sheet, ink, problems, timing, narrowed=boxes is not None, written=written)

@@ -4,7 +4,8 @@ Shared by the stages that look at pixels (`sheet`, `ink`). Pixel coordinates are
 the centre of the stored image's top left pixel is (0, 0).
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 
 import cv2
 import numpy as np
@@ -24,6 +25,8 @@ _ACROSS_STEPS = 16
 """Samples to one side of a cut, where that is neither finer nor coarser than the steps allow."""
 _REMAP_ROWS = 32000
 """Image maps may not have more rows."""
+_PART = 1 << 21
+"""Values of each array of a computation in parts: 8 MB in single precision."""
 _TUKEY_ROUNDS = 6
 _TUKEY = 4.685
 """Tukey's constant: 95 % efficient for normal errors."""
@@ -68,6 +71,13 @@ class Flat:
         small = shrink(self.grey, scale)
         level = cv2.resize(self.paper, (small.shape[1], small.shape[0]), interpolation=cv2.INTER_LINEAR)
         return np.asarray(255 - np.asarray(cv2.divide(small, level, scale=255)), dtype=np.uint8)
+
+
+def parts(count: int, each: int) -> Iterator[slice]:
+    """Slices of `count` rows of `each` values: a computation in parts needs a bounded memory."""
+    rows = max(1, _PART // max(each, 1))
+    for start in range(0, count, rows):
+        yield slice(start, min(start + rows, count))
 
 
 def flatten(grey: GreyImage) -> Flat:
@@ -150,6 +160,25 @@ def cut_across(
     within `capture_px` (k,). A border is where the contrast passes `level` (k,), by default half of
     the stroke's own.
     """
+    samples = count * (2 * _ACROSS_STEPS + 1)
+    cuts = [
+        _cut_part(
+            flat, ends[part], count, reach_px, (capture_px[part], None if level is None else level[part])
+        )
+        for part in parts(len(ends), samples)
+    ] or [Cuts(*np.zeros((4, 0, count)))]
+    return (
+        cuts[0]
+        if len(cuts) == 1
+        else Cuts(*(np.concatenate([getattr(one, name.name) for one in cuts]) for name in fields(Cuts)))
+    )
+
+
+def _cut_part(
+    flat: Flat, ends: FloatArray, count: int, reach_px: float, near: tuple[FloatArray, FloatArray | None]
+) -> Cuts:
+    """Some of the strokes cut across; `near` holds `capture_px` and `level`."""
+    capture_px, level = near
     span = ends[:, 1] - ends[:, 0]
     length = np.maximum(np.hypot(span[:, 0], span[:, 1]), 1e-9)
     share = (np.arange(count) + 0.5) / count
@@ -161,12 +190,12 @@ def cut_across(
     middle = ends[:, None, 0] + share[None, :, None] * span[:, None, :]
     contrast = _contrast_across(flat, middle, normal, across)
     k, n, m = contrast.shape
-    near = np.abs(across)[None, :] <= capture_px[:, None]
+    captured = np.abs(across)[None, :] <= capture_px[:, None]
     if level is None:
-        peak = np.where(near[:, None, :], contrast, np.float32(0.0)).max(axis=2)
+        peak = np.where(captured[:, None, :], contrast, np.float32(0.0)).max(axis=2)
         level = 0.5 * np.median(np.sort(peak, axis=1)[:, int(0.3 * n) :], axis=1)
     left, right, dark = _borders(
-        contrast.reshape(k * n, m), across, np.repeat(near, n, axis=0), np.repeat(level, n)
+        contrast.reshape(k * n, m), across, np.repeat(captured, n, axis=0), np.repeat(level, n)
     )
     along = share[None, :] * length[:, None]
     return Cuts(along, left.reshape(k, n), right.reshape(k, n), dark.reshape(k, n))

@@ -14,7 +14,7 @@ from skimage.transform import probabilistic_hough_line
 
 from grader.bench.lines_sheets import LineSheet, to_mm
 from grader.ink import find_ink
-from grader.records import FloatArray, GreyImage
+from grader.records import FloatArray, GreyImage, Unread
 from reference.geometry import ComplexArray
 
 LEAST_MM, GAP_MM, VOTES_MM = 4.0, 2.5, 4.0
@@ -28,7 +28,8 @@ OURS = "planmark"
 
 def ours(one: LineSheet) -> ComplexArray:
     """The ink stage as it is: with circles, arrowheads, marks and the ink map."""
-    ends = find_ink(one.page, one.sheet).strokes.ends
+    ink = find_ink(one.page, one.sheet)
+    ends = np.zeros((0, 2, 2)) if isinstance(ink, Unread) else ink.strokes.ends
     return np.asarray(ends[..., 0] - 1j * ends[..., 1])
 
 

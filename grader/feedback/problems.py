@@ -19,6 +19,9 @@ PROBLEMS: dict[str, str] = {
     "pages_none": N_("The document has no pages."),
     "pages_too_many": N_("The document has too many pages; split it."),
     "page_blank": N_("The page is blank and was passed over."),
+    "page_not_a_drawing": N_(
+        "The page is no drawing: it has far too many lines, or its tones are inverted. Scan it in greyscale."
+    ),
     "calibration_page": N_("This is the calibration page, not a drawing."),
     "print_scaled": N_("The sheet was printed or copied at another scale than 1:1."),
     "resolution_wrong": N_("The resolution that the file states is wrong."),

@@ -12,24 +12,34 @@ from grader.ink.circles import arcs, find_circles, led_to
 from grader.ink.components import find_components, mark_boxes
 from grader.ink.hatching import boxes_around, hatching
 from grader.ink.inkmap import ink_map
-from grader.ink.regions import field_of
+from grader.ink.regions import brightness, field_of
 from grader.ink.seeds import find_seeds, working_scale
 from grader.ink.squares import without_squares
 from grader.ink.strokes import find_strokes, take
 from grader.ink.tips import find_tips
 from grader.pixels import flatten
-from grader.records import Box, Ink, Page, Sheet
+from grader.records import Box, Ink, Page, Sheet, Unread
 
 __all__ = ["find_ink"]
 
+_DARK = 64.0
+"""Of 255, a quarter of white: paper in photos is brighter than 130, a negative's darker than 20."""
 
-def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> Ink:
-    """Everything drawn inside the frame of a registered page.
+
+def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> Ink | Unread:
+    """Everything drawn inside the frame of a registered page, or, false in a condition, why it is no drawing.
 
     Arguments
     ---------
     boxes : where to look, in sheet mm; all of `sheet.drawable_mm` by default
     """
+    grey = brightness(page, sheet, boxes)
+    if grey < _DARK:
+        return Unread(
+            "ink",
+            f"half of it is as dark as {grey:.0f} of 255 or darker: a picture with its tones inverted, or"
+            " taken in the dark? Scan the sheet in greyscale, dark lines on white paper",
+        )
     flat = flatten(page.grey)
     scale = working_scale(sheet.px_per_mm)
     contrast = without_squares(flat.reduced(scale))
@@ -37,6 +47,8 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     components = find_components(seeds)
     field = field_of(seeds, sheet, scale, boxes)
     strokes = find_strokes(flat, seeds, components, field)
+    if isinstance(strokes, Unread):
+        return strokes
     circles = find_circles(flat, seeds, components, field)
     circles = circles[led_to(circles, strokes)]
     strokes = take(strokes, ~arcs(strokes, circles))

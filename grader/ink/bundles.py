@@ -4,10 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.ink.centreline import Fitted, Pen, lone_width, mean_of, moved, put, standard_errors
-from grader.pixels import BoolArray, Cuts, Flat, Float32Array, cut_across, robust_lines
+from grader.ink.pairs import Rows, near_pairs
+from grader.pixels import BoolArray, Cuts, Flat, Float32Array, cut_across, parts, robust_lines
 from grader.records import FloatArray
 
-_PROBES = 13
+PROBES = 13
 _SAME_MM = 0.13
 _LEAST_JOINED_MM = 6.0
 _ALIKE = 1.35
@@ -158,28 +159,37 @@ def _neighbours(fitted: Fitted, pen: Pen) -> NDArray[np.intp]:
 
     A stroke's neighbours are no shorter than itself: barbs and letters do not tell where a link runs.
     """
-    off = distances(fitted.ends)
-    reach = 0.5 * (fitted.width[:, None] + fitted.width[None, :]) + _ASIDE_MM * pen.px_per_mm
-    near = (off < reach[:, None, :]).mean(axis=1)
-    near = np.maximum(near, near.T)
+    count, width, aside = len(fitted), fitted.width, _ASIDE_MM * pen.px_per_mm
+    first, second = near_pairs(fitted.ends, fitted.ends, float(width.max()) + aside)
+    near = np.zeros(len(first))
+    for part in parts(len(first), PROBES):
+        reach = 0.5 * (width[first[part]] + width[second[part]]) + aside
+        near[part] = (distances(fitted.ends, first[part], second[part]) < reach[:, None]).mean(axis=1)
+    near = np.maximum(near, near[np.argsort(second * count + first)])
     length = np.minimum(fitted.length, _LONG_MM * pen.px_per_mm)
-    near[fitted.length[None, :] < length[:, None]] = 0.0
-    np.fill_diagonal(near, 0.0)
-    order = np.argsort(-near, axis=1, kind="stable")[:, :_MOST_NEIGHBOURS]
-    return np.where(np.take_along_axis(near, order, axis=1) > 0, order, -1)
+    beside = (near > 0) & (first != second) & (fitted.length[second] >= length[first])
+    first, second, near = first[beside], second[beside], near[beside]
+    order = np.lexsort((-near, first))
+    first, second = first[order], second[order]
+    rank = np.arange(len(first)) - np.searchsorted(first, first)
+    best = rank < _MOST_NEIGHBOURS
+    result = np.full((count, _MOST_NEIGHBOURS), -1, dtype=np.intp)
+    result[first[best], rank[best]] = second[best]
+    return result
 
 
-def distances(ends: FloatArray) -> Float32Array:
-    """(k, p, k) distances of places along each segment (k, 2, 2) from every segment."""
+def distances(ends: FloatArray, first: Rows, second: Rows) -> Float32Array:
+    """(n, p) distances of places along the `first` (n,) of segments (k, 2, 2) from the `second`."""
     ends = ends.astype(np.float32)
-    share = np.linspace(0.04, 0.96, _PROBES, dtype=np.float32)
+    share = np.linspace(0.04, 0.96, PROBES, dtype=np.float32)
     span = ends[:, 1] - ends[:, 0]
     length = np.maximum(np.hypot(span[:, 0], span[:, 1]), np.float32(1e-6))
     u = span / length[:, None]
     points = ends[:, None, 0] + share[:, None] * span[:, None, :]
-    x = points[..., 0, None] - ends[:, 0, 0]
-    y = points[..., 1, None] - ends[:, 0, 1]
+    x = points[first, :, 0] - ends[second, 0, 0, None]
+    y = points[first, :, 1] - ends[second, 0, 1, None]
+    u = u[second, :, None]
     along = x * u[:, 0] + y * u[:, 1]
-    along -= np.clip(along, np.float32(0.0), length)
+    along -= np.clip(along, np.float32(0.0), length[second, None])
     across = x * u[:, 1] - y * u[:, 0]
     return np.asarray(np.hypot(along, across))

@@ -5,7 +5,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.pixels import BoolArray, Cuts, Flat, Lines, cut_across, robust_lines
+from grader.ink.pairs import near_pairs
+from grader.pixels import BoolArray, Cuts, Flat, Lines, cut_across, parts, robust_lines
 from grader.records import FloatArray
 
 _REACH_MM = 0.8
@@ -126,8 +127,7 @@ def _fit_group(flat: Flat, guess: Guess, count: int) -> Fitted:
     for _ in range(2):
         reach = _REACH_MM * unit + float(width.max())
         cuts = cut_across(flat, ends, count, reach, 0.5 * width + _CAPTURE_MM * unit)
-        others = _crossings(ends, cuts.along, guess.taken, unit)
-        middle, weight = _middles(cuts, width, others, unit)
+        middle, weight = _middles(cuts, width, (ends, guess.taken, reach), unit)
         lines = robust_lines(cuts.along, middle, weight, 0.03 * unit)
         ends = moved(ends, lines)
         width = np.minimum(lone_width(cuts, weight == 1.0, width), guess.most)
@@ -145,34 +145,41 @@ def mean_of(values: FloatArray, which: BoolArray) -> FloatArray:
 
 
 def _crossings(ends: FloatArray, along: FloatArray, taken: FloatArray, px_per_mm: float) -> FloatArray:
-    """(k, n, t) offset at which each cut meets each stroke fitted already; inf where it does not."""
+    """(p, n) offset at which each cut of a stroke meets the stroke taken beside it; inf where it does not.
+
+    Arguments: `ends` and `taken` (p, 2, 2) in pairs, `along` (p, n) of the cuts.
+    """
     span = ends[:, 1] - ends[:, 0]
     u = span / np.maximum(np.hypot(span[:, 0], span[:, 1]), 1e-9)[:, None]
-    normal = np.column_stack([-u[:, 1], u[:, 0]])
+    normal = np.stack([-u[:, 1], u[:, 0]])[:, :, None]
     way = taken[:, 1] - taken[:, 0]
     length = np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-9)
-    way = way / length[:, None]
+    way = (way / length[:, None]).T[:, :, None]
     points = ends[:, None, 0] + along[..., None] * u[:, None, :]
-    apart = taken[None, None, :, 0] - points[:, :, None, :]
-    across = normal[:, None, 0] * way[None, :, 1] - normal[:, None, 1] * way[None, :, 0]
-    across = np.where(np.abs(across) < _PARALLEL, _PARALLEL, across)[:, None, :]
-    offset = (apart[..., 0] * way[:, 1] - apart[..., 1] * way[:, 0]) / across
-    at = (apart[..., 0] * normal[:, None, None, 1] - apart[..., 1] * normal[:, None, None, 0]) / across
+    apart = taken[:, None, 0] - points
+    across = normal[0] * way[1] - normal[1] * way[0]
+    across = np.where(np.abs(across) < _PARALLEL, _PARALLEL, across)
+    offset = (apart[..., 0] * way[1] - apart[..., 1] * way[0]) / across
+    at = (apart[..., 0] * normal[1] - apart[..., 1] * normal[0]) / across
     past = _PAST_MM * px_per_mm
-    return np.where((at > -past) & (at < length + past), offset, np.inf)
+    return np.where((at > -past) & (at < length[:, None] + past), offset, np.inf)
 
 
 def _middles(
-    cuts: Cuts, width: FloatArray, others: FloatArray, px_per_mm: float
+    cuts: Cuts, width: FloatArray, strokes: tuple[FloatArray, FloatArray, float], px_per_mm: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Each cut's offset of the stroke's middle, and its weight: 1 for a lone stroke, 0 for no say."""
+    """Each cut's offset of the stroke's middle, and its weight: 1 for a lone stroke, 0 for no say.
+
+    Arguments: `strokes` are those cut (k, 2, 2), those fitted already (t, 2, 2), and the cuts' reach.
+    """
     pen = width[:, None]
     seen = np.isfinite(cuts.left)
     across = np.where(seen, cuts.width, 0.0)
     single = seen & (across <= _SINGLE * pen) & (across >= _THIN * pen)
     from_left, from_right = cuts.left + pen / 2.0, cuts.right - pen / 2.0
-    left_off = np.where(_is_other(from_left, others, px_per_mm), np.inf, np.abs(from_left))
-    right_off = np.where(_is_other(from_right, others, px_per_mm), np.inf, np.abs(from_right))
+    left_taken, right_taken = _taken(cuts.along, (from_left, from_right), strokes, px_per_mm)
+    left_off = np.where(left_taken, np.inf, np.abs(from_left))
+    right_off = np.where(right_taken, np.inf, np.abs(from_right))
     border = np.where(left_off <= right_off, from_left, from_right)
     near = np.minimum(left_off, right_off) <= _NEAR_MM * px_per_mm
     bundled = seen & (across > _SINGLE * pen) & near
@@ -180,11 +187,24 @@ def _middles(
     return middle, np.where(single, 1.0, np.where(bundled, _BUNDLED_WEIGHT, 0.0))
 
 
-def _is_other(offset: FloatArray, others: FloatArray, px_per_mm: float) -> BoolArray:
-    """(k, n) whether a place across is where a stroke fitted already runs."""
-    if others.shape[2] == 0:
-        return np.zeros(offset.shape, dtype=bool)
-    return np.asarray((np.abs(others - offset[..., None]) < _TAKEN_MM * px_per_mm).any(axis=2))
+def _taken(
+    along: FloatArray,
+    offsets: tuple[FloatArray, FloatArray],
+    strokes: tuple[FloatArray, FloatArray, float],
+    px_per_mm: float,
+) -> tuple[BoolArray, BoolArray]:
+    """(k, n) each, whether a place across is where a stroke fitted already runs."""
+    ends, taken, reach = strokes
+    result = np.zeros(along.shape, dtype=bool), np.zeros(along.shape, dtype=bool)
+    # A border is within the cut's reach, its stroke's middle not further than as much again.
+    first, second = near_pairs(ends, taken, 2.0 * reach + (_TAKEN_MM + _PAST_MM) * px_per_mm)
+    for part in parts(len(first), along.shape[1]):
+        row, each = first[part], np.flatnonzero(np.diff(first[part], prepend=-1))
+        others = _crossings(ends[row], along[row], taken[second[part]], px_per_mm)
+        for offset, is_taken in zip(offsets, result, strict=True):
+            close = np.abs(others - offset[row]) < _TAKEN_MM * px_per_mm
+            is_taken[row[each]] |= np.logical_or.reduceat(close, each, axis=0)
+    return result
 
 
 def moved(ends: FloatArray, lines: Lines) -> FloatArray:

@@ -56,7 +56,8 @@ def find_components(seeds: Seeds) -> Components:
     small = longest < _LONG_SEED_MM
     stroke_like = straight & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
     written = small & ~stroke_like & (size > 2.0 * _DUST_MM) & (size < _MARK_MM)
-    text = small & stroke_like & (size < _LONE_MM) & _beside(box, written)
+    text = small & stroke_like & (size < _LONE_MM)
+    text[text] = _beside(box, written, np.flatnonzero(text))
     return Components(box, small & ~stroke_like, text, of_seed)
 
 
@@ -78,16 +79,16 @@ def _spread(labels: NDArray[np.int32], count: int) -> tuple[FloatArray, FloatArr
     return np.sqrt(half + root), np.sqrt(np.maximum(half - root, 0.0))
 
 
-def _beside(box: FloatArray, written: BoolArray) -> BoolArray:
-    """Pieces with at least two letters close by."""
+def _beside(box: FloatArray, written: BoolArray, rows: NDArray[np.intp]) -> BoolArray:
+    """Which of the pieces `rows` have at least two letters close by."""
     centre = (box[:, :2] + box[:, 2:] / 2.0) / PX_PER_MM
     letters = centre[written]
-    result = np.zeros(len(box), dtype=bool)
+    result = np.zeros(len(rows), dtype=bool)
     if len(letters) < _NEIGHBOURS:
         return result
-    for index, at in enumerate(centre):
+    for index, at in enumerate(centre[rows]):
         near = np.hypot(*(letters - at).T) < _NEIGHBOUR_MM
-        result[index] = near.sum() >= _NEIGHBOURS + int(written[index])
+        result[index] = near.sum() >= _NEIGHBOURS
     return result
 
 

@@ -5,6 +5,7 @@ import scipy.ndimage
 from numpy.typing import NDArray
 
 from grader.ink.centreline import Fitted
+from grader.ink.pairs import near_pairs
 from grader.pixels import BoolArray, Flat, cut_across
 from grader.records import FloatArray
 
@@ -122,15 +123,19 @@ def _beside_another(
     """(m,) whether another stroke runs past each tip, near it both before and behind."""
     span = fitted.ends[:, 1] - fitted.ends[:, 0]
     u = span / np.maximum(fitted.length, 1e-9)[:, None]
-    beside = np.ones((len(rows), len(fitted)), dtype=bool)
+    limit = fitted.width + _BAND_OFF_MM * px_per_mm
+    reach = _LEAST_BAND_MM * px_per_mm + float(limit.max(initial=0.0))
+    first, second = near_pairs(np.stack([tips, tips], axis=1), fitted.ends, reach)
+    beside = rows[first] != second
     for way in (-1.0, 0.5):
         at = tips + way * _LEAST_BAND_MM * px_per_mm * outward
-        relative = at[:, None, :] - fitted.ends[None, :, 0]
-        along = (relative * u).sum(axis=2)
-        off = np.abs(relative[..., 0] * u[:, 1] - relative[..., 1] * u[:, 0])
-        beside &= (off < fitted.width + _BAND_OFF_MM * px_per_mm) & (along > 0) & (along < fitted.length)
-    beside[np.arange(len(rows)), rows] = False
-    return np.asarray(beside.any(axis=1))
+        relative = at[first] - fitted.ends[second, 0]
+        along = (relative * u[second]).sum(axis=1)
+        off = np.abs(relative[:, 0] * u[second, 1] - relative[:, 1] * u[second, 0])
+        beside &= (off < limit[second]) & (along > 0) & (along < fitted.length[second])
+    result = np.zeros(len(rows), dtype=bool)
+    result[first[beside]] = True
+    return result
 
 
 def coverage(flat: Flat, fitted: Fitted, count: int = 100) -> FloatArray:

@@ -1,8 +1,11 @@
 """Hatching: many parallel strokes side by side, under a support, along a guide, across a plate."""
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
-from grader.pixels import BoolArray
+from grader.ink.pairs import Rows
+from grader.pixels import BoolArray, parts
 from grader.records import FloatArray, Strokes
 
 _ALIKE_DEG = 11.0
@@ -30,50 +33,48 @@ def hatching(strokes: Strokes) -> BoolArray:
     if len(rows) <= _LEAST_ALIKE:
         return result
     weight = (strokes.width * strokes.darkness)[rows]
-    linked, aside = _linked(strokes.ends[rows], length[rows])
-    linked &= np.maximum(weight[:, None], weight[None, :]) < _WEIGHT_RATIO * np.minimum(
-        weight[:, None], weight[None, :]
-    )
-    between = (linked & (aside > 0)).any(axis=1) & (linked & (aside < 0)).any(axis=1)
+    first, second, aside = _linked(strokes.ends[rows], length[rows], weight)
+    left, right = np.zeros((2, len(rows)), dtype=bool)
+    left[first[aside > 0]] = right[first[aside < 0]] = True
     # The last of a family may be the link or the side that runs along it: short ones alone are safe.
-    family, short = _family_size(linked), length[rows] < _SHORT_MM
+    family, short, between = _family_size(first, second, len(rows)), length[rows] < _SHORT_MM, left & right
     result[rows] = np.where(short, family > _LEAST_ALIKE, (family > _LEAST_LONG) & between)
     return result
 
 
-def _linked(ends: FloatArray, length: FloatArray) -> tuple[BoolArray, FloatArray]:
-    """(n, n) pairs that are parallel, alike in length and side by side; how far to the side, signed."""
+def _linked(ends: FloatArray, length: FloatArray, weight: FloatArray) -> tuple[Rows, Rows, FloatArray]:
+    """Pairs of parallel strokes side by side, of like length and weight; how far to the side, signed."""
     span = ends[:, 1] - ends[:, 0]
     span = np.where((span[:, :1] < 0) | ((span[:, :1] == 0) & (span[:, 1:] < 0)), -span, span)
     u = span / np.maximum(length, 1e-9)[:, None]
-    sine = np.abs(u[:, None, 0] * u[None, :, 1] - u[:, None, 1] * u[None, :, 0])
-    shorter = np.minimum(length[:, None], length[None, :])
+    middle, count = ends.mean(axis=1), len(ends)
+    found = [np.zeros(0, dtype=np.intp)]
+    for part in parts(count, 4 * count):
+        apart = middle[None, :] - middle[part, None]
+        along = np.abs((apart * u[part, None]).sum(axis=2))
+        aside = np.abs(apart[..., 0] * u[part, None, 1] - apart[..., 1] * u[part, None, 0])
+        beside = (aside > _APART_MM[0]) & (aside < _APART_MM[1])
+        beside &= along < 0.5 * (length[part, None] + length[None, :])
+        found.append(part.start * count + np.flatnonzero(beside))
+    first, second = np.divmod(np.concatenate(found), count)
+    sine = np.abs(u[first, 0] * u[second, 1] - u[first, 1] * u[second, 0])
+    shorter, longer = np.minimum(length[first], length[second]), np.maximum(length[first], length[second])
     limit = np.where(shorter < _SHORT_MM, np.sin(np.radians(_ALIKE_DEG)), np.sin(np.radians(_LONG_ALIKE_DEG)))
-    middle = ends.mean(axis=1)
-    apart = middle[None, :] - middle[:, None]
-    along = np.abs((apart * u[:, None]).sum(axis=2))
-    aside = apart[..., 0] * u[:, None, 1] - apart[..., 1] * u[:, None, 0]
-    beside = (
-        (np.abs(aside) > _APART_MM[0])
-        & (np.abs(aside) < _APART_MM[1])
-        & (along < 0.5 * (length[:, None] + length[None, :]))
-    )
-    longer = np.maximum(length[:, None], length[None, :])
-    linked = (sine < limit) & beside & (longer < _RATIO * shorter)
-    return linked & linked.T, aside
+    linked = (sine < limit) & (longer < _RATIO * shorter)
+    lighter, heavier = np.minimum(weight[first], weight[second]), np.maximum(weight[first], weight[second])
+    linked &= heavier < _WEIGHT_RATIO * lighter
+    first, second = first[linked], second[linked]
+    mutual = np.isin(first * count + second, second * count + first)
+    first, second = first[mutual], second[mutual]
+    apart = middle[second] - middle[first]
+    return first, second, apart[:, 0] * u[first, 1] - apart[:, 1] * u[first, 0]
 
 
-def _family_size(linked: BoolArray) -> np.ndarray:
-    """(n,) how many strokes hang together with each through links."""
-    count = len(linked)
-    label = np.arange(count)
-    while True:
-        spread = np.where(linked, label[None, :], count).min(axis=1, initial=count)
-        lower = np.minimum(label, spread)
-        if np.array_equal(lower, label):
-            break
-        label = lower
-    return np.bincount(label, minlength=count)[label]
+def _family_size(first: Rows, second: Rows, count: int) -> Rows:
+    """(count,) how many strokes hang together with each through links."""
+    links = coo_matrix((np.ones(len(first)), (first, second)), shape=(count, count))
+    _, label = connected_components(links, directed=False)
+    return np.asarray(np.bincount(label, minlength=count)[label], dtype=np.intp)
 
 
 def boxes_around(strokes: Strokes, which: BoolArray) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from grader.ink.joining import join
 from grader.ink.seeds import Seeds
 from grader.pixels import BoolArray
-from grader.records import Box, FloatArray, Sheet
+from grader.records import Box, FloatArray, Page, Sheet
 
 _FRAME_MM = 1.5
 _BLOCK_MM = (215.0, 80.0)
@@ -23,6 +23,8 @@ _MEET_MM = 4.0
 _REACH_MM = 18.0
 _EDGE_MM = 2.5
 _LEAST_LINES = 4
+_SAMPLES = 64
+"""Places along each side of a box: 4096 tell a median to a few per cent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +66,26 @@ class Field:
         return np.rint((to_px(self.sheet, corners) + 0.5) * self.scale - 0.5).astype(np.int32)
 
 
+def brightness(page: Page, sheet: Sheet, boxes: Sequence[Box] | None) -> float:
+    """Median of the page, 0..255, at places every few millimetres of where drawings are looked for."""
+    shares = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    across, down = (share.ravel() for share in np.meshgrid(shares, shares))
+    mm = [np.column_stack([x + w * across, y + h * down]) for x, y, w, h in boxes or (_inner(sheet),)]
+    last = np.array(page.grey.shape[::-1]) - 1
+    column, row = np.clip(np.rint(to_px(sheet, np.concatenate(mm))), 0, last).astype(np.intp).T
+    return float(np.median(page.grey[row, column]))
+
+
+def _inner(sheet: Sheet) -> Box:
+    """The frame's inside, clear of its line."""
+    x, y, w, h = sheet.drawable_mm
+    return (x + _FRAME_MM, y + _FRAME_MM, w - 2.0 * _FRAME_MM, h - 2.0 * _FRAME_MM)
+
+
 def field_of(seeds: Seeds, sheet: Sheet, scale: float, boxes: Sequence[Box] | None) -> Field:
     """The frame's inside, or the boxes asked for, without the title block."""
-    x, y, w, h = sheet.drawable_mm
-    inner = (x + _FRAME_MM, y + _FRAME_MM, w - 2.0 * _FRAME_MM, h - 2.0 * _FRAME_MM)
     block = None if sheet.zones else title_block(to_mm(sheet, (seeds.ends + 0.5) / scale - 0.5), sheet)
-    return Field(sheet, (inner,) if boxes is None else tuple(boxes), block, scale)
+    return Field(sheet, (_inner(sheet),) if boxes is None else tuple(boxes), block, scale)
 
 
 def title_block(ends: FloatArray, sheet: Sheet) -> Box | None:

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from grader.pixels import parts
 from grader.records import FloatArray, GreyImage
 
 PX_PER_MM = 6.0
@@ -143,7 +144,9 @@ def _band_width(mask: GreyImage, edges: FloatArray) -> tuple[FloatArray, FloatAr
     normal = np.column_stack([direction[:, 1], -direction[:, 0]])
     points = edges[:, None, 0] + share[None, :, None] * (edges[:, None, 1] - edges[:, None, 0])
     depth = np.arange(1.0, _WIDEST_PX + 1.0)
-    inner = _run(mask, points, normal, depth)
+    inner = np.empty((len(edges), len(share)))
+    for part in parts(len(edges), 2 * len(share) * len(depth)):
+        inner[part] = _run(mask, points[part], normal[part], depth)
     return normal, np.median(inner, axis=1) + 1.0
 
 

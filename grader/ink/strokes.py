@@ -4,16 +4,17 @@ from dataclasses import fields
 
 import numpy as np
 
-from grader.ink.bundles import distances, refined, rejoined
+from grader.ink.bundles import PROBES, distances, refined, rejoined
 from grader.ink.centreline import Fitted, Pen, fit_centre
 from grader.ink.components import Components
 from grader.ink.darkness import split_by_darkness
 from grader.ink.ending import coverage, find_ends, through_bands
 from grader.ink.joining import Pieces, join
+from grader.ink.pairs import near_pairs
 from grader.ink.regions import Field, to_mm
 from grader.ink.seeds import PX_PER_MM, Seeds
-from grader.pixels import BoolArray, Flat
-from grader.records import FloatArray, Sheet, Strokes
+from grader.pixels import BoolArray, Flat, parts
+from grader.records import FloatArray, Sheet, Strokes, Unread
 
 _OFF_MM = 0.25
 """Pieces this near to one line are of it; strokes further apart are told apart."""
@@ -23,6 +24,11 @@ _FITTED_GAP_MM = 3.5
 """Gaps of dashed lines, and of lines that stop at a joint's circle and go on behind it."""
 _LEAST_DASHED_MM = 7.0
 _LEAST_MM = 1.0
+_MOST_STROKES = 6000
+"""On a sheet: drawings of a class have up to 530 before fitting, real ones on A3 covered with ink 2,100,
+and 5,300 where the lines of 1 mm squared paper are all taken for strokes."""
+_RUNS_OF_STROKE = 8
+"""Straight runs of border per stroke: 2 to 7 were counted on scans of drawings, squared paper and text."""
 _LEAST_SUPPORT = 0.3
 _SAME_MM = 0.2
 _SHORT_MM = 6.0
@@ -33,13 +39,26 @@ _SE_MERGED_MM = 2.5
 """Ends err by this much, measured on simulated students: lines run on along their neighbours."""
 
 
-def find_strokes(flat: Flat, seeds: Seeds, components: Components, field: Field) -> Strokes:
-    """Straight strokes in the field, in sheet millimetres."""
+def find_strokes(flat: Flat, seeds: Seeds, components: Components, field: Field) -> Strokes | Unread:
+    """Straight strokes in the field, in sheet mm; false where they are more than a drawing has."""
     full = (seeds.ends + 0.5) / field.scale - 0.5
     usable = field.holds(to_mm(field.sheet, full.mean(axis=1))) & ~components.mark[components.of_seed]
+    least = int(usable.sum()) // _RUNS_OF_STROKE
+    if least > _MOST_STROKES:
+        return _too_many(least)
     pieces = _lines(full, seeds, components, usable, field.scale)
+    if len(pieces.width) > _MOST_STROKES:
+        return _too_many(len(pieces.width))
     fitted, merged = _settled(flat, pieces, field.sheet.px_per_mm, seeds.pen_px / field.scale)
     return _records(flat, fitted, merged, field.sheet)
+
+
+def _too_many(count: int) -> Unread:
+    reason = (
+        f"it has about {count:,} straight strokes, a drawing a few hundred: a photo, a printed pattern, or"
+        " a picture with its tones inverted? Scan the sheet in greyscale, on plain or lightly squared paper"
+    )
+    return Unread("ink", reason)
 
 
 def take(strokes: Strokes, which: BoolArray) -> Strokes:
@@ -107,13 +126,20 @@ def distinct(fitted: Fitted, unit: float, covered_share: float = 1.0) -> BoolArr
     keep = np.zeros(len(fitted), dtype=bool)
     if len(fitted) == 0:
         return keep
-    off = distances(fitted.ends)
+    inner = 0.6 * fitted.width
+    first, second = near_pairs(fitted.ends, fitted.ends, max(_SAME_MM * unit, float(inner.max())))
+    off = np.concatenate(
+        [distances(fitted.ends, first[part], second[part]) for part in parts(len(first), PROBES)]
+    )
     along = np.asarray((off < _SAME_MM * unit).all(axis=1))
-    inside = np.asarray(off < 0.6 * fitted.width)
+    inside = np.asarray(off < inner[second, None])
     short = fitted.length < _SHORT_MM * unit
+    start = np.searchsorted(first, np.arange(len(fitted) + 1))
     for row in np.argsort(-fitted.length):
-        covered = short[row] and inside[row][:, keep].any(axis=1).mean() > covered_share
-        keep[row] = not covered and not along[row][keep].any()
+        others = slice(start[row], start[row + 1])
+        kept = keep[second[others]]
+        covered = short[row] and inside[others][kept].any(axis=0).mean() > covered_share
+        keep[row] = not covered and not along[others][kept].any()
     return keep
 
 

@@ -38,6 +38,8 @@ MOST_PIECES = 5
 JOIN_OFF_MM = 0.45
 JOIN_GAP_MM = 14.0
 JOIN_TURN_RAD = 0.03
+PART = 256
+"""Strokes compared with all others at a time, so that memory does not grow with their square."""
 
 OTHER_SORT = 0.5
 TIP_MM = 0.2
@@ -261,20 +263,30 @@ def _joined_tips(single: Lines, pieces: IntArray, start: complex, along: complex
 def _in_line(single: Lines) -> tuple[IntArray, IntArray]:
     """Pairs of strokes, each over 4 mm, that continue one another."""
     long = np.flatnonzero(single.length >= 4.0)
-    start, end, along = single.start[long], single.end[long], single.along[long]
-    turn = np.abs((along[:, None] * np.conj(along[None, :])).imag)
-    near = turn < JOIN_TURN_RAD + np.minimum(JOIN_OFF_MM / single.length[long], 0.05)[None, :]
-    relative_start = (start[None, :] - start[:, None]) * np.conj(along[:, None])
-    relative_end = (end[None, :] - start[:, None]) * np.conj(along[:, None])
+    pairs = [np.zeros((0, 2), dtype=np.int64)]
+    for start in range(0, len(long), PART):
+        some = long[start : start + PART]
+        first, second = np.nonzero(_continues(single, some, long))
+        pairs.append(np.column_stack([start + first, second]))
+    first, second = np.concatenate(pairs).T
+    length = single.length[long]
+    keep = (length[first] != length[second]) | (first < second)
+    keep &= first != second
+    return long[first[keep]], long[second[keep]]
+
+
+def _continues(single: Lines, rows: IntArray, others: IntArray) -> BoolArray:
+    """(r, n) whether each of the `others` lies on the line of each of the `rows` and goes on from it."""
+    start, along, length = single.start[rows, None], single.along[rows, None], single.length[rows, None]
+    turn = np.abs((along * np.conj(single.along[others])).imag)
+    near = turn < JOIN_TURN_RAD + np.minimum(JOIN_OFF_MM / single.length[others], 0.05)
+    relative_start = (single.start[others] - start) * np.conj(along)
+    relative_end = (single.end[others] - start) * np.conj(along)
     off = np.maximum(np.abs(relative_start.imag), np.abs(relative_end.imag))
     low = np.minimum(relative_start.real, relative_end.real)
     high = np.maximum(relative_start.real, relative_end.real)
-    gap = np.maximum(low - single.length[long][:, None], -high)
-    shorter = single.length[long][None, :] <= single.length[long][:, None]
+    gap = np.maximum(low - length, -high)
+    shorter = single.length[others] <= length
     # Contained pieces add nothing; the longer stroke's line decides, the shorter must lie on it.
-    beyond = np.maximum(high - single.length[long][:, None], -low)
-    pairs = near & shorter & (off < JOIN_OFF_MM) & (gap < JOIN_GAP_MM) & (beyond > 1.0)
-    np.fill_diagonal(pairs, val=False)
-    first, second = np.nonzero(pairs)
-    keep = (single.length[long][first] != single.length[long][second]) | (first < second)
-    return long[first[keep]], long[second[keep]]
+    beyond = np.maximum(high - length, -low)
+    return np.asarray(near & shorter & (off < JOIN_OFF_MM) & (gap < JOIN_GAP_MM) & (beyond > 1.0))

@@ -19,6 +19,10 @@ LEAST_EDGE_MM = 8.0
 OVERRUN_MM = 25.0
 PROPOSING_EDGES = 4
 SHORT_LIST = 60
+PAIRS = 1 << 13
+"""Of segments and strokes compared at a time: their arrays stay in a processor's own cache."""
+FARTHEST_SQUARED = 1500.0
+"""Of sigma: the fit of a stroke so far off is zero, its exponential is less than the smallest number."""
 SPECK_MM = 2.0
 """Shorter edges have no direction to speak of."""
 
@@ -138,19 +142,21 @@ def _scores(expected: Expected, lines: Lines, proposed: FloatArray, edges: Seque
 def best_support(lines: Lines, tail: ComplexArray, head: ComplexArray, sigma: FloatArray) -> FloatArray:
     """How well the best stroke lies under each segment, 0..1. Arguments: segments (m,), sigma mm (m,)."""
     support = np.zeros(len(tail))
-    for first in range(0, len(tail), 512):
-        part = slice(first, first + 512)
+    rows = max(1, PAIRS // max(1, len(lines)))
+    for first in range(0, len(tail), rows):
+        part = slice(first, first + rows)
         from_start = (tail[part, None] - lines.start) * np.conj(lines.along)
         to_end = (head[part, None] - lines.start) * np.conj(lines.along)
         off2 = from_start.imag**2 + to_end.imag**2
         low = np.minimum(from_start.real, to_end.real)
         high = np.maximum(from_start.real, to_end.real)
         shared = np.minimum(high, lines.length) - np.maximum(low, 0.0)
-        span = np.maximum(high - low, 1e-6)
-        true_span = np.abs(head[part] - tail[part])[:, None]
-        share = np.clip(shared / np.maximum(true_span, span), 0.0, 1.0)
-        fit = np.exp(-0.5 * off2 / sigma[part, None] ** 2) * share
-        support[part] = fit.max(axis=1, initial=0.0)
+        at = np.nonzero((shared > 0.0) & (off2 < FARTHEST_SQUARED * sigma[part, None] ** 2))
+        span = np.maximum(high[at] - low[at], 1e-6)
+        true_span = np.abs(head[part] - tail[part])[at[0]]
+        share = np.clip(shared[at] / np.maximum(true_span, span), 0.0, 1.0)
+        fit = np.exp(-0.5 * off2[at] / sigma[part][at[0]] ** 2) * share
+        np.maximum.at(support[part], at[0], fit)
     return support
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from grader.ink import find_ink
 from grader.intake import page_of
-from grader.records import HEAD_AHEAD, HEAD_BACK, Page, Sheet
+from grader.records import HEAD_AHEAD, HEAD_BACK, Page, Sheet, Unread
 from grader.sheet import rectify
 
 SHARED = Path(__file__).resolve().parents[4] / "shared"
@@ -426,3 +426,50 @@ def test_a_stroke_seen_alone_at_one_end_only_is_known_the_less_at_the_other():
     alone = paper.ink().strokes
     row = next(found[0] for found in along(strokes, *long, within_mm=0.1) if found[3] > 0.97)
     assert strokes.se_angle[row] > alone.se_angle[only_stroke(alone, *long)[0]]
+
+
+def refusal(paper):
+    ink = paper.ink()
+    assert isinstance(ink, Unread)
+    assert not ink
+    return ink.reason
+
+
+def test_noise_has_more_strokes_than_a_drawing():
+    paper = Paper()
+    paper.grey = np.where(np.random.default_rng(4).random(SHAPE) < 0.5, 245, 20).astype(np.uint8)
+    paper.grey = cv2.resize(paper.grey[::6, ::6], SHAPE[::-1], interpolation=cv2.INTER_NEAREST)
+    reason = refusal(paper)
+    assert "straight strokes" in reason
+    assert "greyscale" in reason
+
+
+def test_a_negative_is_refused_by_its_darkness():
+    paper = Paper()
+    for start, end in SEGMENTS:
+        paper.line(start, end)
+    assert len(paper.ink().strokes) == len(SEGMENTS)
+    paper.grey = 255 - paper.grey
+    assert "tones inverted" in refusal(paper)
+
+
+def test_strokes_are_counted_before_any_is_fitted(monkeypatch):
+    monkeypatch.setattr("grader.ink.strokes._MOST_STROKES", 100)
+    paper = Paper()
+    for row in range(10):
+        paper.line((60, 30 + 5 * row), (100 + 7 * row, 60 + 6 * row))
+    assert len(paper.ink().strokes) == 10
+    for x, y in np.ndindex(12, 12):
+        paper.line((180 + 15 * x, 30 + 15 * y), (190 + 15 * x, 34 + 15 * y))
+    monkeypatch.setattr("grader.ink.strokes.fit_centre", lambda *_: pytest.fail("strokes were fitted"))
+    assert "straight strokes" in refusal(paper)
+
+
+def test_squared_paper_all_of_whose_lines_are_strokes_is_within_the_bound(monkeypatch):
+    monkeypatch.setattr("grader.ink.without_squares", lambda contrast: contrast)
+    paper = Paper()
+    for step in range(25, 400, 5):
+        paper.line((step, 15), (step, 280), pen=0.2)
+    for step in range(15, 285, 5):
+        paper.line((25, step), (405, step), pen=0.2)
+    assert len(paper.ink().strokes) > 100
