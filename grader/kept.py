@@ -9,7 +9,7 @@ import hashlib
 import json
 import zlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,12 +20,14 @@ from numpy.typing import NDArray
 from grader.alike import CELLS, ink_map
 from grader.documents import ReadingDocument
 from grader.files import write_whole
+from grader.intake import load
 from grader.measurements import Names
 from grader.ownership import PageSource
 from grader.picture import Backdrop, restored, stored
 from grader.pipeline import Looked
 from grader.records import Figure, Identity, Problem, Reading, ReadNode, ReadVector, Swapped, Unread, Written
-from grader.survey import MEASUREMENT_TYPES, Survey, survey
+from grader.survey import MEASUREMENT_TYPES, Survey, refused, survey, survey_pages
+from reference.errors import InputFileError
 
 RECORDS: Mapping[str, type] = {
     one.__name__: one
@@ -57,17 +59,6 @@ def digest_of(parts: Iterable[object]) -> str:
         digest.update(repr(told).encode())
         digest.update(b"\0")
     return digest.hexdigest()
-
-
-def file_digest(path: Path) -> str:
-    """A digest of a file's content; of a file that is not there or cannot be read, an empty one."""
-    try:
-        if not path.is_file():
-            return ""  # a pipe would be waited for
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
-        return ""
 
 
 # Records as JSON ----------------------------------------------------------------------------------
@@ -117,10 +108,13 @@ def survey_kept(path: Path, name: str, names: Names, folder: Path) -> Survey:
     """What a file holds, as noted in a folder by an earlier run that saw the same content, else seen now."""
     if path.suffix.lower() in MEASUREMENT_TYPES:
         return survey(path, name, names)
-    digest = file_digest(path)
-    note = folder / f"{digest}.json"
     try:
-        told = json.loads(note.read_bytes()) if digest else {}
+        file = load(path)
+    except InputFileError as error:
+        return refused(error, name)
+    note = folder / f"{file.digest}.json"
+    try:
+        told = json.loads(note.read_bytes())
         if told.get("code") == code_version():
             pages = [(bool(blank), unpacked(identity)) for blank, identity in told["pages"]]
             return Survey(
@@ -128,12 +122,12 @@ def survey_kept(path: Path, name: str, names: Names, folder: Path) -> Survey:
                     PageSource(name, number, len(pages), identity=identity, blank=blank)
                     for number, (blank, identity) in enumerate(pages, start=1)
                 ),
-                digest=digest,
+                digest=file.digest,
             )
     except (OSError, KeyError, TypeError, ValueError, AttributeError):
         pass
-    found = replace(survey(path, name, names), digest=digest)
-    if digest and found.pages and not found.broken:
+    found = survey_pages(file, name)
+    if not found.broken:
         told = [[source.blank, packed(source.identity)] for source in found.pages]
         write_whole(note, json.dumps({"code": code_version(), "pages": told}))
     return found

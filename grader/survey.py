@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from grader.documents import UnmatchedDocument
-from grader.intake import count_pages, is_blank, page_of
+from grader.intake import InputFile, count_pages, is_blank, load, page_of
 from grader.measurements import Measurements, Names, read_measurements
 from grader.ownership import PageSource
 from grader.sheet import whose
@@ -36,25 +36,40 @@ class Survey:
 
 def survey(path: Path, name: str, names: Names) -> Survey:
     """Look at one file; `name` is its path as the user knows it. Never raises for a bad file."""
+    if path.suffix.lower() not in MEASUREMENT_TYPES:
+        try:
+            return survey_pages(load(path), name)
+        except InputFileError as error:
+            return refused(error, name)
     try:
-        if path.suffix.lower() in MEASUREMENT_TYPES:
-            return Survey(measurements=read_measurements(path, names))
-        count = count_pages(path)
+        return Survey(measurements=read_measurements(path, names))
     except InputFileError as error:
-        if path.suffix.lower() in MEASUREMENT_TYPES:
-            return Survey(refused=UnmatchedDocument(file=name, code=error.code, message=error.message))
-        page = PageSource(name, 1, 1)
-        return Survey(pages=(page,), broken={page: error.message})
-    found = [_look(path, PageSource(name, number, count)) for number in range(1, count + 1)]
+        return Survey(refused=UnmatchedDocument(file=name, code=error.code, message=error.message))
+
+
+def survey_pages(file: InputFile, name: str) -> Survey:
+    """All pages of one file, with the digest of the bytes that they were decoded from."""
+    try:
+        count = count_pages(file)
+    except InputFileError as error:
+        return replace(refused(error, name), digest=file.digest)
+    found = [_look(file, PageSource(name, number, count)) for number in range(1, count + 1)]
     broken = {source: told for source, told in found if told is not None}
-    return Survey(pages=tuple(source for source, _ in found), broken=broken)
+    return Survey(pages=tuple(source for source, _ in found), broken=broken, digest=file.digest)
 
 
-def _look(path: Path, source: PageSource) -> tuple[PageSource, str | None]:
+def refused(error: InputFileError, name: str) -> Survey:
+    """A file that cannot be used at all: one page that cannot be decoded, so that its owner is told."""
+    page = PageSource(name, 1, 1)
+    return Survey(pages=(page,), broken={page: error.message})
+
+
+def _look(file: InputFile, source: PageSource) -> tuple[PageSource, str | None]:
     """What is seen on one page, or why it cannot be decoded."""
     try:
-        page = page_of(path, source.page)
+        page = page_of(file, source.page)
     except InputFileError as error:
         return source, error.message
-    blank = is_blank(page)
+    # Rows that a decoder has filled with white are not blank.
+    blank = is_blank(page) and not page.damage
     return replace(source, blank=blank, identity=None if blank else whose(page)), None
