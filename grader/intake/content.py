@@ -38,13 +38,11 @@ class Drawn:
 
     Attributes
     ----------
-    cost : bytes of commands, each as often as it is carried out
     objects : names of forms and images that the page's own commands draw, in their number
     images : each image drawn, by its object
     damage : rows of fax images that are damaged; empty where there are none
     """
 
-    cost: float = 0.0
     objects: int = 0
     images: dict[object, pikepdf.Stream] = field(default_factory=dict)
     damage: str = ""
@@ -54,17 +52,19 @@ def drawn_by(file: InputFile, number: int, page: pikepdf.Page) -> Drawn:
     """What a page draws; raises InputFileError for more than a drawing can have."""
     walk = _Walk(file, number, abs(_area(page.mediabox)))
     contents = page.obj.get("/Contents")
-    streams = list(contents) if isinstance(contents, pikepdf.Array) else [contents]
+    streams = list(contents) if isinstance(contents, pikepdf.Array) else [contents] if contents else []
     left = MAX_CONTENT
     for stream in streams:
-        if isinstance(stream, pikepdf.Stream):
-            left -= walk.size(stream, left)
+        if not isinstance(stream, pikepdf.Stream):
+            raise InputFileError(
+                "pdf_damaged", f"{file.name}, page {number}: its drawing commands are missing; export it again"
+            )
+        left -= walk.size(stream, left)
     uses = walk.uses(page)
     walk.drawn.objects = sum(count for (operator, _), count in uses.items() if operator == "Do")
-    cost = MAX_CONTENT - left + walk.cost(uses, page.obj, page.resources)
+    cost = MAX_CONTENT - left + walk.cost(uses, page.obj.get("/Resources"))
     for annotation in page.obj.get("/Annots", ()):
         cost += sum(walk.of_stream(stream, None) for stream in _appearances(annotation))
-    walk.drawn.cost = cost
     walk.check(cost)
     return walk.drawn
 
@@ -118,7 +118,7 @@ class _Walk:
             self.open.add(key)
             size = self.size(stream, MAX_CONTENT)
             own = stream.get("/Resources", resources)
-            self.costs[key] = size + self.cost(self.uses(stream), stream, own)
+            self.costs[key] = size + self.cost(self.uses(stream), own)
             self.open.remove(key)
             self.check(self.costs[key])
         return self.costs[key]
@@ -137,11 +137,8 @@ class _Walk:
                 uses[operator, str(operands[0 if operator == "Tf" else -1])] += 1
         return uses
 
-    def cost(
-        self, uses: Counter[tuple[str, str]], holder: pikepdf.Object, resources: pikepdf.Object | None
-    ) -> float:
+    def cost(self, uses: Counter[tuple[str, str]], resources: pikepdf.Object | None) -> float:
         """Cost of what a stream names in its resources."""
-        del holder
         if resources is None:
             return uses["pixels", ""] / _PIXELS_A_BYTE
         total, letter = uses["pixels", ""] / _PIXELS_A_BYTE, 0.0

@@ -36,10 +36,10 @@ _LONG = """
 """Table 3b: runs of 1792, 1856 .. 2560 pixels of either colour."""
 _WINDOW = 13
 """Bits of the longest code."""
-_MODE = re.compile("(1*)(?:(0001)|(001)|(011)|(010)|(000011)|(000010)|(0000011)|(0000010))?")
-"""T.6, table 1: vertical modes on the spot, then pass, horizontal, or vertical 1, -1, 2, -2, 3, -3."""
-_PASS, _HORIZONTAL = 2, 3
-_SHIFT = {4: 1, 5: -1, 6: 2, 7: -2, 8: 3, 9: -3}
+_MODE = re.compile("(1+)|(001)|(011)|(010)|(0001)|(000011)|(000010)|(0000011)|(0000010)")
+"""T.6, table 1: vertical modes on the spot; horizontal; vertical 1, -1; pass; vertical 2, -2, 3, -3."""
+_STRAIGHT, _HORIZONTAL, _PASS = 1, 2, 5
+_SHIFT = (0, 0, 0, 1, -1, 0, 2, -2, 3, -3)
 _LINE_END = re.compile("0{11,}1")
 _MAX_PADDING = 64
 """Zero bits behind the last row: to the byte, or to the word of a writer that aligns."""
@@ -72,6 +72,7 @@ def damaged_row(data: bytes, width: int, rows: int, coding: Coding) -> int | Non
     """
     bits = bin(int.from_bytes(b"\1" + data, "big"))[3:]
     line_ends = _LINE_END.match(bits) is not None
+    end, bits = len(bits), bits + "0" * _WINDOW
     edges: list[int] = []
     at = 0
     for row in range(rows):
@@ -80,9 +81,10 @@ def damaged_row(data: bytes, width: int, rows: int, coding: Coding) -> int | Non
             edges, at = _flat_row(bits, at, width) if flat else _row_below(bits, at, edges, width)
         except _DamageError:
             return row
-    padding = bits[at : at + _MAX_PADDING]
-    ended = _LINE_END.match(bits, at) or ("1" not in padding and len(padding) < _MAX_PADDING)
-    return None if ended else rows - 1
+        if at > end:
+            return row
+    padded = end - at < _MAX_PADDING and "1" not in bits[at:]
+    return None if padded or _LINE_END.match(bits, at) else rows - 1
 
 
 def _row_start(bits: str, at: int, coding: Coding, *, line_ends: bool) -> tuple[bool, int]:
@@ -122,26 +124,32 @@ def _row_below(bits: str, at: int, above: list[int], width: int) -> tuple[list[i
         while above[below] <= x:
             below += 2
         mode = _MODE.match(bits, at)
-        straight = 0 if mode is None else min(mode.end(1) - at, max(last + 1 - below, 1))
-        if mode is None or mode.end() == at:
+        if mode is None:
             raise _DamageError
-        if straight:
+        kind, at = mode.lastindex, mode.end()
+        if kind == _STRAIGHT:
+            # Each follows the edge above it; the one at the border ends the row.
+            straight = mode.end() - mode.start()
+            if below + straight > last + 1:
+                at -= straight
+                straight = last + 1 - below if below <= last else 1
+                at += straight
             edges += above[below : below + straight]
-            x, below, at = edges[-1], below + straight, at + straight
-            continue
-        at = mode.end()
-        if mode.lastindex == _PASS:
+            x, below = edges[-1], below + straight
+        elif kind == _HORIZONTAL:
+            black = len(edges) % 2
+            first, at = _run(bits, at, black)
+            second, at = _run(bits, at, 1 - black)
+            x = (x if x > 0 else 0) + first
+            _add(edges, x)
+            x += second
+            _add(edges, x)
+        elif kind == _PASS:
             x = above[below + 1]
             if x >= width:
                 raise _DamageError
-        elif mode.lastindex == _HORIZONTAL:
-            x = max(x, 0)
-            for black in (len(edges) % 2, 1 - len(edges) % 2):
-                run, at = _run(bits, at, black)
-                x += run
-                _add(edges, x)
         else:
-            shifted = above[below] + _SHIFT[mode.lastindex or 0]
+            shifted = above[below] + _SHIFT[kind or 0]
             if shifted <= x:
                 raise _DamageError
             x, below = shifted, below + 1
@@ -168,12 +176,13 @@ def _run(bits: str, at: int, black: int) -> tuple[int, int]:
     """A run's length in pixels, and where its codes end."""
     codes, total = _codes()[black], 0
     while True:
-        run, length = codes.get(bits[at : at + _WINDOW].ljust(_WINDOW, "0"), (0, 0))
-        if not length or at >= len(bits):
+        code = codes.get(bits[at : at + _WINDOW])
+        if code is None:
             raise _DamageError
-        total, at = total + run, at + length
-        if run < 64:
-            return total, at
+        at += code[1]
+        if code[0] < 64:
+            return total + code[0], at
+        total += code[0]
 
 
 @cache

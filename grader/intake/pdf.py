@@ -1,7 +1,7 @@
 """PDF files: a page's embedded scan taken out directly where it is the whole page, else rendered."""
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -22,6 +22,7 @@ from reference.errors import InputFileError
 RENDER_DPI = 300.0
 _POINTS_PER_INCH = 72.0
 _MM_PER_INCH = 25.4
+_INHERITED = ("/Resources", "/MediaBox", "/CropBox", "/Rotate")
 _END, _END_WITHIN = (b"%%EOF", b"startxref"), 1 << 16
 MAX_UNPACKED = 450_000_000
 """Bytes that qpdf may unpack of one stream: A2 at 600 dpi in colour has 417 MB."""
@@ -68,11 +69,20 @@ def _leaves(document: pikepdf.Pdf) -> list[pikepdf.Object | None]:
         node = nodes.pop()
         if isinstance(node, pikepdf.Dictionary) and isinstance(node.get("/Kids"), pikepdf.Array):
             if node.objgen not in known:  # a list that holds itself has no end
-                nodes += reversed(list(node.Kids))
+                kids = list(node.Kids)
+                _hand_down(node, kids)
+                nodes += reversed(kids)
             known.add(node.objgen)
         else:
             leaves.append(node if isinstance(node, pikepdf.Dictionary) else None)
     return leaves
+
+
+def _hand_down(node: pikepdf.Object, kids: Iterable[pikepdf.Object]) -> None:
+    for kid in kids:
+        for name in _INHERITED:
+            if isinstance(kid, pikepdf.Dictionary) and name in node and name not in kid:
+                kid[name] = node[name]
 
 
 def _unreadable(file: InputFile, number: int, why: str) -> InputFileError:
@@ -89,7 +99,10 @@ def _opened(file: InputFile) -> Iterator[pikepdf.Pdf]:
             "pdf_damaged", f"{file.name}: the PDF is cut off before its end; copy or upload the file again"
         )
     try:
-        document = pikepdf.open(io.BytesIO(file.data), suppress_warnings=True)
+        # Handing down what pages inherit, qpdf would drop broken ones from the list.
+        document = pikepdf.open(
+            io.BytesIO(file.data), inherit_page_attributes=False, suppress_warnings=True
+        )
     except pikepdf.PasswordError as error:
         raise InputFileError(
             "pdf_encrypted", f"{file.name}: the PDF asks for a password; save it without one"
