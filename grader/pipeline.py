@@ -241,8 +241,8 @@ def see(place: Place, figures: Collection[str] = ()) -> Seen:
     if page.damage:
         problem = Problem(
             "image_damaged_rows",
-            f"{place.name}: page {place.page}: {page.damage} are damaged in the file, so that lengths read there "
-            "would be wrong: scan the sheet again, or grade it by hand",
+            f"{place.name}: page {place.page}: {page.damage} are damaged in the file, so that lengths read"
+            " there would be wrong: scan the sheet again, or grade it by hand",
             place.name,
         )
         return Seen(place, page, problems=(problem,), timing_ms=timing)

@@ -1,4 +1,4 @@
-"""Files that are made to harm: each function gives the bytes of one, and says what it does to a careless reader."""
+"""Files that are made to harm: each function gives the bytes of one, and says what is wrong with it."""
 
 import io
 import struct
@@ -187,7 +187,8 @@ def pdf_of_nested_groups(deep=30):
     page = pdf.add_blank_page(page_size=(2 * A4_PT[0], 2 * A4_PT[1]))
     group = {"Group": DICTIONARY(S=NAME.Transparency, I=True, K=True)}
     state = DICTIONARY(G=DICTIONARY(Type=NAME.ExtGState, ca=0.5, BM=NAME.Multiply))
-    inner = form(pdf, b"/G gs 0 0 m 500 500 l S 0 0 1000 1000 re f", **group, Resources=DICTIONARY(ExtGState=state))
+    lines = b"/G gs 0 0 m 500 500 l S 0 0 1000 1000 re f"
+    inner = form(pdf, lines, **group, Resources=DICTIONARY(ExtGState=state))
     inner.BBox = [0, 0, 2000, 2000]
     for _ in range(deep):
         inner = form(
@@ -252,7 +253,7 @@ def pdf_of_a_heavy_stamp():
 
 
 def pdf_of_a_large_image(side=40_000):
-    """PDF with a stamp over an image of 1600 million pixels that packs to 200 bytes twice deflated."""
+    """PDF with a stamp over an image of 1600 million pixels, deflated twice to 200 bytes."""
     pdf = pikepdf.new()
     page = pdf.add_blank_page(page_size=A4_PT)
     packer = zlib.compressobj(9)
@@ -277,7 +278,7 @@ def pdf_of_a_large_page():
 
 
 def pdf_of_a_class(pages=6, broken=2, how="page"):
-    """PDF of a class in which one page (from 0) is broken: the ``page`` object, its ``image`` or its ``content``."""
+    """PDF of a class in which a page (from 0) lacks its ``page`` object, an ``image``'s end or ``content``."""
     pdf = pikepdf.new()
     data = stored(paper(), "JPEG", quality=95)
     for number in range(pages):

@@ -8,6 +8,7 @@ import io
 import math
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import cast
 
 import pikepdf
 from PIL import Image
@@ -18,6 +19,7 @@ from grader.intake.limits import InputFile, check_memory, damaged
 from grader.intake.unpacking import MAX_CONTENT, filters_of, unpacked
 from reference.errors import InputFileError
 
+_NOTHING = pikepdf.Dictionary()
 _OPERATORS = "Do gs scn SCN Tf Tj TJ ' \" BI ID EI"
 _SHOWS_TEXT = frozenset(("Tj", "TJ", "'", '"'))
 _PIXELS_A_BYTE = 64
@@ -29,7 +31,7 @@ _FEW_BYTES = 100_000
 """Deflated, they cannot unpack to more than 100 MB."""
 _PLANES = {"/DeviceRGB": 3, "/CalRGB": 3, "/Lab": 3, "/DeviceCMYK": 4}
 _BYTES_A_PLANE = {"/JPXDecode": 8}
-"""Working memory for a pixel in one plane, where it is more than the pixel: JPEG 2000 works on whole tiles."""
+"""Working memory for a pixel in one plane, where it is more than the pixel: JPEG 2000 works on tiles."""
 
 
 @dataclass(slots=True)
@@ -38,9 +40,9 @@ class Drawn:
 
     Attributes
     ----------
-    objects : names of forms and images that the page's own commands draw, in their number
+    objects : number of forms and images that the page's own commands draw
     images : each image drawn, by its object
-    damage : rows of fax images that are damaged; empty where there are none
+    damage : damaged rows of the first fax image that has some; empty where none has
     """
 
     objects: int = 0
@@ -57,7 +59,8 @@ def drawn_by(file: InputFile, number: int, page: pikepdf.Page) -> Drawn:
     for stream in streams:
         if not isinstance(stream, pikepdf.Stream):
             raise InputFileError(
-                "pdf_damaged", f"{file.name}, page {number}: its drawing commands are missing; export it again"
+                "pdf_damaged",
+                f"{file.name}, page {number}: its drawing commands are missing; export it again",
             )
         left -= walk.size(stream, left)
     uses = walk.uses(page)
@@ -132,7 +135,7 @@ class _Walk:
                 uses["letters", ""] += sum(_letters(operand) for operand in operands)
             elif operator == "INLINE IMAGE":
                 image = operands[0]
-                uses["pixels", ""] += image.width * image.height
+                uses["pixels", ""] += int(image.width) * int(image.height)
             elif operands and isinstance(operands[0 if operator == "Tf" else -1], pikepdf.Name):
                 uses[operator, str(operands[0 if operator == "Tf" else -1])] += 1
         return uses
@@ -144,7 +147,7 @@ class _Walk:
         total, letter = uses["pixels", ""] / _PIXELS_A_BYTE, 0.0
         for (operator, name), count in uses.items():
             group = {"Do": "/XObject", "gs": "/ExtGState", "Tf": "/Font"}.get(operator, "/Pattern")
-            one = resources.get(group, {}).get(name) if name else None
+            one = resources.get(group, _NOTHING).get(name) if name else None
             if isinstance(one, pikepdf.Stream) and one.get("/Subtype") == "/Image":
                 total += count * self.image(one)
             elif isinstance(one, pikepdf.Stream):
@@ -153,7 +156,7 @@ class _Walk:
             elif operator == "gs" and one is not None:
                 mask = one.get("/SMask")
                 if isinstance(mask, pikepdf.Dictionary) and isinstance(mask.get("/G"), pikepdf.Stream):
-                    total += count * self.of_stream(mask.G, resources)
+                    total += count * self.of_stream(cast("pikepdf.Stream", mask.G), resources)
             elif operator == "Tf" and one is not None and one.get("/Subtype") == "/Type3":
                 letters = (form for form in one.CharProcs.values() if isinstance(form, pikepdf.Stream))
                 own = one.get("/Resources", resources)
@@ -165,7 +168,8 @@ class _Walk:
         """Raise InputFileError for a pattern of more tiles than a page can show."""
         if "/XStep" not in stream:
             return
-        a, b, c, d = (float(value) for value in list(stream.get("/Matrix", [1, 0, 0, 1, 0, 0]))[:4])
+        matrix = stream.get("/Matrix", pikepdf.Array([1, 0, 0, 1, 0, 0]))
+        a, b, c, d = (float(value) for value in list(matrix)[:4])
         tile = abs(float(stream.XStep) * float(stream.get("/YStep", 0)) * (a * d - b * c))
         if tile * _MAX_TILES < self.area:
             self.check(math.inf)
@@ -177,11 +181,11 @@ class _Walk:
         if key not in self.drawn.images:
             self.drawn.images[key] = stream
             _check_image(self.file, self.number, stream, width, height)
-            row = _fax_damage(stream, width, height)
+            row = _fax_damage(stream, height)
             if row is not None and not self.drawn.damage:
                 self.drawn.damage = f"rows {row + 1} to {height} of {height}"
             if isinstance(stream.get("/SMask"), pikepdf.Stream):
-                self.image(stream.SMask)
+                self.image(cast("pikepdf.Stream", stream.SMask))
         return width * height / _PIXELS_A_BYTE
 
 
@@ -192,7 +196,7 @@ def _letters(operand: pikepdf.Object) -> int:
 
 
 def _check_image(file: InputFile, number: int, stream: pikepdf.Stream, width: int, height: int) -> None:
-    """Raise InputFileError for an image that needs more memory than a sheet can, by all that tells its size."""
+    """Raise InputFileError for an image that needs too much memory, by all that tells its size."""
     filters = filters_of(stream)
     bits = int(stream.get("/BitsPerComponent", 8))
     planes = _PLANES.get(str(stream.get("/ColorSpace")), 1)
@@ -216,8 +220,8 @@ def _long(stream: pikepdf.Stream) -> bool:
     return len(stream.read_raw_bytes()) > _FEW_BYTES
 
 
-def _fax_damage(stream: pikepdf.Stream, width: int, height: int) -> int | None:
-    """The first damaged row of an image packed as fax, from 0; None for a whole one, and for other packing."""
+def _fax_damage(stream: pikepdf.Stream, height: int) -> int | None:
+    """The first damaged row of an image packed as fax, from 0; None for a whole one and for other packing."""
     filters = filters_of(stream)
     if not filters or filters[-1] != "/CCITTFaxDecode":
         return None

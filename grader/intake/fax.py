@@ -140,7 +140,7 @@ def _row_below(bits: str, at: int, above: list[int], width: int) -> tuple[list[i
             black = len(edges) % 2
             first, at = _run(bits, at, black)
             second, at = _run(bits, at, 1 - black)
-            x = (x if x > 0 else 0) + first
+            x = max(x, 0) + first
             _add(edges, x)
             x += second
             _add(edges, x)

@@ -46,7 +46,7 @@ def _in_bands(image: np.ndarray, grey: Callable[[np.ndarray], np.ndarray]) -> Gr
 def _luma(pixels: GreyImage, *, rgb: bool) -> np.ndarray:
     if pixels.ndim == 2:
         return pixels
-    channels = pixels.shape[2]
+    channels: int = pixels.shape[2]
     if channels <= 2:
         grey = pixels[..., 0]
     else:
@@ -71,7 +71,8 @@ def _eight_bit(image: np.ndarray, used: int) -> GreyImage:
 
 def _light(inks: GreyImage) -> np.ndarray:
     clear = 255.0 - inks[..., :4].astype(np.float32)
-    return clear[..., :3].min(axis=2) * clear[..., 3] / np.float32(255.0) + np.float32(0.5)
+    light = clear[..., :3].min(axis=2) * clear[..., 3] / np.float32(255.0)
+    return np.asarray(light + np.float32(0.5))
 
 
 def _on_white(grey: np.ndarray, alpha: np.ndarray) -> np.ndarray:

@@ -95,7 +95,7 @@ def load(path: Path | str) -> InputFile:
 
 
 def _content(path: Path) -> bytes:
-    """All bytes of a regular file. A pipe or device is not opened: it may never say anything, or never end."""
+    """All bytes of a regular file. A pipe or device is not read: it may never say anything, or end."""
     if path.exists() and not path.is_file():
         raise OSError(errno.EISDIR, "it is a folder or a pipe, not a file")
     # Should a pipe take the file's place meanwhile, opening it must not wait for a writer.
@@ -175,7 +175,8 @@ def check_memory(file: InputFile, page: int, pixels: int, decoded_bytes: int) ->
         raise InputFileError(
             "image_too_large",
             f"{file.name}, page {page}: {pixels / 1e6:.0f} million pixels that unpack to"
-            f" {decoded_bytes / 1e6:.0f} MB are more than a sheet can need; scan A3 at 600 dpi or less, in grey",
+            f" {decoded_bytes / 1e6:.0f} MB are more than a sheet can need;"
+            " scan A3 at 600 dpi or less, in grey",
         )
 
 

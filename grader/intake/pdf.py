@@ -30,7 +30,6 @@ _GROUP_BYTES = 4
 """For a pixel of what is drawn together: its colour and how much it covers."""
 
 
-
 if hasattr(pikepdf.settings, "set_qpdf_limits"):
     pikepdf.settings.set_qpdf_limits(
         flate_max_memory=MAX_UNPACKED, run_length_max_memory=MAX_UNPACKED, png_max_memory=MAX_UNPACKED,
@@ -100,9 +99,7 @@ def _opened(file: InputFile) -> Iterator[pikepdf.Pdf]:
         )
     try:
         # Handing down what pages inherit, qpdf would drop broken ones from the list.
-        document = pikepdf.open(
-            io.BytesIO(file.data), inherit_page_attributes=False, suppress_warnings=True
-        )
+        document = pikepdf.open(io.BytesIO(file.data), inherit_page_attributes=False, suppress_warnings=True)
     except pikepdf.PasswordError as error:
         raise InputFileError(
             "pdf_encrypted", f"{file.name}: the PDF asks for a password; save it without one"

@@ -4,6 +4,7 @@ import io
 import logging
 import math
 import struct
+from collections.abc import Callable
 from typing import Any
 
 import imagecodecs
@@ -11,6 +12,7 @@ import numpy as np
 import tifffile
 from tifffile import COMPRESSION
 
+from grader.intake import jpeg
 from grader.intake.fax import Coding, damaged_row
 from grader.intake.grey import of_four_inks, to_grey
 from grader.intake.limits import (
@@ -34,10 +36,15 @@ _MAX_SEGMENTS = 500_000
 _MAX_TAGS = 4096
 _THREADS = 2
 """Segments that are decoded at the same time."""
-_MAX_RATIO = {COMPRESSION.NONE: 1, COMPRESSION.LZW: 1400, COMPRESSION.ADOBE_DEFLATE: 1040,
-              COMPRESSION.DEFLATE: 1040, COMPRESSION.PACKBITS: 64}  # fmt: skip
+_MAX_RATIO: dict[int, int] = {
+    COMPRESSION.NONE: 1, COMPRESSION.LZW: 1400, COMPRESSION.ADOBE_DEFLATE: 1040, COMPRESSION.DEFLATE: 1040,
+    COMPRESSION.PACKBITS: 64,
+}  # fmt: skip
 """Bytes that one byte can unpack to, by the coding itself; 4096 by 1.5 bytes would be LZW's longest."""
-_UNCHECKED = {COMPRESSION.LZW: imagecodecs.lzw_decode, COMPRESSION.PACKBITS: imagecodecs.packbits_decode}
+_UNCHECKED: dict[int, Callable[..., bytes | bytearray]] = {
+    COMPRESSION.LZW: imagecodecs.lzw_decode,
+    COMPRESSION.PACKBITS: imagecodecs.packbits_decode,
+}
 """Codings without a checksum: what is damaged unpacks to another length."""
 _FAX = (COMPRESSION.CCITTRLE, COMPRESSION.CCITT_T4, COMPRESSION.CCITT_T6)
 _REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
@@ -107,6 +114,12 @@ def _check_page(file: InputFile, number: int, page: tifffile.TiffPage) -> None:
         raise truncated(file, number)
     if page.compression in _UNCHECKED:
         _check_lengths(file, number, page, parts)
+    if page.compression == COMPRESSION.JPEG and page.samplesperpixel <= 3 and page.bitspersample == 8:
+        # tifffile's decoder fills what is damaged without a word.
+        tables = bytes(page.jpegtables or b"")[:-2]
+        for offset, length in parts:
+            strip = file.data[offset : offset + length]
+            jpeg.decode(file, number, tables + strip[2:] if tables else strip)
 
 
 def _check_lengths(
@@ -137,11 +150,10 @@ def _rows(page: tifffile.TiffPage, index: int) -> int:
 def _fax_damage(file: InputFile, page: tifffile.TiffPage) -> str:
     """Where the rows of a fax are damaged; empty where they are whole."""
     options = int(_value(page, "T4Options", 0))
-    coding = {
-        COMPRESSION.CCITTRLE: Coding(k=0, aligned=True),
-        COMPRESSION.CCITT_T4: Coding(k=options & 1),
-        COMPRESSION.CCITT_T6: Coding(k=-1),
-    }[page.compression]
+    if page.compression == COMPRESSION.CCITT_T6:
+        coding = Coding(k=-1)
+    else:
+        coding = Coding(k=options & 1, aligned=page.compression == COMPRESSION.CCITTRLE)
     width, across = page.imagewidth, 1
     if page.is_tiled:
         width, across = page.tilewidth, -(-page.imagewidth // page.tilewidth)
@@ -165,7 +177,7 @@ def _grey(page: tifffile.TiffPage) -> GreyImage:
         return of_four_inks(pixels)
     if page.photometric == tifffile.PHOTOMETRIC.PALETTE and page.colormap is not None:
         colours = (page.colormap.T[None] >> 8).astype(np.uint8)
-        return to_grey(colours, rgb=True)[0][pixels]
+        return np.asarray(to_grey(colours, rgb=True)[0][pixels], dtype=np.uint8)
     if page.photometric == tifffile.PHOTOMETRIC.MINISWHITE:
         pixels = ~pixels
     return to_grey(pixels, rgb=True)

@@ -155,11 +155,11 @@ def test_a_file_with_other_content_is_read_again_and_one_only_touched_is_not(cla
 def test_pages_are_surveyed_once(class_folder, tmp_path, monkeypatch):
     seen = []
 
-    def noted(path, name, names, survey=kept_module.survey):
+    def noted(file, name, survey_pages=kept_module.survey_pages):
         seen.append(name)
-        return survey(path, name, names)
+        return survey_pages(file, name)
 
-    monkeypatch.setattr(kept_module, "survey", noted)
+    monkeypatch.setattr(kept_module, "survey_pages", noted)
     run(class_folder, tmp_path / "out")
     assert seen == ["s1.png", "s2.png"]
     scan(class_folder / "s2.png", 150)
