@@ -56,17 +56,6 @@ def digest_of(parts: Iterable[object]) -> str:
     return digest.hexdigest()
 
 
-def file_digest(path: Path) -> str:
-    """A digest of a file's content; of a file that is not there or cannot be read, an empty one."""
-    try:
-        if not path.is_file():
-            return ""  # a pipe would be waited for
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
-        return ""
-
-
 # Records as JSON ----------------------------------------------------------------------------------
 
 

@@ -16,7 +16,7 @@ from grader.declaring import Declarations, Source, declarations, sure_texts
 from grader.documents import ReadingDocument, ReportDocument
 from grader.feedback import Level, criterion_feedback, with_mistakes_told
 from grader.ink import find_ink
-from grader.intake import is_blank, page_of
+from grader.intake import changed, is_blank, load, page_of
 from grader.judging import Submission, Task, judge, task_of
 from grader.letters import find_letters, written_scales
 from grader.letters.lengths import written_lengths
@@ -48,7 +48,7 @@ class Place:
 
     Attributes
     ----------
-    digest : of the content that the page's owner was found in, empty where it is not known
+    digest : of the content whose page is meant; empty where any content will do
     problem : why the page cannot be used, where that is known already: then it is not opened
     """
 
@@ -241,9 +241,17 @@ def see(place: Place, figures: Collection[str] = ()) -> Seen:
         return Seen(place, problems=(place.problem,))
     try:
         with _timed(timing, "decode"):
-            page = replace(page_of(place.path, place.page), source=place.name)
+            page = _decoded(place)
     except InputFileError as error:
         return Seen(place, problems=(Problem(error.code, error.message, place.name),), timing_ms=timing)
+    if page.damage:
+        problem = Problem(
+            "image_damaged_rows",
+            f"{place.name}: page {place.page}: {page.damage} are damaged in the file, so that lengths read"
+            " there would be wrong: scan the sheet again, or grade it by hand",
+            place.name,
+        )
+        return Seen(place, page, problems=(problem,), timing_ms=timing)
     if is_blank(page):
         problem = Problem("page_blank", f"{place.name}: page {place.page} is blank", place.name)
         return Seen(place, page, problems=(problem,), timing_ms=timing)
@@ -267,6 +275,14 @@ def see(place: Place, figures: Collection[str] = ()) -> Seen:
         written = written_scales(page, sheet)
     problems = tuple(replace(problem, file=place.name) for problem in sheet.problems)
     return Seen(place, page, sheet, ink, problems, timing, narrowed=boxes is not None, written=written)
+
+
+def _decoded(place: Place) -> Page:
+    """The page's pixels; raises InputFileError, also where the file has changed since it was surveyed."""
+    file = load(place.path)
+    if place.digest and place.digest != file.digest:
+        raise changed(place.name)
+    return replace(page_of(file, place.page), source=place.name)
 
 
 def _asked_zones(sheet: Sheet, figures: Collection[str]) -> list[Box] | None:

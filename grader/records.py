@@ -42,6 +42,7 @@ class Page:
     dpi : horizontal and vertical resolution that the file states, or None
     turn_deg : counter-clockwise turn that the file asks viewers to apply (EXIF, PDF), 0/90/180/270
     paper_mm : width and height of the stored image on paper where the file states it (PDF), or None
+    damage : which rows are not as they were stored, where the file shows it; empty for a whole page
     """
 
     source: str
@@ -50,6 +51,7 @@ class Page:
     dpi: tuple[float, float] | None = None
     turn_deg: int = 0
     paper_mm: tuple[float, float] | None = None
+    damage: str = ""
 
 
 @dataclass(frozen=True, slots=True)

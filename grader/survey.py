@@ -12,8 +12,8 @@ from pathlib import Path
 from grader.documents import UnmatchedDocument
 from grader.files import write_whole
 from grader.folder import told_name
-from grader.intake import count_pages, is_blank, page_of
-from grader.kept import code_version, file_digest, packed, unpacked
+from grader.intake import changed, count_pages, is_blank, load, page_of
+from grader.kept import code_version, packed, unpacked
 from grader.measurements import Measurements, Names, read_measurements
 from grader.ownership import PageSource
 from grader.records import Problem
@@ -78,19 +78,23 @@ def open_file(path: Path, name: str, names: Names, notes: Path) -> Survey:
     """A measurement file's content, or a file's pages: as noted by an earlier run, else only counted."""
     if path.suffix.lower() in MEASUREMENT_TYPES:
         return Survey(measurements=read_measurements(path, names))
-    digest = file_digest(path)
-    known = _noted(notes, name, digest)
+    file = load(path)
+    known = _noted(notes, name, file.digest)
     if known is not None:
         return known
-    count = count_pages(path)
-    pages = tuple(PageSource(name, number, count, digest=digest) for number in range(1, count + 1))
+    count = count_pages(file)
+    pages = tuple(PageSource(name, number, count, digest=file.digest) for number in range(1, count + 1))
     return Survey(pages, is_complete=False)
 
 
 def look_at(path: Path, source: PageSource) -> PageSource:
     """A page with what is on it: blank, or whose by its QR code. Raises InputFileError."""
-    page = page_of(path, source.page)
-    blank = is_blank(page)
+    file = load(path)
+    if file.digest != source.digest:
+        raise changed(source.file)
+    page = page_of(file, source.page)
+    # Rows that a decoder has filled with white are not blank.
+    blank = is_blank(page) and not page.damage
     return replace(source, blank=blank, identity=None if blank else whose(page))
 
 

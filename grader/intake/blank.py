@@ -27,8 +27,11 @@ def is_blank(page: Page) -> bool:
     small = shrink(page.grey, scale)
     paper = cv2.morphologyEx(small, cv2.MORPH_CLOSE, np.ones((31, 31), np.uint8))
     share = np.asarray(cv2.divide(small, paper, scale=255), dtype=np.uint8)
-    rim = int(_RIM * max(small.shape))
-    inner = np.ascontiguousarray(share[rim:-rim, rim:-rim] < (1.0 - _DARK) * 255).astype(np.uint8)
+    # A strip narrower than two rims has no more than its middle.
+    rim = min(int(_RIM * max(small.shape)), (min(small.shape) - 1) // 2)
+    if rim > 0:
+        share = share[rim:-rim, rim:-rim]
+    inner = np.ascontiguousarray(share < (1.0 - _DARK) * 255).astype(np.uint8)
     _, _, stats, _ = cv2.connectedComponentsWithStats(inner, connectivity=8)
     extent = np.hypot(stats[1:, cv2.CC_STAT_WIDTH], stats[1:, cv2.CC_STAT_HEIGHT])
     long_side = max(small.shape)

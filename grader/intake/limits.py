@@ -1,4 +1,7 @@
-"""What is let in: kinds of file told by their first bytes, and bounds on their size.
+"""What is let in: files read once, their kind by their first bytes, and bounds on what they ask for.
+
+All bounds are checked before pixels are made. What a page needs is counted in bytes of memory: the file,
+the pixels as decoded, and their grey.
 
 Codes of `InputFileError` raised in this package:
 
@@ -6,28 +9,42 @@ Codes of `InputFileError` raised in this package:
 |---|---|
 | file_missing | no such file, or it cannot be opened |
 | file_empty | 0 bytes |
+| file_too_large | more bytes than the scans of one class can need |
+| file_changed | the file was written to while it was read |
 | file_type_unsupported | neither JPEG, PNG, TIFF nor PDF, whatever its name says |
 | image_truncated | the file ends before the image does |
 | image_damaged | the image cannot be decoded |
-| image_too_large | more pixels than a sheet can need |
+| image_too_large | more pixels, or more memory for them, than a sheet can need |
+| image_too_small | a page too small or too narrow to be a drawing |
 | pdf_encrypted | a PDF that asks for a password |
-| pdf_damaged | a PDF that cannot be opened |
+| pdf_damaged | a PDF that cannot be opened, or a page of it that cannot be read |
 | pdf_too_heavy | a page whose drawing commands are more than a drawing can have |
 | pages_none | a document without pages |
 | pages_too_many | more pages than one class can need |
 """
 
 import errno
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+import hashlib
+import os
+import stat
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.records import Page
 from reference.errors import InputFileError
 
-MAX_PIXELS = 220_000_000
-"""A2 at 600 dpi is 139 million pixels; a decompression bomb is more."""
+MAX_FILE_BYTES = 800_000_000
+"""A class of 50 scanned on both sides in colour has 500 MB; all of a file is held in memory."""
+MAX_PIXELS = 178_000_000
+"""A2 at 600 dpi is 139 million pixels; Pillow opens no image of more than 178."""
+MAX_MEMORY_BYTES = 1_100_000_000
+"""File, decoded pixels and grey of one page: leaves 400 MB of a worker's 1.5 GB to the program itself."""
 MAX_PAGES = 2000
+_LEAST_SIDE_PX = 100
+"""A sheet's short side at 9 dpi: no stroke can be read of less."""
+_LEAST_SHARE = 0.1
+"""Short side by long side; paper has 0.7, a crop of one figure at least 0.3."""
 
 _MAGIC = {
     b"\xff\xd8\xff": "jpeg",
@@ -39,87 +56,150 @@ _MAGIC = {
 }
 _PDF_HEADER_WITHIN = 1024
 """Readers accept junk before `%PDF-`, so copiers that write some are let in."""
+_NO_WAIT = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+"""Not every system knows both."""
 _NAMES = {".jpg": "JPEG", ".jpeg": "JPEG", ".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF", ".pdf": "PDF"}
 
 
 @dataclass(frozen=True, slots=True)
-class Door:
-    """How one kind of file is read."""
+class InputFile:
+    """A file as it was read, once: the bytes that are decoded are those of the digest.
 
-    pages: Callable[[Path, int], Iterator[Page]]
-    """Pages of a file from a number on, counted from 1."""
-    count: Callable[[Path], int]
+    Attributes
+    ----------
+    name : without its folder
+    digest : SHA-256 of `data`, hexadecimal
+    """
+
+    name: str
+    data: bytes = field(repr=False)
+    digest: str
 
 
-def kind_of(path: Path) -> str:
-    """`jpeg`, `png`, `tiff` or `pdf`, by content; raises InputFileError for anything else."""
+def load(path: Path | str) -> InputFile:
+    """A file's content.
+
+    Raises InputFileError (`file_missing`, `file_empty`, `file_too_large`, `file_changed`).
+    """
+    path = Path(path)
     try:
-        head = _head(path)
+        data = _content(path)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputFileError(
             "file_missing", f"{path.name}: cannot be opened ({reason}); check the path"
         ) from error
-    if not head:
+    if not data:
         raise InputFileError("file_empty", f"{path.name}: the file is empty (0 bytes); hand it in again")
-    for magic, kind in _MAGIC.items():
-        if head.startswith(magic):
-            return kind
-    if b"%PDF-" in head:
-        return "pdf"
-    named = _NAMES.get(path.suffix.lower())
-    what = f"named {path.suffix} but is no {named} file" if named else "of a type that is not read"
-    raise InputFileError(
-        "file_type_unsupported",
-        f"{path.name}: {what}; scan or export it as JPEG, PNG, TIFF or PDF",
-    )
+    return InputFile(path.name, data, hashlib.sha256(data).hexdigest())
 
 
-def _head(path: Path) -> bytes:
-    """The first bytes. A pipe or device is not opened: it may never say anything, or never end."""
+def _content(path: Path) -> bytes:
+    """All bytes of a regular file. A pipe or device is not read: it may never say anything, or end."""
     if path.exists() and not path.is_file():
         raise OSError(errno.EISDIR, "it is a folder or a pipe, not a file")
-    with path.open("rb") as file:
-        return file.read(_PDF_HEADER_WITHIN)
+    # Should a pipe take the file's place meanwhile, opening it must not wait for a writer.
+    with os.fdopen(os.open(path, os.O_RDONLY | _NO_WAIT), "rb") as file:
+        status = os.fstat(file.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EISDIR, "it is a folder or a pipe, not a file")
+        if status.st_size > MAX_FILE_BYTES:
+            raise InputFileError(
+                "file_too_large",
+                f"{path.name}: {status.st_size // 1_000_000} MB, more than {MAX_FILE_BYTES // 1_000_000} MB;"
+                " split the file, or scan at 300 dpi",
+            )
+        data = file.read(status.st_size + 1)
+    if len(data) != status.st_size:
+        raise changed(path.name)
+    return data
 
 
-def check_size(path: Path, page: int, width: int, height: int) -> None:
-    """Raise InputFileError for an image without pixels or with more than a sheet can need."""
-    if width <= 0 or height <= 0:
-        raise damaged(path, page, "it has no pixels")
-    if width * height > MAX_PIXELS:
-        raise too_large(path, page)
+def changed(name: str) -> InputFileError:
+    """The error for a file whose content is not what it was when the folder was read."""
+    return InputFileError("file_changed", f"{name}: changed while the folder was read; grade again")
 
 
-def too_large(path: Path, page: int) -> InputFileError:
-    """The error for an image of more pixels than a sheet can need."""
-    return InputFileError(
-        "image_too_large",
-        f"{path.name}, page {page}: more than {MAX_PIXELS // 1_000_000} million pixels; "
-        "scan A3 at 600 dpi or less",
+@dataclass(frozen=True, slots=True)
+class Door:
+    """How one kind of file is read.
+
+    Attributes
+    ----------
+    page : a page by its number from 1; None where the file has fewer
+    count : number of pages, without decoding them
+    code, noun : of the error for a page that the libraries cannot read
+    """
+
+    page: Callable[[InputFile, int], Page | None]
+    count: Callable[[InputFile], int]
+    code: str = "image_damaged"
+    noun: str = "image"
+
+
+def kind_of(file: InputFile) -> str:
+    """`jpeg`, `png`, `tiff` or `pdf`, by content; raises InputFileError for anything else."""
+    for magic, kind in _MAGIC.items():
+        if file.data.startswith(magic):
+            return kind
+    if b"%PDF-" in file.data[:_PDF_HEADER_WITHIN]:
+        return "pdf"
+    suffix = Path(file.name).suffix
+    named = _NAMES.get(suffix.lower())
+    what = f"named {suffix} but is no {named} file" if named else "of a type that is not read"
+    raise InputFileError(
+        "file_type_unsupported",
+        f"{file.name}: {what}; scan or export it as JPEG, PNG, TIFF or PDF",
     )
 
 
-def check_pages(path: Path, pages: int) -> None:
-    """Raise InputFileError for a document of no page or of too many."""
-    if pages < 1:
-        raise InputFileError("pages_none", f"{path.name}: the document has no pages; export it again")
-    if pages > MAX_PAGES:
+def check_size(file: InputFile, page: int, width: int, height: int) -> None:
+    """Raise InputFileError for a page that cannot be a drawing by its width and height in pixels."""
+    check_memory(file, page, width * height, 0)
+    if min(width, height) < max(_LEAST_SIDE_PX, _LEAST_SHARE * max(width, height)):
         raise InputFileError(
-            "pages_too_many", f"{path.name}: {pages} pages, more than {MAX_PAGES}; split the file"
+            "image_too_small",
+            f"{file.name}, page {page}: {width} x {height} pixels are too few or too narrow for a drawing; "
+            "scan the whole sheet at 300 dpi",
         )
 
 
-def damaged(path: Path, page: int, why: str) -> InputFileError:
+def check_memory(file: InputFile, page: int, pixels: int, decoded_bytes: int) -> None:
+    """Raise InputFileError for an image without pixels, with too many, or with too many bytes for them.
+
+    Arguments: what decoding needs besides the file and its grey is `decoded_bytes`.
+    """
+    if pixels <= 0:
+        raise damaged(file, page, "it has no pixels")
+    if pixels > MAX_PIXELS or len(file.data) + decoded_bytes + pixels > MAX_MEMORY_BYTES:
+        raise InputFileError(
+            "image_too_large",
+            f"{file.name}, page {page}: {pixels / 1e6:.0f} million pixels that unpack to"
+            f" {decoded_bytes / 1e6:.0f} MB are more than a sheet can need;"
+            " scan A3 at 600 dpi or less, in grey",
+        )
+
+
+def check_pages(file: InputFile, pages: int) -> None:
+    """Raise InputFileError for a document of no page or of too many."""
+    if pages < 1:
+        raise InputFileError("pages_none", f"{file.name}: the document has no pages; export it again")
+    if pages > MAX_PAGES:
+        raise InputFileError(
+            "pages_too_many", f"{file.name}: {pages} pages, more than {MAX_PAGES}; split the file"
+        )
+
+
+def damaged(file: InputFile, page: int, why: str) -> InputFileError:
     """The error for an image that cannot be decoded."""
     return InputFileError(
-        "image_damaged", f"{path.name}, page {page}: the image is damaged ({why}); scan or export it again"
+        "image_damaged", f"{file.name}, page {page}: the image is damaged ({why}); scan or export it again"
     )
 
 
-def truncated(path: Path, page: int) -> InputFileError:
+def truncated(file: InputFile, page: int) -> InputFileError:
     """The error for an image whose data end too early."""
     return InputFileError(
         "image_truncated",
-        f"{path.name}, page {page}: the image is cut off before its end; copy or upload the file again",
+        f"{file.name}, page {page}: the image is cut off before its end; copy or upload the file again",
     )

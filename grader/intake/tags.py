@@ -2,16 +2,11 @@
 
 import io
 import struct
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from grader.intake.limits import check_size, damaged, too_large
 from grader.records import GreyImage
 
 _ORIENTATION_TAG = 274
@@ -69,24 +64,10 @@ def tags_of(dpi: Dpi | None, orientation: int) -> Tags:
     return Tags(dpi, _TURN_CCW.get(orientation, 0), orientation in _MIRRORED)
 
 
-@contextmanager
-def opened(path: Path, data: bytes) -> Iterator[Image.Image]:
-    """An image's header, its size within bounds; InputFileError where it cannot be read."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(io.BytesIO(data)) as image:
-                check_size(path, 1, *image.size)
-                yield image
-    except Image.DecompressionBombError as error:
-        raise too_large(path, 1) from error
-    except (OSError, ValueError, SyntaxError) as error:
-        raise damaged(path, 1, "its header cannot be read") from error
-
-
-def of_image(image: Image.Image) -> Tags:
-    """From JFIF, EXIF or pHYs of an opened image."""
-    return tags_of(plausible(image.info.get("dpi")), _orientation(image))
+def tags_within(content: bytes) -> Tags:
+    """From JFIF, EXIF or pHYs of an image file; only its header is read."""
+    with Image.open(io.BytesIO(content)) as image:
+        return tags_of(plausible(image.info.get("dpi")), _orientation(image))
 
 
 def _orientation(image: Image.Image) -> int:

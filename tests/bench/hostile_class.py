@@ -42,7 +42,9 @@ def negative() -> bytes:
 
 def noise() -> bytes:
     """A3 at 300 dpi of grey noise: no drawing, and strokes everywhere."""
-    return cv2.imencode(".jpg", np.random.default_rng(1).integers(0, 256, (3508, 4961), np.uint8))[1].tobytes()
+    return cv2.imencode(".jpg", np.random.default_rng(1).integers(0, 256, (3508, 4961), np.uint8))[
+        1
+    ].tobytes()
 
 
 FILES = {
@@ -63,7 +65,9 @@ def make_class(folder: Path) -> None:
         lines.append(f"{student},Student {number},{21 if number % MEASURED_EVERY == 0 else NUMBERS[of]}")
         if number % MEASURED_EVERY == 0:
             entered = json.loads((samples / "s08.json").read_text(encoding="utf-8"))
-            (folder / f"{student}.json").write_text(json.dumps({**entered, "student_id": student}), encoding="utf-8")
+            (folder / f"{student}.json").write_text(
+                json.dumps({**entered, "student_id": student}), encoding="utf-8"
+            )
             continue
         for path in sorted(samples.glob(f"{of}_*")):
             shutil.copy(path, folder / path.name.replace(of, student, 1))
@@ -120,6 +124,7 @@ def run(checkout: Path, folder: Path, out: Path, jobs: int, *, kill_workers: boo
 
 def reports(out: Path) -> dict[str, str]:
     """Each report without times, by student."""
+
     def timeless(value: object) -> object:
         if isinstance(value, dict):
             return {key: timeless(one) for key, one in value.items() if key != "timing_ms"}
@@ -153,7 +158,9 @@ def main() -> None:
             out = Path(top) / f"{jobs}"
             if other is not None:
                 before = run(other, good, out / "before", jobs)
-                print(f"{jobs} processes, good files, {other}: {before.seconds:.1f} s, {before.peak_mb:.0f} MB")
+                print(
+                    f"{jobs} processes, good files, {other}: {before.seconds:.1f} s, {before.peak_mb:.0f} MB"
+                )
             alone = run(ROOT, good, out / "good", jobs)
             print(f"{jobs} processes, good files: {alone.seconds:.1f} s, {alone.peak_mb:.0f} MB")
             clean = reports(out / "good")

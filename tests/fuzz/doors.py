@@ -61,7 +61,7 @@ def enter(door: str, data: bytes) -> str:
         try:
             return _ENTER[door](path)
         except PlanmarkError as error:
-            return f"{error.code}: {re.sub(r'[0-9]+|.input[^ ]*', '', error.message)[:120]}"
+            return f"{error.code}: {' '.join(re.findall(r'[a-z]{4,}', error.message)[:8])}"
 
 
 def _name(door: str, data: bytes) -> str:
@@ -106,7 +106,9 @@ def _authored(path: Path) -> str:
     if path.name.endswith(".mechanism.toml"):
         assignment = path.with_name("input.assignment.toml")
         text = (CORPUS.parents[2] / "rubrics" / "pump.assignment.toml").read_text(encoding="utf-8")
-        assignment.write_text(re.sub(r'mechanism = "[^"]*"', 'mechanism = "input.mechanism.toml"', text), "utf-8")
+        assignment.write_text(
+            re.sub(r'mechanism = "[^"]*"', 'mechanism = "input.mechanism.toml"', text), "utf-8"
+        )
         path = assignment
     assignment = load_assignment(path)
     variants = assignment.variants()
@@ -203,13 +205,19 @@ def fuzz(seconds: float, inputs: int | None, seed: int, jobs: int) -> list[tuple
         for turn in range(10**6):
             if time.monotonic() - start > seconds or (inputs is not None and tried.total() >= inputs):
                 break
-            calls = [(door, pools[door], f"{seed} {turn} {k}", BATCH[door]) for door in DOORS for k in range(jobs)]
+            calls = [
+                (door, pools[door], f"{seed} {turn} {k}", BATCH[door]) for door in DOORS for k in range(jobs)
+            ]
             for index, result in workers.run(try_batch, calls):
                 door = calls[index][0]
                 tried[door] += BATCH[door]
-                for found in [result] if isinstance(result, Findings) else _singly(workers, calls[index], result):
+                for found in (
+                    [result] if isinstance(result, Findings) else _singly(workers, calls[index], result)
+                ):
                     failures += [(door, what, data) for what, data in found.failures]
-                    new = {answer: data for answer, data in found.answers.items() if answer not in answers[door]}
+                    new = {
+                        answer: data for answer, data in found.answers.items() if answer not in answers[door]
+                    }
                     answers[door] |= new.keys()
                     pools[door] += new.values()
     for door in DOORS:
@@ -218,7 +226,9 @@ def fuzz(seconds: float, inputs: int | None, seed: int, jobs: int) -> list[tuple
     return failures
 
 
-def _singly(workers: Workers, call: tuple[str, Sequence[bytes], str, int], problem: Problem) -> Iterator[Findings]:
+def _singly(
+    workers: Workers, call: tuple[str, Sequence[bytes], str, int], problem: Problem
+) -> Iterator[Findings]:
     """The inputs of a batch that ended its worker, one by one."""
     door, *rest = call
     files = list(_inputs(door, *rest))

@@ -25,12 +25,23 @@ def _pictures() -> list[bytes]:
     cv2.line(grey, (15, 20), (150, 70), 30, 2)
     colour = np.dstack([grey, grey // 2 + 90, grey])
     bits = Image.fromarray(grey > 128)
-    files = [_saved(grey, "JPEG"), _saved(colour, "JPEG", progressive=True, exif=_turned()), _saved(grey, "PNG")]
+    files = [
+        _saved(grey, "JPEG"),
+        _saved(colour, "JPEG", progressive=True, exif=_turned()),
+        _saved(grey, "PNG"),
+    ]
     files += [_saved(np.dstack([colour, grey]), "PNG"), _saved(grey.astype(np.uint16) << 6, "PNG")]
     files += [_saved(bits, "PNG"), _saved(bits, "TIFF", compression="group4")]
-    files += [_saved(Image.fromarray(colour).convert("CMYK"), "JPEG"), _saved(Image.fromarray(grey).convert("P"), "PNG")]
+    files += [
+        _saved(Image.fromarray(colour).convert("CMYK"), "JPEG"),
+        _saved(Image.fromarray(grey).convert("P"), "PNG"),
+    ]
     files += [_tiff(grey, compression=kind) for kind in (None, "zlib", "lzw", "jpeg")]
-    files += [_tiff(colour, planarconfig="separate"), _tiff(grey, tile=(64, 64)), _tiff(grey, compression="packbits")]
+    files += [
+        _tiff(colour, planarconfig="separate"),
+        _tiff(grey, tile=(64, 64)),
+        _tiff(grey, compression="packbits"),
+    ]
     files += [_pdf_of_scans(files[0], files[1]), _pdf_of_pixels(grey), _pdf_drawn()]
     return files
 

@@ -186,7 +186,7 @@ def test_a_page_with_more_than_its_scan_is_rendered(tmp_path):
         ("notes.docx", b"PK\x03\x04 and so on", "file_type_unsupported"),
         ("broken.pdf", b"%PDF-1.7\nnothing more", "pdf_damaged"),
         ("broken.tif", b"II*\x00\xff\xff\xff\x7f", "image_truncated"),
-        ("broken.png", b"\x89PNG\r\n\x1a\n IEND", "image_damaged"),
+        ("broken.png", b"\x89PNG\r\n\x1a\n IEND", "image_truncated"),
         ("broken.jpg", b"\xff\xd8\xff\xe0 nothing", "image_truncated"),
     ],
 )
