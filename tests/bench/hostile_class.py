@@ -42,17 +42,22 @@ def negative() -> bytes:
 
 def noise() -> bytes:
     """A3 at 300 dpi of grey noise: no drawing, and strokes everywhere."""
-    return cv2.imencode(".jpg", np.random.default_rng(1).integers(0, 256, (3508, 4961), np.uint8))[
-        1
-    ].tobytes()
+    grey = np.random.default_rng(1).integers(0, 256, (3508, 4961), np.uint8)
+    return cv2.imencode(".jpg", grey)[1].tobytes()
 
 
 FILES = {
-    "h01.png": hostile.thin_picture, "h02.png": hostile.tiny_picture, "h03.png": hostile.png_of_deep_pixels,
-    "h04.tif": hostile.tiff_of_many_samples, "h05.pdf": hostile.pdf_of_nested_forms, "h06.pdf":
-    hostile.pdf_of_a_narrow_pattern, "h07.jpg": hostile.jpeg_of_many_scans, "h08.jpg": negative, "h09.jpg": noise,
+    "h01.png": hostile.thin_picture,
+    "h02.png": hostile.tiny_picture,
+    "h03.png": hostile.png_of_deep_pixels,
+    "h04.tif": hostile.tiff_of_many_samples,
+    "h05.pdf": hostile.pdf_of_nested_forms,
+    "h06.pdf": hostile.pdf_of_a_narrow_pattern,
+    "h07.jpg": hostile.jpeg_of_many_scans,
+    "h08.jpg": negative,
+    "h09.jpg": noise,
     "h10.pdf": hostile.pdf_of_a_class,
-}  # fmt: skip
+}
 
 
 def make_class(folder: Path) -> None:
@@ -96,11 +101,11 @@ class Watch:
 
 def run(checkout: Path, folder: Path, out: Path, jobs: int, *, kill_workers: bool = False, end_after: int = 0,
         sent: int = signal.SIGKILL) -> Watch:  # fmt: skip
-    """Grade; at random moments kill a worker; once `end_after` reports are there, send the main process a signal."""
+    """Grade, killing workers at random, or ending the main process once `end_after` reports are there."""
     call = [sys.executable, "-m", "grader", "grade", str(folder), "--assignment", "pump", "--out", str(out)]
     start = time.monotonic()
     dice, next_kill = random.Random(3), 8.0
-    with subprocess.Popen(
+    with subprocess.Popen(  # noqa: S603 - our own program
         [*call, "--jobs", str(jobs)], cwd=checkout, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     ) as process:
         watch = Watch(process)
@@ -171,15 +176,18 @@ def main() -> None:
                     problem["code"] for student, text in found.items() if student.startswith("h")
                     for problem in json.loads(text)["problems"]
                 )  # fmt: skip
-                print(f"{jobs} processes, {name}: {watch.seconds:.1f} s, {watch.peak_mb:.0f} MB, {same(clean, found)}"
-                      f" of {GOOD} as without; hostile: {dict(codes)}")  # fmt: skip
+                kept = f"{same(clean, found)} of {GOOD} as without"
+                print(f"{jobs} processes, {name}: {watch.seconds:.1f} s, {watch.peak_mb:.0f} MB, {kept}")
+                print(f"    problems of the hostile: {dict(codes)}")
             for name, sent in (("main killed", signal.SIGKILL), ("interrupted", signal.SIGINT)):
                 ended = run(ROOT, mixed, out / name, jobs, end_after=12, sent=sent)
                 there = len(list((out / name).glob("*/report.json")))
                 again = run(ROOT, mixed, out / name, jobs)
-                print(f"{jobs} processes, {name}: all gone after {ended.seconds:.2f} s with {there} reports there;"
-                      f" the next run took {again.seconds:.1f} s, {same(clean, reports(out / name))} of {GOOD}"
-                      " as without")  # fmt: skip
+                kept = f"{same(clean, reports(out / name))} of {GOOD} as without"
+                print(
+                    f"{jobs} processes, {name}: ended after {ended.seconds:.2f} s with {there} reports there;"
+                )
+                print(f"    the next run took {again.seconds:.1f} s, {kept}")
 
 
 if __name__ == "__main__":

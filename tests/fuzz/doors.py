@@ -37,9 +37,11 @@ SLOW_S = 20.0
 """One input may take this long: a third of a worker's limit, on a busy machine."""
 BATCH = {"pictures": 100, "measurements": 400, "roster": 400, "authored": 150}
 MOST_PAGES = 3
-_WORDS = (b"", b"0", b"-1", b"1e400", b"nan", b"inf", b"999999999999999999999", b"\x00", b"\xff\xfe", b'"', b"{", b"[",
-          b"[[", b"/Length 999999999", b"/Count -1", b"/Width 100000", b"endobj", b"stream", b"<<", b">>", b"NaN",
-          b"1_0", b"0x10", b"2026-01-01", b"'''", b"\r", b"\n", b";", b",", b"=", b"^", b"9**9**9", b"\xd0\x90")  # fmt: skip
+_WORDS = (
+    b"", b"0", b"-1", b"1e400", b"nan", b"inf", b"NaN", b"999999999999999999999", b"1_0", b"0x10", b"2026-01-01",
+    b"9**9**9", b"\x00", b"\xff\xfe", b"\xd0\x90", b'"', b"{", b"[", b"[[", b"'''", b"\r", b"\n", b";", b",", b"=",
+    b"^", b"<<", b">>", b"endobj", b"stream", b"/Length 999999999", b"/Count -1", b"/Width 100000",
+)  # fmt: skip
 
 
 @dataclass
@@ -211,15 +213,12 @@ def fuzz(seconds: float, inputs: int | None, seed: int, jobs: int) -> list[tuple
             for index, result in workers.run(try_batch, calls):
                 door = calls[index][0]
                 tried[door] += BATCH[door]
-                for found in (
-                    [result] if isinstance(result, Findings) else _singly(workers, calls[index], result)
-                ):
+                whole = isinstance(result, Findings)
+                for found in [result] if whole else _singly(workers, calls[index], result):
                     failures += [(door, what, data) for what, data in found.failures]
-                    new = {
-                        answer: data for answer, data in found.answers.items() if answer not in answers[door]
-                    }
-                    answers[door] |= new.keys()
-                    pools[door] += new.values()
+                    new = found.answers.keys() - answers[door]
+                    answers[door] |= new
+                    pools[door] += [found.answers[answer] for answer in sorted(new)]
     for door in DOORS:
         print(f"{door}: {tried[door]} inputs, {len(answers[door])} answers, "
               f"{sum(one == door for one, *_ in failures)} failures")  # fmt: skip
