@@ -6,7 +6,7 @@ from pathlib import Path
 
 from grader.documents import UnmatchedDocument
 from grader.intake import count_pages, is_blank, page_of
-from grader.measurements import Measurements, Names, read_measurements
+from grader.measurements import Measurements, Names, read_measurements, students_in
 from grader.ownership import PageSource
 from grader.sheet import whose
 from reference.errors import InputFileError
@@ -24,6 +24,7 @@ class Survey:
     measurements : of a measurement file
     broken : why a page cannot be decoded, by its source
     refused : a measurement file that cannot be used at all
+    students : whom such a file names in itself
     digest : of the content of a file with pages
     """
 
@@ -32,17 +33,19 @@ class Survey:
     broken: Mapping[PageSource, str] = field(default_factory=dict)
     refused: UnmatchedDocument | None = None
     digest: str = ""
+    students: tuple[str, ...] = ()
 
 
 def survey(path: Path, name: str, names: Names) -> Survey:
     """Look at one file; `name` is its path as the user knows it. Never raises for a bad file."""
     try:
         if path.suffix.lower() in MEASUREMENT_TYPES:
-            return Survey(measurements=read_measurements(path, names))
+            return Survey(measurements=read_measurements(path, names, name))
         count = count_pages(path)
     except InputFileError as error:
         if path.suffix.lower() in MEASUREMENT_TYPES:
-            return Survey(refused=UnmatchedDocument(file=name, code=error.code, message=error.message))
+            told = UnmatchedDocument(file=name, code=error.code, message=error.message)
+            return Survey(refused=told, students=students_in(path))
         page = PageSource(name, 1, 1)
         return Survey(pages=(page,), broken={page: error.message})
     found = [_look(path, PageSource(name, number, count)) for number in range(1, count + 1)]

@@ -62,7 +62,26 @@ def _in_order(task: Task, scales: tuple[str, ...]) -> list[CriterionTable]:
 
 
 def _outcome(ledger: Ledger, criterion: CriterionTable) -> Outcome:
-    """The verdict on one criterion; what it costs is remembered for the later ones."""
+    """The verdict on one criterion, open where something entered for it, or for its scale, cannot be used."""
+    found, refused = _judged(ledger, criterion), ledger.evidence.refused
+    entry = refused.get(criterion.name)
+    if entry is None and found.verdict in {"none", "partial"}:
+        entry = refused.get(_scale_of(ledger.task, criterion.name))
+    if entry is None:
+        return found
+    ledger.leave_open(criterion.name)
+    return verdicts.entry_refused(found, entry)
+
+
+def _scale_of(task: Task, name: str) -> str:
+    """The scale of a vector, a link or an angular quantity; empty for a scale."""
+    turned = task.construction.rates.get(name)
+    segment = task.segments.get(name if turned is None else turned.vector)
+    return "" if segment is None else segment.scale
+
+
+def _judged(ledger: Ledger, criterion: CriterionTable) -> Outcome:
+    """The verdict on what can be used; what it costs is remembered for the later ones."""
     if criterion.scale is not None:
         return _scale(ledger, criterion)
     if criterion.angular is not None:
