@@ -23,6 +23,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from grader.documents import MeasurementsDocument
+from grader.quantities import MAX_LENGTH as LONGEST_SCALE
 from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Figure, Problem, Reading, ReadVector, Unread
 from grader.roster import MAX_LINES, delimiter_of, why_no_id
 from reference.assignment import Assignment
@@ -38,6 +39,7 @@ TABLES = {"segments_mm": "", "directions_deg": "_deg", "values": "_value"}
 """The tables of a JSON file, and what a CSV file's columns add to the names in them."""
 MAX_BYTES = 1_000_000
 """A class of a thousand with every length, direction and value writes half of it."""
+_LONG = f"a scale has at most {LONGEST_SCALE} characters"
 MAX_LENGTH_MM = 2000.0
 """Longer than any sheet: a length in other units, or a slip of the pen."""
 
@@ -298,13 +300,14 @@ class _Row:
         """What the line says; what it says wrongly is left out and told."""
         cells = [cell.strip() for cell in self.cells]
         known = {name: cell for name, cell in zip(self.header, cells, strict=False) if cell and name}
-        is_usable = not any(cells[len(self.header) :])
-        if not is_usable:
+        if any(cells[len(self.header) :]):
             told = f"has {len(cells)} fields, the first line names {len(self.header)} columns"
             self.fault("", f"{told}; quote a field that holds a '{self.delimiter}'; nothing of it is used")
             known = {"student_id": cells[0]} if self.header[0] == "student_id" else {}
         student = self.student(known.get("student_id", ""))
         n, position = (self.whole(name, known.get(name, "")) for name in ("n", "position"))
+        # Without its student, n and position nobody knows what it is held against.
+        is_usable = not self.entries.faults
         for column, text in known.items():
             if column in self.entries.columns:
                 self.number(column, text)
@@ -312,7 +315,7 @@ class _Row:
             student_id=student,
             n=n,
             position=position,
-            scales={name: known[name] for name in SCALES if name in known},
+            scales=self.scales(known),
             reading=self.entries.reading(),
             values=self.entries.values(),
             source=self.entries.file,
@@ -320,6 +323,14 @@ class _Row:
             problems=self.entries.problems(),
             is_usable=is_usable,
         )
+
+    def scales(self, known: Mapping[str, str]) -> dict[str, str]:
+        """The scales as declared."""
+        scales = {name: known[name] for name in SCALES if name in known}
+        for name in [name for name, text in scales.items() if len(text) > LONGEST_SCALE]:
+            self.fault(name, f"'{scales[name][:40]}...': {_LONG}")
+            self.entries.refuse(name, name, f"{scales.pop(name)[:40]}...")
+        return scales
 
     def fault(self, column: str, why: str) -> None:
         """Note a fault of this line."""
@@ -360,7 +371,7 @@ class _Row:
             self.entries.refuse(self.entries.columns[column][1], column, text[:40])
 
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 
 
 def _unused(names: Names, given: Collection[str], file: str) -> Iterator[Problem]:
@@ -519,6 +530,8 @@ class _Document:
         for name, value in self.table("scales"):
             if name not in SCALES:
                 self.fault(f"scales.{name[:40]}", f"is not known here; there are {', '.join(SCALES)}")
+            elif isinstance(value, str) and len(value) > LONGEST_SCALE:
+                self.refuse(name, name, f"scales.{name}", _NoValue(value, _LONG))
             elif isinstance(value, str | int | float) and not isinstance(value, bool):
                 scales[name] = str(value)
             else:

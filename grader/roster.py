@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from grader.quantities import MAX_LENGTH as LONGEST_SCALE
 from grader.records import Problem
 from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
 
@@ -150,7 +151,7 @@ def parse_roster(text: str, file: str = "roster.csv") -> Roster:
 def _text_of(path: Path) -> str:
     try:
         if path.stat().st_size > _MAX_BYTES:
-            finding = Finding("$", f"is larger than {_MAX_BYTES:_} bytes: no class's list is")
+            finding = Finding("$", f"is larger than {_MAX_BYTES // 1_000_000} MB: no class's list is")
             raise AuthoredFileError(str(path), (finding,))
         return path.read_bytes().decode("utf-8-sig")
     except OSError as error:
@@ -239,6 +240,8 @@ class _Row:
             return None
         cells = [cell.strip() for cell in self.cells] + [""] * (len(self.header) - len(self.cells))
         known = {name: cell for name, cell in zip(self.header, cells, strict=False) if name in COLUMNS}
+        long = [name for name in SCALES if len(known.get(name, "")) > LONGEST_SCALE]
+        findings.extend(self._told(name, f"has more than {LONGEST_SCALE} characters") for name in long)
         row = RosterRow(
             student_id=self._student_id(known["student_id"], findings),
             name=known["name"],

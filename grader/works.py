@@ -123,7 +123,8 @@ class _Submissions:
             other = self.spelled.get(student.lower(), student)
             if other == student:
                 return exact
-            return Unusable((_unmatched(entered, f"{_line(entered)}{student} differs in case only from {other}"),))
+            why = f"{_line(entered)}{student} differs in case only from {other}: the two would share a folder"
+            return Unusable((_unmatched(entered, why),))
         if (student, None) in self.by_key:
             return student, None
         if not keys:

@@ -36,9 +36,7 @@ class VariantTable(Authored):
         for numbers in (self.n, self.position):
             count *= 1 if numbers is None else max(numbers.last - numbers.first + 1, 0)
         if count > MOST_VARIANTS:
-            raise ValueError(
-                f"has {count:_} variants, at most {MOST_VARIANTS:_} are computed: narrow n or position"
-            )
+            raise ValueError(f"has {count} variants, more than {MOST_VARIANTS}: narrow n or position")
         return self
 
 

@@ -105,11 +105,13 @@ def load(model: type[Model], path: Path) -> Model:
 def _content_of(path: Path) -> bytes:
     """A file's bytes, no more than anything that is authored has; raises OSError, or AuthoredFileError."""
     if path.exists() and not path.is_file():
-        raise AuthoredFileError(str(path), (Finding("$", "is a folder or a device, not a file"),))
+        raise AuthoredFileError(
+            str(path), (Finding("$", "cannot be read: it is a folder or a device, not a file"),)
+        )
     with path.open("rb") as stream:
         content = stream.read(MAX_BYTES + 1)
     if len(content) > MAX_BYTES:
-        finding = Finding("$", f"is larger than {MAX_BYTES:_} bytes: nothing that is authored by hand is")
+        finding = Finding("$", f"is larger than {MAX_BYTES // 1000} kB: nothing that is written by hand is")
         raise AuthoredFileError(str(path), (finding,))
     return content
 

@@ -118,6 +118,14 @@ def test_a_refused_value_is_carried_with_what_was_entered(entered, column, cell)
     assert one.numbers == {"v_B": 58.0}
 
 
+@pytest.mark.parametrize("cell", ["9" * 120_000 + "x", "1." + "0" * 120_000 + "x"])
+def test_a_cell_of_a_hundred_thousand_digits_is_told_in_a_line(entered, cell):
+    (one,) = entered(f"student_id,n,v_A,kv\ns01,{cell},{cell},{cell}\n")
+    assert len(one.problems) == 3
+    assert len(told(one)) < 500
+    assert [gap.name for gap in one.reading.unread] == ["v_A", "kv"]
+
+
 def test_a_student_on_two_lines_is_read_twice_so_that_neither_line_is_lost(entered):
     first, second = entered("student_id,v_A\ns01,60\ns01,61\n")
     assert (first.numbers, second.numbers) == ({"v_A": 60.0}, {"v_A": 61.0})
@@ -142,6 +150,12 @@ def test_no_more_unknown_columns_are_told_than_a_person_reads(entered):
 def test_more_lines_than_any_class_are_refused(entered):
     with pytest.raises(InputFileError, match="line 20001: more than 20000 lines"):
         entered("student_id,v_A\n" + "s1,60\n" * 20_001)
+
+
+@pytest.mark.parametrize("line", ["s01,seven,,60", "s01,7,1.5,60", "s/1,7,,60"])
+def test_a_line_that_is_of_no_known_student_or_variant_is_not_used(entered, line):
+    (one,) = entered(f"student_id,n,position,v_A\n{line}\n")
+    assert not one.is_usable
 
 
 def test_a_student_may_have_several_positions(entered):
@@ -234,7 +248,11 @@ def test_a_students_file_need_not_name_its_student(entered):
         ({"segments_mm": {"v_A": True, "v_B": 58}}, "is no number", "v_A: 'True'"),
         ({"segments_mm": {"v_A": [60], "v_B": 58}}, "is no number", "v_A: 'a list or table'"),
         ({"directions_deg": {"v_A": 720}}, "$.directions_deg.v_A: '720': a direction is", "v_A_deg: '720'"),
-        ({"values": {"omega_3": float("nan")}}, "$.values.omega_3: 'NaN': is no finite", "omega_3_value: 'NaN'"),
+        (
+            {"values": {"omega_3": float("nan")}},
+            "$.values.omega_3: 'NaN': is no finite",
+            "omega_3_value: 'NaN'",
+        ),
         ({"values": {"v_D": float("inf")}}, "'Infinity': is no finite number", "v_D_value: 'Infinity'"),
         ({"scales": {"kL": "1:5", "kv": [1, 2]}}, "$.scales.kv: 'a list or table'", "kv: 'a list or table'"),
     ],
