@@ -23,7 +23,7 @@ from grader.roster import Roster, read_roster
 from grader.rubric import RubricFile
 from grader.survey import Progress, Survey, survey_folder
 from grader.workers import ENDED, Limits, Pool, Workers
-from grader.works import works_of
+from grader.works import Unusable, works_of
 from reference.assignment import Assignment, Variant
 from reference.errors import CallError, PlanmarkError
 
@@ -148,14 +148,17 @@ def _works(
         student_ids=[row.student_id for row in measured if row.student_id],
     )
     paths = {told_name(path, batch.folder): path for path in files}
-    works, strangers = works_of(batch.assignment, roster, ownership, measured, paths, batch.lang)
+    refused = [(one.refused, one.students) for one in surveys if one.refused is not None]
+    unusable = [Unusable((Problem(one.code, one.message, one.file),), who) for one, who in refused]
+    works, strangers = works_of(
+        batch.assignment, roster, ownership, measured, paths, batch.lang, refused=unusable
+    )
     unmatched = [_unmatched(one) for one in ownership.unmatched]
     told = [
         UnmatchedDocument(file=one.file or "", code=one.code, message=one.message)
         for one in ownership.problems
     ]
-    refused = [one.refused for one in surveys if one.refused is not None]
-    return works, [*refused, *unmatched, *strangers, *told]
+    return works, [*(one for one, _ in refused), *unmatched, *strangers, *told]
 
 
 def _unmatched(one: Unmatched) -> UnmatchedDocument:

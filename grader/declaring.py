@@ -11,7 +11,7 @@ from typing import Literal
 from grader.comparison import Submission, Task
 from grader.comparison.evidence import Evidence, gather
 from grader.quantities import ByRule, Declared, ParsedScale, parse_scale
-from grader.records import Problem, Reading, Written
+from grader.records import Problem, Reading, Unread, Written
 
 LIKELY, SURE, BEYOND_DOUBT = 0.2, 0.9, 0.985
 """Confidence at which a box is believed where the drawing or the rule has the very scale (a misreading
@@ -33,11 +33,13 @@ class Declarations:
     texts : as written, by scale
     sources : where each is from
     problems : boxes that were not believed, or that contradict what was entered
+    unread : scales that were entered in two ways, of which none counts
     """
 
     texts: Mapping[str, str]
     sources: Mapping[str, Source]
     problems: tuple[Problem, ...] = ()
+    unread: tuple[Unread, ...] = ()
 
 
 def sure_texts(readings: Sequence[Mapping[str, Written]]) -> dict[str, str]:
@@ -51,18 +53,31 @@ def sure_texts(readings: Sequence[Mapping[str, Written]]) -> dict[str, str]:
 
 
 def declarations(
-    task: Task, entered: Mapping[Source, Mapping[str, str]], readings: Sequence[Reading]
+    task: Task,
+    entered: Mapping[Source, Mapping[str, str]],
+    readings: Sequence[Reading],
+    further: Sequence[Mapping[str, str]] = (),
 ) -> Declarations:
-    """What counts, from what was entered (later sources before earlier ones) and from the boxes."""
+    """What counts, from what was entered (later sources before earlier ones) and from the boxes.
+
+    Arguments: `further` are the scales of further files of measurements.
+    """
     evidence = gather(task, Submission(readings=tuple(readings)))
     texts: dict[str, str] = {}
     sources: dict[str, Source] = {}
     problems: list[Problem] = []
+    unread: list[Unread] = []
     known: dict[str, float] = {}
     for name in SCALE_NAMES:
-        for source, declared in entered.items():
-            if declared.get(name, "").strip():
-                texts[name], sources[name] = declared[name], source
+        given = [(declared.get(name, "").strip(), source) for source, declared in entered.items()]
+        given += [(declared.get(name, "").strip(), "measurements") for declared in further]
+        given = [(text, source) for text, source in given if text]
+        if any(not _is_one_scale(task, name, text, given[0][0], known) for text, _ in given):
+            problems.append(_differ(name, given))
+            unread.append(Unread(name, " / ".join(dict.fromkeys(f"'{text}'" for text, _ in given))))
+            continue
+        if given:
+            texts[name], sources[name] = given[-1]
         boxes = [reading.written[name] for reading in readings if name in reading.written]
         box, told = _believed(task, evidence, name, boxes, known)
         if name not in texts:
@@ -73,7 +88,7 @@ def declarations(
             problems.append(_contradicts(name, box, texts[name], sources[name]))
         if name in texts:
             known.update(_value(task, name, texts[name], known))
-    return Declarations(texts, sources, tuple(problems))
+    return Declarations(texts, sources, tuple(problems), tuple(unread))
 
 
 def _believed(
@@ -103,9 +118,21 @@ def _believed(
 
 
 def _contradicts(name: str, box: Written, text: str, source: Source) -> Problem:
-    where = {"roster": "the roster", "measurements": "the measurements", "box": "the box"}[source]
-    told = f"{name}'s box reads '{box.text}' ({100 * box.confidence:.0f} %), {where} '{text}', which is used"
-    return Problem("scale_box_disagrees", told)
+    told = f"{name}'s box reads '{box.text}' ({100 * box.confidence:.0f} %)"
+    return Problem("scale_box_disagrees", f"{told}, {SOURCES[source]} '{text}', which is used")
+
+
+def _differ(name: str, given: Sequence[tuple[str, Source]]) -> Problem:
+    told = ", ".join(dict.fromkeys(f"'{text}' in {SOURCES[source]}" for text, source in given))
+    return Problem("scale_disagrees", f"{name} is {told}: none is used; correct one of them")
+
+
+SOURCES: Mapping[Source, str] = {
+    "roster": "the roster",
+    "measurements": "the measurements",
+    "box": "the box",
+}
+"""What messages call them."""
 
 
 # Values -------------------------------------------------------------------------------------------
@@ -132,6 +159,15 @@ def _is_same(task: Task, name: str, one: str, other: str, known: Mapping[str, fl
     """Whether two texts mean one scale; what cannot be understood contradicts nothing."""
     first, second = (_value(task, name, text, known).get(name) for text in (one, other))
     return first is None or second is None or abs(first / second - 1.0) <= SAME
+
+
+def _is_one_scale(task: Task, name: str, one: str, other: str, known: Mapping[str, float]) -> bool:
+    """Whether two texts surely mean one scale; the assignment's own stand for those that a rule needs."""
+    if one == other or _parsed(task, name, one) == _parsed(task, name, other):
+        return True
+    known = {**task.rule_scales, **known}
+    first, second = (_value(task, name, text, known).get(name) for text in (one, other))
+    return first is not None and second is not None and abs(first / second - 1.0) <= SAME
 
 
 def _is_borne_out(

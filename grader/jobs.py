@@ -1,5 +1,6 @@
 """The jobs of a run, one for each submission, and what all of them together tell."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,9 +39,10 @@ class Job:
 
 def folders_of(works: Iterable[Work]) -> list[str]:
     """Each work's folder below the results: the student's, with several positions one for each."""
-    students = [work.student_id for work in works]
+    works = list(works)
+    count = Counter(work.student_id for work in works)
     return [
-        work.student_id if students.count(work.student_id) == 1 else f"{work.student_id}/{_position(work)}"
+        work.student_id if count[work.student_id] == 1 else f"{work.student_id}/{_position(work)}"
         for work in works
     ]
 

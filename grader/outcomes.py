@@ -21,6 +21,7 @@ value_reversed        measured, expected, unit                               its
 not_measured                                                                 nothing was handed in
 optional                                                                     not handed in, not asked
 unread                reason                                                 asked for, not read
+entry_refused         reason                                                 an entry cannot be used
 doubtful              confidence                                             read without confidence
 near_limit            se, off, tolerance, what                               the error straddles a limit
 hand_may_miss                                                                off by no more than a careful

@@ -23,7 +23,7 @@ from pathlib import PurePath
 
 from grader.class_order import OrderRefused, deal
 from grader.records import Identity, Problem
-from grader.roster import STUDENT_ID, Roster, RosterRow, ScanRef
+from grader.roster import Roster, RosterRow, ScanRef, why_no_id
 
 
 class How(Enum):
@@ -73,10 +73,11 @@ class Owned:
 
 @dataclass(frozen=True, slots=True)
 class Unmatched:
-    """A page without an owner, and why."""
+    """A page without an owner, why, and the students whose it may be."""
 
     source: PageSource
     problem: Problem
+    students: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +136,8 @@ def assign_pages(
         if isinstance(settled, Owned):
             owned.append(settled)
         else:
-            unmatched.append(Unmatched(page, settled))
+            students = dict.fromkeys(row.student_id for claim in claims for row in claim.rows)
+            unmatched.append(Unmatched(page, settled, tuple(students)))
     return Ownership(tuple(owned), tuple(unmatched), tuple(blank), tuple(_missing_scans(pages, listed)))
 
 
@@ -151,25 +153,31 @@ def student_of_name(file: str, student_ids: Iterable[str]) -> str | None:
 
 
 def _improvised(pages: Sequence[PageSource], student_ids: Iterable[str]) -> Roster:
-    """A roster from what the pages say, for a folder that has none."""
-    rows = {
-        (page.identity.student_id, page.identity.position): RosterRow(
-            page.identity.student_id, n=page.identity.n, position=page.identity.position
-        )
-        for page in pages
-        if page.identity is not None
-    }
+    """A roster from what the pages say, for a folder that has none.
+
+    Nobody is on it under an id that could not name a folder of its own.
+    """
+    rows: dict[tuple[str, int | None], RosterRow] = {}
+    spelled: dict[str, str] = {}
+
+    def add(row: RosterRow) -> None:
+        other = spelled.setdefault(row.student_id.lower(), row.student_id)
+        if other == row.student_id and why_no_id(row.student_id) is None:
+            rows[row.student_id, row.position] = row
+
+    for page in pages:
+        if page.identity is not None:
+            identity = page.identity
+            add(RosterRow(identity.student_id, n=identity.n, position=identity.position))
     known = {student for student, _ in rows}
     for student in student_ids:
         if student not in known:
-            rows[student, None] = RosterRow(student)
-            known.add(student)
+            add(RosterRow(student))
     stems = {PurePath(page.file).stem for page in pages if page.identity is None and not page.blank}
     for stem in sorted(stems, key=lambda stem: (len(stem), stem)):
         # A second sheet's s07_2 belongs to s07 where there is one.
-        if STUDENT_ID.fullmatch(stem) and set(stem) != {"."} and student_of_name(f"{stem}.x", known) is None:
-            rows[stem, None] = RosterRow(stem)
-            known.add(stem)
+        if student_of_name(f"{stem}.x", spelled.values()) is None:
+            add(RosterRow(stem))
     return Roster("", tuple(rows.values()))
 
 
@@ -279,7 +287,9 @@ def _settle(
     if not claims:
         if refusal is not None:
             return problem("order_refused", f"the roster's order cannot be used: {refusal}")
-        return problem("owner_unknown", "nothing says whose it is" + _near(page.file, roster))
+        why = why_no_id(PurePath(page.file).stem)
+        refused = f"; its name is no student's id: {why}" if why and not roster.file else ""
+        return problem("owner_unknown", f"nothing says whose it is{_near(page.file, roster)}{refused}")
     common = _common(claims)
     if not common:
         if identity is not None and not claims[0].rows and len(claims) == 1:

@@ -69,6 +69,7 @@ class Work:
     declared : scales as declared, text by ``kL``, ``kv``, ``ka``
     measured : entered measurements, or None
     problems : what was noticed before marking
+    has_unusable : whether something was handed in that cannot be used; `problems` say what
     """
 
     student_id: str
@@ -79,6 +80,7 @@ class Work:
     lang: str = "en"
     name: str = ""
     problems: tuple[Problem, ...] = ()
+    has_unusable: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,7 +200,8 @@ def mark_looked(
         problems = (*work.problems, *_problems_of(looked), judged)
         report = unjudged_report(
             assignment, rubric, work.variant or Variant(), work.student_id,
-            "unreadable" if work.pages or work.measured else "missing", problems=problems, sheets=documents,
+            "unreadable" if work.pages or work.measured or work.has_unusable else "missing",
+            problems=problems, sheets=documents,
         )  # fmt: skip
         return Marked(work, report, _pictures(looked, None, None, show_expected=with_ghosts))
     task, judgement, declared = judged
@@ -368,6 +371,8 @@ def _judged(
             "variant_unknown", "nothing says this student's number or position: add it to the roster"
         )
     if not drawn and work.measured is None:
+        if work.has_unusable:
+            return Problem("nothing_usable", "nothing that was handed in can be used")
         if not work.pages:
             return Problem("nothing_handed_in", "nothing was handed in")
         return Problem("nothing_read", "no figure of this assignment could be read on the pages handed in")
@@ -379,10 +384,12 @@ def _judged(
     entered: dict[Source, Mapping[str, str]] = {"roster": work.declared}
     if measured is not None:
         entered["measurements"] = measured.scales
-    declared = declarations(task, entered, readings)
+    further = () if measured is None else measured.further_scales
+    declared = declarations(task, entered, readings, further)
+    by_hand = Reading({}) if measured is None else measured.reading
     submission = Submission(
         readings=drawn,
-        measured=None if measured is None else measured.reading,
+        measured=replace(by_hand, unread=(*by_hand.unread, *declared.unread)),
         values={} if measured is None else measured.values,
         declared=declared.texts,
     )

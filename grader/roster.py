@@ -6,28 +6,36 @@ semicolon-separated file numbers have decimal commas, and a `scans` field of sev
 """
 
 import csv
-import difflib
 import io
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from grader.quantities import MAX_LENGTH as LONGEST_SCALE
 from grader.records import Problem
-from reference.errors import AuthoredFileError, Finding
+from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
 
 if TYPE_CHECKING:
     from _csv import Reader
 
-STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
+_STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
+_DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
+"""Windows opens a device in place of a file or folder of such a name, whatever its extension."""
+_RESULT_FILES = frozenset({"results.json", "summary.csv", "index.html", "decisions.csv"})
+"""What lies beside the students' folders of results."""
 LANGUAGES = ("en", "ro", "ru")
 SCALES = ("kL", "kv", "ka")
 COLUMNS = ("student_id", "name", "n", "position", "email", *SCALES, "lang", "scans")
 DRAFT_COLUMNS = ("why", "sure")
 """What `planmark match` adds for the person who checks its draft; without meaning here."""
 _REQUIRED = ("student_id", "name")
-_MAX_LINES = 20_000
+MAX_LINES = 20_000
+"""No class has more students and positions."""
+_MAX_BYTES = 20_000_000
+"""So many lines of a thousand characters."""
 _ALMOST = 0.75
 """Likeness from which an unknown column is taken for a misspelt one."""
 
@@ -93,6 +101,19 @@ class Roster:
         return tuple(row for row in self.rows if row.student_id == student_id)
 
 
+def why_no_id(text: str) -> str | None:
+    """Why a text cannot be a student's id, which names the student's folder of results; None where it can."""
+    if _STUDENT_ID.fullmatch(text) is None:
+        return "letters A-Z a-z, digits, '.', '_' and '-', at most 64, are allowed"
+    if text.startswith(".") or text.endswith("."):
+        return "it cannot name a folder: it begins or ends with a dot"
+    if _DEVICES.fullmatch(text):
+        return "it cannot name a folder: Windows has a device of that name"
+    if text.lower() in _RESULT_FILES:
+        return "it cannot name a folder: a file of the results has that name"
+    return None
+
+
 def read_roster(path: Path | str) -> Roster:
     """Read a roster.
 
@@ -124,11 +145,14 @@ def parse_roster(text: str, file: str = "roster.csv") -> Roster:
             findings.append(Finding("line 2", "there are no students below the line of column names"))
     if findings:
         raise AuthoredFileError(file, tuple(findings))
-    return Roster(file, tuple(rows), (*_passed_over(header, file), *_alike(rows, file)))
+    return Roster(file, tuple(rows), tuple(_passed_over(header, file)))
 
 
 def _text_of(path: Path) -> str:
     try:
+        if path.stat().st_size > _MAX_BYTES:
+            finding = Finding("$", f"is larger than {_MAX_BYTES // 1_000_000} MB: no class's list is")
+            raise AuthoredFileError(str(path), (finding,))
         return path.read_bytes().decode("utf-8-sig")
     except OSError as error:
         finding = Finding("$", f"cannot be read: {error.strerror or error}")
@@ -155,8 +179,8 @@ def _lines(reader: "Reader", findings: list[Finding]) -> Iterator[tuple[int, lis
         except csv.Error as error:
             findings.append(Finding(f"line {begin}", f"is no CSV: {error}; check its quotes"))
             return
-        if begin > _MAX_LINES:
-            findings.append(Finding(f"line {begin}", f"more than {_MAX_LINES} lines are no class"))
+        if begin > MAX_LINES:
+            findings.append(Finding(f"line {begin}", f"more than {MAX_LINES} lines are no class"))
             return
         if any(cell.strip() for cell in cells):
             yield begin, cells
@@ -167,36 +191,32 @@ def _check_header(header: list[str]) -> Iterator[Finding]:
     for name in _REQUIRED:
         if name not in header:
             yield Finding("line 1", f"column {name} is missing")
-    for name in sorted({name for name in header if name and header.count(name) > 1}):
-        yield Finding("line 1", f"column {name} is there {header.count(name)} times")
-    for name in header:
-        if name in COLUMNS or name in DRAFT_COLUMNS:
-            continue
+    for name, count in sorted(Counter(filter(None, header)).items()):
+        if count > 1:
+            yield Finding("line 1", f"column {_short(name)} is there {count} times")
+    names = frozenset(header)
+    for name in _unknown(header)[:MOST_FINDINGS]:
         near = _near(name)
-        if near is not None and near not in header:
-            yield Finding("line 1", f"column '{name}' is not known; did you mean {near}?")
+        if near is not None and near not in names:
+            yield Finding("line 1", f"column '{_short(name)}' is not known; did you mean {near}?")
+
+
+def _unknown(header: list[str]) -> list[str]:
+    return [name for name in header if name and name not in COLUMNS and name not in DRAFT_COLUMNS]
 
 
 def _near(name: str) -> str | None:
-    by_lower = {column.lower(): column for column in COLUMNS}
-    found = difflib.get_close_matches(name.lower().replace(" ", "_"), by_lower, n=1, cutoff=_ALMOST)
-    return by_lower[found[0]] if found else None
+    found = near_names(name.replace(" ", "_"), COLUMNS, most=1, cutoff=_ALMOST)
+    return found[0] if found else None
 
 
 def _passed_over(header: list[str], file: str) -> Iterator[Problem]:
-    unknown = [name for name in header if name and name not in COLUMNS and name not in DRAFT_COLUMNS]
+    unknown = _unknown(header)
     if unknown:
-        message = f"columns without meaning here are passed over: {', '.join(unknown)}"
+        told = ", ".join(_short(name) for name in unknown[:MOST_FINDINGS])
+        more = f" and {len(unknown) - MOST_FINDINGS} more" if len(unknown) > MOST_FINDINGS else ""
+        message = f"columns without meaning here are passed over: {told}{more}"
         yield Problem("roster_columns", message, file)
-
-
-def _alike(rows: list[RosterRow], file: str) -> Iterator[Problem]:
-    """Folders of results are named by the ids: where case does not count, two of them would be one."""
-    spelled: dict[str, str] = {}
-    for student in dict.fromkeys(row.student_id for row in rows):
-        other = spelled.setdefault(student.lower(), student)
-        if other != student:
-            yield Problem("roster_ids_alike", f"{other} and {student} differ in case only", file)
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,6 +240,8 @@ class _Row:
             return None
         cells = [cell.strip() for cell in self.cells] + [""] * (len(self.header) - len(self.cells))
         known = {name: cell for name, cell in zip(self.header, cells, strict=False) if name in COLUMNS}
+        long = [name for name in SCALES if len(known.get(name, "")) > LONGEST_SCALE]
+        findings.extend(self._told(name, f"has more than {LONGEST_SCALE} characters") for name in long)
         row = RosterRow(
             student_id=self._student_id(known["student_id"], findings),
             name=known["name"],
@@ -237,13 +259,11 @@ class _Row:
         return Finding(f"line {self.line}, {column}", message)
 
     def _student_id(self, text: str, findings: list[Finding]) -> str:
+        why = why_no_id(text)
         if not text:
             findings.append(self._told("student_id", "is empty"))
-        elif STUDENT_ID.fullmatch(text) is None:
-            allowed = "letters A-Z a-z, digits, '.', '_' and '-', at most 64"
-            findings.append(self._told("student_id", f"'{_short(text)}' is refused: {allowed} are allowed"))
-        elif set(text) == {"."}:
-            findings.append(self._told("student_id", f"'{text}' is refused: it cannot name a folder"))
+        elif why is not None:
+            findings.append(self._told("student_id", f"'{_short(text)}' is refused: {why}"))
         return text
 
     def _whole(self, column: str, text: str, findings: list[Finding]) -> int | None:
@@ -289,7 +309,7 @@ def parse_scan(text: str) -> ScanRef | str:
 
 
 def _check_together(rows: list[RosterRow]) -> Iterator[Finding]:
-    """Faults between lines: a student twice, positions missing, a file of two students."""
+    """Faults between lines: a student twice, two in one folder, positions missing, a file of two students."""
     first: dict[tuple[str, int | None], int] = {}
     for row in rows:
         key = (row.student_id, row.position)
@@ -298,8 +318,19 @@ def _check_together(rows: list[RosterRow]) -> Iterator[Finding]:
             told = f"{row.student_id}{where} is on line {first[key]} already"
             yield Finding(f"line {row.line}, student_id", told)
         first.setdefault(key, row.line)
+    yield from _check_case(rows)
     yield from _check_positions(rows)
     yield from _check_scans(rows)
+
+
+def _check_case(rows: list[RosterRow]) -> Iterator[Finding]:
+    """Folders of results are named by the ids: where case does not count, two of them would be one."""
+    spelled: dict[str, RosterRow] = {}
+    for row in rows:
+        other = spelled.setdefault(row.student_id.lower(), row)
+        if other.student_id != row.student_id:
+            told = f"{row.student_id} differs in case only from {other.student_id} on line {other.line}"
+            yield Finding(f"line {row.line}, student_id", f"{told}: the two would share a folder")
 
 
 def _check_positions(rows: list[RosterRow]) -> Iterator[Finding]:
@@ -316,16 +347,20 @@ def _check_positions(rows: list[RosterRow]) -> Iterator[Finding]:
 
 
 def _check_scans(rows: list[RosterRow]) -> Iterator[Finding]:
-    owners: dict[str, list[tuple[ScanRef, RosterRow]]] = {}
+    """Files and pages that two lines name, or one line twice; a whole file holds each of its pages."""
+    owners: dict[str, dict[int | None, tuple[ScanRef, RosterRow]]] = {}
     for row in rows:
         for ref in row.scans:
-            named = owners.setdefault(ref.file, [])
-            for other, owner in named:
-                if other.page is None or ref.page is None or other.page == ref.page:
-                    told = f"{ref} is named on line {owner.line} already ({other})"
-                    yield Finding(f"line {row.line}, scans", told)
-                    break
-            named.append((ref, row))
+            named = owners.setdefault(ref.file, {})
+            clash = (
+                next(iter(named.values()), None)
+                if ref.page is None
+                else named.get(ref.page) or named.get(None)
+            )
+            if clash is not None:
+                told = f"{ref} is named on line {clash[1].line} already ({clash[0]})"
+                yield Finding(f"line {row.line}, scans", told)
+            named.setdefault(ref.page, (ref, row))
 
 
 def _short(text: str) -> str:

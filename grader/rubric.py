@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from reference.assignment import Assignment, locate
-from reference.authored import Authored, Identifier, Text, load
+from reference.authored import Authored, Identifier, Text, is_file, load
 from reference.construction import Construction
 from reference.derivation import construction_of
 from reference.errors import AuthoredFileError, CallError, Finding
@@ -251,10 +251,10 @@ def load_rubric(name: str | Path, *, beside: Path | None = None) -> RubricFile:
     Raises CallError for an unknown name, AuthoredFileError with every fault of the file.
     """
     path = locate("rubric", str(name), beside)
-    if not path.is_file() and not str(name).endswith(".toml"):
+    if not is_file(path) and not str(name).endswith(".toml"):
         places = "among the built-in ones" if beside is None else f"in {beside.parent} and the built-in ones"
         raise CallError("unknown_rubric", f"there is no rubric '{name}': {path.name} was looked for {places}")
-    return _load(path.resolve(), path.stat().st_mtime_ns if path.is_file() else 0)
+    return _load(path.resolve(), path.stat().st_mtime_ns if is_file(path) else 0)
 
 
 @cache

@@ -14,11 +14,12 @@ from grader.files import write_whole
 from grader.folder import told_name
 from grader.intake import changed, count_pages, is_blank, load, page_of
 from grader.kept import code_version, packed, unpacked
-from grader.measurements import Measurements, Names, read_measurements
+from grader.measurements import Measurements, Names, read_measurements, students_in
 from grader.ownership import PageSource
 from grader.records import Problem
 from grader.sheet import whose
 from grader.workers import Pool
+from reference.errors import InputFileError
 
 MEASUREMENT_TYPES = {".csv", ".json"}
 Progress = Callable[[str, int, int], None]
@@ -34,12 +35,14 @@ class Survey:
     pages : a source for each page; a page that cannot be decoded has one too, so that its owner is told
     measurements : of a measurement file
     refused : a measurement file that cannot be used at all
+    students : whom such a file names in itself
     is_complete : whether the pages were looked at; otherwise they are only counted
     """
 
     pages: tuple[PageSource, ...] = ()
     measurements: tuple[Measurements, ...] = ()
     refused: UnmatchedDocument | None = None
+    students: tuple[str, ...] = ()
     is_complete: bool = True
 
 
@@ -77,7 +80,7 @@ def survey_folder(
 def open_file(path: Path, name: str, names: Names, notes: Path) -> Survey:
     """A measurement file's content, or a file's pages: as noted by an earlier run, else only counted."""
     if path.suffix.lower() in MEASUREMENT_TYPES:
-        return Survey(measurements=read_measurements(path, names))
+        return _measured(path, name, names)
     file = load(path)
     known = _noted(notes, name, file.digest)
     if known is not None:
@@ -85,6 +88,14 @@ def open_file(path: Path, name: str, names: Names, notes: Path) -> Survey:
     count = count_pages(file)
     pages = tuple(PageSource(name, number, count, digest=file.digest) for number in range(1, count + 1))
     return Survey(pages, is_complete=False)
+
+
+def _measured(path: Path, name: str, names: Names) -> Survey:
+    try:
+        return Survey(measurements=read_measurements(path, names, name))
+    except InputFileError as error:
+        refused = UnmatchedDocument(file=name, code=error.code, message=error.message)
+        return Survey(refused=refused, students=students_in(path))
 
 
 def look_at(path: Path, source: PageSource) -> PageSource:

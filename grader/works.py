@@ -1,38 +1,161 @@
-"""From pages with owners, measurements and the roster to each student's work."""
+"""From pages with owners, measurements and the roster to each student's work.
 
+What cannot be used, and what two students may have handed in, is told in the reports of both: nobody
+is missing where a file of theirs lies in the folder. Codes of the problems of measurements, beside
+those of `grader.ownership`:
+
+| code | meaning |
+|---|---|
+| measurements_unmatched | of nobody on the roster, or of nobody who can be told |
+| position_disagrees | the student is on the roster, with other positions |
+"""
+
+import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 
 from grader.documents import UnmatchedDocument
-from grader.measurements import Measurements
+from grader.measurements import Measurements, combined
 from grader.ownership import How, Owned, Ownership, PageSource, student_of_name
 from grader.pipeline import Place, Work
 from grader.records import Problem
-from grader.roster import STUDENT_ID, Roster, RosterRow
+from grader.roster import Roster, RosterRow, why_no_id
 from reference.assignment import Assignment, Variant
 from reference.errors import CallError
 
 Key = tuple[str, int | None]
 """student_id and position."""
+_DIGITS = re.compile(r"[0-9]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Unusable:
+    """A file, page or line that cannot be used, and the students whose it may be.
+
+    Attributes
+    ----------
+    position : of those students, None where it is not known or they have it not
+    """
+
+    problems: tuple[Problem, ...]
+    students: tuple[str, ...] = ()
+    position: int | None = None
 
 
 @dataclass(slots=True)
 class _Gathered:
-    """What was found for one student and position so far."""
+    """What was handed in by one student for one position."""
 
     row: RosterRow | None = None
     owned: list[Owned] = field(default_factory=list)
     measured: list[Measurements] = field(default_factory=list)
+    unusable: list[Problem] = field(default_factory=list)
 
 
-def works_of(
+@dataclass(slots=True)
+class _Submissions:
+    """Everybody's, by student and position, in the order in which they were added."""
+
+    roster: Roster | None
+    by_key: dict[Key, _Gathered] = field(default_factory=dict)
+    keys: dict[str, list[Key]] = field(default_factory=dict)
+    spelled: dict[str, str] = field(default_factory=dict)
+    """Ids by their letters in lower case: folders whose names differ in case only may be one."""
+    said: dict[str, set[str]] = field(default_factory=dict)
+    """The students whom each measurement file names in itself."""
+    named: dict[str, str | None] = field(default_factory=dict)
+    """The student whom each file's name tells."""
+
+    def at(self, key: Key) -> _Gathered:
+        """One student's for one position, new where there is none yet."""
+        if key not in self.by_key:
+            self.by_key[key] = _Gathered()
+            self.keys.setdefault(key[0], []).append(key)
+            self.spelled.setdefault(key[0].lower(), key[0])
+        return self.by_key[key]
+
+    def take(self, entered: Measurements) -> Unusable | None:
+        """Add measurements to their owner's; or what keeps them from being used."""
+        student, named = entered.student_id, self.student_of_file(entered.source)
+        if student is not None and named not in {None, student}:
+            told = f"{entered.place}: the file's name says {named}, what is in it {student}"
+            problem = Problem("owner_disagree", f"{told}; used for neither: correct one", entered.source)
+            return Unusable((problem,), (str(named), student), entered.position)
+        student = named if student is None and entered.line is None else student
+        if student is None:
+            why = "; ".join(problem.message for problem in entered.problems)
+            return Unusable((_unmatched(entered, why or "nothing says whose measurements these are"),))
+        if not entered.is_usable:
+            return Unusable(entered.problems, (student,), entered.position)
+        key = self.key_of(student, entered)
+        if isinstance(key, Unusable):
+            return key
+        self.at(key).measured.append(entered)
+        return None
+
+    def student_of_file(self, file: str) -> str | None:
+        """The student whom a measurement file's name tells; none of a class's file.
+
+        Without a roster that is also the whole stem of a JSON file that names nobody, or somebody
+        whose id is made as the stem is.
+        """
+        said = self.said.get(file, set())
+        if file not in self.named:
+            ids = set(self.keys).union(*(() if self.roster is not None else self.said.values()))
+            self.named[file] = student_of_name(file, ids) if len(said) <= 1 else None
+            stem = PurePath(file).stem
+            is_json = file.lower().endswith(".json") and self.roster is None and why_no_id(stem) is None
+            if self.named[file] is None and is_json:
+                made = {_DIGITS.sub("0", student) for student in said}
+                self.named[file] = stem if made <= {_DIGITS.sub("0", stem)} else None
+        return self.named[file]
+
+    def key_of(self, student: str, entered: Measurements) -> Key | Unusable:
+        """The student and position that measurements belong to, or why there is none."""
+        keys = self.keys.get(student, [])
+        exact = (student, entered.position)
+        if entered.position is None and len(keys) == 1:
+            return keys[0]
+        if exact in self.by_key:
+            return exact
+        if self.roster is None:
+            other = self.spelled.get(student.lower(), student)
+            if other == student:
+                return exact
+            why = f"{_line(entered)}{student} differs in case only from {other}: the two would share a folder"
+            return Unusable((_unmatched(entered, why),))
+        if (student, None) in self.by_key:
+            return student, None
+        if not keys:
+            return Unusable((_unmatched(entered, f"{_line(entered)}{student} is not on the roster"),))
+        places = ", ".join(str(position) for _, position in keys)
+        if entered.position is None:
+            told = f"{entered.place}: {student} has the positions {places}; nothing says which"
+            return Unusable((Problem("owner_ambiguous", told, entered.source),), (student,))
+        told = f"{entered.place}: {student} in position {entered.position}, the roster has {places}"
+        return Unusable((Problem("position_disagrees", told, entered.source),), (student,))
+
+    def tell(self, unusable: Unusable) -> None:
+        """Tell everybody whose it may be; with a roster, those on it alone."""
+        for student in unusable.students:
+            keys = self.keys.get(student, [])
+            exact = [key for key in keys if key[1] == unusable.position]
+            if not keys and self.roster is None and self.spelled.get(student.lower(), student) == student:
+                keys = [(student, unusable.position)]
+            for key in exact or keys:
+                self.at(key).unusable.extend(unusable.problems)
+
+
+def works_of(  # noqa: PLR0913 - whatever a folder holds
     assignment: Assignment,
     roster: Roster | None,
     ownership: Ownership,
     measured: Sequence[Measurements],
     paths: Mapping[str, Path],
     lang: str,
+    *,
+    refused: Sequence[Unusable] = (),
 ) -> tuple[list[Work], list[UnmatchedDocument]]:
     """Each student's work (with a roster: of everybody on it), and measurements that are nobody's.
 
@@ -40,22 +163,44 @@ def works_of(
     ---------
     paths : of the files by their names in the folder
     lang : where the roster does not say
+    refused : measurement files that cannot be used, with the students whom they name in themselves
     """
-    found: dict[Key, _Gathered] = {}
-    if roster is not None:
-        for row in roster.rows:
-            found[row.student_id, row.position] = _Gathered(row)
+    found = _Submissions(roster)
+    for row in () if roster is None else roster.rows:
+        found.at((row.student_id, row.position)).row = row
     for owned in (*ownership.owned, *_blank_only(ownership, roster)):
-        found.setdefault((owned.student_id, owned.position), _Gathered()).owned.append(owned)
-    strangers = []
+        found.at((owned.student_id, owned.position)).owned.append(owned)
     for entered in measured:
-        key = _owner(entered, found, roster)
-        if key is None:
-            strangers.append(_nobody(entered))
-        else:
-            found.setdefault(key, _Gathered()).measured.append(entered)
-    works = [_work(assignment, key, one, paths, lang) for key, one in found.items()]
+        said = found.said.setdefault(entered.source, set())
+        said.update([] if entered.student_id is None else [entered.student_id])
+    unusable = [one for one in map(found.take, measured) if one is not None]
+    pages = [Unusable((one.problem,), one.students) for one in ownership.unmatched]
+    for one in (*unusable, *(_by_name(found, one) for one in refused), *pages):
+        found.tell(one)
+    works = [_work(assignment, key, one, paths, lang) for key, one in found.by_key.items()]
+    strangers = [
+        UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
+        for one in unusable
+        for problem in one.problems
+    ]
     return works, strangers
+
+
+def _by_name(found: _Submissions, refused: Unusable) -> Unusable:
+    """A file that cannot be used, with the student whom its name tells among those whose it may be."""
+    file = refused.problems[0].file or ""
+    found.said[file] = set(refused.students)
+    named = found.student_of_file(file)
+    students = [named] if named is not None and named not in refused.students else []
+    return replace(refused, students=(*students, *refused.students))
+
+
+def _line(entered: Measurements) -> str:
+    return "" if entered.line is None else f"line {entered.line}, student_id: "
+
+
+def _unmatched(entered: Measurements, why: str) -> Problem:
+    return Problem("measurements_unmatched", f"{entered.source}: {why}", entered.source)
 
 
 def _blank_only(ownership: Ownership, roster: Roster | None) -> list[Owned]:
@@ -64,7 +209,7 @@ def _blank_only(ownership: Ownership, roster: Roster | None) -> list[Owned]:
     found: dict[str, Owned] = {}
     for source in ownership.blank:
         stem = PurePath(source.file).stem
-        improvised = [stem] if STUDENT_ID.fullmatch(stem) else []
+        improvised = [stem] if why_no_id(stem) is None else []
         student = student_of_name(source.file, improvised if roster is None else roster.student_ids)
         if student is not None and student not in having:
             rows = () if roster is None else roster.rows_of(student)
@@ -73,53 +218,26 @@ def _blank_only(ownership: Ownership, roster: Roster | None) -> list[Owned]:
     return list(found.values())
 
 
-def _owner(entered: Measurements, found: Mapping[Key, _Gathered], roster: Roster | None) -> Key | None:
-    """The student and position that measurements belong to; None where the roster knows nobody so."""
-    if entered.student_id is None:
-        return None
-    places = [key for key in found if key[0] == entered.student_id]
-    exact = (entered.student_id, entered.position)
-    if exact in found or roster is None:
-        if entered.position is None and len(places) == 1:
-            return places[0]
-        return exact
-    if entered.position is None and len(places) == 1:
-        return places[0]
-    loose = (entered.student_id, None)
-    return loose if loose in found else None
-
-
-def _nobody(entered: Measurements) -> UnmatchedDocument:
-    line = "" if entered.line is None else f", line {entered.line}"
-    who = entered.student_id or "nobody"
-    position = "" if entered.position is None else f", position {entered.position}"
-    told = f"{entered.source}{line}: measurements of {who}{position}, who is not on the roster so"
-    return UnmatchedDocument(file=entered.source, code="measurements_unmatched", message=told)
-
-
 def _work(assignment: Assignment, key: Key, one: _Gathered, paths: Mapping[str, Path], lang: str) -> Work:
     student_id, position = key
     row = one.row or RosterRow(student_id)
-    problems: list[Problem] = []
+    problems = list(one.unusable)
     numbers = [row.n, *(owned.n for owned in one.owned), *(entered.n for entered in one.measured)]
     positions = [position, *(entered.position for entered in one.measured)]
     n = _agreed("n", numbers, problems)
     place = _agreed("position", positions, problems)
     variant = _variant(assignment, n, place, problems)
-    entered = one.measured[0] if one.measured else None
-    for extra in one.measured[1:]:
-        told = f"{extra.source}: further measurements of {student_id} are not counted, only those of"
-        problems.append(Problem("measurements_twice", f"{told} {one.measured[0].source}", extra.source))
     pages = tuple(_place(owned.source, paths) for owned in one.owned)
     return Work(
         student_id=student_id,
         variant=variant,
         pages=pages,
         declared=row.scales,
-        measured=entered,
+        measured=combined(one.measured) if one.measured else None,
         lang=row.lang or lang,
         name=row.name,
         problems=tuple(problems),
+        has_unusable=bool(one.unusable),
     )
 
 

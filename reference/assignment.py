@@ -158,7 +158,7 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
         path = Path(name)
         return path if path.is_absolute() or beside is None else beside.parent / path
     file = f"{name}{SUFFIXES[kind]}"
-    if beside is not None and (beside.parent / file).is_file():
+    if beside is not None and authored.is_file(beside.parent / file):
         return beside.parent / file
     return library() / file
 
@@ -170,13 +170,13 @@ def load_assignment(name: str | Path) -> Assignment:
     fault of the files.
     """
     path = locate("assignment", str(name))
-    if not path.is_file() and not str(name).endswith(".toml"):
+    if not authored.is_file(path) and not str(name).endswith(".toml"):
         raise CallError(
             "unknown_assignment",
             f"there is no assignment '{name}': built in are {', '.join(built_in())};"
             " or give the path of an assignment file (.toml)",
         )
-    return _load(path.resolve(), path.stat().st_mtime_ns if path.is_file() else 0)
+    return _load(path.resolve(), path.stat().st_mtime_ns if authored.is_file(path) else 0)
 
 
 @cache

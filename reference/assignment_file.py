@@ -7,8 +7,8 @@ from pydantic import Field, model_validator
 from reference.authored import Authored, FormulaText, Identifier, Text
 from reference.mechanism_file import MechanismFile
 
-MOST_VARIANTS = 1_000_000
-"""Of a range of n or position: more is a slip of the pen."""
+MOST_VARIANTS = 10_000
+"""Of an assignment: more than any class has students, and all of them are computed before it is used."""
 
 
 class Range(Authored):
@@ -16,12 +16,6 @@ class Range(Authored):
 
     first: Annotated[int, Field(alias="from")]
     last: Annotated[int, Field(alias="to")]
-
-    @model_validator(mode="after")
-    def _is_no_more_than_can_be_graded(self) -> Self:
-        if self.last - self.first >= MOST_VARIANTS:
-            raise ValueError(f"is a range of more than {MOST_VARIANTS} numbers")
-        return self
 
     @property
     def values(self) -> range:
@@ -35,6 +29,15 @@ class VariantTable(Authored):
     n: Range | None = None
     position: Range | None = None
     values: dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], FormulaText] = Field(default={})
+
+    @model_validator(mode="after")
+    def _has_no_more_than_can_be_graded(self) -> Self:
+        count = 1
+        for numbers in (self.n, self.position):
+            count *= 1 if numbers is None else max(numbers.last - numbers.first + 1, 0)
+        if count > MOST_VARIANTS:
+            raise ValueError(f"has {count} variants, more than {MOST_VARIANTS}: narrow n or position")
+        return self
 
 
 class ScalesTable(Authored):

@@ -17,10 +17,17 @@ from pydantic import (
 )
 
 from reference import formula
-from reference.errors import AuthoredFileError, Finding
+from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
 from reference.formula import Formula
 
 LENGTH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+MAX_BYTES = 200_000
+"""Twenty times the largest file that comes with the program."""
+MAX_DEPTH = 12
+"""Three times as deep as the tables of the formats go."""
+MAX_NAME = 64
+LARGEST_NUMBER = 1e300
+"""Its neighbours overflow in the first product."""
 
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -79,16 +86,58 @@ def load(model: type[Model], path: Path) -> Model:
     Raises AuthoredFileError with every fault found, each with its path in the file.
     """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(_content_of(path).decode("utf-8"))
     except FileNotFoundError as error:
         raise AuthoredFileError(str(path), (Finding("$", "there is no such file"),)) from error
     except OSError as error:
         raise AuthoredFileError(str(path), (Finding("$", f"cannot be read: {error.strerror}"),)) from error
     except UnicodeDecodeError as error:
         raise AuthoredFileError(str(path), (Finding("$", "is not UTF-8 text"),)) from error
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
+        # Besides TOMLDecodeError: numbers of thousands of digits, tables nested a thousand deep.
         raise AuthoredFileError(str(path), (Finding("$", f"is not TOML: {error}"),)) from error
+    faults = tuple(_check_tree(data))
+    if faults:
+        raise AuthoredFileError(str(path), faults)
     return validate(model, data, str(path))
+
+
+def _content_of(path: Path) -> bytes:
+    """A file's bytes, no more than anything that is authored has; raises OSError, or AuthoredFileError."""
+    if path.exists() and not path.is_file():
+        raise AuthoredFileError(
+            str(path), (Finding("$", "cannot be read: it is a folder or a device, not a file"),)
+        )
+    with path.open("rb") as stream:
+        content = stream.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        finding = Finding("$", f"is larger than {MAX_BYTES // 1000} kB: nothing that is written by hand is")
+        raise AuthoredFileError(str(path), (finding,))
+    return content
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; a name that the system refuses is none."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
+def _check_tree(data: dict[str, Any]) -> Iterator[Finding]:
+    """Numbers that nothing can be computed with, and tables nested deeper than any that is authored."""
+    waiting: list[tuple[str, Any, int]] = [("$", data, 0)]
+    while waiting:
+        path, value, depth = waiting.pop()
+        if isinstance(value, dict | list) and depth == MAX_DEPTH:
+            yield Finding(path, f"is nested deeper than {MAX_DEPTH} tables")
+        elif isinstance(value, dict):
+            waiting += [(f"{path}.{key[:MAX_NAME]}", inner, depth + 1) for key, inner in value.items()]
+        elif isinstance(value, list):
+            waiting += [(f"{path}[{index}]", inner, depth + 1) for index, inner in enumerate(value)]
+        elif isinstance(value, int | float) and not abs(value) <= LARGEST_NUMBER:
+            # Not a number is no less than any.
+            yield Finding(path, "is no number that can be computed with")
 
 
 def validate(model: type[Model], data: dict[str, Any], file: str) -> Model:
@@ -100,8 +149,9 @@ def validate(model: type[Model], data: dict[str, Any], file: str) -> Model:
 
 
 def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Finding]:
-    """Pydantic's faults as paths and plain sentences."""
-    for fault in error.errors():
+    """Pydantic's faults as paths and plain sentences: the first twenty, and how many more there are."""
+    faults = error.errors(include_url=False, include_context=False, include_input=False)
+    for fault in faults[:MOST_FINDINGS]:
         *above, last = fault["loc"] or ("",)
         is_field = fault["type"] in {"extra_forbidden", "missing"}
         path = "$" + "".join(map(_path_part, above)) + (f".{last}" if is_field else _path_part(last))
@@ -113,6 +163,8 @@ def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Find
         elif fault["type"].startswith("union_tag"):
             message = f"needs a type, one of {', '.join(_GROUP_TYPES)}"
         yield Finding(path, message)
+    if len(faults) > MOST_FINDINGS:
+        yield Finding("$", f"and {len(faults) - MOST_FINDINGS} more faults")
 
 
 _GROUP_TYPES = ("RRR", "RRP", "RPR", "PRP", "RPP", "plate", "point_on_line", "point")
@@ -131,12 +183,10 @@ def _path_part(part: str | int) -> str:
 
 
 def _not_known(name: str, model: type[BaseModel]) -> str:
-    import difflib  # noqa: PLC0415 - only on the way to an error message
-
     fields = {field for kind in _models_in(model, set()) for field in kind.model_fields}
     if name in fields:
         return "does not belong here: another kind of table has it; leave it out"
-    near = difflib.get_close_matches(name, sorted(fields), n=1)
+    near = near_names(name, sorted(fields), most=1)
     return "is not known here; check its spelling" + (f" (did you mean {near[0]}?)" if near else "")
 
 

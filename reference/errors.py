@@ -8,7 +8,16 @@ PlanmarkError            caught once, at the rim
                          call names it; in a folder that is graded, a problem of its report)
 """
 
+import difflib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+
+MOST_FINDINGS = 20
+"""A person reads no more at a time; a hostile file has a million."""
+_MOST_CHARACTERS = 500
+"""Of a line of a message: a name in the file may be a megabyte long."""
+_LONGEST_NAME = 64
+"""Longer ones are like no name there is, and comparing them takes the square of their length."""
 
 
 class PlanmarkError(Exception):
@@ -41,12 +50,31 @@ class Finding:
         return f"{self.path}: {self.message}"
 
 
+def lines_of(findings: Sequence[object]) -> str:
+    """Findings as lines of a message: the first twenty, and how many more there are."""
+    lines = [str(finding) for finding in findings[:MOST_FINDINGS]]
+    lines = [line if len(line) <= _MOST_CHARACTERS else f"{line[:_MOST_CHARACTERS]}..." for line in lines]
+    if len(findings) > MOST_FINDINGS:
+        lines.append(f"... and {len(findings) - MOST_FINDINGS} more")
+    return "\n".join(f"  {line}" for line in lines)
+
+
+def near_names(name: str, known: Iterable[str], *, most: int = 2, cutoff: float = 0.6) -> list[str]:
+    """The known names that a misspelt one may stand for, the nearest first; case does not count.
+
+    Arguments: `cutoff` is the least similarity, 0..1, as `difflib` counts it.
+    """
+    if len(name) > _LONGEST_NAME:
+        return []
+    by_lower = {one.lower(): one for one in known}
+    return [by_lower[one] for one in difflib.get_close_matches(name.lower(), by_lower, most, cutoff)]
+
+
 class AuthoredFileError(PlanmarkError):
     """A mechanism, assignment or rubric file: all its faults at once."""
 
     def __init__(self, file: str, findings: tuple[Finding, ...]) -> None:
-        lines = "\n".join(f"  {finding}" for finding in findings)
-        super().__init__("authored_file", f"{file}: {len(findings)} fault(s)\n{lines}")
+        super().__init__("authored_file", f"{file}: {len(findings)} fault(s)\n{lines_of(findings)}")
         self.file = file
         self.findings = findings
 

@@ -53,23 +53,12 @@ def handed_in(report: ReportDocument, variant: Variant, measured: Measurements |
             for sheet in report.reading.sheets
             if sheet.figures
         ),
-        numbers={} if measured is None else _numbers(measured),
+        numbers={} if measured is None else measured.numbers,
         used={name: one.used for name, one in report.scales.items() if one.used},
         fits=_fits(variant, report),
         excused=frozenset(mistake.at for mistake in report.mistakes),
         printed=any(one.sheet is not None and one.sheet.method == "markers" for one in report.reading.sheets),
     )
-
-
-def _numbers(measured: Measurements) -> dict[str, float]:
-    told: dict[str, float] = {}
-    for figure in measured.reading.figures.values():
-        for name, vector in figure.vectors.items():
-            if vector.length_mm is not None:
-                told[name] = vector.length_mm
-            if vector.direction_deg is not None:
-                told[f"{name}_deg"] = vector.direction_deg
-    return told | {f"{name}_value": value for name, value in measured.values.items()}
 
 
 def _fits(variant: Variant, report: ReportDocument) -> tuple[Variant, float] | None:

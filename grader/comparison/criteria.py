@@ -62,7 +62,34 @@ def _in_order(task: Task, scales: tuple[str, ...]) -> list[CriterionTable]:
 
 
 def _outcome(ledger: Ledger, criterion: CriterionTable) -> Outcome:
-    """The verdict on one criterion; what it costs is remembered for the later ones."""
+    """The verdict on one criterion, open where it rests on something entered that cannot be used."""
+    found = _judged(ledger, criterion)
+    entry = ledger.evidence.refused.get(criterion.name)
+    if entry is None and found.verdict in {"none", "partial"}:
+        entry = _refused_below(ledger, criterion.name)
+    if entry is None:
+        return found
+    ledger.leave_open(criterion.name)
+    return verdicts.entry_refused(found, entry)
+
+
+def _refused_below(ledger: Ledger, name: str) -> str | None:
+    """What was entered for the scale, or for a node that a vector is made from, and cannot be used."""
+    task, evidence = ledger.task, ledger.evidence
+    turned = task.construction.rates.get(name)
+    segment = task.segments.get(name if turned is None else turned.vector)
+    if segment is None or not evidence.refused:
+        return None
+    needs = {need for need in task.construction.step(segment.head).needs if need not in evidence.nodes}
+    below = [one.name for one in task.segments.values() if one.head in needs]
+    return next(
+        (evidence.refused[one] for one in (segment.scale, segment.name, *below) if one in evidence.refused),
+        None,
+    )
+
+
+def _judged(ledger: Ledger, criterion: CriterionTable) -> Outcome:
+    """The verdict on what can be used; what it costs is remembered for the later ones."""
     if criterion.scale is not None:
         return _scale(ledger, criterion)
     if criterion.angular is not None:

@@ -62,6 +62,7 @@ class Evidence:
     unread : why something asked for was not read, by name
     has_sheets : whether any sheet was handed in
     has_sketch : whether the mechanism was read on any
+    refused : what was entered by hand for a vector, angular quantity or scale and cannot be used, by name
     written : lengths that stand in the sheets' cells, mm, and the probability that they do, by vector
     """
 
@@ -76,6 +77,7 @@ class Evidence:
     se_mm: Mapping[str, float] = field(default_factory=dict)
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
     has_sketch: bool = False
+    refused: Mapping[str, str] = field(default_factory=dict)
 
     def vector(self, name: str) -> DrawnVector | None:
         """The vector as read, else as measured."""
@@ -101,6 +103,7 @@ def gather(task: Task, submission: Submission) -> Evidence:
         se_mm=sheets.se_mm,
         sketches=sheets.sketches,
         has_sketch=any(MECHANISM in reading.figures for reading in submission.readings),
+        refused=_refused(submission.measured),
     )
 
 
@@ -219,6 +222,13 @@ def _measured(reading: Reading | None) -> dict[str, DrawnVector]:
                     one.length_mm, one.se_mm, direction, one.se_deg or 0.0, one.confidence
                 )
     return found
+
+
+def _refused(reading: Reading | None) -> dict[str, str]:
+    found: dict[str, list[str]] = {}
+    for gap in reading.unread if reading else ():
+        found.setdefault(gap.name, []).append(gap.reason)
+    return {name: ", ".join(reasons) for name, reasons in found.items()}
 
 
 def _nodes_from(task: Task, measured: Mapping[str, DrawnVector]) -> dict[str, complex]:

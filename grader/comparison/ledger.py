@@ -225,6 +225,15 @@ class Ledger:
         else:
             self.cleared.add(name)
 
+    def leave_open(self, name: str) -> None:
+        """The verdict on a vector, angular quantity or scale is open after all."""
+        segment = self.task.segments.get(name)
+        node = name if segment is None else segment.head
+        self.shown.clear()
+        for judged in (self.charged, self.cleared, self.by_length, self.inherited):
+            judged.discard(node)
+        self.doubtful.add(node)
+
     # Why ------------------------------------------------------------------------------------------
 
     def why(self, one: Expectation) -> tuple[Reason, ...]:

@@ -86,6 +86,23 @@ def unjudged(
     )
 
 
+def entry_refused(found: Outcome, entry: str) -> Outcome:
+    """The outcome left to a person, because something that was entered for it cannot be used.
+
+    Arguments: `entry` is what was entered.
+    """
+    said = [reason for reason in found.reasons if reason.code != "right"]
+    return replace(
+        found,
+        verdict="review",
+        possible=("none", "full"),
+        shares=(NONE, FULL),
+        confidence=0.0,
+        reasons=(Reason("entry_refused", {"reason": entry}), *(said if found.measured != Quantity() else ())),
+        mistake=None,
+    )
+
+
 def both(first: Outcome, second: Outcome, allowed_mm: float) -> Outcome:
     """Scan and measurement of one vector: told where they differ, reviewed where it matters."""
     lengths = first.measured.length_mm or 0.0, second.measured.length_mm or 0.0

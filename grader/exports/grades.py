@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.documents import ReportDocument, ResultsDocument
-from grader.roster import STUDENT_ID
+from grader.roster import why_no_id
 from reference.errors import CallError, InputFileError
 
 
@@ -87,7 +87,7 @@ def _check(reports: Sequence[ReportDocument]) -> None:
     seen = set()
     for report in reports:
         who = report.student_id if report.position is None else f"{report.student_id} at {report.position}"
-        if not STUDENT_ID.fullmatch(report.student_id) or not report.student_id.strip("."):
+        if why_no_id(report.student_id) is not None:
             faults.append(f"'{report.student_id}' is no student_id")
         if (report.student_id, report.position) in seen:
             faults.append(f"{who}: has two reports")

@@ -23,6 +23,7 @@ OR = N_("or")
 MOST_WAITING_DETAILS = 3
 
 WAITING: dict[str, str] = {
+    "entry_refused": N_("an entry that it rests on cannot be used"),
     "doubtful": N_("read with too little certainty"),
     "near_limit": N_("so near the limit of the tolerance that the scan cannot decide"),
     "hand_may_miss": N_("off by no more than a careful hand may be where lines meet at a small angle"),

@@ -36,6 +36,7 @@ HINTS: dict[str, str] = {
     "not_measured": N_("Nothing was handed in for it."),
     "optional": N_("It was not handed in, and is not required."),
     "unread": N_("It could not be read on the sheet."),
+    "entry_refused": N_("An entry that it rests on cannot be used: a person must look."),
     "doubtful": N_("It was read with too little certainty."),
     "near_limit": N_("It lies so near the limit of the tolerance that the scan cannot decide."),
     "hand_may_miss": N_(
@@ -72,6 +73,7 @@ FULL: dict[str, str] = {
         "The sign is wrong: %(measured)s instead of %(expected)s; counter-clockwise is positive."
     ),
     "unread": N_("It could not be read on the sheet (%(reason)s)."),
+    "entry_refused": N_("An entry that it rests on cannot be used (%(reason)s): a person must look."),
     "doubtful": N_("It was read with too little certainty (%(confidence)s)."),
     "near_limit": N_(
         "It lies so near the limit of the tolerance that the scan cannot decide (standard error %(se)s)."

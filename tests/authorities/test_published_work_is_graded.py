@@ -127,7 +127,7 @@ def entered(case_task, printed: dict[str, float], *, as_segments: bool) -> Submi
             values[name] = value
     plans = {"v": "velocity_plan", "a": "acceleration_plan"}
     names = Names({name: plans[name[0]] for name in case_task.construction.vectors}, ())
-    return Submission(measured=reading_of(names, lengths, {}), values=values)
+    return Submission(measured=reading_of(names.vectors, lengths, {}), values=values)
 
 
 def cases(shared: Path) -> list[tuple[str, dict, dict[str, float]]]:
@@ -202,7 +202,7 @@ def test_a_textbooks_computed_vectors_score_full_marks():
     plans = {"v": "velocity_plan", "a": "acceleration_plan"}
     names = Names({name: plans[name[0]] for name in vectors}, ())
     rates = {name: COMPUTED["published"][name] for name in case_task.rates}
-    handed_in = Submission(measured=reading_of(names, lengths, turns), values=rates)
+    handed_in = Submission(measured=reading_of(names.vectors, lengths, turns), values=rates)
     judgement = judge(case_task, handed_in)
     asked = {*vectors, *rates}
     assert len(asked) > 10

@@ -39,8 +39,9 @@ BATCH = {"pictures": 100, "measurements": 400, "roster": 400, "authored": 150}
 MOST_PAGES = 3
 _WORDS = (
     b"", b"0", b"-1", b"1e400", b"nan", b"inf", b"NaN", b"999999999999999999999", b"1_0", b"0x10",
-    b"2026-01-01", b"9**9**9", b"\x00", b"\xff\xfe", b"\xd0\x90", b'"', b"{", b"[", b"[[", b"'''", b"\r", b"\n", b";",
-    b",", b"=", b"^", b"<<", b">>", b"endobj", b"stream", b"/Length 999999999", b"/Count -1", b"/Width 100000",
+    b"2026-01-01", b"9**9**9", b"\x00", b"\xff\xfe", b"\xd0\x90", b'"', b"{", b"[", b"[[", b"'''", b"\r",
+    b"\n", b";", b",", b"=", b"^", b"<<", b">>", b"endobj", b"stream", b"/Length 999999999", b"/Count -1",
+    b"/Width 100000",
 )  # fmt: skip
 
 

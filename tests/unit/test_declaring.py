@@ -82,10 +82,36 @@ def test_an_unreadable_box_does_not_matter_where_the_roster_says_the_scale(task)
     assert not found.problems
 
 
-def test_measurements_count_before_the_roster(task):
-    found = declarations(task, {"roster": {"kL": OTHER}, "measurements": {"kL": RULED}}, [])
+@pytest.mark.parametrize(
+    ("roster", "entered"),
+    [("1:5", "5 cm/cm"), (RULED, "0.00501 m/mm"), ("1:5", "kL = 1:5")],
+)
+def test_roster_and_measurements_that_mean_one_scale_agree(task, roster, entered):
+    found = declarations(task, {"roster": {"kL": roster}, "measurements": {"kL": entered}}, [])
     assert found.sources == {"kL": "measurements"}
-    assert found.texts == {"kL": RULED}
+    assert found.texts == {"kL": entered}
+    assert not found.problems
+
+
+def test_a_rule_and_the_value_that_it_gives_are_one_scale(task):
+    value = f"{task.omega * task.rule_scales['kL']:.6f} (m/s)/mm"
+    found = declarations(task, {"roster": {"kv": "omega kL"}, "measurements": {"kv": value}}, [])
+    assert found.texts == {"kv": value}
+
+
+@pytest.mark.parametrize("entered", [RULED, "five", "0.0052 m/mm"])
+def test_of_two_scales_that_contradict_each_other_none_counts_nor_does_the_box(task, entered):
+    sources = {"roster": {"kL": OTHER}, "measurements": {"kL": entered}}
+    found = declarations(task, sources, [reading(RULED, FIRM)])
+    assert (found.texts, codes(found)) == ({}, ["scale_disagrees"])
+    assert f"'{OTHER}' in the roster, '{entered}' in the measurements" in found.problems[0].message
+    assert [(gap.name, gap.reason) for gap in found.unread] == [("kL", f"'{OTHER}' / '{entered}'")]
+
+
+def test_two_files_of_measurements_may_contradict_each_other(task):
+    found = declarations(task, {"measurements": {"kL": RULED}}, [], [{"kL": RULED}, {"kL": OTHER}])
+    assert codes(found) == ["scale_disagrees"]
+    assert found.texts == {}
 
 
 def test_two_sheets_whose_boxes_contradict_each_other_give_nothing(task):

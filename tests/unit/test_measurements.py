@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from grader.measurements import names_of, read_measurements
+from grader.measurements import MAX_BYTES, combined, names_of, read_measurements, students_in
 from reference.assignment import load_assignment
 from reference.errors import InputFileError
 
@@ -109,11 +109,53 @@ def test_a_student_id_that_is_none_is_refused(entered, student_id):
     assert "refused" in told(one)
 
 
-def test_a_student_twice_counts_once(entered):
+@pytest.mark.parametrize(
+    ("column", "cell"), [("v_A", "6O"), ("v_A_deg", "720"), ("v_A_deg", "nan"), ("v_A_value", "1e400")]
+)
+def test_a_refused_value_is_carried_with_what_was_entered(entered, column, cell):
+    (one,) = entered(f"student_id,{column},v_B\ns01,{cell},58\n")
+    assert [(gap.name, gap.reason) for gap in one.reading.unread] == [("v_A", f"{column}: '{cell}'")]
+    assert one.numbers == {"v_B": 58.0}
+
+
+@pytest.mark.parametrize("cell", ["9" * 120_000 + "x", "1." + "0" * 120_000 + "x"])
+def test_a_cell_of_a_hundred_thousand_digits_is_told_in_a_line(entered, cell):
+    (one,) = entered(f"student_id,n,v_A,kv\ns01,{cell},{cell},{cell}\n")
+    assert len(one.problems) == 3
+    assert len(told(one)) < 500
+    assert [gap.name for gap in one.reading.unread] == ["v_A", "kv"]
+
+
+def test_a_student_on_two_lines_is_read_twice_so_that_neither_line_is_lost(entered):
     first, second = entered("student_id,v_A\ns01,60\ns01,61\n")
-    assert vector(first, "v_A").length_mm == 60.0
-    assert second.reading.figures == {}
-    assert "on line 2 already" in told(second)
+    assert (first.numbers, second.numbers) == ({"v_A": 60.0}, {"v_A": 61.0})
+    assert (first.place, second.place) == ("class.csv, line 2", "class.csv, line 3")
+
+
+def test_no_more_faults_are_told_than_a_person_reads(entered):
+    vectors = list(NAMES.vectors)[:30]
+    (one,) = entered(f"student_id,{','.join(vectors)}\ns01{',x' * 30}\n")
+    assert len(one.problems) == 21
+    assert one.problems[-1].message == "... and 10 more faults"
+    assert len(one.reading.unread) == 30
+
+
+def test_no_more_unknown_columns_are_told_than_a_person_reads(entered):
+    with pytest.raises(InputFileError) as caught:
+        entered("student_id," + ",".join(f"v_A{number}x" for number in range(20_000)) + "\ns01\n")
+    assert caught.value.message.endswith("... and 19980 more")
+    assert len(caught.value.message) < 5000
+
+
+def test_more_lines_than_any_class_are_refused(entered):
+    with pytest.raises(InputFileError, match="line 20001: more than 20000 lines"):
+        entered("student_id,v_A\n" + "s1,60\n" * 20_001)
+
+
+@pytest.mark.parametrize("line", ["s01,seven,,60", "s01,7,1.5,60", "s/1,7,,60"])
+def test_a_line_that_is_of_no_known_student_or_variant_is_not_used(entered, line):
+    (one,) = entered(f"student_id,n,position,v_A\n{line}\n")
+    assert not one.is_usable
 
 
 def test_a_student_may_have_several_positions(entered):
@@ -127,6 +169,7 @@ def test_a_student_may_have_several_positions(entered):
 def test_a_line_with_too_many_fields_is_not_used(entered, header):
     (one,) = entered(f"{header}\ns01,60,5\n")
     assert one.reading.figures == {}
+    assert not one.is_usable
     assert "3 fields" in told(one)
 
 
@@ -165,8 +208,8 @@ def test_a_file_that_is_not_there_is_refused(tmp_path):
 def test_a_huge_file_is_refused(tmp_path):
     path = tmp_path / "huge.csv"
     with path.open("wb") as file:
-        file.truncate(30_000_000)
-    with pytest.raises(InputFileError, match="no measurements"):
+        file.truncate(MAX_BYTES + 1)
+    with pytest.raises(InputFileError, match="these are no measurements"):
         read_measurements(path, NAMES)
 
 
@@ -197,31 +240,138 @@ def test_a_students_file_need_not_name_its_student(entered):
 
 
 @pytest.mark.parametrize(
-    ("change", "where"),
+    ("change", "where", "entry"),
     [
-        ({"segments_mm": {"v_A": -1}}, r"\$\.segments_mm\.v_A"),
-        ({"segments_mm": {"v_A": 5000}}, r"\$\.segments_mm\.v_A.*2000"),
-        ({"segments_mm": {"v_AA": 1}}, r"\$\.segments_mm\.v_AA.*did you mean"),
-        ({"directions_deg": {"v_A": 400}}, r"\$\.directions_deg\.v_A"),
-        ({"values": {"w_3": 1}}, r"\$\.values\.w_3"),
-        ({"student_id": "../x"}, r"\$\.student_id"),
-        ({"scales": {"kq": "1"}}, r"\$\.scales"),
-        ({"n": 7.5}, r"\$\.n"),
-        ({"lengths": {}}, r"\$\.lengths.*not known"),
+        ({"segments_mm": {"v_A": -1, "v_B": 58}}, "$.segments_mm.v_A: '-1': a drawn length", "v_A: '-1'"),
+        ({"segments_mm": {"v_A": 5000, "v_B": 58}}, "from 0 to 2000 mm", "v_A: '5000'"),
+        ({"segments_mm": {"v_A": "60", "v_B": 58}}, "$.segments_mm.v_A: '60': is no number", "v_A: '60'"),
+        ({"segments_mm": {"v_A": True, "v_B": 58}}, "is no number", "v_A: 'True'"),
+        ({"segments_mm": {"v_A": [60], "v_B": 58}}, "is no number", "v_A: 'a list or table'"),
+        ({"directions_deg": {"v_A": 720}}, "$.directions_deg.v_A: '720': a direction is", "v_A_deg: '720'"),
+        (
+            {"values": {"omega_3": float("nan")}},
+            "$.values.omega_3: 'NaN': is no finite",
+            "omega_3_value: 'NaN'",
+        ),
+        ({"values": {"v_D": float("inf")}}, "'Infinity': is no finite number", "v_D_value: 'Infinity'"),
+        ({"scales": {"kL": "1:5", "kv": [1, 2]}}, "$.scales.kv: 'a list or table'", "kv: 'a list or table'"),
     ],
 )
-def test_a_fault_is_told_with_its_path(entered, change, where):
+def test_a_refused_value_of_a_students_file_costs_that_value_alone(entered, change, where, entry):
+    (one,) = entered(json.dumps(GOOD | change), "s07.json")
+    assert where in told(one)
+    assert [gap.reason for gap in one.reading.unread] == [entry]
+    assert vector(one, "v_B").length_mm == 58.0
+    assert one.scales["kL"] == "1:5"
+
+
+@pytest.mark.parametrize("number", ["1e400", "9" * 5000])
+def test_a_number_that_no_computer_number_can_be_is_refused_alone(entered, number):
+    (one,) = entered(f'{{"segments_mm": {{"v_A": {number}, "v_B": 58}}}}', "s07.json")
+    assert "is no finite number" in told(one)
+    assert one.numbers == {"v_B": 58.0}
+
+
+def test_a_misspelt_name_is_told_and_what_it_may_have_been_meant_for_is_not_judged(entered):
+    (one,) = entered('{"segments_mm": {"v_BAA": 12, "v_A": 60}}', "s07.json")
+    assert "$.segments_mm.v_BAA: is not known here; did you mean v_BA" in told(one)
+    assert ("v_BA", "v_BAA: '12'") in [(gap.name, gap.reason) for gap in one.reading.unread]
+    assert "v_A" not in {gap.name for gap in one.reading.unread}
+    assert one.numbers == {"v_A": 60.0}
+
+
+def test_a_key_that_is_there_twice_has_no_value(entered):
+    (one,) = entered('{"segments_mm": {"v_A": 60, "v_B": 58, "v_A": 65}}', "s07.json")
+    assert "$.segments_mm.v_A: '60 and 65': is there more than once" in told(one)
+    assert one.numbers == {"v_B": 58.0}
+
+
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [
+        ({"student_id": "../x"}, r"\$\.student_id"),
+        ({"student_id": "results.json"}, r"\$\.student_id.*a file of the results"),
+        ({"n": 7.5}, r"\$\.n"),
+        ({"n": "7"}, r"\$\.n"),
+        ({"lengths": {}}, r"\$\.lengths.*not known"),
+        ({"segments_mm": [60]}, r"\$\.segments_mm"),
+        ({"scales": "1:5"}, r"\$\.scales"),
+    ],
+)
+def test_a_fault_of_the_whole_file_is_told_with_its_path(entered, change, where):
     with pytest.raises(InputFileError, match=where):
         entered(json.dumps(GOOD | change), "s07.json")
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"segments_mm": {"v_A": NaN}}', "[" * 100_000])
+@pytest.mark.parametrize(
+    "text",
+    ["{", "[]", '{"n": NaN}', "[" * 100_000, '{"n": 7, "n": 8}', '{"segments_mm": {}, "segments_mm": {}}'],
+)
 def test_what_is_no_such_document_is_refused(entered, text):
     with pytest.raises(InputFileError):
         entered(text, "s07.json")
+
+
+def test_half_of_a_surrogate_pair_becomes_text_that_can_be_written(entered):
+    (one,) = entered(r'{"scales": {"kv": "\ud800"}, "values": {"\ud800": 1}}', "s07.json")
+    assert one.scales["kv"] == r"\ud800"
+    assert told(one).encode()
 
 
 def test_a_vector_that_the_plans_are_drawn_without_is_told_in_json_too(entered):
     press = names_of(load_assignment("press"))
     (one,) = entered('{"segments_mm": {"v_CA": 60}}', "s07.json", press)
     assert "v_CA" in told(one)
+
+
+# Several sets -------------------------------------------------------------------------------------
+
+
+def test_sets_that_agree_are_taken_together(entered):
+    (first,) = entered("student_id,v_A,kv\ns01,60,1:5\n", "a.csv")
+    (second,) = entered("student_id,v_A,v_B_deg,v_B,omega_3_value\ns01,60,12,58,-4\n", "b.csv")
+    both = combined([first, second])
+    assert both.numbers == {"v_A": 60.0, "v_B": 58.0, "v_B_deg": 12.0, "omega_3_value": -4.0}
+    assert both.reading.unread == ()
+    assert [problem.code for problem in both.problems] == ["measurements_twice"]
+    assert "a.csv, line 2 and b.csv, line 2" in told(both)
+    assert both.further_scales == (second.scales,)
+
+
+def test_of_a_value_in_which_two_sets_differ_neither_counts(entered):
+    (first,) = entered("student_id,v_A,v_A_deg\ns01,60,10\n", "a.csv")
+    (second,) = entered("student_id,v_A,v_A_deg\ns01,65,10\n", "b.csv")
+    both = combined([first, second])
+    assert both.numbers == {"v_A_deg": 10.0}
+    assert [(gap.name, gap.reason) for gap in both.reading.unread] == [("v_A", "v_A: 60 / 65")]
+    assert "v_A: 60 (a.csv, line 2), 65 (b.csv, line 2)" in told(both)
+
+
+def test_what_was_refused_in_one_set_stays_refused(entered):
+    (first,) = entered("student_id,v_A\ns01,x\n", "a.csv")
+    (second,) = entered("student_id,v_A\ns01,65\n", "b.csv")
+    assert [gap.name for gap in combined([first, second]).reading.unread] == ["v_A"]
+
+
+# Files that cannot be used ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("x.json", b'{"student_id": "s07", "n": 7'),
+        ("x.json", b'\xff{"student_id": "s07"}'),
+        ("x.csv", b"v_A,student_id,colour\n60,s07,red\n"),
+        ("x.csv", b'student_id,v_A\n"s07",\xe9\nresults.json,5\n'),
+        ("x.csv", b"student_id,v_A\ns07,1\n" + b" " * MAX_BYTES),
+    ],
+)
+def test_a_file_that_cannot_be_used_still_names_its_students(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputFileError):
+        read_measurements(tmp_path / name, NAMES)
+    assert students_in(tmp_path / name) == ("s07",)
+
+
+def test_a_file_that_is_not_there_names_nobody(tmp_path):
+    assert students_in(tmp_path / "none.csv") == ()

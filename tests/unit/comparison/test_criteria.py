@@ -231,6 +231,50 @@ def test_what_was_not_read_goes_to_a_person_with_the_reason(named):
     assert outcome.reasons[0].params["reason"] == "torn off"
 
 
+def entered(task, name, *change, **values):
+    """All vectors measured, with something that was entered for a name refused."""
+    reading = change[0] if change else measured(task)
+    return Submission(measured=replace(reading, unread=(Unread(name, f"{name}: 'x'"),)), **values)
+
+
+def test_a_vector_of_which_the_direction_was_refused_waits_for_a_person():
+    lengths = changed(measured(PUMP), "v_B", direction_deg=None)
+    comparison = compare(PUMP, entered(PUMP, "v_B", lengths))
+    outcome = outcome_of(comparison, "v_B")
+    assert (outcome.verdict, outcome.possible, outcome.shares) == ("review", ("none", "full"), (0.0, 1.0))
+    assert outcome.reasons[0].params["reason"] == "v_B: 'x'"
+    assert lost(comparison) == ["v_B"]
+
+
+def test_a_vector_of_which_the_length_was_refused_waits_although_the_rubric_gives_nothing_for_it():
+    task = with_rubric(PUMP, missing="none")
+    outcome = outcome_of(compare(task, entered(task, "v_D", without(measured(task), "v_D"))), "v_D")
+    assert (outcome.verdict, codes(outcome)) == ("review", ["entry_refused"])
+
+
+@pytest.mark.parametrize("name", ["v_CA", "omega_3", "kv"])
+def test_what_is_optional_waits_where_something_was_entered_and_refused(name):
+    comparison = compare(PUMP, entered(PUMP, name, without(measured(PUMP), name)))
+    assert codes(outcome_of(comparison, name)) == ["entry_refused"]
+    assert lost(comparison) == [name]
+
+
+def test_what_follows_from_a_vector_that_was_refused_is_open():
+    wrong = measured(PUMP, mistakes=(Mistake("sense_reversed", "a"),))
+    turned = changed(wrong, "v_A", direction_deg=None)
+    known, refused = compare(PUMP, Submission(measured=wrong)), compare(PUMP, entered(PUMP, "v_A", turned))
+    assert outcome_of(known, "v_A").verdict == "none"
+    assert outcome_of(known, "v_B").verdict == "follow_through"
+    assert outcome_of(refused, "v_A").verdict == outcome_of(refused, "v_B").verdict == "review"
+
+
+def test_what_is_lost_at_a_disputed_scale_waits_and_what_is_right_does_not():
+    long = changed(measured(PUMP), "v_D", length_mm=1.2 * abs(PUMP.drawn("v_D", rule_scales(PUMP))))
+    comparison = compare(PUMP, entered(PUMP, "kv", long))
+    assert lost(comparison) == ["kv", "v_D"]
+    assert {outcome_of(comparison, name).verdict for name in ("kv", "v_D")} == {"review"}
+
+
 def test_a_plan_that_is_on_no_sheet_goes_to_a_person():
     reading = sheet(PUMP, figures=("mechanism", "velocity_plan"))
     outcome = outcome_of(compare(PUMP, Submission(readings=(reading,))), "a_D")

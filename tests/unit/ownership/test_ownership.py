@@ -206,3 +206,20 @@ def test_without_a_roster_codes_and_names_say_who_the_students_are():
     found = assign_pages(pages, None, "pump")
     assert owners(found) == {"s1.jpg": "s1", "s1_2.jpg": "s1", "scan.jpg": "s7"}
     assert codes(found) == {"not valid.jpg": "owner_unknown"}
+
+
+def test_without_a_roster_nobody_is_called_as_no_folder_can_be():
+    files = ["results.json.jpg", "CON.jpg", "s1.jpg", "S1.png"]
+    found = assign_pages([PageSource(file, 1, 1) for file in files], None, "pump")
+    assert sorted([*owners(found), *codes(found)]) == sorted(files)
+    assert len(owners(found)) == 1
+    told = {str(loose.source): loose.problem.message for loose in found.unmatched}
+    assert "a file of the results has that name" in told["results.json.jpg"]
+    assert "Windows has a device of that name" in told["CON.jpg"]
+
+
+def test_a_page_that_two_students_may_own_names_both():
+    page = PageSource("s2.jpg", 1, 1, identity=code("s1", 1))
+    (loose,) = assign_pages([page], THREE, "pump").unmatched
+    assert loose.problem.code == "owner_disagree"
+    assert loose.students == ("s1", "s2")

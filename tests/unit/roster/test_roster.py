@@ -137,6 +137,45 @@ def test_a_hash_may_be_part_of_a_file_name():
     assert isinstance(parse_scan("lab.pdf#3-4"), str)
 
 
-def test_ids_that_only_case_tells_apart_are_told():
-    roster = parse_roster("student_id,name\ns1,A\nS1,B\n")
-    assert [problem.code for problem in roster.problems] == ["roster_ids_alike"]
+def test_ids_that_only_case_tells_apart_are_refused():
+    (fault,) = faults("student_id,name\ns1,A\nS1,B\n")
+    assert fault.startswith("line 3, student_id: S1 differs in case only from s1 on line 2")
+
+
+@pytest.mark.parametrize("student", ["results.json", "Index.HTML", "summary.csv", "decisions.csv"])
+def test_an_id_that_a_file_of_the_results_has_for_its_name_is_refused(student):
+    (fault,) = faults(f"student_id,name\n{student},A\n")
+    assert fault == (
+        f"line 2, student_id: '{student}' is refused: it cannot name a folder:"
+        " a file of the results has that name"
+    )
+
+
+@pytest.mark.parametrize("student", ["CON", "aux", "nul.txt", "com1", "LPT9.a.b", "s1.", ".planmark"])
+def test_an_id_that_names_a_device_or_a_hidden_folder_is_refused(student):
+    (fault,) = faults(f"student_id,name\n{student},A\n")
+    assert "it cannot name a folder" in fault
+
+
+@pytest.mark.parametrize("student", ["con1", "com10", "auxiliary", "s1.x", "results", "-1"])
+def test_an_id_that_only_begins_like_a_device_is_none(student):
+    assert parse_roster(f"student_id,name\n{student},A\n").student_ids == (student,)
+
+
+def test_columns_without_number_are_passed_over_without_being_listed_one_by_one():
+    columns = ",".join(f"extra{number}" for number in range(20_000))
+    (problem,) = parse_roster(f"student_id,name,{columns}\ns1,A\n").problems
+    assert problem.message.endswith("extra19 and 19980 more")
+
+
+def test_a_page_is_one_students_however_many_lines_name_the_file():
+    lines = "".join(f"s{page},A,class.pdf#{page}\n" for page in range(1, 6000))
+    (fault,) = faults(f"student_id,name,scans\n{lines}x,B,class.pdf#5\n")
+    assert fault == "line 6001, scans: class.pdf#5 is named on line 6 already (class.pdf#5)"
+
+
+def test_a_huge_roster_is_refused(tmp_path):
+    with (tmp_path / "roster.csv").open("wb") as file:
+        file.truncate(30_000_000)
+    with pytest.raises(AuthoredFileError, match="no class's list"):
+        read_roster(tmp_path / "roster.csv")

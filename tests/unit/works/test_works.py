@@ -1,10 +1,13 @@
+from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from grader.measurements import Measurements
-from grader.ownership import How, Owned, Ownership, PageSource
-from grader.records import Reading
+from grader.ownership import How, Owned, Ownership, PageSource, Unmatched
+from grader.records import Problem, Reading
 from grader.roster import Roster, RosterRow
-from grader.works import works_of
+from grader.works import Unusable, works_of
 from reference.assignment import Variant, load_assignment
 
 PUMP = load_assignment("pump")
@@ -84,11 +87,127 @@ def test_measurements_without_a_position_go_to_the_only_one():
     assert not strangers
 
 
-def test_a_second_file_of_measurements_is_told_and_not_counted():
+def test_two_files_of_measurements_are_taken_together_and_told():
     first, second = entered("s1", n=3), entered("s1", n=3, source="other.csv")
     found, _ = works(PUMP, None, ownership(), [first, second])
-    assert found[0].measured is first
-    assert [problem.code for problem in found[0].problems] == ["measurements_twice"]
+    assert found[0].measured is not None
+    assert found[0].measured.values == {"v_A": 1.0}
+    assert [problem.code for problem in found[0].measured.problems] == ["measurements_twice"]
+
+
+ROSTER = Roster("roster.csv", (RosterRow("s1", n=3), RosterRow("s2", n=4)))
+
+
+def json_of(student, source):
+    return Measurements(student, 3, None, {}, Reading({}), {"v_A": 1.0}, source)
+
+
+def codes(work):
+    return [problem.code for problem in work.problems]
+
+
+def test_a_file_whose_name_and_content_name_two_students_is_used_for_neither():
+    own = json_of("s2", "s2.json")
+    found, strangers = works(PUMP, ROSTER, ownership(), [json_of("s2", "s1.json"), own])
+    first, second = found
+    assert (first.measured, second.measured) == (None, own)
+    assert first.has_unusable
+    assert codes(first)[0] == codes(second)[0] == "owner_disagree"
+    assert "s1.json: the file's name says s1, what is in it s2" in first.problems[0].message
+    assert [(one.file, one.code) for one in strangers] == [("s1.json", "owner_disagree")]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_without_a_roster_a_file_named_as_another_student_is_used_for_neither(order):
+    measured = [json_of("s2", "s1.json"), json_of("s2", "s2.json")][::order]
+    found, _ = works(PUMP, None, ownership(), measured)
+    assert {work.student_id: work.measured is not None for work in found} == {"s1": False, "s2": True}
+
+
+def test_without_a_roster_a_name_that_is_not_made_as_ids_are_says_nothing():
+    found, strangers = works(PUMP, None, ownership(), [json_of("s2", "measured.json")])
+    assert [(work.student_id, work.measured is not None) for work in found] == [("s2", True)]
+    assert not strangers
+
+
+def test_the_name_of_a_class_file_says_nothing_of_its_students():
+    measured = [entered("s1", n=3, source="s1_all.csv"), entered("s2", n=4, source="s1_all.csv")]
+    found, strangers = works(PUMP, ROSTER, ownership(), measured)
+    assert all(work.measured is not None for work in found)
+    assert not strangers
+
+
+def test_a_students_file_that_names_nobody_belongs_to_whom_its_name_tells():
+    for roster in (ROSTER, None):
+        found, strangers = works(PUMP, roster, ownership(), [json_of(None, "s1.json")])
+        assert found[0].student_id == "s1"
+        assert found[0].measured is not None
+        assert not strangers
+
+
+def test_a_line_whose_student_is_refused_belongs_to_nobody():
+    line = replace(entered(None), problems=(Problem("measurement_fault", "line 2: 'CON' is refused"),))
+    found, strangers = works(PUMP, ROSTER, ownership(), [line])
+    assert not any(work.measured or work.has_unusable for work in found)
+    assert "class.csv: line 2: 'CON' is refused" in strangers[0].message
+
+
+def test_a_line_of_which_nothing_can_be_used_is_its_students():
+    fault = Problem("measurement_fault", "line 2: has 9 fields", "class.csv")
+    found, strangers = works(
+        PUMP, ROSTER, ownership(), [replace(entered("s1"), is_usable=False, problems=(fault,))]
+    )
+    assert (found[0].measured, found[0].has_unusable, found[0].problems[0]) == (None, True, fault)
+    assert [one.message for one in strangers] == [fault.message]
+
+
+def test_a_file_that_cannot_be_used_is_told_to_those_whom_its_name_or_content_tells():
+    fault = Problem("measurements", "s1.json: cannot be used", "s1.json")
+    class_file = Problem("measurements", "class.csv: cannot be used", "class.csv")
+    refused = [Unusable((fault,)), Unusable((class_file,), ("s2", "zz"))]
+    found, strangers = works_of(PUMP, ROSTER, ownership(), [], {}, "en", refused=refused)
+    assert [(work.student_id, work.has_unusable, codes(work)) for work in found] == [
+        ("s1", True, ["measurements"]),
+        ("s2", True, ["measurements"]),
+    ]
+    assert not strangers
+
+
+def test_without_a_roster_a_students_file_that_cannot_be_used_is_a_submission():
+    fault = Problem("measurements", "s1.json: cannot be used", "s1.json")
+    found, _ = works_of(PUMP, None, ownership(), [], {}, "en", refused=[Unusable((fault,))])
+    assert [(work.student_id, work.has_unusable) for work in found] == [("s1", True)]
+
+
+def test_a_position_that_the_roster_does_not_give_the_student_is_told_to_the_student():
+    roster = Roster("roster.csv", (RosterRow("s1", position=1), RosterRow("s2", position=1)))
+    found, strangers = works(PRESS, roster, ownership(), [entered("s1", position=2)])
+    assert [(work.has_unusable, codes(work)) for work in found] == [
+        (True, ["position_disagrees"]),
+        (False, []),
+    ]
+    assert strangers[0].code == "position_disagrees"
+
+
+def test_measurements_that_may_be_of_several_positions_are_told_at_each():
+    roster = Roster("roster.csv", (RosterRow("s1", position=1), RosterRow("s1", position=2)))
+    found, strangers = works(PRESS, roster, ownership(), [entered("s1")])
+    assert [codes(work) for work in found] == [["owner_ambiguous"], ["owner_ambiguous"]]
+    assert strangers[0].code == "owner_ambiguous"
+
+
+def test_a_page_on_whose_owner_sources_disagree_is_told_to_each_of_them():
+    problem = Problem("owner_disagree", "x.jpg: the QR code: s1; the file's name: s2", "x.jpg")
+    pages = Ownership((), (Unmatched(PageSource("x.jpg", 1, 1), problem, ("s1", "s2")),), ())
+    found, strangers = works(PUMP, ROSTER, pages)
+    assert all(work.has_unusable and work.problems[0] == problem for work in found)
+    assert not strangers
+
+
+def test_without_a_roster_an_id_that_only_case_tells_from_another_is_nobodys():
+    found, strangers = works(PUMP, None, ownership(), [entered("s1", n=3), entered("S1", n=3)])
+    assert [work.student_id for work in found] == ["s1"]
+    assert "S1 differs in case only from s1" in strangers[0].message
 
 
 def test_a_blank_page_that_is_all_a_student_handed_in_is_looked_at():
