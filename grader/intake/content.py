@@ -27,8 +27,6 @@ _PIXELS_A_BYTE = 64
 _MAX_TILES = 1_000_000
 """Tiles of a pattern on a page: A3 in millimetre squares has 125,000."""
 _IMAGE_SLACK = 1 << 16
-_FEW_BYTES = 100_000
-"""Deflated, they cannot unpack to more than 100 MB."""
 _PLANES = {"/DeviceRGB": 3, "/CalRGB": 3, "/Lab": 3, "/DeviceCMYK": 4}
 _BYTES_A_PLANE = {"/JPXDecode": 8}
 """Working memory for a pixel in one plane, where it is more than the pixel: JPEG 2000 works on tiles."""
@@ -211,13 +209,9 @@ def _check_image(file: InputFile, number: int, stream: pikepdf.Stream, width: in
         check_memory(file, number, pixels, pixels * planes * _BYTES_A_PLANE["/JPXDecode"])
     elif filters and set(filters) == {"/FlateDecode"}:
         most = height * (width * planes * bits // 8 + 2) * (1 if planes > 1 else 4) + _IMAGE_SLACK
-        data = unpacked(stream, most) if len(filters) > 1 or _long(stream) else b""
+        data = unpacked(stream, most)
         if data is not None and len(data) > most:
             raise damaged(file, number, "its data are more than its size asks for")
-
-
-def _long(stream: pikepdf.Stream) -> bool:
-    return len(stream.read_raw_bytes()) > _FEW_BYTES
 
 
 def _fax_damage(stream: pikepdf.Stream, height: int) -> int | None:
