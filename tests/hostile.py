@@ -230,7 +230,8 @@ def pdf_of_a_heavy_font():
     page = pdf.add_blank_page(page_size=A4_PT)
     glyph = pdf.make_stream(b"1000 0 d0 " + b"0 0 m 900 900 l S " * 2000)
     font = DICTIONARY(
-        Type=NAME.Font, Subtype=NAME.Type3, FontBBox=[0, 0, 1000, 1000], FontMatrix=[0.001, 0, 0, 0.001, 0, 0],
+        Type=NAME.Font, Subtype=NAME.Type3, FontBBox=[0, 0, 1000, 1000],
+        FontMatrix=[0.001, 0, 0, 0.001, 0, 0],
         CharProcs=DICTIONARY(a=glyph), FirstChar=97, LastChar=97, Widths=[1000],
         Encoding=DICTIONARY(Type=NAME.Encoding, Differences=[97, NAME.a]), Resources=DICTIONARY(),
     )  # fmt: skip
@@ -278,7 +279,7 @@ def pdf_of_a_large_page():
 
 
 def pdf_of_a_class(pages=6, broken=2, how="page"):
-    """PDF of a class in which a page (from 0) lacks its ``page`` object, an ``image``'s end or ``content``."""
+    """PDF of a class; one page (from 0) lacks its ``page`` object, an ``image``'s end or ``content``."""
     pdf = pikepdf.new()
     data = stored(paper(), "JPEG", quality=95)
     for number in range(pages):
