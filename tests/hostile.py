@@ -45,10 +45,10 @@ def tiny_picture():
 # PNG ----------------------------------------------------------------------------------------------
 
 
-def png_of(wide, high, *, bits=8, colour=0, data=b"\0", extra=()):
+def png_of(wide, high, *, bits=8, colour=0, data=b"\0", level=9, extra=()):
     """PNG by its header, its packed data and further chunks (name, content)."""
     header = (b"IHDR", struct.pack(">IIBBBBB", wide, high, bits, colour, 0, 0, 0))
-    chunks = (header, *extra, (b"IDAT", zlib.compress(data)), (b"IEND", b""))
+    chunks = (header, *extra, (b"IDAT", zlib.compress(data, level)), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(
         struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
         for name, content in chunks
@@ -66,9 +66,9 @@ def png_of_deep_pixels():
 
 
 def png_of_long_profile():
-    """PNG of a small picture whose colour profile unpacks to 1 GB."""
+    """PNG of a small picture whose colour profile unpacks to 200 MB."""
     packer = zlib.compressobj(9)
-    profile = b"".join(packer.compress(bytes(10_000_000)) for _ in range(100)) + packer.flush()
+    profile = b"".join(packer.compress(bytes(10_000_000)) for _ in range(20)) + packer.flush()
     rows = b"".join(b"\0" + row.tobytes() for row in paper())
     return png_of(420, 300, data=rows, extra=((b"iCCP", b"x\0\0" + profile),))
 
@@ -230,7 +230,8 @@ def pdf_of_a_heavy_font():
     page = pdf.add_blank_page(page_size=A4_PT)
     glyph = pdf.make_stream(b"1000 0 d0 " + b"0 0 m 900 900 l S " * 2000)
     font = DICTIONARY(
-        Type=NAME.Font, Subtype=NAME.Type3, FontBBox=[0, 0, 1000, 1000], FontMatrix=[0.001, 0, 0, 0.001, 0, 0],
+        Type=NAME.Font, Subtype=NAME.Type3, FontBBox=[0, 0, 1000, 1000],
+        FontMatrix=[0.001, 0, 0, 0.001, 0, 0],
         CharProcs=DICTIONARY(a=glyph), FirstChar=97, LastChar=97, Widths=[1000],
         Encoding=DICTIONARY(Type=NAME.Encoding, Differences=[97, NAME.a]), Resources=DICTIONARY(),
     )  # fmt: skip
@@ -278,7 +279,7 @@ def pdf_of_a_large_page():
 
 
 def pdf_of_a_class(pages=6, broken=2, how="page"):
-    """PDF of a class in which a page (from 0) lacks its ``page`` object, an ``image``'s end or ``content``."""
+    """PDF of a class; one page (from 0) lacks its ``page`` object, an ``image``'s end or ``content``."""
     pdf = pikepdf.new()
     data = stored(paper(), "JPEG", quality=95)
     for number in range(pages):
@@ -293,7 +294,7 @@ def pdf_of_a_class(pages=6, broken=2, how="page"):
     if how == "content":
         pdf.pages[broken].Contents = DICTIONARY(No=1)
     saved = pdf_bytes(pdf, object_stream_mode=pikepdf.ObjectStreamMode.disable)
-    if how == "page":
+    if how == "page" and broken < pages:
         number = b"%d 0 R" % pdf_object(saved, broken)
         saved = saved.replace(number, b"null".ljust(len(number)), 1)
     return saved

@@ -19,7 +19,6 @@ from grader.intake.limits import InputFile, check_memory, damaged
 from grader.intake.unpacking import MAX_CONTENT, filters_of, unpacked
 from reference.errors import InputFileError
 
-_NOTHING = pikepdf.Dictionary()
 _OPERATORS = "Do gs scn SCN Tf Tj TJ ' \" BI ID EI"
 _SHOWS_TEXT = frozenset(("Tj", "TJ", "'", '"'))
 _PIXELS_A_BYTE = 64
@@ -27,8 +26,6 @@ _PIXELS_A_BYTE = 64
 _MAX_TILES = 1_000_000
 """Tiles of a pattern on a page: A3 in millimetre squares has 125,000."""
 _IMAGE_SLACK = 1 << 16
-_FEW_BYTES = 100_000
-"""Deflated, they cannot unpack to more than 100 MB."""
 _PLANES = {"/DeviceRGB": 3, "/CalRGB": 3, "/Lab": 3, "/DeviceCMYK": 4}
 _BYTES_A_PLANE = {"/JPXDecode": 8}
 """Working memory for a pixel in one plane, where it is more than the pixel: JPEG 2000 works on tiles."""
@@ -52,7 +49,7 @@ class Drawn:
 
 def drawn_by(file: InputFile, number: int, page: pikepdf.Page) -> Drawn:
     """What a page draws; raises InputFileError for more than a drawing can have."""
-    walk = _Walk(file, number, abs(_area(page.mediabox)))
+    walk = _Walk(file, number, page)
     contents = page.obj.get("/Contents")
     streams = list(contents) if isinstance(contents, pikepdf.Array) else [contents] if contents else []
     left = MAX_CONTENT
@@ -65,7 +62,7 @@ def drawn_by(file: InputFile, number: int, page: pikepdf.Page) -> Drawn:
         left -= walk.size(stream, left)
     uses = walk.uses(page)
     walk.drawn.objects = sum(count for (operator, _), count in uses.items() if operator == "Do")
-    cost = MAX_CONTENT - left + walk.cost(uses, page.obj.get("/Resources"))
+    cost = MAX_CONTENT - left + walk.cost(uses, walk.resources)
     for annotation in page.obj.get("/Annots", ()):
         cost += sum(walk.of_stream(stream, None) for stream in _appearances(annotation))
     walk.check(cost)
@@ -89,8 +86,10 @@ def _appearances(annotation: pikepdf.Object) -> list[pikepdf.Stream]:
 class _Walk:
     """Follows the streams of one page; each is parsed once."""
 
-    def __init__(self, file: InputFile, number: int, area: float) -> None:
-        self.file, self.number, self.area = file, number, area
+    def __init__(self, file: InputFile, number: int, page: pikepdf.Page) -> None:
+        self.file, self.number = file, number
+        self.area = abs(_area(page.mediabox))
+        self.resources = page.obj.get("/Resources")
         self.drawn = Drawn()
         self.costs: dict[object, float] = {}
         self.open: set[object] = set()
@@ -115,8 +114,8 @@ class _Walk:
     def of_stream(self, stream: pikepdf.Stream, resources: pikepdf.Object | None) -> float:
         """Cost of carrying out a form, pattern or letter once; `resources` where it has none of its own."""
         key = stream.objgen if stream.is_indirect else id(stream)
-        if key in self.open:
-            self.check(math.inf)  # it draws itself
+        if key in self.open or stream.get("/Type") == pikepdf.Name.Page:
+            self.check(math.inf)  # it draws itself, or hides its commands from qpdf
         if key not in self.costs:
             self.open.add(key)
             size = self.size(stream, MAX_CONTENT)
@@ -142,12 +141,10 @@ class _Walk:
 
     def cost(self, uses: Counter[tuple[str, str]], resources: pikepdf.Object | None) -> float:
         """Cost of what a stream names in its resources."""
-        if resources is None:
-            return uses["pixels", ""] / _PIXELS_A_BYTE
         total, letter = uses["pixels", ""] / _PIXELS_A_BYTE, 0.0
         for (operator, name), count in uses.items():
             group = {"Do": "/XObject", "gs": "/ExtGState", "Tf": "/Font"}.get(operator, "/Pattern")
-            one = resources.get(group, _NOTHING).get(name) if name else None
+            one = self.named(group, name, resources)
             if isinstance(one, pikepdf.Stream) and one.get("/Subtype") == "/Image":
                 total += count * self.image(one)
             elif isinstance(one, pikepdf.Stream):
@@ -163,6 +160,14 @@ class _Walk:
                 letter = max([letter, *(self.of_stream(form, own) for form in letters)])
             self.check(total)
         return total + uses["letters", ""] * letter
+
+    def named(self, group: str, name: str, resources: pikepdf.Object | None) -> pikepdf.Object | None:
+        """What a name stands for; as in pdfium, among the page's resources where a form's own lack it."""
+        for known in (resources, self.resources):
+            kind = known.get(group) if isinstance(known, pikepdf.Dictionary) else None
+            if isinstance(kind, pikepdf.Dictionary) and name in kind:
+                return kind[name]
+        return None
 
     def check_tiles(self, stream: pikepdf.Stream) -> None:
         """Raise InputFileError for a pattern of more tiles than a page can show."""
@@ -211,13 +216,9 @@ def _check_image(file: InputFile, number: int, stream: pikepdf.Stream, width: in
         check_memory(file, number, pixels, pixels * planes * _BYTES_A_PLANE["/JPXDecode"])
     elif filters and set(filters) == {"/FlateDecode"}:
         most = height * (width * planes * bits // 8 + 2) * (1 if planes > 1 else 4) + _IMAGE_SLACK
-        data = unpacked(stream, most) if len(filters) > 1 or _long(stream) else b""
+        data = unpacked(stream, most)
         if data is not None and len(data) > most:
             raise damaged(file, number, "its data are more than its size asks for")
-
-
-def _long(stream: pikepdf.Stream) -> bool:
-    return len(stream.read_raw_bytes()) > _FEW_BYTES
 
 
 def _fax_damage(stream: pikepdf.Stream, height: int) -> int | None:

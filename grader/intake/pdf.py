@@ -1,6 +1,7 @@
 """PDF files: a page's embedded scan taken out directly where it is the whole page, else rendered."""
 
 import io
+import logging
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -30,10 +31,12 @@ _GROUP_BYTES = 4
 """For a pixel of what is drawn together: its colour and how much it covers."""
 
 
+logging.getLogger("pikepdf").setLevel(logging.CRITICAL)
+"""What is wrong with a file is told by an error; the library's own words on it would be in the way."""
 if hasattr(pikepdf.settings, "set_qpdf_limits"):
     pikepdf.settings.set_qpdf_limits(
         flate_max_memory=MAX_UNPACKED, run_length_max_memory=MAX_UNPACKED, png_max_memory=MAX_UNPACKED,
-        tiff_max_memory=MAX_UNPACKED, dct_max_memory=MAX_UNPACKED, max_stream_filters=4,
+        tiff_max_memory=MAX_UNPACKED, dct_max_memory=MAX_UNPACKED, max_stream_filters=4, parser_max_errors=0,
     )  # fmt: skip
 
 
@@ -46,16 +49,18 @@ def _page(file: InputFile, number: int) -> Page | None:
         leaf = leaves[number - 1]
         if leaf is None:
             raise _unreadable(file, number, "its place in the list of pages is empty")
+        leaf.Type = pikepdf.Name.Page  # without it qpdf finds no drawing commands
         page = pikepdf.Page(leaf)
         drawn = drawn_by(file, number, page)
-        placement = only_image(page) if drawn.objects == 1 else None
+        # libtiff would print what it thinks of damaged rows.
+        placement = only_image(page) if drawn.objects == 1 and not drawn.damage else None
         taken = None if placement is None else _taken_out(file, number, placement)
         if taken is None:
             for image in drawn.images.values():
                 if filters_of(image) == ["/DCTDecode"]:
                     # What renders the page would fill the rest of a damaged one without a word.
                     jpeg.decode(file, number, image.read_raw_bytes())
-            taken = _rendered(file, number, len(leaves))
+            taken = _rendered(file, number, len(leaves), _as_understood(file, document))
     return replace(taken, damage=drawn.damage)
 
 
@@ -139,8 +144,17 @@ def _decoded(file: InputFile, number: int, image: pikepdf.PdfImage) -> GreyImage
         return None
 
 
-def _rendered(file: InputFile, number: int, pages: int) -> Page:
-    with pypdfium2.PdfDocument(file.data) as document:
+def _as_understood(file: InputFile, document: pikepdf.Pdf) -> bytes:
+    """The file; where qpdf had to mend it, as mended: what is rendered must be what was judged."""
+    if not document.get_warnings():
+        return file.data
+    mended = io.BytesIO()
+    document.save(mended)
+    return mended.getvalue()
+
+
+def _rendered(file: InputFile, number: int, pages: int, data: bytes) -> Page:
+    with pypdfium2.PdfDocument(data) as document:
         if len(document) != pages:
             raise _unreadable(file, number, "its place in the list of pages is not sure")
         page = document[number - 1]

@@ -10,7 +10,7 @@ from grader.intake.limits import InputFile, damaged
 from grader.records import GreyImage
 
 MAX_CONTENT = 32_000_000
-"""Bytes of drawing commands on a page, each as often as it is carried out; an exported drawing has a few MB."""
+"""Bytes of drawing commands on a page, each as often as it is carried out; exported drawings have 5 MB."""
 _SLACK = 1 << 16
 _EIGHT, _ONE = 8, 1
 
