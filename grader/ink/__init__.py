@@ -37,8 +37,8 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     if grey < _DARK:
         return Unread(
             "ink",
-            f"half of it is as dark as {grey:.0f} of 255 or darker: a picture with its tones inverted, or"
-            " taken in the dark? Scan the sheet in greyscale, dark lines on white paper",
+            f"half of it is as dark as {grey:.0f} of 255 or darker: a picture with its tones inverted, a"
+            " pattern, or a photo taken in the dark? Scan the sheet in greyscale, dark lines on white paper",
         )
     flat = flatten(page.grey)
     scale = working_scale(sheet.px_per_mm)
