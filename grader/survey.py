@@ -44,8 +44,8 @@ def survey(path: Path, name: str, names: Names) -> Survey:
         count = count_pages(path)
     except InputFileError as error:
         if path.suffix.lower() in MEASUREMENT_TYPES:
-            told = UnmatchedDocument(file=name, code=error.code, message=error.message)
-            return Survey(refused=told, students=students_in(path))
+            refused = UnmatchedDocument(file=name, code=error.code, message=error.message)
+            return Survey(refused=refused, students=students_in(path))
         page = PageSource(name, 1, 1)
         return Survey(pages=(page,), broken={page: error.message})
     found = [_look(path, PageSource(name, number, count)) for number in range(1, count + 1)]
