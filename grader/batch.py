@@ -148,8 +148,8 @@ def _works(
         student_ids=[row.student_id for row in measured if row.student_id],
     )
     paths = {told_name(path, batch.folder): path for path in files}
-    refused = [(one.refused, one.students) for one in surveys if one.refused is not None]
-    unusable = [Unusable((Problem(one.code, one.message, one.file),), who) for one, who in refused]
+    refused = [(survey.refused, survey.students) for survey in surveys if survey.refused is not None]
+    unusable = [Unusable((Problem(file.code, file.message, file.file),), who) for file, who in refused]
     works, strangers = works_of(
         batch.assignment, roster, ownership, measured, paths, batch.lang, refused=unusable
     )
@@ -158,7 +158,7 @@ def _works(
         UnmatchedDocument(file=one.file or "", code=one.code, message=one.message)
         for one in ownership.problems
     ]
-    return works, [*(one for one, _ in refused), *unmatched, *strangers, *told]
+    return works, [*(file for file, _ in refused), *unmatched, *strangers, *told]
 
 
 def _unmatched(one: Unmatched) -> UnmatchedDocument:

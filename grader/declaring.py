@@ -72,7 +72,7 @@ def declarations(
         given = [(declared.get(name, "").strip(), source) for source, declared in entered.items()]
         given += [(declared.get(name, "").strip(), "measurements") for declared in further]
         given = [(text, source) for text, source in given if text]
-        if any(not _is_one_scale(task, name, text, given[0][0], known) for text, _ in given):
+        if any(not _is_certainly_same(task, name, text, given[0][0], known) for text, _ in given):
             problems.append(_differ(name, given))
             unread.append(Unread(name, " / ".join(dict.fromkeys(f"'{text}'" for text, _ in given))))
             continue
@@ -118,13 +118,13 @@ def _believed(
 
 
 def _contradicts(name: str, box: Written, text: str, source: Source) -> Problem:
-    told = f"{name}'s box reads '{box.text}' ({100 * box.confidence:.0f} %)"
-    return Problem("scale_box_disagrees", f"{told}, {SOURCES[source]} '{text}', which is used")
+    message = f"{name}'s box reads '{box.text}' ({100 * box.confidence:.0f} %)"
+    return Problem("scale_box_disagrees", f"{message}, {SOURCES[source]} '{text}', which is used")
 
 
 def _differ(name: str, given: Sequence[tuple[str, Source]]) -> Problem:
-    told = ", ".join(dict.fromkeys(f"'{text}' in {SOURCES[source]}" for text, source in given))
-    return Problem("scale_disagrees", f"{name} is {told}: none is used; correct one of them")
+    texts = ", ".join(dict.fromkeys(f"'{text}' in {SOURCES[source]}" for text, source in given))
+    return Problem("scale_disagrees", f"{name} is {texts}: none is used; correct one of them")
 
 
 SOURCES: Mapping[Source, str] = {
@@ -161,12 +161,12 @@ def _is_same(task: Task, name: str, one: str, other: str, known: Mapping[str, fl
     return first is None or second is None or abs(first / second - 1.0) <= SAME
 
 
-def _is_one_scale(task: Task, name: str, one: str, other: str, known: Mapping[str, float]) -> bool:
-    """Whether two texts surely mean one scale; the assignment's own stand for those that a rule needs."""
-    if one == other or _parsed(task, name, one) == _parsed(task, name, other):
+def _is_certainly_same(task: Task, name: str, text: str, other: str, known: Mapping[str, float]) -> bool:
+    """Whether two texts surely mean the same scale; a rule takes undeclared scales from the assignment."""
+    if text == other or _parsed(task, name, text) == _parsed(task, name, other):
         return True
     known = {**task.rule_scales, **known}
-    first, second = (_value(task, name, text, known).get(name) for text in (one, other))
+    first, second = (_value(task, name, each, known).get(name) for each in (text, other))
     return first is not None and second is not None and abs(first / second - 1.0) <= SAME
 
 

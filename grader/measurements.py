@@ -228,12 +228,14 @@ class _Entries:
 
     def problems(self) -> tuple[Problem, ...]:
         """The faults, no more than a person reads, and what was entered and is not asked for."""
-        found = [Problem("measurement_fault", str(fault), self.file) for fault in self.faults[:MOST_FINDINGS]]
+        problems = [
+            Problem("measurement_fault", str(fault), self.file) for fault in self.faults[:MOST_FINDINGS]
+        ]
         if len(self.faults) > MOST_FINDINGS:
             more = f"... and {len(self.faults) - MOST_FINDINGS} more faults"
-            found.append(Problem("measurement_fault", more, self.file))
+            problems.append(Problem("measurement_fault", more, self.file))
         given = {name for table in self.tables.values() for name in table}
-        return (*found, *_unused(self.names, given, self.file))
+        return (*problems, *_unused(self.names, given, self.file))
 
 
 # CSV ----------------------------------------------------------------------------------------------
@@ -376,10 +378,10 @@ _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 
 def _unused(names: Names, given: Collection[str], file: str) -> Iterator[Problem]:
     """Vectors measured that nothing can be held against."""
-    found = sorted(names.unused.intersection(given))
-    if found:
-        told = f"{', '.join(found)}: not drawn in this mechanism's plans, and not judged"
-        yield Problem("measurement_not_used", told, file)
+    unused = sorted(names.unused.intersection(given))
+    if unused:
+        message = f"{', '.join(unused)}: not drawn in this mechanism's plans, and not judged"
+        yield Problem("measurement_not_used", message, file)
 
 
 def reading_of(
@@ -400,38 +402,39 @@ def reading_of(
     return Reading({plan: Figure({}, vectors) for plan, vectors in figures.items()})
 
 
-def combined(entered: Sequence[Measurements]) -> Measurements:
+def combined(sets: Sequence[Measurements]) -> Measurements:
     """All that several files or lines of one student give.
 
     Where they contradict each other, no value is used: a problem says which they are, and
     `Reading.unread` what they were entered for. Scales are left to `further_scales`.
     """
-    first, *others = entered
+    first, *others = sets
     if not others:
         return first
-    places = " and ".join(one.place for one in entered)
+    places = " and ".join(each.place for each in sets)
     problems = [Problem("measurements_twice", f"{first.student_id} is in {places}: both count", first.source)]
     given: dict[str, dict[float, str]] = {}
-    for one in entered:
-        for column, value in one.numbers.items():
-            given.setdefault(column, {}).setdefault(value, one.place)
-    unread = [gap for one in entered for gap in one.reading.unread]
+    for each in sets:
+        for column, value in each.numbers.items():
+            given.setdefault(column, {}).setdefault(value, each.place)
+    unread = [gap for each in sets for gap in each.reading.unread]
     for column, where in given.items():
         if len(where) > 1:
-            unread.append(Unread(_name_of(column), f"{column}: {' / '.join(f'{one:g}' for one in where)}"))
-            told = ", ".join(f"{value:g} ({place})" for value, place in where.items())
-            problems.append(Problem("measurements_disagree", f"{column}: {told}; none of them is used"))
+            unread.append(
+                Unread(_name_of(column), f"{column}: {' / '.join(f'{value:g}' for value in where)}")
+            )
+            values = ", ".join(f"{value:g} ({place})" for value, place in where.items())
+            problems.append(Problem("measurements_disagree", f"{column}: {values}; none of them is used"))
     agreed = {column: next(iter(where)) for column, where in given.items() if len(where) == 1}
-    figures = [figure for one in entered for figure in one.reading.figures.items()]
+    figures = [figure for each in sets for figure in each.reading.figures.items()]
     plans = {name: plan for plan, figure in figures for name in figure.vectors}
     directions = {name: agreed[f"{name}_deg"] for name in plans if f"{name}_deg" in agreed}
-    values = {column.removesuffix("_value"): agreed[column] for column in agreed if column.endswith("_value")}
     return replace(
         first,
         reading=replace(reading_of(plans, agreed, directions), unread=tuple(unread)),
-        values=values,
-        problems=(*(problem for one in entered for problem in one.problems), *problems),
-        further_scales=tuple(one.scales for one in others),
+        values={_name_of(column): value for column, value in agreed.items() if column.endswith("_value")},
+        problems=(*(problem for each in sets for problem in each.problems), *problems),
+        further_scales=tuple(each.scales for each in others),
     )
 
 
@@ -455,15 +458,15 @@ class _NoValue:
 
 
 def _object(pairs: Sequence[tuple[str, object]]) -> dict[str, object]:
-    """An object of JSON; a key that is there twice has no value: nothing says which one is meant."""
-    found: dict[str, object] = {}
+    """An object of JSON; a key that is there twice has no value: nothing says which is meant."""
+    table: dict[str, object] = {}
     for key, value in pairs:
         # A half of a surrogate pair can be written in JSON, and in no file of ours.
         name, read = _encodable(key), _encodable(value) if isinstance(value, str) else value
-        if name in found:
-            read = _NoValue(f"{_shown(found[name])} and {_shown(read)}", "is there more than once")
-        found[name] = read
-    return found
+        if name in table:
+            read = _NoValue(f"{_shown(table[name])} and {_shown(read)}", "is there more than once")
+        table[name] = read
+    return table
 
 
 def _encodable(text: str) -> str:
@@ -548,9 +551,9 @@ class _Document:
             if name not in known:
                 near = near_names(name, known) if len(self.entries.faults) < MOST_FINDINGS else []
                 self.fault(path, f"is not known here{_did_you_mean(near)}")
-                for one in near:
-                    if one not in given:
-                        self.entries.refuse(one, name, _shown(value))
+                for meant in near:
+                    if meant not in given:
+                        self.entries.refuse(meant, name, _shown(value))
             elif isinstance(value, int | float) and not isinstance(value, bool):
                 why = self.entries.take(f"{name}{end}", float(value))
                 if why is not None:

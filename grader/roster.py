@@ -206,16 +206,16 @@ def _unknown(header: list[str]) -> list[str]:
 
 
 def _near(name: str) -> str | None:
-    found = near_names(name.replace(" ", "_"), COLUMNS, most=1, cutoff=_ALMOST)
-    return found[0] if found else None
+    near = near_names(name.replace(" ", "_"), COLUMNS, most=1, cutoff=_ALMOST)
+    return near[0] if near else None
 
 
 def _passed_over(header: list[str], file: str) -> Iterator[Problem]:
     unknown = _unknown(header)
     if unknown:
-        told = ", ".join(_short(name) for name in unknown[:MOST_FINDINGS])
+        names = ", ".join(_short(name) for name in unknown[:MOST_FINDINGS])
         more = f" and {len(unknown) - MOST_FINDINGS} more" if len(unknown) > MOST_FINDINGS else ""
-        message = f"columns without meaning here are passed over: {told}{more}"
+        message = f"columns without meaning here are passed over: {names}{more}"
         yield Problem("roster_columns", message, file)
 
 
@@ -329,8 +329,8 @@ def _check_case(rows: list[RosterRow]) -> Iterator[Finding]:
     for row in rows:
         other = spelled.setdefault(row.student_id.lower(), row)
         if other.student_id != row.student_id:
-            told = f"{row.student_id} differs in case only from {other.student_id} on line {other.line}"
-            yield Finding(f"line {row.line}, student_id", f"{told}: the two would share a folder")
+            clash = f"{row.student_id} differs in case only from {other.student_id} on line {other.line}"
+            yield Finding(f"line {row.line}, student_id", f"{clash}: the two would share a folder")
 
 
 def _check_positions(rows: list[RosterRow]) -> Iterator[Finding]:
@@ -358,8 +358,8 @@ def _check_scans(rows: list[RosterRow]) -> Iterator[Finding]:
                 else named.get(ref.page) or named.get(None)
             )
             if clash is not None:
-                told = f"{ref} is named on line {clash[1].line} already ({clash[0]})"
-                yield Finding(f"line {row.line}, scans", told)
+                message = f"{ref} is named on line {clash[1].line} already ({clash[0]})"
+                yield Finding(f"line {row.line}, scans", message)
             named.setdefault(ref.page, (ref, row))
 
 

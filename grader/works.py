@@ -1,12 +1,12 @@
 """From pages with owners, measurements and the roster to each student's work.
 
-What cannot be used, and what two students may have handed in, is told in the reports of both: nobody
+What cannot be used, and what two students may have handed in, stands in the reports of both: nobody
 is missing where a file of theirs lies in the folder. Codes of the problems of measurements, beside
 those of `grader.ownership`:
 
 | code | meaning |
 |---|---|
-| measurements_unmatched | of nobody on the roster, or of nobody who can be told |
+| measurements_unmatched | of nobody on the roster, or of nobody who is named |
 | position_disagrees | the student is on the roster, with other positions |
 """
 
@@ -79,8 +79,10 @@ class _Submissions:
         """Add measurements to their owner's; or what keeps them from being used."""
         student, named = entered.student_id, self.student_of_file(entered.source)
         if student is not None and named not in {None, student}:
-            told = f"{entered.place}: the file's name says {named}, what is in it {student}"
-            problem = Problem("owner_disagree", f"{told}; used for neither: correct one", entered.source)
+            message = f"{entered.place}: the file's name says {named}, what is in it {student}"
+            problem = Problem(
+                "owner_disagree", f"{message}; it is used for neither: correct one of the two", entered.source
+            )
             return Unusable((problem,), (str(named), student), entered.position)
         student = named if student is None and entered.line is None else student
         if student is None:
@@ -131,13 +133,13 @@ class _Submissions:
             return Unusable((_unmatched(entered, f"{_line(entered)}{student} is not on the roster"),))
         places = ", ".join(str(position) for _, position in keys)
         if entered.position is None:
-            told = f"{entered.place}: {student} has the positions {places}; nothing says which"
-            return Unusable((Problem("owner_ambiguous", told, entered.source),), (student,))
-        told = f"{entered.place}: {student} in position {entered.position}, the roster has {places}"
-        return Unusable((Problem("position_disagrees", told, entered.source),), (student,))
+            message = f"{entered.place}: {student} has the positions {places}; nothing says which"
+            return Unusable((Problem("owner_ambiguous", message, entered.source),), (student,))
+        message = f"{entered.place}: {student} in position {entered.position}, the roster has {places}"
+        return Unusable((Problem("position_disagrees", message, entered.source),), (student,))
 
-    def tell(self, unusable: Unusable) -> None:
-        """Tell everybody whose it may be; with a roster, those on it alone."""
+    def report(self, unusable: Unusable) -> None:
+        """Note it with everybody whose it may be; with a roster, with those on it alone."""
         for student in unusable.students:
             keys = self.keys.get(student, [])
             exact = [key for key in keys if key[1] == unusable.position]
@@ -165,32 +167,32 @@ def works_of(  # noqa: PLR0913 - whatever a folder holds
     lang : where the roster does not say
     refused : measurement files that cannot be used, with the students whom they name in themselves
     """
-    found = _Submissions(roster)
+    submissions = _Submissions(roster)
     for row in () if roster is None else roster.rows:
-        found.at((row.student_id, row.position)).row = row
+        submissions.at((row.student_id, row.position)).row = row
     for owned in (*ownership.owned, *_blank_only(ownership, roster)):
-        found.at((owned.student_id, owned.position)).owned.append(owned)
+        submissions.at((owned.student_id, owned.position)).owned.append(owned)
     for entered in measured:
-        said = found.said.setdefault(entered.source, set())
+        said = submissions.said.setdefault(entered.source, set())
         said.update([] if entered.student_id is None else [entered.student_id])
-    unusable = [one for one in map(found.take, measured) if one is not None]
-    pages = [Unusable((one.problem,), one.students) for one in ownership.unmatched]
-    for one in (*unusable, *(_by_name(found, one) for one in refused), *pages):
-        found.tell(one)
-    works = [_work(assignment, key, one, paths, lang) for key, one in found.by_key.items()]
+    unusable = [refusal for refusal in map(submissions.take, measured) if refusal is not None]
+    pages = [Unusable((page.problem,), page.students) for page in ownership.unmatched]
+    for refusal in (*unusable, *(_by_name(submissions, file) for file in refused), *pages):
+        submissions.report(refusal)
+    works = [_work(assignment, key, gathered, paths, lang) for key, gathered in submissions.by_key.items()]
     strangers = [
         UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
-        for one in unusable
-        for problem in one.problems
+        for refusal in unusable
+        for problem in refusal.problems
     ]
     return works, strangers
 
 
-def _by_name(found: _Submissions, refused: Unusable) -> Unusable:
+def _by_name(submissions: _Submissions, refused: Unusable) -> Unusable:
     """A file that cannot be used, with the student whom its name tells among those whose it may be."""
     file = refused.problems[0].file or ""
-    found.said[file] = set(refused.students)
-    named = found.student_of_file(file)
+    submissions.said[file] = set(refused.students)
+    named = submissions.student_of_file(file)
     students = [named] if named is not None and named not in refused.students else []
     return replace(refused, students=(*students, *refused.students))
 

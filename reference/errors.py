@@ -60,14 +60,14 @@ def lines_of(findings: Sequence[object]) -> str:
 
 
 def near_names(name: str, known: Iterable[str], *, most: int = 2, cutoff: float = 0.6) -> list[str]:
-    """The known names that a misspelt one may stand for, the nearest first; case does not count.
+    """The known names that a misspelt name may stand for, the nearest first; case does not count.
 
     Arguments: `cutoff` is the least similarity, 0..1, as `difflib` counts it.
     """
     if len(name) > _LONGEST_NAME:
         return []
-    by_lower = {one.lower(): one for one in known}
-    return [by_lower[one] for one in difflib.get_close_matches(name.lower(), by_lower, most, cutoff)]
+    by_lower = {each.lower(): each for each in known}
+    return [by_lower[near] for near in difflib.get_close_matches(name.lower(), by_lower, most, cutoff)]
 
 
 class AuthoredFileError(PlanmarkError):

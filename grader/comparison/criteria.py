@@ -63,14 +63,14 @@ def _in_order(task: Task, scales: tuple[str, ...]) -> list[CriterionTable]:
 
 def _outcome(ledger: Ledger, criterion: CriterionTable) -> Outcome:
     """The verdict on one criterion, open where it rests on something entered that cannot be used."""
-    found = _judged(ledger, criterion)
+    outcome = _judged(ledger, criterion)
     entry = ledger.evidence.refused.get(criterion.name)
-    if entry is None and found.verdict in {"none", "partial"}:
+    if entry is None and outcome.verdict in {"none", "partial"}:
         entry = _refused_below(ledger, criterion.name)
     if entry is None:
-        return found
+        return outcome
     ledger.leave_open(criterion.name)
-    return verdicts.entry_refused(found, entry)
+    return verdicts.entry_refused(outcome, entry)
 
 
 def _refused_below(ledger: Ledger, name: str) -> str | None:
@@ -81,11 +81,9 @@ def _refused_below(ledger: Ledger, name: str) -> str | None:
     if segment is None or not evidence.refused:
         return None
     needs = {need for need in task.construction.step(segment.head).needs if need not in evidence.nodes}
-    below = [one.name for one in task.segments.values() if one.head in needs]
-    return next(
-        (evidence.refused[one] for one in (segment.scale, segment.name, *below) if one in evidence.refused),
-        None,
-    )
+    vectors = [vector.name for vector in task.segments.values() if vector.head in needs]
+    below = [name for name in (segment.scale, segment.name, *vectors) if name in evidence.refused]
+    return evidence.refused[below[0]] if below else None
 
 
 def _judged(ledger: Ledger, criterion: CriterionTable) -> Outcome:

@@ -225,10 +225,10 @@ def _measured(reading: Reading | None) -> dict[str, DrawnVector]:
 
 
 def _refused(reading: Reading | None) -> dict[str, str]:
-    found: dict[str, list[str]] = {}
+    entries: dict[str, list[str]] = {}
     for gap in reading.unread if reading else ():
-        found.setdefault(gap.name, []).append(gap.reason)
-    return {name: ", ".join(reasons) for name, reasons in found.items()}
+        entries.setdefault(gap.name, []).append(gap.reason)
+    return {name: ", ".join(texts) for name, texts in entries.items()}
 
 
 def _nodes_from(task: Task, measured: Mapping[str, DrawnVector]) -> dict[str, complex]:

@@ -86,19 +86,22 @@ def unjudged(
     )
 
 
-def entry_refused(found: Outcome, entry: str) -> Outcome:
+def entry_refused(judged: Outcome, entry: str) -> Outcome:
     """The outcome left to a person, because something that was entered for it cannot be used.
 
     Arguments: `entry` is what was entered.
     """
-    said = [reason for reason in found.reasons if reason.code != "right"]
+    reasons = [reason for reason in judged.reasons if reason.code != "right"]
+    if judged.measured == Quantity():
+        # Why nothing was judged is that nothing of it can be used.
+        reasons = []
     return replace(
-        found,
+        judged,
         verdict="review",
         possible=("none", "full"),
         shares=(NONE, FULL),
         confidence=0.0,
-        reasons=(Reason("entry_refused", {"reason": entry}), *(said if found.measured != Quantity() else ())),
+        reasons=(Reason("entry_refused", {"reason": entry}), *reasons),
         mistake=None,
     )
 

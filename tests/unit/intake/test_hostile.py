@@ -22,9 +22,10 @@ from grader.intake.limits import MAX_FILE_BYTES
 from grader.pipeline import Place, see
 from grader.records import Page
 from grader.sheet import rectify, whose
-from grader.survey import survey
+from grader.survey import survey_folder
 from reference.errors import InputFileError
 from tests import hostile
+from tests.inline import Inline
 
 PROJECT = Path(__file__).parents[3]
 WORKER_BYTES = 1_500_000_000
@@ -114,6 +115,12 @@ def test_pages_of_any_accepted_size_come_through_the_sheet_stage(seed):
     rectify(page)
 
 
+def surveyed(path):
+    """The pages of one file, as a run over its folder finds them."""
+    (survey,) = survey_folder([path], path.parent, None, Inline(), lambda *_: None, path.parent / "notes")
+    return survey.pages
+
+
 # One page never costs another ---------------------------------------------------------------------
 
 
@@ -121,9 +128,9 @@ def test_pages_of_any_accepted_size_come_through_the_sheet_stage(seed):
 def test_a_broken_page_of_a_class_leaves_the_others_in_their_places(tmp_path, how):
     path = tmp_path / "class.pdf"
     path.write_bytes(hostile.pdf_of_a_class(pages=6, broken=2, how=how))
-    pages = survey(path, "class.pdf", None)
-    assert [source.page for source in pages.pages] == [1, 2, 3, 4, 5, 6]
-    assert [source.page for source in pages.broken] == [3]
+    pages = surveyed(path)
+    assert [source.page for source in pages] == [1, 2, 3, 4, 5, 6]
+    assert [source.page for source in pages if source.problem] == [3]
     widths = [page_of(path, number).paper_mm[0] * 72 / 25.4 for number in (1, 2, 4, 5, 6)]
     assert widths == pytest.approx([840, 841, 843, 844, 845])
 
@@ -220,7 +227,7 @@ def test_a_file_is_read_once_and_its_digest_is_that_of_what_is_decoded(tmp_path)
 def test_a_page_of_a_file_that_has_changed_since_it_was_surveyed_is_not_read(tmp_path):
     path = tmp_path / "scan.png"
     path.write_bytes(hostile.stored(hostile.paper()))
-    digest = survey(path, "scan.png", None).digest
+    digest = surveyed(path)[0].digest
     assert see(Place(path, 1, "scan.png", digest)).page is not None
     path.write_bytes(hostile.stored(255 - hostile.paper()))
     changed = see(Place(path, 1, "scan.png", digest))
@@ -356,7 +363,7 @@ def test_a_page_with_damaged_rows_is_told_and_not_read(tmp_path):
     page = see(Place(path, 1, "copy.tif"))
     assert [problem.code for problem in page.problems] == ["image_damaged_rows"]
     assert page.sheet is None
-    assert not survey(path, "copy.tif", None).pages[0].blank
+    assert not surveyed(path)[0].blank
 
 
 @pytest.mark.parametrize("compression", ["tiff_lzw", "packbits", "tiff_adobe_deflate"])
