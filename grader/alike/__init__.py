@@ -61,7 +61,9 @@ def find_alike(assignment: Assignment, handed: Sequence[Handed], maps: Maps = ()
     _add_drawings(pairs, drawings)
     _add_numbers(pairs, like_numbers(assignment, handed))
     owners = [k for k, of_one in enumerate(maps) for _ in of_one]
-    _add_pictures(pairs, like_pictures(owners, [one for of_one in maps for one in of_one], len(handed)))
+    printed = np.array([one.printed for one in handed])
+    pictures = like_pictures(owners, [one for of_one in maps for one in of_one], printed)
+    _add_pictures(pairs, pictures, drawings)
     _add_other_numbers(pairs, handed, drawings)
     told = [(i, j, pair) for (i, j), pair in pairs.items() if handed[i].student_id != handed[j].student_id]
     found = [_document(handed, members, told) for members in _groups([(i, j) for i, j, _ in told])]
@@ -90,8 +92,10 @@ def _add_numbers(pairs: dict[tuple[int, int], _Pair], found: LikeNumbers) -> Non
         pairs.setdefault((i, j), _Pair()).add(["same_numbers"], measure, share, compared)
 
 
-def _add_pictures(pairs: dict[tuple[int, int], _Pair], found: LikePictures) -> None:
-    for i, j, measure in _rare(found.log_chance, found.pairs):
+def _add_pictures(pairs: dict[tuple[int, int], _Pair], found: LikePictures, drawings: LikeDrawings) -> None:
+    # Good drawings whose figures lie in the same places have the same ink: that is no rarer than the places.
+    log_chance = np.fmax(found.log_chance, drawings.log_layout)
+    for i, j, measure in _rare(log_chance, found.pairs):
         share = float(np.clip(found.overlap[i, j], 0.0, 1.0))
         pairs.setdefault((i, j), _Pair()).add(["same_picture"], measure, share, 0)
 

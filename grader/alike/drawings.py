@@ -31,6 +31,7 @@ class LikeDrawings:
     ----------
     log_chance : natural logarithm of the chance that independent hands come so near; 0 where not compared
     log_hands, log_places : what errors of the hand and places on the sheet give alone
+    log_layout : as `log_places`, nan where places were not read unless the class follows a layout
     cosine, count : agreement of the errors, and how many there are
     pairs : of different students
     fits : the variant of the class that a drawing fits though it is not the own, and how far off it is, mm
@@ -39,6 +40,7 @@ class LikeDrawings:
     log_chance: FloatArray
     log_hands: FloatArray
     log_places: FloatArray
+    log_layout: FloatArray
     cosine: FloatArray
     count: FloatArray
     pairs: int
@@ -56,7 +58,8 @@ def like_drawings(assignment: Assignment, handed: Sequence[Handed]) -> LikeDrawi
     fits = fitting(assignment, handed, drawn)
     variants = list(dict.fromkeys(one.variant for one in handed))
     printed = np.array([one.printed for one in handed])
-    places = place_chance(drawn, printed, np.array([variants.index(one.variant) for one in handed]))
+    layout, known = place_chance(drawn, printed, np.array([variants.index(one.variant) for one in handed]))
+    places = np.where(known, layout, 0.0)
     rows = _rows(handed, fits, places)
     hands = hands_of(assignment, handed, drawn, rows)
     together = _together(rows, handed)
@@ -68,12 +71,12 @@ def like_drawings(assignment: Assignment, handed: Sequence[Handed]) -> LikeDrawi
         (found.cosine, found.count),
     )
     compared = _by_student(rows, len(handed), np.where(together, -1.0, 0.0), ())[0] < 0.0
-    places = np.where(compared, places, 0.0)
     people = np.array([one.student_id for one in handed])
     return LikeDrawings(
         log_chance=np.where(compared, _both(log_hands, places), 0.0),
         log_hands=log_hands,
-        log_places=places,
+        log_places=np.where(compared, places, 0.0),
+        log_layout=layout,
         cosine=cosine,
         count=count,
         pairs=int((people[:, None] != people[None, :]).sum()) // 2,

@@ -18,15 +18,27 @@ CELLS = (118, 168)
 """Rows and columns of an A3 sheet's map; what lies outside is left out."""
 COMMON = 0.3
 """Share of the sheets with ink in a cell from which it belongs to the sheet, not to the drawing."""
-INKED = 12
-"""Of 255: darker cells have ink."""
-LEAST_SHEETS = 6
+INKED = 3
+"""Of 255: darker cells have ink, of a hard pencil too."""
+DARKEST = 60.0
+"""A darker cell counts as this one: ink and pencil weigh alike."""
+RUN, RUN_INKED = 32, 0.8
+"""Cells of a straight run (80 mm) that is the page's, and the share of them that have ink."""
+PART = 12
+"""Side of a part in cells: 30 mm, a letter or line with its surroundings, less than a figure."""
+FAINT = 20.0
+"""Norm of a part's ink below which it is dust."""
+LEAST_PARTS = 8
+"""A sheet with ink in fewer parts shows too little to be recognised by."""
+LEAST_SHEETS = 7
+"""Of six sheets two are a third: what they share would be taken for the page's."""
 LEAST_ALIKE = 0.5
-"""Correlation of the ink below which two sheets are never the same drawing."""
+"""Mean correlation of the parts below which two sheets are never the same drawing."""
 
-LEAST_SPREAD = 0.03
-TAIL, TAIL_FROM = 2.0, 2.0
-"""The log of the chance falls by 2 for each spread beyond the first: a heavy tail."""
+LEAST_SPREAD = 0.015
+QUANTILES = 0.84, 0.95
+"""The upper one leaves a copied pair out in a class of seven."""
+TAIL_DROP = float(np.log((1.0 - QUANTILES[0]) / (1.0 - QUANTILES[1])))
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,40 +79,102 @@ def ink_map(scan: GreyImage, page_mm: tuple[float, float]) -> NDArray[np.uint8]:
     return found
 
 
-def like_pictures(owners: Sequence[int], maps: Sequence[NDArray[np.uint8]], students: int) -> LikePictures:
+def like_pictures(
+    owners: Sequence[int], maps: Sequence[NDArray[np.uint8]], printed: NDArray[np.bool_]
+) -> LikePictures:
     """Compare the sheets of a class.
 
-    Arguments: `owners` tells whose each map is, an index below `students`.
+    Arguments: `owners` tells whose each map is, an index of `printed`: who drew on printed answer sheets.
     """
-    chance, overlap = np.zeros((students, students)), np.zeros((students, students))
+    students = len(printed)
+    overlap = np.zeros((students, students))
     owner = np.array(owners, np.int64)
-    if len(set(owners)) < LEAST_SHEETS:
-        return LikePictures(chance, overlap, 0)
-    alike = _correlations(np.array(maps))
-    others = owner[:, None] != owner[None, :]
-    turned = np.arctanh(np.clip(alike, -0.999, 0.999))
-    known = turned[others & np.triu(np.ones(alike.shape, bool))]
-    low, middle, high = np.percentile(known, [15.87, 50.0, 84.13])
-    spread = max(high - middle, middle - low, LEAST_SPREAD)
-    beyond = (turned - middle) / spread
-    # An exponential tail: heavier than a normal one, as resemblances are.
-    log = np.where((alike > LEAST_ALIKE) & others, np.minimum(TAIL_FROM - TAIL * beyond, 0.0), 0.0)
-    for i, j in np.argwhere(others & (alike > 0.0)):
-        a, b = owner[i], owner[j]
-        overlap[a, b] = max(overlap[a, b], alike[i, j])
-        chance[a, b] = min(chance[a, b], log[i, j])
-    return LikePictures(chance, overlap, len(set(owners)) * (len(set(owners)) - 1) // 2)
+    having = np.unique(owner)
+    if len(having) < LEAST_SHEETS:
+        return LikePictures(np.zeros_like(overlap), overlap, 0)
+    np.maximum.at(overlap, (owner[:, None], owner[None, :]), _agreement(np.array(maps), printed[owner]))
+    rows, columns = having[np.array(np.triu_indices(len(having), 1))]
+    scaled = np.arctanh(np.minimum(overlap, 0.999))
+    # A few printed sheets among plain ones (or the reverse) are each other's like by their print.
+    many = np.bincount(printed[having], minlength=2)[printed.astype(np.int64)] >= LEAST_SHEETS
+    compared = (printed[:, None] != printed[None, :]) | many
+    log = np.where((overlap > LEAST_ALIKE) & compared, _log_tail(scaled, scaled[rows, columns]), 0.0)
+    return LikePictures(log, overlap, len(rows))
 
 
-def _correlations(maps: NDArray[np.uint8]) -> FloatArray:
-    """(sheets, sheets) how the ink of sheets correlates, where not all have it."""
-    own = (maps > INKED).mean(axis=0) < COMMON
-    ink = np.minimum(maps.astype(np.float32), 60.0) * own
-    ink = _blurred(ink)[:, own]
-    ink -= ink.mean(axis=1, keepdims=True)
-    size = np.sqrt((ink**2).sum(axis=1, keepdims=True))
-    ink /= np.maximum(size, 1e-6)
-    return np.asarray((ink @ ink.T).astype(np.float64))
+def _log_tail(values: FloatArray, known: FloatArray) -> FloatArray:
+    """Log of the chance of values as large, by an exponential tail through upper quantiles of the known ones.
+
+    The tail is heavier than a normal one, as resemblances are, and no steeper than the class shows: where
+    all follow one layout some pairs are much more like each other than others.
+    """
+    middle, high, higher = np.quantile(known, [0.5, *QUANTILES])
+    scale = max((high - middle) / 2.0, (higher - high) / TAIL_DROP, LEAST_SPREAD)
+    return np.asarray(np.minimum(np.log(1.0 - QUANTILES[1]) - (values - higher) / scale, 0.0))
+
+
+def _agreement(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> FloatArray:
+    """(sheets, sheets) correlation of the ink in one part of the page, the mean over parts that have ink.
+
+    A part counts once, however dark it is: a block, a stain or an edge that two sheets share cannot
+    stand for the whole of them.
+    """
+    ink = np.minimum(maps.astype(np.float32), DARKEST) * ~_of_the_page(maps, printed)
+    parts = _parts(_blurred(ink))
+    size = np.sqrt((parts**2).sum(axis=2))
+    parts /= np.maximum(size, FAINT)[..., None]
+    total, count = np.zeros((2, len(maps), len(maps)))
+    for part, its_size in zip(parts, size, strict=True):
+        having = its_size > FAINT
+        total += part @ part.T
+        count += having[:, None] | having[None, :]
+    return np.asarray(np.clip(total / np.maximum(count, LEAST_PARTS), 0.0, 1.0))
+
+
+def _of_the_page(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(sheets, rows, columns) ink of the page, not of the drawing.
+
+    It is what many printed or many plain sheets have in common, and straight runs along an edge that
+    are longer than a figure's lines: frame, rows of a title block, folds, squares, the desk beside
+    the paper.
+    """
+    inked = maps > INKED
+    runs = _long_runs(inked) | _long_runs(inked.transpose(0, 2, 1)).transpose(0, 2, 1)
+    for kind in (printed, ~printed):
+        if kind.any():
+            runs[kind] |= inked[kind].mean(axis=0) >= COMMON
+    return runs
+
+
+def _long_runs(inked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Cells of straight runs along the last axis.
+
+    A run may step aside by a cell, for the page lies askew, and have gaps, for pencil is faint.
+    """
+    wide = _with_neighbours(inked).astype(np.int16)
+    sums = np.pad(wide.cumsum(axis=2, dtype=np.int16), ((0, 0), (0, 0), (1, 0)))
+    begins = sums[..., RUN:] - sums[..., :-RUN] >= RUN_INKED * RUN
+    marks = np.pad(begins, ((0, 0), (0, 0), (RUN, RUN))).cumsum(axis=2, dtype=np.int16)
+    covered = marks[..., RUN:] - marks[..., :-RUN] > 0
+    return _with_neighbours(covered[..., : inked.shape[2]])
+
+
+def _with_neighbours(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Cells and those beside them across the last axis."""
+    wide = cells.copy()
+    wide[:, 1:] |= cells[:, :-1]
+    wide[:, :-1] |= cells[:, 1:]
+    return wide
+
+
+def _parts(ink: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(parts, sheets, cells) squares of `PART` cells, those at the end filled up with paper."""
+    sheets, rows, columns = ink.shape
+    down, across = -(-rows // PART), -(-columns // PART)
+    whole = np.zeros((sheets, down * PART, across * PART), np.float32)
+    whole[:, :rows, :columns] = ink
+    cut = whole.reshape(sheets, down, PART, across, PART).transpose(1, 3, 0, 2, 4)
+    return np.ascontiguousarray(cut).reshape(down * across, sheets, PART * PART)
 
 
 def _blurred(ink: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -18,13 +18,19 @@ NEAR_MM = 0.5
 """Nearer than this is not told apart."""
 RINGS_MM = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Radii within which the class's own placements are counted."""
+LAYOUT_MM, LAYOUT_SHARE = 4.0, 0.05
+"""A class follows a layout where this share of its pairs has all figures in the same places, so nearly."""
 LEAST_PAIRS = 10
 TRUSTED = 3000.0
 """So many times the class's pairs the rarest placement may be: rarer ones no class can vouch for."""
 
 
-def place_chance(drawn: Mapping[str, Drawn], printed: NDArray[np.bool_], variant: IntArray) -> FloatArray:
-    """Log of the chance that two placements come so near, for every two students; 0 where not known.
+def place_chance(
+    drawn: Mapping[str, Drawn], printed: NDArray[np.bool_], variant: IntArray
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Log of the chance that two placements come so near, for every two students, and where they are known.
+
+    Where they are not, it is nan, but 0 in a class that follows a layout: the same places are usual there.
 
     Arguments: which students drew on a `printed` sheet, whose crosses say for each variant where poles
     are best put: there the sketch alone is placed freely. `variant` is each student's, as a number.
@@ -49,7 +55,10 @@ def place_chance(drawn: Mapping[str, Drawn], printed: NDArray[np.bool_], variant
     same = variant[:, None] == variant[None, :]
     # Those of one variant may have more in common than all.
     chance = _chance(apart, freedom)
-    return np.where(same, np.maximum(chance, _chance(apart, freedom, same)), chance)
+    chance = np.where(same, np.maximum(chance, _chance(apart, freedom, same)), chance)
+    known = (freedom > 0) & ~np.eye(count, dtype=bool)
+    follows = known.any() and (apart[known] < LAYOUT_MM).mean() > LAYOUT_SHARE
+    return np.where(known, chance, 0.0 if follows else np.nan), known
 
 
 def _shift(at: ComplexArray) -> ComplexArray:

@@ -150,11 +150,12 @@ def test_a_number_named_by_diagnosis_tells_whose_it_is_without_a_measure():
 # Pictures -----------------------------------------------------------------------------------------
 
 
-def sheet_picture(seed, shift_px=0):
-    """A sheet with a frame that all have, and lines of its own."""
+def sheet_picture(seed, shift_px=0, *, frame=True):
+    """A sheet with lines of its own, and a frame that all have."""
     rng = np.random.default_rng(seed)
     grey = np.full((297 * 2, 420 * 2), 255, np.uint8)
-    grey[20:24], grey[-24:-20], grey[:, 40:44] = 60, 60, 60
+    if frame:
+        grey[20:24], grey[-24:-20], grey[:, 40:44] = 60, 60, 60
     for _ in range(14):
         (x, y), angle = rng.uniform((120, 120), (700, 460)), rng.uniform(0, np.pi)
         along = np.arange(rng.integers(60, 200))
@@ -164,12 +165,77 @@ def sheet_picture(seed, shift_px=0):
     return grey
 
 
+def laid_out(handed, variant, seed):
+    """A drawing with its figures where a teacher wants them, to 0.3 mm."""
+    rng = np.random.default_rng([seed, 31])
+    (sheet,) = handed.sheets
+    spots = {"mechanism": 110 - 190j, "velocity_plan": 250 - 110j, "acceleration_plan": 330 - 180j}
+    placed = {}
+    for figure, nodes in sheet.items():
+        first = next(iter(drawing("pump", variant, seed, "careful").sheets[0][figure].values()))
+        shift = spots[figure] - first + complex(*rng.normal(0.0, 0.3, 2))
+        placed[figure] = {node: at + shift for node, at in nodes.items()}
+    return replace(handed, sheets=(placed,))
+
+
+def drawn_picture(handed, seed):
+    """A sheet with a drawing's nodes joined by lines, and a few letters elsewhere."""
+    rng = np.random.default_rng([seed, 41])
+    grey = np.full((297 * 2, 420 * 2), 255, np.uint8)
+    share = np.linspace(0.0, 1.0, 400)
+    for nodes in handed.sheets[0].values():
+        for tail, head in pairwise(nodes.values()):
+            at = 2.0 * (tail + share * (head - tail))
+            rows, columns = np.clip(-at.imag, 0, 592).astype(int), np.clip(at.real, 0, 838).astype(int)
+            grey[rows, columns], grey[rows + 1, columns] = 80, 80
+    for x, y in rng.uniform((60, 60), (780, 540), (3, 2)).astype(int):
+        grey[y : y + 6, x : x + 4] = 120
+    return grey
+
+
 def test_the_very_same_picture_is_found_though_it_lay_otherwise_and_nothing_was_read():
     handed = [replace(drawing("pump", k, k), sheets=()) for k in range(12)]
     pictures = [sheet_picture(k) for k in range(11)] + [sheet_picture(4, shift_px=1)]
     maps = [[ink_map(grey, (420.0, 297.0))] for grey in pictures]
     (one,) = found("pump", handed, maps).values()
     assert (set(one.students), one.why) == ({"s4", "s11"}, ["same_picture"])
+
+
+def test_frame_desk_and_folds_that_a_few_sheets_share_make_nobody_alike():
+    """Three of forty have one desk, frame and fold: too few for the class to show that it is common."""
+    pictures = [sheet_picture(k, frame=False) for k in range(40)]
+    for grey in pictures[:3]:
+        grey[:, :16], grey[:14], grey[-14:] = 0, 0, 0
+        grey[30:33, 50:-20], grey[-33:-30, 50:-20], grey[30:-30, 50:53], grey[30:-30, -23:-20] = (
+            40,
+            40,
+            40,
+            40,
+        )
+        grey[:, 415:418] = 30
+    handed = [replace(drawing("pump", k, k), sheets=()) for k in range(40)]
+    assert found("pump", handed, [[ink_map(grey, (420.0, 297.0))] for grey in pictures]) == {}
+
+
+@pytest.mark.parametrize("read", [False, True])
+def test_the_ink_of_two_of_one_variant_is_no_evidence_where_all_follow_one_layout(read):
+    made = []
+    for seed in range(30):
+        variant = max(seed - 1, 0)
+        made.append(laid_out(scanned(drawing("pump", variant, seed, "careful"), seed), variant, seed))
+    maps = [[ink_map(drawn_picture(one, seed), (420.0, 297.0))] for seed, one in enumerate(made)]
+    maps[0] = maps[1]
+    first = made[0] if read else replace(made[0], sheets=())
+    assert found("pump", [first, *made[1:]], maps) == {}
+
+
+def test_two_on_printed_sheets_in_a_class_on_plain_paper_are_not_alike_by_their_print():
+    pictures = [sheet_picture(k) for k in range(20)]
+    for grey in pictures[:2]:
+        for k in range(60):
+            grey[60 + 8 * k : 62 + 8 * k, 60 + 90 * (k % 8) : 110 + 90 * (k % 8)] = 0
+    handed = [replace(drawing("pump", k, k), sheets=(), printed=k < 2) for k in range(20)]
+    assert found("pump", handed, [[ink_map(grey, (420.0, 297.0))] for grey in pictures]) == {}
 
 
 def test_a_map_tells_where_the_ink_lies():
