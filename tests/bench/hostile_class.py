@@ -8,6 +8,7 @@ good files in the same run.
 """
 
 import argparse
+import contextlib
 import json
 import random
 import shutil
@@ -89,14 +90,17 @@ class Watch:
     seconds: float = 0.0
 
     def sample(self) -> list[psutil.Process]:
-        """The living processes; the memory of all together is noted."""
-        try:
+        """The workers that live; the memory of all processes together is noted."""
+        workers, memory = [], 0
+        with contextlib.suppress(psutil.NoSuchProcess):
             main = psutil.Process(self.process.pid)
-            alive = [main, *main.children(recursive=True)]
-            self.peak_mb = max(self.peak_mb, sum(one.memory_info().rss for one in alive) / 1e6)
-        except psutil.NoSuchProcess:
-            return []
-        return alive[1:]
+            for one in (main, *main.children(recursive=True)):
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    memory += one.memory_info().rss
+                    if "spawn_main" in " ".join(one.cmdline()):
+                        workers.append(one)
+        self.peak_mb = max(self.peak_mb, memory / 1e6)
+        return workers
 
 
 def run(checkout: Path, folder: Path, out: Path, jobs: int, *, kill_workers: bool = False, end_after: int = 0,
@@ -110,7 +114,7 @@ def run(checkout: Path, folder: Path, out: Path, jobs: int, *, kill_workers: boo
     ) as process:
         watch = Watch(process)
         while process.poll() is None:
-            workers = [one for one in watch.sample() if "spawn_main" in " ".join(one.cmdline())]
+            workers = watch.sample()
             passed = time.monotonic() - start
             if kill_workers and workers and passed > next_kill:
                 dice.choice(workers).kill()
@@ -151,7 +155,9 @@ def main() -> None:
     """Make the class, grade it in every way, and print a table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--checkout", type=Path)
-    other = parser.parse_args().checkout
+    parser.add_argument("--jobs", type=int, nargs="*", default=[1, 2])
+    asked = parser.parse_args()
+    other = asked.checkout
     with tempfile.TemporaryDirectory() as top:
         good, mixed = Path(top) / "good", Path(top) / "mixed"
         good.mkdir()
@@ -159,7 +165,7 @@ def main() -> None:
         shutil.copytree(good, mixed)
         for name, make in FILES.items():
             (mixed / name).write_bytes(make())
-        for jobs in (1, 2):
+        for jobs in asked.jobs:
             out = Path(top) / f"{jobs}"
             if other is not None:
                 before = run(other, good, out / "before", jobs)

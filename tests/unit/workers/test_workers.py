@@ -6,10 +6,12 @@ import signal
 import subprocess
 import sys
 import threading
+from multiprocessing import active_children
 from pathlib import Path
 
 import psutil
 import pytest
+from pebble.pool.process import WORKERS_NAME
 
 from grader.records import Problem
 from grader.workers import Limits, Workers, result_of
@@ -67,9 +69,9 @@ def test_processes_killed_at_any_moment_lose_no_call():
 
     def kill():
         while not stop.wait(dice.uniform(0.2, 2.5)):
-            for child in dice.sample(found := psutil.Process().children(), min(1, len(found))):
-                if "resource_tracker" not in " ".join(child.cmdline()):
-                    child.kill()
+            children = [child for child in active_children() if child.name == WORKERS_NAME]
+            if children:
+                dice.choice(children).kill()
 
     killer = threading.Thread(target=kill)
     with Workers(2, LIMITS, calls.__name__) as workers:
@@ -116,8 +118,7 @@ def test_the_pool_closes_at_once_though_its_processes_are_busy():
         result_of(workers, calls.doubled, 1)
         running = workers.run(calls.sleeps, [(0.01,), (600,)])
         assert next(running) == (0, 0.01)
-        children = psutil.Process().children()
-        processes = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+        processes = [psutil.Process(child.pid) for child in active_children() if child.name == WORKERS_NAME]
         assert processes
     _, alive = psutil.wait_procs(processes, timeout=30)
     assert not alive

@@ -1,0 +1,9 @@
+"""Prints pyproject's lower bounds as constraints for pip: the lowest versions that it allows."""
+
+import re
+import tomllib
+from pathlib import Path
+
+project = tomllib.loads((Path(__file__).parent.parent / "pyproject.toml").read_text())["project"]
+for requirement in project["dependencies"]:
+    print(re.sub(r">=([^,]+).*", r"==\1", requirement))
