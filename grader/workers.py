@@ -28,6 +28,10 @@ _WATCH_S = 0.05
 """Between two looks at the workers' memory: a worker fills at most some 100 MB in this time."""
 _STALLED_S = 30.0
 """Past every time limit without any result: a worker was killed while it took its task, which is lost."""
+_ROUNDS = 3
+"""Pools started one after the other without a single result: then what is left is told as crashed."""
+_KILLED = -9
+"""Exit code of a process that somebody else killed: the system for want of memory, or a person."""
 _MEGABYTE = 1_000_000
 
 
@@ -107,11 +111,11 @@ class Workers:
     def _finished(
         self, tasks: Sequence[tuple[Any, ...]], seconds: Sequence[float], indices: Iterable[int]
     ) -> Iterator[tuple[int, Any]]:
-        """Results of the chosen tasks; a pool that breaks is made anew for what is left of them."""
+        """Results of the chosen tasks; what a broken pool or a killed worker left is done by a new pool."""
         left = set(indices)
-        tries = 2
-        while left and tries:
-            tries -= 1
+        rounds = _ROUNDS
+        while left and rounds:
+            rounds -= 1
             pool = self._started_pool()
             futures: dict[Future[Any], int] = {
                 pool.schedule(guarded, tasks[index], timeout=seconds[index]): index for index in sorted(left)
@@ -119,20 +123,22 @@ class Workers:
             longest = max(seconds[index] for index in left)
             while futures:
                 ended, _ = wait(futures, longest + _STALLED_S, FIRST_COMPLETED)
-                results = [(futures.pop(future), self._result(future)) for future in ended]
-                if not ended or any(result is None for _, result in results):
-                    self._end_pool()
-                    futures.clear()
-                for index, result in results:
+                if not ended:
+                    break
+                for future in ended:
+                    index = futures.pop(future)
+                    result = self._result(future)
                     if result is not None:
                         left.discard(index)
-                        tries = 2
+                        rounds = _ROUNDS
                         yield index, result
+            if left:
+                self._end_pool()
         for index in sorted(left):
-            yield index, Problem("crashed", "the process that worked on it ended; grade again")
+            yield index, Problem("crashed", "the process that worked on it was killed; grade again")
 
     def _result(self, future: "Future[Any]") -> Any:  # noqa: ANN401 - whatever the function returns
-        """A finished call's result or Problem; None where the pool broke under it."""
+        """A finished call's result or Problem; None where it was ended from outside, or the pool broke."""
         try:
             return future.result()
         except TimeoutError:
@@ -142,6 +148,8 @@ class Workers:
         except ProcessExpired as error:
             if error.pid in self._over_memory:
                 return self._too_much_memory()
+            if error.exitcode == _KILLED:
+                return None
             return Problem("crashed", f"the program crashed on it (exit code {error.exitcode}); {_ADVICE}")
         except MemoryError:
             return self._too_much_memory()
