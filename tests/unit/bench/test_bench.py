@@ -5,17 +5,17 @@ import json
 
 import pytest
 
-from grader.bench import branches, solver, speed, stability
-from grader.bench.branches import BranchRow
-from grader.bench.judging_tally import JudgingFigures
-from grader.bench.peers import PEERS, Package
-from grader.bench.reading_tally import Tally, row_of
-from grader.bench.report import Report
-from grader.bench.singular import KINDS
-from grader.bench.solver import SolverBench, measure_errors
-from grader.bench.speed import NOT_INSTALLED, SpeedRow, measure_speed, speed_rows
-from grader.bench.stability import DISTANCES_QUICK, measure_stability
-from grader.cli.benchmark import show_benchmark
+from tests.bench import branches, solver, speed, stability
+from tests.bench.__main__ import main
+from tests.bench.branches import BranchRow
+from tests.bench.judging_tally import JudgingFigures
+from tests.bench.peers import PEERS, Package
+from tests.bench.reading_tally import Tally, row_of
+from tests.bench.report import Report
+from tests.bench.singular import KINDS
+from tests.bench.solver import SolverBench, measure_errors
+from tests.bench.speed import NOT_INSTALLED, SpeedRow, measure_speed, speed_rows
+from tests.bench.stability import DISTANCES_QUICK, measure_stability
 
 SHARE_OF_PLAN = 1e-12
 """Error allowed, relative to the plan's size."""
@@ -121,10 +121,10 @@ def test_the_command_prints_the_figures_of_the_parts_asked_for(asked, monkeypatc
         def run(self):
             yield "branches"
 
-    monkeypatch.setattr("grader.bench.solver.SolverBench", Bench)
-    monkeypatch.setattr("grader.bench.reading.ReadingBench", Bench)
-    monkeypatch.setattr("grader.bench.judging.JudgingBench", Bench)
-    show_benchmark(quick=True, as_json=True, parts=asked)
+    monkeypatch.setattr("tests.bench.__main__.SolverBench", Bench)
+    monkeypatch.setattr("tests.bench.__main__.ReadingBench", Bench)
+    monkeypatch.setattr("tests.bench.__main__.JudgingBench", Bench)
+    main(["--quick", "--json", *(f"--{part}" for part in asked)])
     told = json.loads(capsys.readouterr().out)
     assert (told["solver"] is not None) == ("solver" in asked)
     assert len(told["reading"]) == ("reading" in asked)

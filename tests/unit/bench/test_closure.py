@@ -9,10 +9,6 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from grader.bench.closure import ExactMotion, _solve, exact_motion, exact_motion_of, rounded, turning
-from grader.bench.exact_data import DIGITS, authored_exactly, exactly
-from grader.bench.jets import Jet, dot, fixed, follow
-from grader.bench.singular import KINDS
 from reference.assembly import build_mechanism
 from reference.assignment import Variant, load_assignment
 from reference.authored import validate
@@ -23,6 +19,10 @@ from reference.mechanism_file import MechanismFile
 from reference.motion import move
 from reference.parameters import parameters_of
 from reference.plan import _measured
+from tests.bench.closure import ExactMotion, _solve, exact_motion, exact_motion_of, rounded, turning
+from tests.bench.exact_data import DIGITS, authored_exactly, exactly
+from tests.bench.jets import Jet, dot, fixed, follow
+from tests.bench.singular import KINDS
 
 FAR = 0.1
 """A distance from the singular position at which nothing is lost."""

@@ -5,19 +5,19 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from grader.bench.honesty import NORMAL_SHARES, Spread, calibration, whitened
-from grader.bench.lines import LinesFigures, LinesRow, Noiseless, measure_detector, measure_noiseless
-from grader.bench.lines_detectors import DETECTORS, OURS
-from grader.bench.lines_figure import lines_svg
-from grader.bench.lines_sheets import pencil_sheet
-from grader.bench.reading_places import OnPaper
-from grader.bench.reading_tally import Tally, row_of
-from grader.bench.reading_truth import LEAST_MM, MISREAD_MM, TrueVector, each_vector, figures_of, judged
 from grader.records import VELOCITY_PLAN, Figure, ReadVector, Sheet
-from grader.simulation import Scan, simulate
-from grader.simulation.settings import PERFECT, Settings
 from reference.assignment import load_assignment
 from reference.derivation import construction_of
+from samples.simulation import Scan, simulate
+from samples.simulation.settings import PERFECT, Settings
+from tests.bench.honesty import NORMAL_SHARES, Spread, calibration, whitened
+from tests.bench.lines import LinesFigures, LinesRow, Noiseless, measure_detector, measure_noiseless
+from tests.bench.lines_detectors import DETECTORS, OURS
+from tests.bench.lines_figure import lines_svg
+from tests.bench.lines_sheets import pencil_sheet
+from tests.bench.reading_places import OnPaper
+from tests.bench.reading_tally import Tally, row_of
+from tests.bench.reading_truth import LEAST_MM, MISREAD_MM, TrueVector, each_vector, figures_of, judged
 
 SURE, UNSURE = 0.95, 0.5
 ENDS, STROKE = (10 - 100j, 10 - 50j), (10 - 100j, 10 - 52j)

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.bench import branches, stability
-from grader.bench.arrays import one_of, stacked
-from grader.bench.peers import PEERS, Answer, NoAnswerError, error_of, plain, sketch
-from grader.bench.singular import KINDS
-from grader.bench.speed import spread
-from grader.bench.stability import EPSILON, _count, _Outcomes, measure_stability, truth_of
 from reference.assignment import load_assignment
 from reference.motion import move
+from tests.bench import branches, stability
+from tests.bench.arrays import one_of, stacked
+from tests.bench.peers import PEERS, Answer, NoAnswerError, error_of, plain, sketch
+from tests.bench.singular import KINDS
+from tests.bench.speed import spread
+from tests.bench.stability import EPSILON, _count, _Outcomes, measure_stability, truth_of
 
 PEER_ERROR = 1e-6
 """The coarsest peer stops its iteration there."""
@@ -101,7 +101,7 @@ def test_an_installed_peer_solves_the_pump_as_the_closed_form_does(peer):
 def test_the_compiled_cycle_of_pylinkage_gives_every_variant():
     pytest.importorskip("numba")
     pytest.importorskip("pylinkage")
-    from grader.bench.adapters.pylinkage_adapter import PylinkageCycle  # noqa: PLC0415
+    from tests.bench.adapters.pylinkage_adapter import PylinkageCycle  # noqa: PLC0415
 
     mechanism = spread(load_assignment("pump"), 4)
     motion = move(mechanism)

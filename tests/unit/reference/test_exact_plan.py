@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from grader.bench.closure import ExactMotion, exact_motion
 from reference.assignment import Assignment, load_assignment
 from reference.plan import Plan, conditioning, exact_plan
+from tests.bench.closure import ExactMotion, exact_motion
 
 SHARE_OF_PLAN = 1e-12
 """Error allowed, relative to the plan's size: the longest vector of the same plan."""
