@@ -25,7 +25,7 @@ from reference.mechanism import (
     SlottedLink,
     Yoke,
 )
-from tests.bench.exact_data import DIGITS
+from tests.bench.oracle import DIGITS
 
 QUARTER = 0.5 * np.pi
 STEP = 2.0**-20

@@ -11,7 +11,7 @@ from grader.cli.benchmark import construction_error
 from reference.assignment import Assignment, built_in, load_assignment
 from reference.plan import Plan, exact_plan
 from tests.bench.branches import BranchRow, count_branches
-from tests.bench.closure import ExactMotion, exact_motion
+from tests.bench.oracle import ExactMotion
 from tests.bench.singular import KINDS
 from tests.bench.speed import SpeedRow, has_numba, measure_speed, speed_rows
 from tests.bench.stability import (
@@ -105,7 +105,7 @@ def measure_solver(*, quick: bool = False) -> SolverFigures:
 
 
 def measure_errors() -> Iterator[ErrorRow]:
-    """Every variant of every built-in assignment, its data as written in the file."""
+    """Every variant of every built-in assignment."""
     for name in built_in():
         yield _errors(load_assignment(name))
 
@@ -113,7 +113,7 @@ def measure_errors() -> Iterator[ErrorRow]:
 def _errors(assignment: Assignment) -> ErrorRow:
     variants = assignment.variants()
     plan = exact_plan(assignment, variants)
-    truth = [exact_motion(assignment, variant) for variant in variants]
+    truth = [ExactMotion(plan.mechanism, index) for index in range(len(variants))]
     worst = {}
     for figure in plan.construction.poles:
         vectors = plan.construction.vectors_of(figure)

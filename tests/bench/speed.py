@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +22,7 @@ from reference.mechanism import Mechanism
 from reference.motion import Motion, move
 from reference.parameters import parameters_of
 from reference.plan import exact_plan
-from tests.bench.closure import ExactMotion, exact_motion_of, rounded
-from tests.bench.jets import Pair
+from tests.bench.oracle import ExactMotion
 from tests.bench.peers import (
     PEERS,
     PYLINKAGE,
@@ -107,7 +107,7 @@ class _Bench:
         self.assignment = assignment
         self.mechanisms = {count: spread(assignment, count) for count in batches}
         self.reference = spread(assignment, CLASS)
-        self.truth = [_rounded(exact_motion_of(self.reference, index)) for index in range(CLASS)]
+        self.truth = [_rounded(ExactMotion(self.reference, index)) for index in range(CLASS)]
 
     def entries(self) -> Iterator[_Entry]:
         """All rows in their order."""
@@ -202,8 +202,8 @@ def spread(assignment: Assignment, count: int) -> Mechanism:
 
 
 def _rounded(motion: ExactMotion) -> Answer:
-    def read(rates: Mapping[str, Pair]) -> Places:
-        return {joint: rounded(pair) for joint, pair in rates.items()}
+    def read(rates: Mapping[str, Any]) -> Places:
+        return {joint: complex(rate) for joint, rate in rates.items()}
 
     return Answer(read(motion.position), read(motion.velocity), read(motion.acceleration))
 

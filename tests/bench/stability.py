@@ -3,7 +3,7 @@
 At a relative distance delta from a singular position an error of one rounding, eps, in the data moves
 the velocities by about eps/delta of the largest: no solver in double precision that takes its
 data as known to eps does better. Here the doubles are taken as exact, and the truth is the exact motion
-for exactly these doubles, in 50 digits (`closure`): errors are told in units of eps/delta. Where the
+for exactly these doubles, in 50 digits (`oracle`): errors are told in units of eps/delta. Where the
 motion is smooth through the position nothing need be lost, and errors are told in units of eps.
 """
 
@@ -19,8 +19,7 @@ from reference.errors import MechanismError
 from reference.mechanism import Dyad, Group, Mechanism, Slider, SlottedLink
 from reference.motion import Motion, move, move_where_possible
 from tests.bench.arrays import stacked
-from tests.bench.closure import exact_motion_of, rounded
-from tests.bench.jets import Pair
+from tests.bench.oracle import ExactMotion
 from tests.bench.peers import PEERS, Answer, NoAnswerError, Package, answer_of, error_of, sketch
 from tests.bench.singular import KINDS, Case, Kind
 from tests.bench.speed import has_numba
@@ -138,11 +137,11 @@ def _row(kind: Kind, delta: float, cases: Sequence[Case]) -> StabilityRow:
 
 def truth_of(mechanism: Mechanism) -> Truth:
     """The exact motion of a mechanism of one variant, and its mirrored assembly where it has one."""
-    motion = exact_motion_of(mechanism)
+    motion = ExactMotion(mechanism)
     flipped = tuple(map(_flipped, mechanism.groups))
     mirrored = None
     if flipped != mechanism.groups:
-        mirrored = _rounded(exact_motion_of(replace(mechanism, groups=flipped)).position)
+        mirrored = _rounded(ExactMotion(replace(mechanism, groups=flipped)).position)
     return Truth(
         _rounded(motion.position), _rounded(motion.velocity), _rounded(motion.acceleration), mirrored
     )
@@ -155,8 +154,8 @@ def _flipped(group: Group) -> Group:
     return group
 
 
-def _rounded(pairs: Mapping[str, Pair]) -> dict[str, complex]:
-    return {joint: rounded(pair) for joint, pair in pairs.items()}
+def _rounded(exact: Mapping[str, Any]) -> dict[str, complex]:
+    return {joint: complex(number) for joint, number in exact.items()}
 
 
 def _by_numbers(mechanism: Mechanism) -> Answer | None:
