@@ -1,25 +1,23 @@
 """Wrong branches counted in many random mechanisms, near singular positions and far.
 
-Four-bars and slider-cranks for all; slotted links, which no peer knows, for ours as well.
+Four-bars and slider-cranks for all; slotted links for ours as well.
 
 A tenth of the cases lies nearer than 0.1 to a singular position, down to 1e-14. On which side a solver
 puts the group's node is told by the node's distance from the line of symmetry of both assemblies.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from reference.geometry import ComplexArray, FloatArray, cross, direction, dot
 from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, Slider, SlotPoint, SlottedLink
-from reference.motion import Motion, move_where_possible
+from reference.motion import move_where_possible
 from tests.bench.arrays import one_of
-from tests.bench.peers import PEERS, NoAnswerError, Package, Places, sketch
-from tests.bench.speed import has_numba
+from tests.bench.peers import FSOLVE, Fsolve, NoAnswerError, Places, sketch
 
 CASES, CASES_QUICK = 100_000, 2_000
 PEER_CASES, PEER_CASES_QUICK = 2_000, 100
@@ -39,28 +37,17 @@ class BranchRow:
 
 
 def count_branches(*, quick: bool = False) -> Iterator[BranchRow]:
-    """Ours in many cases, then each installed peer in fewer: it takes a thousand times as long."""
+    """Ours in many cases, then scipy's `fsolve` in fewer: it takes hundreds of times as long."""
     yield count_ours(quick=quick)
-    if has_numba():
-        from reference.compiled import by_machine  # noqa: PLC0415 - numba is an extra
-
-        yield count_ours(quick=quick, name="compiled", solve=partial(move_where_possible, solver=by_machine))
-    for peer in PEERS:
-        if peer.version is not None:
-            yield count_peer(peer, quick=quick)
+    yield count_peer(quick=quick)
 
 
-def count_ours(
-    *,
-    quick: bool = False,
-    name: str = "closed form",
-    solve: Callable[[Mechanism], Motion] = move_where_possible,
-) -> BranchRow:
-    """By the closed form, on arrays or compiled."""
+def count_ours(*, quick: bool = False) -> BranchRow:
+    """By the closed form, on arrays."""
     count = CASES_QUICK if quick else CASES
     wrong = refused = silent = 0
     for mechanism in _all_kinds(count):
-        motion = solve(mechanism)
+        motion = move_where_possible(mechanism)
         told = np.isfinite(motion.predicted_error)
         numbers = (*motion.position.values(), *motion.velocity.values(), *motion.acceleration.values())
         finite = np.isfinite(sum(numbers))
@@ -68,11 +55,11 @@ def count_ours(
         refused += int(np.sum(~told))
         silent += int(np.sum(told & ~finite))
         wrong += int(np.sum(told & finite & (share < 0.0)))
-    return BranchRow(name, count, wrong, refused, silent)
+    return BranchRow("closed form", count, wrong, refused, silent)
 
 
-def count_peer(peer: Package, *, quick: bool = False) -> BranchRow:
-    """By a peer, each case a mechanism of its own."""
+def count_peer(*, quick: bool = False) -> BranchRow:
+    """By scipy, each case a mechanism of its own."""
     count = PEER_CASES_QUICK if quick else PEER_CASES
     tally = dict.fromkeys(("wrong", "refused", "silent"), 0)
     for mechanism in _both_kinds(count):
@@ -80,16 +67,16 @@ def count_peer(peer: Package, *, quick: bool = False) -> BranchRow:
         for index in range(count // 2):
             one = one_of(mechanism, index, np.atleast_1d)
             start = {joint: complex(places[index]) for joint, places in starts.items()}
-            outcome = _outcome(peer, one, start)
+            outcome = _outcome(one, start)
             if outcome:
                 tally[outcome] += 1
-    return BranchRow(peer.name, count, **tally)
+    return BranchRow(FSOLVE, count, **tally)
 
 
-def _outcome(peer: Package, mechanism: Mechanism, start: Places) -> str | None:
+def _outcome(mechanism: Mechanism, start: Places) -> str | None:
     """What went wrong; None where nothing did."""
     try:
-        answer = peer.build(mechanism).solve(0, start)()
+        answer = Fsolve(mechanism).solve(0, start)()
     except NoAnswerError:
         return "refused"
     numbers = (*answer.position.values(), *answer.velocity.values(), *answer.acceleration.values())

@@ -1,8 +1,8 @@
 """The exact motion of a mechanism in 50 digits, by nothing that the closed forms use.
 
 Places solve the closure equations, the lengths of links and the lines of guides, by mpmath's `findroot` at
-any time; velocities and accelerations are `diff` of these places by time. A group's side is given by the place
-near which the root is sought, which the law of cosines gives. A mechanism's doubles are taken as exact.
+any time; velocities and accelerations are `diff` of these places by time. A group's side is given by the
+place near which the root is sought, which the law of cosines gives. A mechanism's doubles are taken as exact.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,26 +1,24 @@
-"""Other programs that solve the same mechanisms, each through the calls that it recommends itself.
+"""scipy's `fsolve`, which solves any mechanism of four-bars and slider-cranks as a user would ask it to.
 
-They are optional: a peer that is not installed is left out, and said so. Each is told the branch as
-well as its interface lets a user tell it: where it takes a starting place, it gets that of a sketch in
-which each dyad and rod is opened a little further than it is (`sketch`), so that the nearer of two
-assemblies is the one meant. The adapters stand in `tests.bench.adapters`.
+It solves the closure equations with their Jacobian, then two linear systems for velocities and accelerations.
+It takes a starting place and not a side: it gets that of a sketch in which each dyad and rod is opened a
+little further than it is (`sketch`), so that the nearer of two assemblies is the one meant.
 """
 
 import cmath
-import importlib
-import importlib.util
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
-from typing import Protocol
+from typing import Any
 
 import numpy as np
+from scipy.optimize import fsolve
 
 from reference.geometry import ComplexArray
 from reference.mechanism import Dyad, FixedGuide, Mechanism, Plate, Slider
 from reference.motion import Motion
 
+FSOLVE = "scipy fsolve"
 OPENED = 0.05
 """How far a sketch opens a group: this share of its link's length."""
 
@@ -28,7 +26,7 @@ Places = Mapping[str, complex]
 
 
 class NoAnswerError(Exception):
-    """The peer says that it has no answer, and why."""
+    """The solver says that it has no answer, and why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +60,11 @@ def error_of(found: Places, truth: Places) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Triangle:
-    """A node held by two lengths to two joints; `shape` where all three are of one link (a plate)."""
+    """A node held by two lengths to two joints."""
 
     node: str
     pins: tuple[str, str]
     lengths: tuple[float, float]
-    shape: complex | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +80,7 @@ class Rod:
 
 @dataclass(frozen=True, slots=True)
 class Plain:
-    """A mechanism in Python's own numbers, as a peer's user would have it: metres, radians.
+    """A mechanism in Python's own numbers, as a user of other programs would have it: metres, radians.
 
     The lengths are the same in all variants; the crank's angle, speed and acceleration are by variant.
     """
@@ -102,8 +99,8 @@ class Plain:
         return cmath.rect(self.length, self.angle[index])
 
 
-def plain(mechanism: Mechanism) -> Plain:
-    """Raises NoAnswerError for groups that no peer here knows."""
+def plain_of(mechanism: Mechanism) -> Plain:
+    """Raises NoAnswerError for groups that have no such form."""
     crank = mechanism.crank
     angle, omega, epsilon = np.broadcast_arrays(crank.angle_rad, crank.omega, crank.epsilon)
     return Plain(
@@ -124,10 +121,9 @@ def _plain_group(group: object) -> Triangle | Rod:
             numbers = float(group.length_m.flat[0]), complex(through.flat[0]), float(angle.flat[0])
             return Rod(group.node, group.pin, *numbers)
         case Dyad(pins=pins) | Plate(base=pins):
-            shape = complex(group.shape.flat[0]) if isinstance(group, Plate) else None
             first, second = (float(length.flat[0]) for length in group.lengths_m)
-            return Triangle(group.node, pins, (first, second), shape)
-    raise NoAnswerError(f"no adapter for {type(group).__name__}")
+            return Triangle(group.node, pins, (first, second))
+    raise NoAnswerError(f"no plain form of {type(group).__name__}")
 
 
 def sketch(mechanism: Mechanism, position: Mapping[str, ComplexArray]) -> dict[str, ComplexArray]:
@@ -146,44 +142,93 @@ def sketch(mechanism: Mechanism, position: Mapping[str, ComplexArray]) -> dict[s
     return told
 
 
-class Peer(Protocol):
-    """A solver built once for a mechanism whose lengths are the same in all variants."""
+class Fsolve:
+    """Unknown are the nodes' coordinates: (N - P).(N - P) = l^2 for a link, u x (N - G) = 0 for a guide."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        plain = self.plain = plain_of(mechanism)
+        self.rows = [row for group in plain.groups for row in _rows(group)]
+        self.names = [group.node for group in plain.groups]
+        self.columns = {name: 2 * k for k, name in enumerate(self.names)}
+        self.known: dict[str, complex] = dict(plain.ground)
+        self.still = dict.fromkeys(plain.ground, 0j)
+
+    def _gaps(self, x: Any) -> list[float]:
+        at = self._places(x)
+        told = []
+        for node, pin, datum in self.rows:
+            if pin is None:
+                told.append(_cross(datum[1], at[node] - datum[0]))
+            else:
+                arm = at[node] - at[pin]
+                told.append(arm.real * arm.real + arm.imag * arm.imag - datum * datum)
+        return told
+
+    def _jacobian(self, x: Any) -> Any:
+        at, column = self._places(x), self.columns
+        matrix = np.zeros((len(self.rows), len(self.rows)))
+        for row, (node, pin, datum) in enumerate(self.rows):
+            if pin is None:
+                gradient = 1j * datum[1]
+            else:
+                gradient = 2.0 * (at[node] - at[pin])
+                if pin in column:
+                    matrix[row, column[pin]], matrix[row, column[pin] + 1] = -gradient.real, -gradient.imag
+            matrix[row, column[node]], matrix[row, column[node] + 1] = gradient.real, gradient.imag
+        return matrix
+
+    def _places(self, x: Any) -> dict[str, complex]:
+        return self.known | self._pairs(x)
+
+    def _pairs(self, x: Any) -> dict[str, complex]:
+        values = x.tolist()
+        return {name: complex(values[2 * k], values[2 * k + 1]) for k, name in enumerate(self.names)}
 
     def solve(self, index: int, start: Places, *, accelerations: bool = True) -> Callable[[], Answer]:
-        """Solve one variant; what it returns reads the answer.
+        """The place from the sketch on; velocities and accelerations from the differentiated equations."""
+        plain, pin = self.plain, self.plain.pin
+        arm, omega, epsilon = plain.arm(index), plain.omega[index], plain.epsilon[index]
+        self.known[pin] = plain.ground[plain.pivot] + arm
+        guess = np.array([part for name in self.names for part in (start[name].real, start[name].imag)])
+        x, _, flag, message = fsolve(self._gaps, guess, fprime=self._jacobian, full_output=True)
+        if flag != 1:
+            raise NoAnswerError(message)
+        at, matrix = self._places(x), self._jacobian(x)
+        moved = self.still | {pin: 1j * omega * arm}
+        pushed = self.still | {pin: (1j * epsilon - omega**2) * arm}
+        try:
+            moved |= self._pairs(np.linalg.solve(matrix, self._pull(at, moved)))
+            if accelerations:
+                pushed |= self._pairs(np.linalg.solve(matrix, self._pull(at, pushed, moved)))
+        except np.linalg.LinAlgError as error:
+            raise NoAnswerError(str(error)) from error
+        return lambda: Answer(at, moved, pushed)
 
-        Raises NoAnswerError where the peer says so.
-        """
+    def _pull(self, at: Places, known: Places, speeds: Places | None = None) -> Any:
+        """What the known joints' rates ask of the unknown ones; `speeds` for the second derivative."""
+        told = np.zeros(len(self.rows))
+        for row, (node, pin, _) in enumerate(self.rows):
+            if pin is None:
+                continue
+            if pin in known:
+                told[row] = 2.0 * _dot(at[node] - at[pin], known[pin])
+            if speeds is not None:
+                between = speeds[node] - speeds[pin]
+                told[row] -= 2.0 * _dot(between, between)
+        return told
 
 
-@dataclass(frozen=True, slots=True)
-class Package:
-    """A peer: the name shown, its distribution, the module it needs, and its adapter's class.
-
-    `velocities_alone` where it can leave out the accelerations.
-    """
-
-    name: str
-    distribution: str
-    module: str
-    adapter: str
-    velocities_alone: bool = True
-
-    @property
-    def version(self) -> str | None:
-        """The installed version; None where it is not installed."""
-        return version(self.distribution) if importlib.util.find_spec(self.module) else None
-
-    def build(self, mechanism: Mechanism) -> Peer:
-        """The peer's solver for a mechanism."""
-        where = importlib.import_module(f"tests.bench.adapters.{self.module}_adapter")
-        solver: Peer = getattr(where, self.adapter)(plain(mechanism))
-        return solver
+def _rows(group: Triangle | Rod) -> list[tuple[str, str | None, Any]]:
+    """(node, pin, length) for a link; (node, None, (through, along)) for a guide."""
+    if isinstance(group, Rod):
+        line = group.through, cmath.rect(1.0, group.angle)
+        return [(group.node, group.pin, group.length), (group.node, None, line)]
+    return [(group.node, pin, length) for pin, length in zip(group.pins, group.lengths, strict=True)]
 
 
-PYLINKAGE = Package("pylinkage", "pylinkage", "pylinkage", "Pylinkage", velocities_alone=False)
-PEERS = (
-    PYLINKAGE,
-    Package("mechanism", "mechanism", "mechanism", "VectorLoops"),
-    Package("scipy fsolve", "scipy", "scipy", "Fsolve"),
-)
+def _dot(u: complex, v: complex) -> float:
+    return u.real * v.real + u.imag * v.imag
+
+
+def _cross(u: complex, v: complex) -> float:
+    return u.real * v.imag - u.imag * v.real

@@ -48,7 +48,7 @@ class Kind:
     ----------
     smooth : the motion itself is smooth through the position: nothing need be lost there
     draw : a random case at about the distance given
-    plain : made of what the peers know (four-bars and slider-cranks)
+    plain : made of what others know too (four-bars and slider-cranks)
     """
 
     id: str

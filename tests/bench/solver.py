@@ -13,12 +13,11 @@ from reference.plan import Plan, exact_plan
 from tests.bench.branches import BranchRow, count_branches
 from tests.bench.oracle import ExactMotion
 from tests.bench.singular import KINDS
-from tests.bench.speed import SpeedRow, has_numba, measure_speed, speed_rows
+from tests.bench.speed import SpeedRow, measure_speed, speed_rows
 from tests.bench.stability import (
     DISTANCES,
     DISTANCES_QUICK,
     StabilityRow,
-    installed_peers,
     measure_stability,
 )
 
@@ -70,8 +69,7 @@ class SolverBench:
     def steps(self) -> int:
         """How many rows there will be."""
         distances = DISTANCES_QUICK if self.quick else DISTANCES
-        branches = 1 + has_numba() + len(installed_peers())
-        return speed_rows() + len(built_in()) + len(KINDS) * len(distances) + branches
+        return speed_rows() + len(built_in()) + len(KINDS) * len(distances) + 2
 
     def run(self) -> Iterator[str]:
         """Measure; each item says what was measured."""

@@ -1,10 +1,9 @@
-"""Run time per variant, side by side with other programs, with the error of each beside it.
+"""Run time per variant, side by side with another solver, with the error of each beside it.
 
 All solve the same mechanism, the pump (four-bar, plate, rod and slider), at so many crank angles between
 those of its first and its last variant. Building a mechanism is no part of the time, for none.
 """
 
-import importlib.util
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -23,27 +22,15 @@ from reference.motion import Motion, move
 from reference.parameters import parameters_of
 from reference.plan import exact_plan
 from tests.bench.oracle import ExactMotion
-from tests.bench.peers import (
-    PEERS,
-    PYLINKAGE,
-    Answer,
-    Package,
-    Peer,
-    Places,
-    answer_of,
-    error_of,
-    plain,
-    sketch,
-)
+from tests.bench.peers import FSOLVE, Answer, Fsolve, Places, answer_of, error_of, sketch
 from tests.bench.timing import medians_us
 
 BATCHES = (1, 30, 10_000)
 CLASS = 30
 ROUNDS, ROUNDS_QUICK = 21, 5
 PEER_VARIANTS = 300
-"""A peer without a road for many variants takes as long for each: so many are timed for a larger batch."""
+"""fsolve takes as long for each of many variants: so many are timed for a larger batch."""
 ASSIGNMENT = "pump"
-NOT_INSTALLED = "not installed"
 PLANS = "a class with both plans"
 
 
@@ -54,7 +41,7 @@ class SpeedRow:
     Attributes
     ----------
     accelerations : positions, velocities and accelerations; False: velocities only
-    us : by the number of variants at once; empty where the solver is not installed
+    us : by the number of variants at once
     velocity_error, acceleration_error : of the joints, relative to the largest of each plan
     """
 
@@ -64,7 +51,6 @@ class SpeedRow:
     us: Mapping[int, float]
     velocity_error: float | None = None
     acceleration_error: float | None = None
-    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +62,10 @@ class _Entry:
     accelerations: bool
     runs: Mapping[int, tuple[Callable[[], object], int]] = field(default_factory=dict)
     answers: Sequence[Answer] = ()
-    note: str = ""
 
 
 def measure_speed(*, quick: bool = False, batches: Sequence[int] = BATCHES) -> Iterator[SpeedRow]:
-    """Ours by each road, then the peers; the same for velocities alone; then a class's plans."""
+    """Ours by each road, then scipy; the same for velocities alone; then a class's plans."""
     bench = _Bench(load_assignment(ASSIGNMENT), batches)
     entries = list(bench.entries())
     runs = {(row, count): run for row, one in enumerate(entries) for count, (run, _) in one.runs.items()}
@@ -92,12 +77,7 @@ def measure_speed(*, quick: bool = False, batches: Sequence[int] = BATCHES) -> I
 
 def speed_rows() -> int:
     """How many rows `measure_speed` gives."""
-    return 8 + sum(1 + peer.velocities_alone for peer in PEERS)
-
-
-def has_numba() -> bool:
-    """Whether compiled roads can be measured here."""
-    return all(importlib.util.find_spec(name) for name in ("numba", "reference.compiled"))
+    return 7
 
 
 class _Bench:
@@ -113,12 +93,8 @@ class _Bench:
         """All rows in their order."""
         for accelerations in (True, False):
             yield self._by(move, "closed form", None, accelerations=accelerations)
-            yield self._compiled(accelerations=accelerations)
             yield self._construction(accelerations=accelerations)
-            for peer in PEERS:
-                if accelerations or peer.velocities_alone:
-                    yield self._peer(peer, accelerations=accelerations)
-        yield self._cycle()
+            yield self._fsolve(accelerations=accelerations)
         variants = self.assignment.variants()[:CLASS]
         run = partial(exact_plan, self.assignment, variants)
         yield _Entry(PLANS, None, accelerations=True, runs={len(variants): (run, len(variants))})
@@ -132,14 +108,6 @@ class _Bench:
         }
         return _Entry(name, release, accelerations, runs, _answers(solve(self.reference)))
 
-    def _compiled(self, *, accelerations: bool) -> _Entry:
-        name = "closed form, compiled (numba)"
-        if not has_numba():
-            return _Entry(name, None, accelerations, note=NOT_INSTALLED)
-        from reference.compiled import move_compiled  # noqa: PLC0415 - numba is an extra
-
-        return self._by(move_compiled, name, version("numba"), accelerations=accelerations)
-
     def _construction(self, *, accelerations: bool) -> _Entry:
         """The steps of mechanism and plans, evaluated."""
         runs, scale = {}, np.asarray(0.01)
@@ -148,33 +116,17 @@ class _Bench:
             runs[count] = partial(evaluate, steps, parameters_of(one, scale, scale, scale)), count
         return _Entry("construction", None, accelerations, runs)
 
-    def _peer(self, peer: Package, *, accelerations: bool) -> _Entry:
+    def _fsolve(self, *, accelerations: bool) -> _Entry:
         """One variant after another."""
-        if peer.version is None:
-            return _Entry(peer.name, None, accelerations, note=NOT_INSTALLED)
-        solver, starts = peer.build(self.reference), _starts(self.reference)
+        solver, starts = Fsolve(self.reference), _starts(self.reference)
         answers = [solver.solve(index, start)() for index, start in enumerate(starts)]
         runs = {}
         for count in self.mechanisms:
             timed = spread(self.assignment, min(count, PEER_VARIANTS))
             starts = _starts(timed)
-            run = _one_after_another(peer.build(timed), starts, accelerations=accelerations)
+            run = _one_after_another(Fsolve(timed), starts, accelerations=accelerations)
             runs[count] = run, len(starts)
-        return _Entry(peer.name, peer.version, accelerations, runs, answers)
-
-    def _cycle(self) -> _Entry:
-        """The compiled road of pylinkage, where numba is installed too."""
-        name, release = f"{PYLINKAGE.name}, a cycle (numba)", PYLINKAGE.version
-        if release is None or not has_numba():
-            return _Entry(name, release, accelerations=True, note=NOT_INSTALLED)
-        from tests.bench.adapters.pylinkage_adapter import PylinkageCycle  # noqa: PLC0415 - an extra
-
-        answers = PylinkageCycle(plain(self.reference)).answers(_starts(self.reference)[0])
-        runs = {
-            count: (partial(PylinkageCycle(plain(one)).run, _starts(one)[0]), count)
-            for count, one in self.mechanisms.items()
-        }
-        return _Entry(name, release, accelerations=True, runs=runs, answers=answers)
+        return _Entry(FSOLVE, version("scipy"), accelerations, runs, answers)
 
     def row(self, entry: _Entry, us: Mapping[int, float]) -> SpeedRow:
         """What was measured of an entry."""
@@ -184,9 +136,7 @@ class _Bench:
             velocity = max(error_of(found.velocity, exact.velocity) for found, exact in pairs)
             if entry.accelerations:
                 acceleration = max(error_of(found.acceleration, exact.acceleration) for found, exact in pairs)
-        return SpeedRow(
-            entry.solver, entry.version, entry.accelerations, us, velocity, acceleration, entry.note
-        )
+        return SpeedRow(entry.solver, entry.version, entry.accelerations, us, velocity, acceleration)
 
 
 def spread(assignment: Assignment, count: int) -> Mechanism:
@@ -215,7 +165,9 @@ def _starts(mechanism: Mechanism) -> list[Places]:
     return [{joint: complex(at[index]) for joint, at in drawn.items()} for index in range(count)]
 
 
-def _one_after_another(solver: Peer, starts: Sequence[Places], *, accelerations: bool) -> Callable[[], None]:
+def _one_after_another(
+    solver: Fsolve, starts: Sequence[Places], *, accelerations: bool
+) -> Callable[[], None]:
     def run() -> None:
         for index, start in enumerate(starts):
             solver.solve(index, start, accelerations=accelerations)

@@ -20,15 +20,14 @@ from reference.mechanism import Dyad, Group, Mechanism, Slider, SlottedLink
 from reference.motion import Motion, move, move_where_possible
 from tests.bench.arrays import stacked
 from tests.bench.oracle import ExactMotion
-from tests.bench.peers import PEERS, Answer, NoAnswerError, Package, answer_of, error_of, sketch
+from tests.bench.peers import FSOLVE, Answer, Fsolve, NoAnswerError, answer_of, error_of, sketch
 from tests.bench.singular import KINDS, Case, Kind
-from tests.bench.speed import has_numba
 
 EPSILON = float(np.finfo(np.float64).eps)
 DISTANCES = tuple(10.0**-k for k in range(1, 15))
 DISTANCES_QUICK = (1e-1, 1e-4, 1e-8, 1e-12, 1e-14)
 CASES, CASES_QUICK = 30, 5
-OURS, OURS_ON_ARRAYS, OURS_COMPILED = "closed form", "on arrays", "compiled"
+OURS, OURS_ON_ARRAYS = "closed form", "on arrays"
 SEED = 20
 
 
@@ -98,11 +97,6 @@ class StabilityRow:
         return asdict(self)
 
 
-def installed_peers() -> tuple[Package, ...]:
-    """The peers that can be measured here."""
-    return tuple(peer for peer in PEERS if peer.version is not None)
-
-
 def measure_stability(*, quick: bool = False, kinds: Sequence[Kind] = KINDS) -> Iterator[StabilityRow]:
     """Each kind at each distance; the same random cases for every solver."""
     count = CASES_QUICK if quick else CASES
@@ -119,13 +113,8 @@ def _row(kind: Kind, delta: float, cases: Sequence[Case]) -> StabilityRow:
         OURS: [_by_numbers(one) for one in mechanisms],
         OURS_ON_ARRAYS: _all_at_once(move_where_possible(stacked(mechanisms))),
     }
-    if has_numba():
-        from reference.compiled import by_machine  # noqa: PLC0415 - numba is an extra
-
-        answers[OURS_COMPILED] = _all_at_once(move_where_possible(stacked(mechanisms), solver=by_machine))
     if kind.plain:
-        for peer in installed_peers():
-            answers[peer.name] = [_by(peer, *pair) for pair in zip(mechanisms, truths, strict=True)]
+        answers[FSOLVE] = [_by_fsolve(*pair) for pair in zip(mechanisms, truths, strict=True)]
     cells = []
     for name, told in answers.items():
         outcomes = _Outcomes()
@@ -172,11 +161,11 @@ def _all_at_once(motion: Motion) -> list[Answer | None]:
     return [answer_of(motion, index) if told[index] else None for index in range(told.size)]
 
 
-def _by(peer: Package, mechanism: Mechanism, truth: Truth) -> Answer | None:
+def _by_fsolve(mechanism: Mechanism, truth: Truth) -> Answer | None:
     at = {joint: np.array([z]) for joint, z in truth.position.items()}
     start = {joint: complex(z[0]) for joint, z in sketch(mechanism, at).items()}
     try:
-        return peer.build(mechanism).solve(0, start)()
+        return Fsolve(mechanism).solve(0, start)()
     except NoAnswerError:
         return None
 

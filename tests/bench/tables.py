@@ -42,7 +42,7 @@ def _speed(title: str, rows: Sequence[SpeedRow]) -> Table:
 
 def _time(row: SpeedRow, ours: SpeedRow, count: int) -> str:
     if count not in row.us:
-        return row.note or NOTHING
+        return NOTHING
     ratio = "" if row is ours else f" ({_digits(row.us[count] / ours.us[count], 2)})"
     return f"{_digits(row.us[count], 3)}{ratio}"
 
