@@ -15,9 +15,7 @@ from tests.bench.judging import JudgingBench
 from tests.bench.judging_class import measure_class
 from tests.bench.judging_scans import judged_scan
 from tests.bench.judging_tables import judging_tables
-from tests.bench.lines import measure_lines
-from tests.bench.lines_figure import lines_svg
-from tests.bench.lines_tables import lines_tables
+from tests.bench.lines import lines_tables, measure_lines
 from tests.bench.plain_text import Table, as_text
 from tests.bench.reading import STUDENTS, measure_reading
 from tests.bench.reading_foreign import foreign_tables, measure_foreign
@@ -26,7 +24,6 @@ from tests.bench.solver import measure_solver
 from tests.bench.tables import solver_tables
 
 PAGE = Path(__file__).resolve().parent / "benchmarks.md"
-FIGURE = PAGE.with_name("lines.svg")
 
 
 def _reading(students: int | None) -> Iterable[Table]:
@@ -37,9 +34,7 @@ def _reading(students: int | None) -> Iterable[Table]:
 
 def _lines(_: int | None) -> Iterable[Table]:
     cv2.setNumThreads(1)
-    lines = measure_lines()
-    FIGURE.write_text(lines_svg(lines), encoding="utf-8")
-    return lines_tables(lines)
+    return lines_tables(measure_lines())
 
 
 def _judging(students: int | None) -> Iterable[Table]:

@@ -1,7 +1,7 @@
 """Reading measured on simulated sheets whose truth is known, scene by scene.
 
 What counts as right, and what as a silent misread, stands in `tests.bench.reading_truth`.
-`ReadingBench` adds pages without the drawing asked for, and line detectors side by side.
+`ReadingBench` adds pages without the drawing asked for, and strokes by themselves.
 """
 
 import tempfile

@@ -9,8 +9,7 @@ import numpy as np
 
 from tests.bench.judging_tables import judging_tables
 from tests.bench.judging_tally import JudgingFigures
-from tests.bench.lines import LinesFigures
-from tests.bench.lines_tables import lines_tables
+from tests.bench.lines import LinesFigures, lines_tables
 from tests.bench.plain_text import Table, as_text
 from tests.bench.reading_foreign import ForeignRow, foreign_tables
 from tests.bench.reading_tables import reading_tables
@@ -57,7 +56,7 @@ class Report:
 def all_reading_tables(
     reading: Sequence[ReadingRow], foreign: Sequence[ForeignRow], lines: LinesFigures | None
 ) -> Iterator[Table]:
-    """Scenes, foreign pages, line detectors."""
+    """Scenes, foreign pages, strokes."""
     yield from reading_tables(reading)
     yield from foreign_tables(foreign)
     yield from lines_tables(lines)
