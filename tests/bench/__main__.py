@@ -28,7 +28,10 @@ def main(arguments: list[str]) -> None:
     if "judging" in parts:
         judging = JudgingBench(quick=quick, students=students, whole_class=measure_class, scan=judged_scan)
     with Progress(console=Console(stderr=True), transient=True) as progress:
-        for bench in filter(None, (solver, reading, judging)):
+        benches: list[SolverBench | ReadingBench | JudgingBench | None] = [solver, reading, judging]
+        for bench in benches:
+            if bench is None:
+                continue
             bar = progress.add_task("", total=bench.steps)
             for step in bench.run():
                 progress.update(bar, advance=1, description=step)
