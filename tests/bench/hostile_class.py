@@ -24,7 +24,6 @@ import cv2
 import numpy as np
 import psutil
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests import hostile
 
 ROOT = Path(__file__).parents[2]
