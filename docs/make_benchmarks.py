@@ -1,4 +1,4 @@
-"""Measure and put the figures into benchmarks.md: `python docs/make_benchmarks.py`, some half an hour.
+"""Measure and put the figures into benchmarks.md: `python -m docs.make_benchmarks`, some half an hour.
 
 With `solver`, `reading`, `lines` or `judging` only that part is measured and replaced; `reading 20` takes 20
 students per scene, `judging 20` so many of each kind, hand and mechanism.
@@ -11,22 +11,19 @@ from pathlib import Path
 
 import cv2
 
-from grader.bench.judging import JudgingBench
-from grader.bench.judging_class import measure_class
-from grader.bench.judging_scans import judged_scan
-from grader.bench.judging_tables import judging_tables
-from grader.bench.lines import measure_lines
-from grader.bench.lines_figure import lines_svg
-from grader.bench.lines_tables import lines_tables
-from grader.bench.plain_text import Table, as_text
-from grader.bench.reading import STUDENTS, measure_reading
-from grader.bench.reading_foreign import foreign_tables, measure_foreign
-from grader.bench.reading_tables import reading_tables
-from grader.bench.solver import measure_solver
-from grader.bench.tables import solver_tables
+from tests.bench.judging import JudgingBench
+from tests.bench.judging_class import measure_class
+from tests.bench.judging_scans import judged_scan
+from tests.bench.judging_tables import judging_tables
+from tests.bench.lines import lines_tables, measure_lines
+from tests.bench.plain_text import Table, as_text
+from tests.bench.reading import STUDENTS, measure_reading
+from tests.bench.reading_foreign import foreign_tables, measure_foreign
+from tests.bench.reading_tables import reading_tables
+from tests.bench.solver import measure_solver
+from tests.bench.tables import solver_tables
 
 PAGE = Path(__file__).resolve().parent / "benchmarks.md"
-FIGURE = PAGE.with_name("lines.svg")
 
 
 def _reading(students: int | None) -> Iterable[Table]:
@@ -37,9 +34,7 @@ def _reading(students: int | None) -> Iterable[Table]:
 
 def _lines(_: int | None) -> Iterable[Table]:
     cv2.setNumThreads(1)
-    lines = measure_lines()
-    FIGURE.write_text(lines_svg(lines), encoding="utf-8")
-    return lines_tables(lines)
+    return lines_tables(measure_lines())
 
 
 def _judging(students: int | None) -> Iterable[Table]:

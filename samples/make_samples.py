@@ -1,6 +1,6 @@
 """Make the bundled classes: scans, entered measurements, rosters, and the truth of what was drawn.
 
-    python samples/make_samples.py [FOLDER]
+    python -m samples.make_samples [FOLDER]
 
 Everything follows from the seeds below; FOLDER is this folder by default.
 """
@@ -17,7 +17,8 @@ import numpy as np
 
 from grader.answer_sheet import make_sheets
 from grader.roster import RosterRow
-from grader.simulation import (
+from reference.assignment import Assignment, load_assignment
+from samples.simulation import (
     CAREFUL,
     PENS,
     TYPICAL,
@@ -32,8 +33,7 @@ from grader.simulation import (
     write_pdf,
     write_truth,
 )
-from grader.simulation.printing import printed_sheets
-from reference.assignment import Assignment, load_assignment
+from samples.simulation.printing import printed_sheets
 
 QUIET = Scan(dpi=150.0, dpi_tag=150.0, noise=1.0, tint_grain=0.5, jpeg_quality=62, dust=8)
 """A good flatbed, frugal with bytes."""

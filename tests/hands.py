@@ -11,11 +11,11 @@ import numpy as np
 from grader.comparison import Submission, Task, task_of
 from grader.records import Figure, Reading, ReadNode, ReadVector
 from grader.rubric import rubric_of
-from grader.simulation import Hand
-from grader.simulation.hand import slips
 from reference.assignment import load_assignment
 from reference.construction import evaluate
 from reference.mistakes import Drawing, Mistake, commit
+from samples.simulation import Hand
+from samples.simulation.hand import slips
 
 ZERO_MM = 1e-9
 

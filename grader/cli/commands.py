@@ -282,27 +282,10 @@ def match(
 
 @app.command()
 def bench(
-    quick: Annotated[bool, typer.Option("--quick", help="A few sheets and cases only.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="One student of each class, fewer runs.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
-    solver: Annotated[
-        bool, typer.Option("--solver", help="The solver only: speed, errors, stability beside its peers.")
-    ] = False,
-    reading: Annotated[
-        bool, typer.Option("--reading", help="The reading only: scenes, foreign pages, line detectors.")
-    ] = False,
-    judging: Annotated[
-        bool, typer.Option("--judging", help="The judging only: verdicts, mistakes named, time.")
-    ] = False,
-    students: Annotated[
-        int | None,
-        typer.Option(
-            "--students", min=1, help="Simulated students per scene of the reading, per kind of class."
-        ),
-    ] = None,
 ) -> None:
-    """Run time against error, on generated sheets with known truth."""
-    from grader.cli.benchmark import PARTS, show_benchmark
+    """Run time against error: of the solver, and of the reading of the bundled samples."""
+    from grader.cli.benchmark import show_benchmark
 
-    asked = {"solver": solver, "reading": reading, "judging": judging}
-    parts = [name for name, is_asked in asked.items() if is_asked] or PARTS
-    show_benchmark(quick=quick, as_json=as_json, parts=parts, students=students)
+    show_benchmark(quick=quick, as_json=as_json)

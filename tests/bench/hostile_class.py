@@ -1,6 +1,6 @@
 """A class of 50 in which ten files are hostile, graded whole, killed and interrupted on the way.
 
-    OMP_NUM_THREADS=1 python tests/bench/hostile_class.py [--checkout OTHER]
+    OMP_NUM_THREADS=1 python -m tests.bench.hostile_class [--checkout OTHER]
 
 Held against the same class without the hostile files: the reports of the good ones byte for byte but
 times, peak memory of all processes together, time of the run. `--checkout` times another checkout on the
@@ -25,7 +25,6 @@ import cv2
 import numpy as np
 import psutil
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests import hostile
 
 ROOT = Path(__file__).parents[2]

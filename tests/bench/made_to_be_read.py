@@ -1,6 +1,6 @@
 """What a sheet made to be read gains: the same simulated students with and without each advice.
 
-    python tests/bench/made_to_be_read.py [--students N] [--seed S] [--assignments pump,press]
+    python -m tests.bench.made_to_be_read [--students N] [--seed S] [--assignments pump,press]
 
 Everybody draws on a flatbed at 300 dpi, without mistakes, on
 
@@ -30,13 +30,13 @@ from grader.lint import lint
 from grader.pipeline import Place, read, see
 from grader.roster import RosterRow
 from grader.rubric import load_rubric
-from grader.simulation import any_settings, simulate
-from grader.simulation.desk import Desk
-from grader.simulation.lettering import write
-from grader.simulation.printing import printed_sheets
-from grader.simulation.sketch import Label, Sketch
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.formula import parse
+from samples.simulation import any_settings, simulate
+from samples.simulation.desk import Desk
+from samples.simulation.lettering import write
+from samples.simulation.printing import printed_sheets
+from samples.simulation.sketch import Label, Sketch
 
 RIGHT_MM, RIGHT_DEG, WRONG_MM, SURE, ZERO_MM = 0.3, 0.3, 1.0, 0.9, 0.4
 SHORT_MM = 8.0

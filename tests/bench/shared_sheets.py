@@ -1,6 +1,6 @@
 """Reading measured on scanned drawings with known truth, made by others.
 
-    python tests/bench/shared_sheets.py [FOLDER ...]     (folders below ../shared/sheets)
+    python -m tests.bench.shared_sheets [FOLDER ...]     (folders below ../shared/sheets)
 
 A vector is right where its end minus its start lies within 0.5 mm of what was drawn: node to node,
 or the stroke itself, which may miss the nodes that it joins (no reader can know which is meant).

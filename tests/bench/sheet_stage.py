@@ -1,8 +1,8 @@
 """Registration measured on sheets whose map is known: how far millimetres are off, and how long it takes.
 
-    python tests/bench/sheet_stage.py [FOLDER ...] [--each]
+    python -m tests.bench.sheet_stage [FOLDER ...] [--each]
 
-A folder holds images with a `NAME.json` each (as `grader.simulation` writes its truth) or a `truth.jsonl`;
+A folder holds images with a `NAME.json` each (as `samples.simulation` writes its truth) or a `truth.jsonl`;
 without one the folders of ../shared/sheets are measured. Told for each folder: grid points on the
 sheet in millimetres, as placed and after the best rigid motion (what lengths and angles feel: a sheet
 without a frame has no place of its own); |scale error| / `scale_se`; pages refused, turned wrongly,

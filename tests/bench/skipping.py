@@ -1,6 +1,6 @@
 """What is not done twice, or not at all: the same verdicts in less time.
 
-    python tests/bench/skipping.py [--students N] [--seed S]
+    python -m tests.bench.skipping [--students N] [--seed S]
 
 A class on printed sheets of `pump`, a page for the velocities and one for the accelerations, is
 graded; then again after each kind of change, and by a rubric that asks for velocities alone.
@@ -21,9 +21,9 @@ from grader.answer_sheet import make_sheets
 from grader.batch import Batch, grade
 from grader.roster import RosterRow
 from grader.rubric import load_rubric
-from grader.simulation import any_settings, simulate
-from grader.simulation.printing import printed_sheets
 from reference.assignment import load_assignment
+from samples.simulation import any_settings, simulate
+from samples.simulation.printing import printed_sheets
 
 PUMP = load_assignment("pump")
 HEAD = "student_id,name,n,kL,kv,ka"

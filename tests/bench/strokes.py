@@ -1,6 +1,6 @@
 """Strokes found on scanned drawings held against those drawn, made by others.
 
-    python tests/bench/strokes.py [FOLDER ...]     (folders below ../shared/sheets)
+    python -m tests.bench.strokes [FOLDER ...]     (folders below ../shared/sheets)
 
 A vector is found where a stroke covers 70 % of it and both true ends lie within 0.3 mm of its line. The
 page is laid by its true map, so that only the strokes' own errors count.

@@ -1,7 +1,7 @@
 """Why vectors are not read, scene by scene, with a picture of each.
 
-    python tests/bench/why_missed.py [--scene plain --scene press ...] [--students 12]
-    python tests/bench/why_missed.py --shared ../shared/sheets/pump-clean [--pictures /tmp/missed]
+    python -m tests.bench.why_missed [--scene plain --scene press ...] [--students 12]
+    python -m tests.bench.why_missed --shared ../shared/sheets/pump-clean [--pictures /tmp/missed]
 
 Of every asked vector that is drawn and not both right and confident, the first that holds:
 
@@ -28,9 +28,15 @@ from typing import Any
 import cv2
 import numpy as np
 
-from grader.bench.reading_places import OnPaper
-from grader.bench.reading_scenes import SCENES, scene_named, works
-from grader.bench.reading_truth import (
+from grader.pipeline import Place, Seen, read, see
+from grader.records import Figure, Reading
+from grader.roster import read_roster
+from grader.rubric import load_rubric
+from reference.assignment import Assignment, Variant, load_assignment
+from reference.derivation import construction_of
+from tests.bench.reading_places import OnPaper
+from tests.bench.reading_scenes import SCENES, scene_named, works
+from tests.bench.reading_truth import (
     RIGHT_MM,
     Judged,
     Segment,
@@ -38,12 +44,6 @@ from grader.bench.reading_truth import (
     figures_of,
     judged,
 )
-from grader.pipeline import Place, Seen, read, see
-from grader.records import Figure, Reading
-from grader.roster import read_roster
-from grader.rubric import load_rubric
-from reference.assignment import Assignment, Variant, load_assignment
-from reference.derivation import construction_of
 
 CAUSES = ("sheet", "ink", "plan", "choice", "place", "doubt")
 FOUND_SHARE = 0.6

@@ -9,8 +9,8 @@ import pytest
 
 from grader.comparison import compare
 from grader.comparison.marking import direction_tolerance, length_tolerance
-from grader.simulation import PERFECT, TYPICAL
 from reference.mistakes import Drawing, affected, single_mistakes
+from samples.simulation import PERFECT, TYPICAL
 from tests.hands import SOURCES, drawn_by, drawn_nodes, handed_in, task_for
 
 CREDITED = {"full", "follow_through"}

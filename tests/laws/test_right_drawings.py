@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from grader.comparison import compare, task_of
 from grader.rubric import rubric_of
-from grader.simulation import CAREFUL, TYPICAL
 from reference.assignment import built_in, load_assignment
 from reference.mechanism import Mechanism
+from samples.simulation import CAREFUL, TYPICAL
 from tests.hands import SOURCES, drawn_by, handed_in
 from tests.laws.test_marking_any_mechanism import task_for
 

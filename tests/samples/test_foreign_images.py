@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.bench import reading_foreign
 from grader.pipeline import Place, read, see
+from tests.bench import reading_foreign
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "real"
 IMAGES = sorted(path for path in REAL.rglob("*") if path.suffix in {".jpg", ".png"}) if REAL.is_dir() else []

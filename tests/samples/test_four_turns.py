@@ -19,9 +19,9 @@ from grader.answer_sheet import make_sheets
 from grader.pipeline import Place, read, see
 from grader.roster import RosterRow
 from grader.rubric import rubric_of
-from grader.simulation import CAREFUL, Scan, Settings, simulate
-from grader.simulation.printing import printed_sheets
 from reference.assignment import load_assignment
+from samples.simulation import CAREFUL, Scan, Settings, simulate
+from samples.simulation.printing import printed_sheets
 from tests.samples.counting import counted
 
 SAME_MM, MOST_MM = 0.05, 0.25

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.simulation import HARDSHIPS, PERFECT, Scan, Settings, any_settings, simulate, with_hardships
-from grader.simulation.hand import draw, task_of
 from reference.assignment import load_assignment
+from samples.simulation import HARDSHIPS, PERFECT, Scan, Settings, any_settings, simulate, with_hardships
+from samples.simulation.hand import draw, task_of
 
 SMALL = Scan(dpi=45.0, noise=0.0, tint_grain=0.0, dust=0)
 

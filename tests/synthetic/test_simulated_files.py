@@ -9,9 +9,9 @@ from PIL import Image
 
 from grader.answer_sheet import make_sheets
 from grader.roster import RosterRow
-from grader.simulation import Scan, Settings, Student, blank_back, simulate, write_pdf, write_truth
-from grader.simulation.printing import printed_sheets
 from reference.assignment import load_assignment
+from samples.simulation import Scan, Settings, Student, blank_back, simulate, write_pdf, write_truth
+from samples.simulation.printing import printed_sheets
 
 SMALL = Scan(dpi=40.0, dpi_tag=40.0)
 

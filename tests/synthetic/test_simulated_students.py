@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.simulation import (
+from reference.assignment import load_assignment
+from reference.mistakes import CODES
+from reference.plan import exact_plan
+from samples.simulation import (
     CLEAN_SCAN,
     PERFECT,
     SLOPPY,
@@ -17,10 +20,7 @@ from grader.simulation import (
     measured_by,
     simulate,
 )
-from grader.simulation.hand import draw, task_of
-from reference.assignment import load_assignment
-from reference.mistakes import CODES
-from reference.plan import exact_plan
+from samples.simulation.hand import draw, task_of
 
 ROUNDING_MM = 2e-4
 TINY = replace(CLEAN_SCAN, dpi=12.0)

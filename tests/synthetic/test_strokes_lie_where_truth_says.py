@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from grader.simulation import CAREFUL, CLEAN_SCAN, PERFECT, PenStyle, Scan, Settings, simulate
-from grader.simulation.raster import render
-from grader.simulation.strokes import Pen, straight
-from grader.simulation.view import View
 from reference.assignment import load_assignment
+from samples.simulation import CAREFUL, CLEAN_SCAN, PERFECT, PenStyle, Scan, Settings, simulate
+from samples.simulation.raster import render
+from samples.simulation.strokes import Pen, straight
+from samples.simulation.view import View
 
 RENDER_ERROR_MM = 0.01  # what sampling by whole pixels leaves of a centre of mass at 150 dpi
 SCAN_ERROR_MM = 0.02

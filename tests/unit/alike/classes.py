@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 
 from grader.alike import Handed
-from grader.simulation import CAREFUL, SLOPPY, TYPICAL, Student
-from grader.simulation.hand import draw, task_of
 from reference.assignment import load_assignment
 from reference.derivation import construction_of
+from samples.simulation import CAREFUL, SLOPPY, TYPICAL, Student
+from samples.simulation.hand import draw, task_of
 
 HANDS = {"careful": CAREFUL, "typical": TYPICAL, "sloppy": SLOPPY}
 READ_MM = 0.06

@@ -10,8 +10,8 @@ import pytest
 from grader.alike import CELLS, find_alike, ink_map
 from grader.alike.drawings import like_drawings
 from grader.alike.hands import log_chance
-from grader.simulation import PERFECT
 from reference.assignment import built_in, load_assignment
+from samples.simulation import PERFECT
 from tests.unit.alike import classes
 from tests.unit.alike.classes import any_drawing, changed, drawing, measured, scanned, scanned_class
 

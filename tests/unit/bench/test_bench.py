@@ -1,25 +1,22 @@
 """The benchmark: what it counts, and that it counts rightly."""
 
-import importlib.util
 import json
 
 import pytest
 
-from grader.bench import branches, solver, speed, stability
-from grader.bench.branches import BranchRow
-from grader.bench.judging_tally import JudgingFigures
-from grader.bench.peers import PEERS, Package
-from grader.bench.reading_tally import Tally, row_of
-from grader.bench.report import Report
-from grader.bench.singular import KINDS
-from grader.bench.solver import SolverBench, measure_errors
-from grader.bench.speed import NOT_INSTALLED, SpeedRow, measure_speed, speed_rows
-from grader.bench.stability import DISTANCES_QUICK, measure_stability
-from grader.cli.benchmark import show_benchmark
+from tests.bench import solver
+from tests.bench.__main__ import main
+from tests.bench.branches import BranchRow
+from tests.bench.judging_tally import JudgingFigures
+from tests.bench.reading_tally import Tally, row_of
+from tests.bench.report import Report
+from tests.bench.singular import KINDS
+from tests.bench.solver import SolverBench, measure_errors
+from tests.bench.speed import SpeedRow, measure_speed, speed_rows
+from tests.bench.stability import DISTANCES_QUICK, measure_stability
 
 SHARE_OF_PLAN = 1e-12
 """Error allowed, relative to the plan's size."""
-ABSENT = Package("no such solver", "no-such-solver", "no_such_solver", "Solver")
 
 READING = row_of("plain", "a plain sheet", Tally(refused=7), 123.0)
 
@@ -34,17 +31,7 @@ def test_every_built_in_assignment_is_held_against_fifty_digits():
         assert row.construction <= SHARE_OF_PLAN
 
 
-@pytest.fixture
-def only_scipy(monkeypatch):
-    """Of the peers, the one that is always there, and one that never is."""
-    scipy = next(peer for peer in PEERS if peer.module == "scipy")
-    for module in (speed, stability, branches):
-        monkeypatch.setattr(module, "PEERS", (ABSENT, scipy))
-    monkeypatch.setattr(speed, "PYLINKAGE", ABSENT)
-
-
-@pytest.mark.usefixtures("only_scipy")
-def test_the_speed_of_ours_stands_beside_the_peers_with_the_errors_of_each():
+def test_the_speed_of_ours_stands_beside_scipys_with_the_errors_of_each():
     rows = list(measure_speed(quick=True, batches=(1, 30)))
     assert len(rows) == speed_rows()
     timed = [row for row in rows if row.accelerations and set(row.us) == {1, 30}]
@@ -55,16 +42,6 @@ def test_the_speed_of_ours_stands_beside_the_peers_with_the_errors_of_each():
     assert errors["closed form"] < errors["scipy fsolve"] < 1e-6
 
 
-@pytest.mark.usefixtures("only_scipy")
-def test_a_peer_that_is_not_installed_is_told_and_nothing_of_it_is_measured():
-    rows = [row for row in measure_speed(quick=True, batches=(1,)) if row.solver.startswith(ABSENT.name)]
-    assert rows
-    assert all(row.note == NOT_INSTALLED and not row.us for row in rows)
-    text = Report(solver.SolverFigures(speed=tuple(measure_speed(quick=True, batches=(1,))))).as_text()
-    assert NOT_INSTALLED in text
-
-
-@pytest.mark.usefixtures("only_scipy")
 def test_the_bench_of_the_solver_measures_as_many_rows_as_it_says(monkeypatch):
     few = KINDS[:1]
     monkeypatch.setattr(solver, "KINDS", few)
@@ -96,11 +73,6 @@ def test_the_report_shows_time_and_error_and_is_json_too():
     assert json.loads(json.dumps(report.as_json()))["reading"][0]["refused"] == 7
 
 
-@pytest.mark.parametrize("peer", PEERS, ids=lambda peer: peer.name)
-def test_a_peers_version_is_known_where_it_is_installed(peer):
-    assert (peer.version is not None) == (importlib.util.find_spec(peer.module) is not None)
-
-
 @pytest.mark.parametrize(
     "asked", [["solver", "reading", "judging"], ["solver"], ["reading"], ["judging", "reading"]]
 )
@@ -121,10 +93,10 @@ def test_the_command_prints_the_figures_of_the_parts_asked_for(asked, monkeypatc
         def run(self):
             yield "branches"
 
-    monkeypatch.setattr("grader.bench.solver.SolverBench", Bench)
-    monkeypatch.setattr("grader.bench.reading.ReadingBench", Bench)
-    monkeypatch.setattr("grader.bench.judging.JudgingBench", Bench)
-    show_benchmark(quick=True, as_json=True, parts=asked)
+    monkeypatch.setattr("tests.bench.__main__.SolverBench", Bench)
+    monkeypatch.setattr("tests.bench.__main__.ReadingBench", Bench)
+    monkeypatch.setattr("tests.bench.__main__.JudgingBench", Bench)
+    main(["--quick", "--json", *(f"--{part}" for part in asked)])
     told = json.loads(capsys.readouterr().out)
     assert (told["solver"] is not None) == ("solver" in asked)
     assert len(told["reading"]) == ("reading" in asked)

@@ -6,28 +6,28 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from grader.bench import judging, judging_scans
-from grader.bench.judging import JudgingBench, judged, main
-from grader.bench.judging_assignments import ASSIGNMENTS, assignment_named
-from grader.bench.judging_class import measure_class
-from grader.bench.judging_handed_in import submission
-from grader.bench.judging_naming import is_named, mistakes_due
-from grader.bench.judging_redrawn import Asked, meant, vectors_of
-from grader.bench.judging_rules import Seen, off
-from grader.bench.judging_students import SOURCES, Key, Work, student
-from grader.bench.judging_tables import judging_tables
-from grader.bench.judging_tally import ClassTime, JudgingFigures, Marked, Tally, Times, result_of, summed
-from grader.bench.judging_truth import verdicts_due
-from grader.bench.judging_values import computed, exact_rates
-from grader.bench.plain_text import as_text
 from grader.judging import judge, task_of
 from grader.lint import lint
 from grader.outcomes import Mistake as Named
 from grader.records import Reading
-from grader.simulation.hand import draw
-from grader.simulation.hand import task_of as drawing_task
-from grader.simulation.settings import PERFECT, Student
 from reference.mistakes import Mistake, commit
+from samples.simulation.hand import draw
+from samples.simulation.hand import task_of as drawing_task
+from samples.simulation.settings import PERFECT, Student
+from tests.bench import judging, judging_scans
+from tests.bench.judging import JudgingBench, judged, main
+from tests.bench.judging_assignments import ASSIGNMENTS, assignment_named
+from tests.bench.judging_class import measure_class
+from tests.bench.judging_handed_in import submission
+from tests.bench.judging_naming import is_named, mistakes_due
+from tests.bench.judging_redrawn import Asked, meant, vectors_of
+from tests.bench.judging_rules import Seen, off
+from tests.bench.judging_students import SOURCES, Key, Work, student
+from tests.bench.judging_tables import judging_tables
+from tests.bench.judging_tally import ClassTime, JudgingFigures, Marked, Tally, Times, result_of, summed
+from tests.bench.judging_truth import verdicts_due
+from tests.bench.judging_values import computed, exact_rates
+from tests.bench.plain_text import as_text
 
 STEEP = Key("pump", "careful", "single", 1)
 ROUNDING_MM = 1e-9

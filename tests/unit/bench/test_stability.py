@@ -1,4 +1,4 @@
-"""The stability table: outcomes are told apart, distances are as asked, peers are asked fairly."""
+"""The stability table: outcomes are told apart, distances are as asked, fsolve is asked fairly."""
 
 import math
 from dataclasses import replace
@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.bench import branches, stability
-from grader.bench.arrays import one_of, stacked
-from grader.bench.peers import PEERS, Answer, NoAnswerError, error_of, plain, sketch
-from grader.bench.singular import KINDS
-from grader.bench.speed import spread
-from grader.bench.stability import EPSILON, _count, _Outcomes, measure_stability, truth_of
 from reference.assignment import load_assignment
 from reference.motion import move
+from tests.bench import branches
+from tests.bench.arrays import one_of, stacked
+from tests.bench.peers import Answer, Fsolve, NoAnswerError, error_of, plain_of, sketch
+from tests.bench.singular import KINDS
+from tests.bench.speed import spread
+from tests.bench.stability import EPSILON, _count, _Outcomes, measure_stability, truth_of
 
 PEER_ERROR = 1e-6
-"""The coarsest peer stops its iteration there."""
+"""fsolve stops its iteration there."""
 PLAIN = [kind for kind in KINDS if kind.plain]
 
 
@@ -80,13 +80,11 @@ def test_ours_is_never_on_a_wrong_branch_nor_silent_and_its_usual_error_is_below
             assert max(cell.velocity[0], cell.acceleration[0]) <= 1.0
 
 
-@pytest.mark.parametrize("peer", PEERS, ids=lambda peer: peer.name)
-def test_an_installed_peer_solves_the_pump_as_the_closed_form_does(peer):
-    pytest.importorskip(peer.module)
+def test_fsolve_solves_the_pump_as_the_closed_form_does():
     mechanism = spread(load_assignment("pump"), 3)
     motion = move(mechanism)
     starts = sketch(mechanism, motion.position)
-    solver = peer.build(mechanism)
+    solver = Fsolve(mechanism)
     for index in range(3):
         start = {joint: complex(places[index]) for joint, places in starts.items()}
         answer = solver.solve(index, start)()
@@ -98,24 +96,10 @@ def test_an_installed_peer_solves_the_pump_as_the_closed_form_does(peer):
             assert error_of(found, {joint: complex(at[index]) for joint, at in ours.items()}) <= PEER_ERROR
 
 
-def test_the_compiled_cycle_of_pylinkage_gives_every_variant():
-    pytest.importorskip("numba")
-    pytest.importorskip("pylinkage")
-    from grader.bench.adapters.pylinkage_adapter import PylinkageCycle  # noqa: PLC0415
-
-    mechanism = spread(load_assignment("pump"), 4)
-    motion = move(mechanism)
-    drawn = sketch(mechanism, motion.position)
-    answers = PylinkageCycle(plain(mechanism)).answers({joint: complex(at[0]) for joint, at in drawn.items()})
-    for index, answer in enumerate(answers):
-        ours = {joint: complex(at[index]) for joint, at in motion.acceleration.items()}
-        assert error_of(answer.acceleration, ours) <= PEER_ERROR
-
-
-def test_a_mechanism_that_no_peer_knows_is_no_answer():
+def test_a_mechanism_without_a_plain_form_is_no_answer():
     slotted = next(kind for kind in KINDS if not kind.plain)
-    with pytest.raises(NoAnswerError, match="no adapter for SlottedLink"):
-        plain(case_of(slotted).mechanism)
+    with pytest.raises(NoAnswerError, match="no plain form of SlottedLink"):
+        plain_of(case_of(slotted).mechanism)
 
 
 def test_a_sketch_shows_the_side_plainly():
@@ -153,9 +137,12 @@ def test_ours_puts_no_random_case_on_the_wrong_branch():
 
 
 def test_solvers_that_fail_are_counted_for_how_they_fail(monkeypatch):
+    seen = []
+
     class Odd:
-        def __init__(self, start):
-            self.start = start
+        def __init__(self, mechanism):
+            del mechanism
+            self.start = seen
 
         def solve(self, index, start):
             if index:
@@ -166,20 +153,7 @@ def test_solvers_that_fail_are_counted_for_how_they_fail(monkeypatch):
             place = dict(start) if len(self.start) % 3 == 1 else dict.fromkeys(start, complex(math.nan))
             return lambda: Answer(place, place, place)
 
-    seen = []
-
-    class Package:
-        name = "odd"
-
-        def build(self, mechanism):
-            del mechanism
-            return Odd(seen)
-
     monkeypatch.setattr(branches, "PEER_CASES_QUICK", 12)
-    row = branches.count_peer(Package(), quick=True)
+    monkeypatch.setattr(branches, "Fsolve", Odd)
+    row = branches.count_peer(quick=True)
     assert (row.cases, row.refused, row.silent) == (12, 4, 4)
-
-
-def test_the_peers_measured_are_those_installed(monkeypatch):
-    monkeypatch.setattr(stability, "PEERS", tuple(peer for peer in PEERS if peer.module == "scipy"))
-    assert [peer.name for peer in stability.installed_peers()] == ["scipy fsolve"]

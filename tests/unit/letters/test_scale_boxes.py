@@ -12,9 +12,9 @@ from grader.quantities import Refused, parse_scale
 from grader.records import Page, Sheet, Written
 from grader.roster import RosterRow
 from grader.sheet import rectify
-from grader.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate
-from grader.simulation.printing import printed_sheets
 from reference.assignment import load_assignment
+from samples.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate
+from samples.simulation.printing import printed_sheets
 
 SURE = 0.9
 

@@ -10,8 +10,8 @@ from grader.letters.features import normalised
 from grader.letters.model import recognise
 from grader.records import Page, Sheet
 from grader.sheet import rectify
-from grader.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate
 from reference.assignment import load_assignment
+from samples.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate
 
 CLEAR_SHARE = 0.75
 """Of the letters clear of the lines of a careful drawing that are to be recognised."""

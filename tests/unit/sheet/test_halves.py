@@ -11,8 +11,8 @@ from grader.intake import page_of
 from grader.records import Page, Sheet
 from grader.roster import RosterRow
 from grader.sheet import rectify
-from grader.simulation import any_settings, simulate
 from reference.assignment import load_assignment
+from samples.simulation import any_settings, simulate
 
 PUMP = load_assignment("pump")
 

@@ -8,8 +8,8 @@ import pytest
 from grader.intake import page_of
 from grader.records import Sheet
 from grader.sheet import rectify
-from grader.simulation import any_settings, simulate
 from reference.assignment import load_assignment
+from samples.simulation import any_settings, simulate
 
 PUMP = load_assignment("pump")
 STANDARD_ERRORS = 4.0

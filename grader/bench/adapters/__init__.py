@@ -1,1 +1,0 @@
-"""One module per peer; each is imported only where the peer is installed."""

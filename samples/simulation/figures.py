@@ -1,0 +1,305 @@
+"""The mechanism's sketch and the two plans as a student draws them."""
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+
+from reference.construction import Vector, evaluate
+from reference.mechanism import Crank, Dyad, Plate
+from reference.steps import Divide, Given, Similar, TwoArcs, TwoLines
+from samples.simulation import symbols
+from samples.simulation.hand import MECHANISM, DrawnFigure, Nodes, Task
+from samples.simulation.links import blocks_of, coincident, fixed_guides, lines_of, links_of
+from samples.simulation.settings import Student
+from samples.simulation.sketch import CHAIN, DASHES, Sketch
+from samples.simulation.strokes import Dash, arc
+
+TOO_SHORT_MM = 0.8
+
+
+def at_origin(figure: DrawnFigure, origin: complex) -> dict[str, complex]:
+    """The figure's nodes on the sheet."""
+    return {name: origin + node for name, node in figure.nodes.items()}
+
+
+# Mechanism ----------------------------------------------------------------------------------------
+
+
+def draw_mechanism(sketch: Sketch, task: Task, nodes: Nodes, student: Student) -> None:
+    """Links, joints, supports, sliders, letters, and what some people add."""
+    turn = complex(np.exp(1j * np.radians(student.turn_deg)))
+    _compass_arcs(sketch, task, nodes)
+    for name, tail, head in links_of(task):
+        _link(sketch, name, nodes[tail], nodes[head])
+    for group in task.mechanism.groups:
+        if isinstance(group, Plate) and group.line_ratio is None and sketch.style.plate_hatched:
+            p, q = group.base
+            corners = (nodes[p], nodes[q], nodes[group.node])
+            symbols.inside_hatching(sketch, corners, sketch.rng.uniform(2.5, 5.0))
+    _sliders(sketch, task, nodes, turn)
+    named = [joint for joint in task.mechanism.joints if joint not in coincident(task)]
+    for joint in named:
+        if task.mechanism.is_ground(joint):
+            symbols.support(sketch, nodes[joint], turn)
+        else:
+            symbols.circle(sketch, nodes[joint], symbols.JOINT_RADIUS_MM, sketch.pen("line"))
+    _crank_extras(sketch, task, nodes)
+    if student.vectors_on_mechanism:
+        _vectors_at_pin(sketch, task, nodes)
+    if student.altitude:
+        _altitude(sketch, task, nodes)
+    for joint in named:
+        text = joint[0] + (f"_{{{joint[1:]}}}" if joint[1:] else "")
+        sketch.letter(nodes[joint], text, sketch.page.letter_mm, names=joint, distance_mm=2.0)
+
+
+def _sliders(sketch: Sketch, task: Task, nodes: Nodes, turn: complex) -> None:
+    """Blocks: on guides on the ground with their guides, on moving links without."""
+    for node, step in ((step.node, step) for step in task.wrong.construction.figures[MECHANISM]):
+        for guide in fixed_guides(step):
+            angle = float(task.wrong.parameters[f"angle {guide.guide}"])
+            symbols.slider(sketch, nodes[node], turn * complex(np.exp(1j * angle)))
+    for group in task.mechanism.groups:
+        for at, tail, head in blocks_of(task, group):
+            along = nodes[head] - nodes[tail]
+            beyond = ((nodes[at] - nodes[tail]) / along).real
+            if not 0.0 <= beyond <= 1.0:
+                sketch.line(sketch.pen("line"), nodes[head if beyond > 1.0 else tail], nodes[at])
+            symbols.block(sketch, nodes[at], along / abs(along))
+
+
+def _link(sketch: Sketch, name: str, tail: complex, head: complex) -> None:
+    p, q = sketch.redrawn(tail, head)
+    along = (q - p) / max(abs(q - p), 1e-9)
+    if sketch.style.links_stop_short and abs(q - p) > 5 * symbols.JOINT_RADIUS_MM:
+        gaps = symbols.JOINT_RADIUS_MM + sketch.rng.normal(0.05, 0.12, 2)
+        p, q = p + along * gaps[0], q - along * gaps[1]
+    sketch.line(sketch.pen("line"), p, q)
+    sketch.lines[MECHANISM, name] = (p, q)
+    if sketch.chance(sketch.style.erased):
+        miss = 1j * along * sketch.rng.choice([-1, 1]) * sketch.rng.uniform(0.8, 4.0)
+        sketch.line(sketch.pen("ghost"), p + 0.2 * miss, q + miss)
+
+
+def _compass_arcs(sketch: Sketch, task: Task, nodes: Nodes) -> None:
+    """The traces of the compass where two arcs met."""
+    for step in task.wrong.construction.figures[MECHANISM]:
+        if isinstance(step, TwoArcs) and sketch.chance(sketch.style.arcs):
+            for centre in step.centres:
+                reach = nodes[step.node] - nodes[centre]
+                sweep = sketch.rng.uniform(5.0, 14.0) / abs(reach)
+                points = arc(nodes[centre], abs(reach), float(np.angle(reach)) - sweep / 2, sweep)
+                sketch.curve(sketch.pen("thin"), points)
+
+
+def _crank_extras(sketch: Sketch, task: Task, nodes: Nodes) -> None:
+    crank = task.mechanism.driver
+    if not isinstance(crank, Crank):
+        return
+    pivot, pin = nodes[crank.pivot], nodes[crank.pin]
+    sense = float(np.mean(crank.omega))
+    radius = abs(pin - pivot)
+    if sketch.style.crank_circle:
+        start, sweep = sketch.rng.uniform(0, 6), sketch.rng.choice([2 * np.pi, 2.0])
+        sketch.curve(sketch.pen("thin"), arc(pivot, radius, start, sweep), DASHES)
+    start = float(np.angle(pin - pivot)) + sketch.rng.uniform(0.2, 0.5) * np.sign(sense)
+    symbols.turning_arrow(sketch, pivot, start, min(radius * 0.5, sketch.rng.uniform(7, 12)), sense)
+
+
+def _vectors_at_pin(sketch: Sketch, task: Task, nodes: Nodes) -> None:
+    """v_A and a_A drawn at the crank's pin as well."""
+    known, crank = task.wrong.parameters, task.mechanism.driver
+    if not isinstance(crank, Crank):
+        return
+    arm = nodes[crank.pin] - nodes[crank.pivot]
+    along = arm / abs(arm)
+    speed = float(known[f"v_{crank.pin}"] / known["kv"])
+    pull = float(known[f"a_{crank.pin}_n"] / known["ka"])
+    for name, vector in ((f"v_{crank.pin}", 1j * along * speed), (f"a_{crank.pin}", -along * pull)):
+        if sketch.chance(0.75):
+            p, q = sketch.redrawn(nodes[crank.pin], nodes[crank.pin] + vector)
+            sketch.line(sketch.pen("line", plan=True), p, q)
+            symbols.arrowhead(sketch, sketch.pen("line", plan=True), p, q, sketch.style.arrow_mm)
+            sketch.lines[MECHANISM, name] = (p, q)
+            height = 0.85 * sketch.page.letter_mm
+            sketch.letter(q, _vector_text(sketch, name), height, names=name, distance_mm=1.5)
+
+
+def _altitude(sketch: Sketch, task: Task, nodes: Nodes) -> None:
+    """The right triangle whose altitude gives a normal component, at the first moving link's end."""
+    fixed = task.mechanism.is_ground
+    dyads = (g for g in task.mechanism.groups if isinstance(g, Dyad) and not fixed(g.pins[0]))
+    dyad = next(dyads, None)
+    if dyad is None:
+        return
+    known = task.wrong.parameters
+    if abs(float(known["kL"] * known["ka"] / known["kv"] ** 2) - 1.0) > 0.01:
+        return  # the triangle's altitude is a normal component only at matching scales
+    tail, head = nodes[dyad.pins[0]], nodes[dyad.node]
+    ideal = evaluate(task.wrong.construction, known, wanted=_velocity_ends(task, dyad))
+    start, end = (complex(ideal[node]) for node in _velocity_ends(task, dyad))
+    link = head - tail
+    speed = end - start
+    tip = head + speed
+    foot = head + link / abs(link) * abs(speed) ** 2 / abs(link)
+    pen = sketch.pen("thin")
+    for p, q in ((head, tip), (tail, tip), (tip, foot), (head, foot)):
+        sketch.line(pen, *sketch.redrawn(p, q))
+
+
+def _velocity_ends(task: Task, dyad: Dyad) -> tuple[str, str]:
+    vector = task.right.construction.vectors[f"v_{dyad.node}{dyad.pins[0]}"]
+    return vector.tail, vector.head
+
+
+# Plans --------------------------------------------------------------------------------------------
+
+
+def draw_plan(sketch: Sketch, task: Task, figure: str, nodes: Nodes, student: Student) -> dict[str, str]:
+    """A plan: construction lines, vectors, letters. Returns the vectors not drawn, each with the reason."""
+    missing = {name: "mistake" for name in task.missing if name in _names(task, figure)}
+    _construction_lines(sketch, task, figure, nodes)
+    _unnamed_sides(sketch, task, figure, nodes)
+    for vector in task.wrong.construction.vectors_of(figure):
+        reason = _left_out(sketch, task, vector, nodes, student)
+        if reason:
+            missing[vector.name] = reason
+        else:
+            _vector(sketch, task, figure, vector, nodes)
+    _letters(sketch, task, figure, nodes)
+    return missing
+
+
+def _names(task: Task, figure: str) -> set[str]:
+    return {vector.name for vector in task.right.construction.vectors_of(figure)}
+
+
+def _left_out(sketch: Sketch, task: Task, vector: Vector, nodes: Nodes, student: Student) -> str | None:
+    if abs(nodes[vector.head] - nodes[vector.tail]) < TOO_SHORT_MM:
+        return "too short to draw"
+    if _is_result(task, vector) and sketch.chance(student.omitted):
+        return "not drawn out"
+    return None
+
+
+def _is_result(task: Task, vector: Vector) -> bool:
+    """Whether a vector only joins two nodes that are there without it (pole and c, pole and b')."""
+    step = task.wrong.construction.step(vector.head)
+    if isinstance(step, TwoLines):
+        return vector.tail not in {line.through for line in lines_of(step)}
+    return vector.link is None and not isinstance(step, Given)
+
+
+def _vector(sketch: Sketch, task: Task, figure: str, vector: Vector, nodes: Nodes) -> None:
+    p, q = sketch.redrawn(nodes[vector.tail], nodes[vector.head])
+    pen = sketch.pen("line", plan=True)
+    dash = None
+    if sketch.style.dashed_absolutes and abs(q - p) > 12 and _is_result(task, vector):
+        dash = DASHES
+    sketch.line(pen, p, q, dash)
+    if dash is None and sketch.chance(sketch.style.doubled):
+        sketch.line(pen, *sketch.redrawn(p, q))
+    symbols.arrowhead(sketch, pen, p, q, sketch.style.arrow_mm)
+    sketch.lines[figure, vector.name] = (p, q)
+    if sketch.chance(0.4 * sketch.style.erased):
+        slip = complex(*sketch.rng.normal(0.0, 1.2, 2))
+        sketch.line(sketch.pen("ghost"), p, q + slip)
+    if abs(q - p) > 9.0 and sketch.chance(sketch.page.vector_labels):
+        text = _vector_text(sketch, vector.name)
+        middle = p + (q - p) * sketch.rng.uniform(0.35, 0.65)
+        sketch.letter(middle, text, 0.75 * sketch.page.letter_mm, names=vector.name, distance_mm=0.9)
+
+
+def _construction_lines(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
+    """Thin lines that run past the points they gave."""
+    for step in task.wrong.construction.figures[figure]:
+        if not isinstance(step, TwoLines):
+            continue
+        for line in lines_of(step):
+            reach = nodes[step.node] - nodes[line.through]
+            if abs(reach) < 0.3 or not sketch.chance(sketch.style.construction_lines):
+                continue
+            along = reach / abs(reach)
+            past = sketch.rng.exponential(sketch.style.overrun_mm + 0.5, 2)
+            before = past[0] if sketch.chance(0.4) else 0.0
+            ends = nodes[line.through] - before * along, nodes[step.node] + past[1] * along
+            sketch.line(sketch.pen("thin", plan=True), *ends, _construction_dash(sketch))
+            sketch.construction.setdefault(figure, []).append(ends)
+
+
+def _construction_dash(sketch: Sketch) -> Dash | None:
+    """None for a line drawn through."""
+    share = sketch.style.construction_dashed
+    if not share or not sketch.chance(share):
+        return None
+    return DASHES if sketch.chance(0.6) else CHAIN
+
+
+def draw_helpers(sketch: Sketch, task: Task, mechanism: Nodes, plan: Nodes, count: int) -> None:
+    """Thin lines of no meaning: a link's direction carried over to the plan, a ruler set wrongly."""
+    links = list(links_of(task))
+    points = list(plan.values())
+    low, high = extent(plan)
+    for _ in range(count):
+        _, tail, head = links[sketch.rng.integers(len(links))]
+        along = mechanism[head] - mechanism[tail]
+        along *= complex(np.exp(1j * sketch.rng.choice([0.0, np.pi / 2]))) / abs(along)
+        if sketch.chance(0.5):
+            foot = points[sketch.rng.integers(len(points))]
+            foot += complex(*sketch.rng.normal(0.0, 2.0, 2))
+        else:
+            share = sketch.rng.uniform(-0.1, 1.1, 2)
+            foot = low + complex(share[0] * (high - low).real, share[1] * (high - low).imag)
+        before, past = sketch.rng.uniform(2.0, 25.0, 2)
+        sketch.line(sketch.pen("thin", plan=True), foot - before * along, foot + past * along)
+
+
+def _unnamed_sides(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
+    """Sides of a similar triangle that no named vector draws."""
+    drawn = {frozenset((v.tail, v.head)) for v in task.wrong.construction.vectors_of(figure)}
+    for step in task.wrong.construction.figures[figure]:
+        if isinstance(step, Similar | Divide):
+            for end in step.base:
+                length = abs(nodes[end] - nodes[step.node])
+                if frozenset((end, step.node)) not in drawn and length > TOO_SHORT_MM:
+                    p, q = sketch.redrawn(nodes[end], nodes[step.node])
+                    sketch.line(sketch.pen("line", plan=True), p, q)
+                    sketch.lines[figure, f"side {end} {step.node}"] = (p, q)
+
+
+def _letters(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
+    circles = sketch.chance(sketch.style.node_circles)
+    dots = not circles and sketch.chance(sketch.style.node_dots)
+    for node, at in nodes.items():
+        letter = task.letter_of(node)
+        if node.startswith(("n_", "k_")):
+            if sketch.chance(sketch.page.end_labels):
+                text, height = f"{letter[0]}_{{{letter[2:]}}}", 0.7 * sketch.page.letter_mm
+                sketch.letter(at, text, height, names=node, distance_mm=0.8)
+            continue
+        if circles:
+            symbols.circle(sketch, at, sketch.rng.uniform(0.5, 1.1), sketch.pen("thin"))
+        elif dots:
+            symbols.dot(sketch, at, sketch.rng.uniform(0.35, 0.55))
+        is_pole = node == task.wrong.construction.poles[figure]
+        text = pole_text(task, figure) if is_pole else re.sub(r"(\d+)", r"_{\1}", letter)
+        sketch.letter(at, text, sketch.page.letter_mm, names=node, distance_mm=1.2)
+
+
+def pole_text(task: Task, figure: str) -> str:
+    """The letter of a plan's pole as the assignment has it."""
+    pole = task.wrong.construction.poles[figure]
+    return task.assignment.file.names.get(pole, pole)
+
+
+def _vector_text(sketch: Sketch, name: str) -> str:
+    kind, about, *part = name.split("_")
+    bar = "\u0304" if sketch.page.bar_over_vectors else ""
+    return f"{kind}{bar}_{{{about}}}" + (f"^{part[0]}" if part else "")
+
+
+def extent(nodes: Mapping[str, complex]) -> tuple[complex, complex]:
+    """Low and high corner of the nodes."""
+    points = np.array(list(nodes.values()))
+    return (complex(points.real.min(), points.imag.min()), complex(points.real.max(), points.imag.max()))

@@ -1,0 +1,137 @@
+"""Writing: letters as strokes, with subscripts, superscripts and a hand's unevenness.
+
+Markup: ``_x`` or ``_{xy}`` lowers, ``^x`` or ``^{xy}`` raises; everything else is written as it is.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from samples.simulation.glyphs import GLYPHS, TWINS
+from samples.simulation.strokes import ComplexArray, Pen, Rng, Stroke, inked, smooth
+
+BAR = "\u0304"
+"""A bar over the letter before it, as over a vector's name."""
+_SMALL = 0.66
+_DROP, _RISE = -0.32, 0.52
+_SPACE = 0.42
+"""Widths and heights in capital heights."""
+
+
+@dataclass(frozen=True, slots=True)
+class Handwriting:
+    """How one person writes.
+
+    Attributes
+    ----------
+    slant : run per rise of upright strokes
+    aspect : width to height, 1 as the alphabet
+    jitter : standard deviation of a letter's corners, in capital heights
+    unevenness : variation of size and base line from letter to letter
+    gap : space between letters, in capital heights
+    forms : which form of each letter this person uses, by letter
+    """
+
+    slant: float = 0.2
+    aspect: float = 0.9
+    jitter: float = 0.025
+    unevenness: float = 0.05
+    gap: float = 0.17
+    forms: tuple[tuple[str, int], ...] = ()
+
+
+def any_handwriting(rng: Rng) -> Handwriting:
+    """Somebody's handwriting."""
+    forms = tuple((letter, int(rng.integers(len(ways)))) for letter, ways in GLYPHS.items() if len(ways) > 1)
+    return Handwriting(
+        slant=float(rng.choice([0.0, 0.05, 0.15, 0.27, 0.35])),
+        aspect=float(rng.uniform(0.65, 1.05)),
+        jitter=float(rng.uniform(0.01, 0.045)),
+        unevenness=float(rng.uniform(0.02, 0.1)),
+        gap=float(rng.uniform(0.1, 0.24)),
+        forms=forms,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """Strokes of a text and its box: (left, bottom), (right, top), complex sheet millimetres."""
+
+    strokes: tuple[Stroke, ...]
+    low: complex
+    high: complex
+
+    def moved(self, by: complex) -> "Written":
+        """The same text elsewhere."""
+        strokes = tuple(Stroke(s.points + by, s.width, s.dark, s.layer) for s in self.strokes)
+        return Written(strokes, self.low + by, self.high + by)
+
+
+@dataclass(frozen=True, slots=True)
+class _Letter:
+    sign: str
+    size: float
+    lift: float
+
+
+def _letters(text: str) -> Iterator[_Letter]:
+    at = 0
+    while at < len(text):
+        if text[at] in "_^" and at + 1 < len(text):
+            lift = _DROP if text[at] == "_" else _RISE
+            if text[at + 1] == "{":
+                end = text.index("}", at)
+                small, at = text[at + 2 : end], end + 1
+            else:
+                small, at = text[at + 1], at + 2
+            yield from (_Letter(sign, _SMALL, lift) for sign in small)
+        else:
+            yield _Letter(text[at], 1.0, 0.0)
+            at += 1
+
+
+def _strokes_of(sign: str, forms: dict[str, int]) -> list[tuple[bool, ComplexArray]]:
+    ways = GLYPHS.get(sign) or GLYPHS.get(TWINS.get(sign, "?")) or GLYPHS["?"]
+    form = ways[forms.get(sign, 0) % len(ways)]
+    strokes: list[tuple[bool, ComplexArray]] = []
+    for text in form.split("|"):
+        pairs = [pair.split(",") for pair in text.lstrip("~").split()]
+        corners = np.array([complex(float(x), float(y)) for x, y in pairs], dtype=np.complex128) / 100.0
+        strokes.append((text.startswith("~"), np.asarray(corners, dtype=np.complex128)))
+    return strokes
+
+
+def write(rng: Rng, pen: Pen, text: str, height_mm: float, style: Handwriting) -> Written:
+    """A text whose base line starts at 0."""
+    forms = dict(style.forms)
+    at, strokes = 0.0, []
+    for letter in _letters(text):
+        if letter.sign == " ":
+            at += _SPACE * letter.size
+            continue
+        if letter.sign == BAR:
+            at -= 0.55 * style.aspect + style.gap
+        size = letter.size * (1.0 + style.unevenness * rng.standard_normal())
+        lift = letter.lift + 0.4 * style.unevenness * rng.standard_normal()
+        right = at
+        for curved, corners in _strokes_of(letter.sign, forms):
+            shape = corners + style.jitter * (
+                rng.standard_normal(len(corners)) + 1j * rng.standard_normal(len(corners))
+            )
+            points = smooth(shape, 4) if curved else shape
+            x = at + points.real * size * style.aspect
+            y = points.imag * size + lift
+            place = (x + style.slant * y + 1j * y) * height_mm
+            strokes.append(inked(rng, pen, np.asarray(place)))
+            right = max(right, float(x.max()))
+        at = right + style.gap * letter.size
+    return _boxed(strokes)
+
+
+def _boxed(strokes: list[Stroke]) -> Written:
+    if not strokes:
+        return Written((), 0j, 0j)
+    points = np.concatenate([stroke.points for stroke in strokes])
+    low = complex(points.real.min(), points.imag.min())
+    return Written(tuple(strokes), low, complex(points.real.max(), points.imag.max()))

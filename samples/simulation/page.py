@@ -1,0 +1,231 @@
+"""A sheet of A3: frame, title block, where the figures go, captions and working."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from grader.records import Box
+from samples.simulation import wording
+from samples.simulation.figures import extent
+from samples.simulation.hand import DrawnFigure, Task
+from samples.simulation.sketch import SQUARES_LAYER, Sketch
+from samples.simulation.strokes import Pen, Rng, straight
+
+PAPER_MM = (420.0, 297.0)
+FRAMES_MM: Mapping[str, Box] = {
+    "iso": (20.0, 10.0, 390.0, 277.0),
+    "gost": (20.0, 5.0, 395.0, 287.0),
+    "none": (12.0, 12.0, 396.0, 273.0),
+}
+TITLE_MM = {"rows": (178.0, 44.0), "form": (185.0, 55.0), "none": (0.0, 0.0)}
+_MARGIN_MM = 13.0
+"""Room for letters and arrows around a figure's nodes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The frame as drawn: its kind and its four corners (top left first, clockwise), None where absent."""
+
+    kind: str
+    by: str
+    corners: tuple[complex, ...] | None
+
+
+def print_squares(sketch: Sketch) -> None:
+    """The fine lines of squared paper, printed a little askew to its edges."""
+    pitch = sketch.page.squared_mm
+    if pitch <= 0.0:
+        return
+    pen = Pen(SQUARES_LAYER, 0.12, 0.6, 0.0, 0.0)
+    turn = complex(np.exp(1j * sketch.rng.normal(0.0, 0.003)))
+    start = sketch.rng.uniform(0.0, pitch, 2)
+    w, h = PAPER_MM
+    lines = [(complex(x, 4.0), complex(x, -h - 4.0)) for x in np.arange(start[0], w, pitch)]
+    lines += [(complex(-4.0, -y), complex(w + 4.0, -y)) for y in np.arange(start[1], h, pitch)]
+    for p, q in lines:
+        sketch.strokes.append(straight(sketch.rng, pen, p * turn, q * turn))
+
+
+def draw_frame(sketch: Sketch) -> Frame:
+    """The frame, ruled by hand with small errors, or printed exactly."""
+    style = sketch.page
+    if style.frame == "none":
+        return Frame("none", "nobody", None)
+    x, y, w, h = FRAMES_MM[style.frame]
+    corners = [complex(x, -y), complex(x + w, -y), complex(x + w, -y - h), complex(x, -y - h)]
+    printed = style.frame_by == "print"
+    if not printed:
+        miss = max(0.12, 0.7 * sketch.hand.place_mm)
+        corners = [c + complex(*sketch.rng.normal(0.0, miss, 2)) for c in corners]
+    pen = sketch.pen("print" if printed else "line")
+    for p, q in zip(corners, corners[1:] + corners[:1], strict=True):
+        past = (q - p) / abs(q - p) * (0.0 if printed else float(sketch.rng.exponential(0.6)))
+        sketch.line(pen, p - past, q + past)
+    return Frame(style.frame, style.frame_by, tuple(corners))
+
+
+def title_block(sketch: Sketch, rows: list[list[str]], corner: complex) -> Box | None:
+    """A title block whose lower right corner is the frame's; its box in sheet millimetres, y down."""
+    kind = sketch.page.title_block
+    if kind == "none":
+        return None
+    wide, high = TITLE_MM[kind]
+    printed = sketch.page.frame_by == "print"
+    low = corner - wide
+    pen = sketch.pen("print" if printed else "line")
+    x0 = low.real + (62.0 if kind == "form" else 0.0)
+    top = low + 1j * high
+    sketch.line(pen, low, top)
+    sketch.line(pen, top, top + wide)
+    if sketch.page.frame == "none":
+        sketch.line(pen, low, corner)
+        sketch.line(pen, corner, corner + 1j * high)
+    if kind == "form":
+        _form_columns(sketch, low, high, x0)
+    depth = high / len(rows)
+    for index, cells in enumerate(rows):
+        y = top.imag - index * depth
+        if index:
+            sketch.line(pen, complex(x0, y), complex(corner.real, y))
+        _cells(sketch, cells, (x0, y, corner.real - x0, depth))
+    return (low.real, -top.imag, wide, high)
+
+
+def _form_columns(sketch: Sketch, low: complex, high: float, x1: float) -> None:
+    """The narrow columns of signatures at the left of a form."""
+    thin = sketch.pen("print" if sketch.page.frame_by == "print" else "thin")
+    thick = sketch.pen("print" if sketch.page.frame_by == "print" else "line")
+    for x in (low.real + 7.0, low.real + 17.0, low.real + 40.0, x1):
+        sketch.line(thick, complex(x, low.imag), complex(x, low.imag + high))
+    for index in range(1, 11):
+        y = low.imag + index * high / 11.0
+        sketch.line(thin, complex(low.real, y), complex(x1, y))
+
+
+def _cells(sketch: Sketch, cells: list[str], box: Box) -> None:
+    x, y, w, h = box
+    shares = np.cumsum([0.0, *(len(cell) + 6.0 for cell in cells)])
+    shares /= shares[-1]
+    pen = sketch.pen("print" if sketch.page.frame_by == "print" else "line")
+    height = min(sketch.page.letter_mm * 0.9, 0.45 * h)
+    for index, cell in enumerate(cells):
+        left, right = x + w * shares[index], x + w * shares[index + 1]
+        if index:
+            sketch.line(pen, complex(left, y), complex(left, y - h))
+        fitting = min(height, (right - left - 4.0) / max(1, len(cell)) / 0.62)
+        base = complex(left + 2.0, y - 0.5 * h - 0.4 * fitting)
+        sketch.text(base, cell, fitting)
+
+
+# Layout -------------------------------------------------------------------------------------------
+
+
+def place_figures(
+    figures: tuple[DrawnFigure, ...], room: Box, taken: list[Box], rng: Rng
+) -> dict[str, complex] | None:
+    """Origins of the figures, at random without overlap; None where they do not fit.
+
+    Arguments: `room` and `taken` are boxes in sheet millimetres, y down.
+    """
+    for margin in (_MARGIN_MM, 0.75 * _MARGIN_MM, 0.5 * _MARGIN_MM):
+        for _ in range(150):
+            origins = _one_layout(figures, room, list(taken), rng, margin)
+            if origins is not None:
+                return origins
+    return None
+
+
+def _one_layout(
+    figures: tuple[DrawnFigure, ...], room: Box, taken: list[Box], rng: Rng, margin: float
+) -> dict[str, complex] | None:
+    origins: dict[str, complex] = {}
+    order = sorted(figures, key=lambda f: -_size(f) * rng.uniform(0.6, 1.4))
+    for figure in order:
+        low, high = extent(figure.nodes)
+        w, h = (high - low).real + 2 * margin, (high - low).imag + 2 * margin
+        if w > room[2] or h > room[3]:
+            return None
+        for _ in range(12):
+            x = room[0] + rng.uniform(0.0, room[2] - w)
+            y = room[1] + rng.uniform(0.0, room[3] - h)
+            if not any(overlap((x, y, w, h), box) for box in taken):
+                taken.append((x, y, w, h))
+                origins[figure.name] = complex(x + margin, -y - margin) - complex(low.real, high.imag)
+                break
+        else:
+            return None
+    return origins
+
+
+def _size(figure: DrawnFigure) -> float:
+    low, high = extent(figure.nodes)
+    return abs(high - low)
+
+
+def overlap(one: Box, other: Box) -> bool:
+    """Whether two boxes share area."""
+    return (
+        one[0] < other[0] + other[2]
+        and other[0] < one[0] + one[2]
+        and one[1] < other[1] + other[3]
+        and other[1] < one[1] + one[3]
+    )
+
+
+def place_in_zones(
+    figures: tuple[DrawnFigure, ...], zones: Mapping[str, Box], rng: Rng
+) -> dict[str, complex]:
+    """Origins of the figures inside the zones of a printed sheet, about their middles."""
+    origins = {}
+    for figure in figures:
+        x, y, w, h = zones[figure.name]
+        low, high = extent(figure.nodes)
+        slack = max(0.0, w - (high - low).real - 16.0), max(0.0, h - (high - low).imag - 16.0)
+        middle = complex(x + w / 2, -y - h / 2) + complex(
+            rng.uniform(-0.4, 0.4) * slack[0], rng.uniform(-0.4, 0.4) * slack[1]
+        )
+        origins[figure.name] = middle - (low + high) / 2.0
+    return origins
+
+
+def write_caption(
+    sketch: Sketch, task: Task, figure: str, nodes: Mapping[str, complex], written: dict[str, str]
+) -> None:
+    """The figure's caption above it (or below), with its scale where the student writes it there."""
+    low, high = extent(nodes)
+    lines = wording.caption(figure, task, sketch.page, sketch.rng, written)
+    height = 0.95 * sketch.page.letter_mm
+    top = high.imag + 9.0 + 1.6 * height * (len(lines) - 1)
+    if top > -12.0:
+        top = low.imag - 9.0 - height
+    for index, text in enumerate(lines):
+        sketch.text(complex(max(low.real, 26.0), top - 1.6 * height * index), text, height)
+
+
+def write_block(sketch: Sketch, lines: list[str], room: Box, taken: list[Box]) -> None:
+    """Working written where there is room for it, or not at all."""
+    if not lines:
+        return
+    height = 0.8 * sketch.page.letter_mm
+    size = max(len(line) for line in lines) * 0.5 * height, len(lines) * 1.9 * height
+    place = free_place(size, room, taken, sketch.rng)
+    if place is None:
+        return
+    taken.append((*place, *size))
+    for index, line in enumerate(lines):
+        sketch.text(complex(place[0], -place[1] - (index + 1) * 1.9 * height), line, height)
+
+
+def free_place(
+    size: tuple[float, float], room: Box, taken: list[Box], rng: Rng
+) -> tuple[float, float] | None:
+    """The top left corner of a free box of this size, None where none was found."""
+    if size[0] > room[2] or size[1] > room[3]:
+        return None
+    for _ in range(60):
+        x = room[0] + rng.uniform(0.0, room[2] - size[0])
+        y = room[1] + rng.uniform(0.0, room[3] - size[1])
+        if not any(overlap((x, y, *size), box) for box in taken):
+            return x, y
+    return None

@@ -1,0 +1,136 @@
+"""One student's work from the task to the files: the run of a simulation, read top to bottom."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.assignment import Assignment, Variant
+from reference.mechanism import Crank
+from samples.simulation import truth
+from samples.simulation.desk import Desk, Printed
+from samples.simulation.hand import MECHANISM, VELOCITY, DrawnSheet, draw, task_of
+from samples.simulation.scanner import DrawnPaper, digitise
+from samples.simulation.settings import Settings
+from samples.simulation.storing import encoded
+from samples.simulation.strokes import Rng
+from samples.simulation.view import view_of
+
+_SHRINK = (1.0, 0.9, 0.8, 0.66, 0.5, 0.4)
+"""Lengths of the crank tried, as shares of the one wished for."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedSheet:
+    """One page: its stored image, and the truth of it as JSON-like data."""
+
+    image: NDArray[np.uint8]
+    truth: dict[str, Any]
+    settings: Settings
+
+    @property
+    def suffix(self) -> str:
+        """The file name's ending."""
+        return {"jpg": ".jpg", "png": ".png", "tif": ".tif"}[self.settings.scan.container]
+
+    def save(self, path: Path) -> Path:
+        """Write the file (its ending set by the scan's container); the truth then names it.
+
+        A phone's picture says by EXIF how it is to be turned.
+        """
+        target = path.with_name(path.name + self.suffix)
+        target.write_bytes(encoded(self.image, self.settings.scan, exif=self.settings.scan.device == "phone"))
+        self.truth.update({"file": target.name, "page": 1})
+        return target
+
+
+def simulate(
+    assignment: Assignment,
+    variant: Variant,
+    seed: int,
+    settings: Settings | None = None,
+    *,
+    student_id: str = "s01",
+    printed: Printed | None = None,
+) -> list[SimulatedSheet]:
+    """A student's sheets, in the order of drawing.
+
+    Arguments: `printed` gives answer sheets by kind of page (``all``, ``velocity``,
+    ``acceleration``), drawn on instead of plain paper. Raises ValueError where a mistake asked for
+    cannot be made.
+    """
+    desk, drawn = drawn_by(assignment, variant, seed, settings, student_id=student_id, printed=printed)
+    return [_scanned(desk, sheet, (number, len(drawn))) for number, sheet in enumerate(drawn, start=1)]
+
+
+def drawn_by(
+    assignment: Assignment,
+    variant: Variant,
+    seed: int,
+    settings: Settings | None = None,
+    *,
+    student_id: str = "s01",
+    printed: Printed | None = None,
+) -> tuple[Desk, tuple[DrawnSheet, ...]]:
+    """The same student's desk and figures before anything is inked, as `simulate` takes them on."""
+    chosen = settings or Settings()
+    if printed is not None:
+        chosen = replace(chosen, student=replace(chosen.student, sheets=1 if "all" in printed else 2))
+    for share in _SHRINK:
+        tried = _with_crank(assignment, variant, chosen, share)
+        task = task_of(assignment, variant, tried.student, np.random.default_rng([seed, 0]))
+        desk = Desk(task, tried, printed, student_id, seed)
+        drawn = draw(task, tried.hand, tried.student, np.random.default_rng([seed, 1]))
+        if all(desk.fits(sheet) for sheet in drawn):
+            return desk, drawn
+    return desk, tuple(one for sheet in drawn for one in _split(sheet))
+
+
+def _with_crank(assignment: Assignment, variant: Variant, settings: Settings, share: float) -> Settings:
+    """The settings with a share of the crank's wished length: people choose a scale that fits the paper."""
+    if share == 1.0:
+        return settings
+    driver = assignment.mechanism([variant]).driver
+    if not isinstance(driver, Crank):
+        return replace(settings, student=replace(settings.student, shrunk=share))
+    proposed = float(assignment.scales([variant]).kL[0])
+    wished = settings.student.crank_mm or float(driver.length_m.reshape(-1)[0]) / proposed
+    return replace(settings, student=replace(settings.student, crank_mm=float(round(wished * share))))
+
+
+def _split(sheet: DrawnSheet) -> list[DrawnSheet]:
+    """The mechanism with the velocity plan, the acceleration plan apart."""
+    if sheet.kind != "all":
+        return [sheet]
+    first = tuple(f for f in sheet.figures if f.name in {MECHANISM, VELOCITY})
+    rest = tuple(f for f in sheet.figures if f not in first)
+    return [DrawnSheet("velocity", first), DrawnSheet("acceleration", rest)]
+
+
+def _scanned(desk: Desk, sheet: DrawnSheet, number: tuple[int, int]) -> SimulatedSheet:
+    """The sheet drawn out and laid on the glass."""
+    settings = desk.settings
+    sketch, told, frame = desk.draw_out(sheet, number)
+    rng = np.random.default_rng([desk.seed, 3, number[0]])
+    view = view_of(settings.scan, rng)
+    background = None if desk.printed is None else desk.printed[sheet.kind].background
+    image = digitise(DrawnPaper(sketch.strokes, settings.pen, background), settings.scan, view, rng)
+    about = {"student_id": desk.student_id, "seed": desk.seed, "page": number[0]}
+    return SimulatedSheet(image, {**told, **truth.scan_truth(view, frame, settings), **about}, settings)
+
+
+def measured_by(
+    sheets: Sequence[SimulatedSheet], rng: Rng, spread_mm: float = 0.2, step_mm: float = 0.5
+) -> dict[str, float]:
+    """What the student's ruler and protractor say: lengths in mm by vector, ``NAME_deg`` directions."""
+    measured: dict[str, float] = {}
+    plans = [figure for sheet in sheets for figure in sheet.truth["figures"].values()]
+    for name, vector in (item for plan in plans for item in plan.get("vectors", {}).items()):
+        length = vector["length_mm"] + rng.normal(0.0, spread_mm)
+        measured[name] = round(max(0.0, round(length / step_mm) * step_mm), 3)
+        if vector["direction_deg"] is not None and vector["length_mm"] > 5.0:
+            measured[f"{name}_deg"] = round(vector["direction_deg"] + rng.normal(0.0, 0.4)) % 360
+    return measured

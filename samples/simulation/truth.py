@@ -1,0 +1,145 @@
+"""What was really drawn on a sheet, as one JSON object.
+
+Positions are sheet millimetres from the top left corner, x right, y down; directions are degrees
+counter-clockwise from +x. `nodes` are where the construction's points came out under this hand;
+a stroke may miss them by the redraw error (`line_mm`). `intended` is what a perfect hand would
+have drawn with the same mistakes: what follow-through should expect.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from reference.mistakes import Mistake
+from samples.simulation.figures import at_origin, pole_text
+from samples.simulation.hand import MECHANISM, DrawnFigure, DrawnSheet, Task
+from samples.simulation.page import Frame
+from samples.simulation.settings import Settings
+from samples.simulation.sketch import Label, Sketch
+from samples.simulation.view import View
+
+SCHEMA_VERSION = 1
+
+
+def xy(at: complex) -> list[float]:
+    """A place as written: x, y down, 0.1 um."""
+    return [round(at.real, 4), round(-at.imag, 4)]
+
+
+def direction(vector: complex) -> float | None:
+    """Degrees counter-clockwise from +x, 0 <= d < 360; None for a zero vector."""
+    if abs(vector) < 1e-6:
+        return None
+    return round(float(np.degrees(np.angle(vector))) % 360.0, 4) % 360.0
+
+
+def drawing_truth(
+    task: Task,
+    sheet: DrawnSheet,
+    sketch: Sketch,
+    origins: Mapping[str, complex],
+    missing: Mapping[str, Mapping[str, str]],
+) -> dict[str, Any]:
+    """What is on the paper, whatever the scanner does to it."""
+    figures = {
+        figure.name: _figure(task, figure, sketch, origins[figure.name], missing.get(figure.name, {}))
+        for figure in sheet.figures
+    }
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "assignment": task.assignment.id,
+        "n": task.variant.n,
+        "position": task.variant.position,
+        "kind": sheet.kind,
+        "figures": figures,
+        "poles": {name: pole_text(task, name) for name in figures if name != MECHANISM},
+        "scales": {"declared": _rounded(task.declared), "used": _rounded(task.used)},
+        "mistakes": [_mistake(mistake) for mistake in task.mistakes],
+        "labels": [_label(label) for label in sketch.labels],
+    }
+
+
+def _label(label: Label) -> dict[str, Any]:
+    top_left, low_right = complex(label.low.real, label.high.imag), complex(label.high.real, label.low.imag)
+    return {"text": label.text, "names": label.names, "box_mm": [*xy(top_left), *xy(low_right)]}
+
+
+def _rounded(scales: Mapping[str, float]) -> dict[str, float]:
+    return {name: float(f"{value:.9g}") for name, value in scales.items()}
+
+
+def _mistake(mistake: Mistake) -> dict[str, Any]:
+    usual = Mistake(mistake.code, mistake.at)
+    details = ("slot", "other", "factor", "quarters", "n", "position")
+    told = {name: getattr(mistake, name) for name in details}
+    unusual = {name: value for name, value in told.items() if value != getattr(usual, name)}
+    return {"code": mistake.code, "at": mistake.at, **unusual}
+
+
+def _figure(
+    task: Task, figure: DrawnFigure, sketch: Sketch, origin: complex, missing: Mapping[str, str]
+) -> dict[str, Any]:
+    nodes = at_origin(figure, origin)
+    lines = {name: [xy(p), xy(q)] for (owner, name), (p, q) in sketch.lines.items() if owner == figure.name}
+    truth: dict[str, Any] = {
+        "origin_mm": xy(origin),
+        "nodes": {name: xy(at) for name, at in nodes.items()},
+    }
+    if figure.name == MECHANISM:
+        extras = {name: line for name, line in lines.items() if name[1] == "_"}
+        return {**truth, "links": {n: line for n, line in lines.items() if n not in extras}, "extras": extras}
+    vectors = {}
+    for vector in task.right.construction.vectors_of(figure.name):
+        if vector.name in missing:
+            continue
+        drawn = nodes[vector.head] - nodes[vector.tail]
+        meant = figure.intended[vector.head] - figure.intended[vector.tail]
+        vectors[vector.name] = {
+            "tail": vector.tail,
+            "head": vector.head,
+            "length_mm": round(abs(drawn), 4),
+            "direction_deg": direction(drawn),
+            "line_mm": lines.get(vector.name),
+            "intended": {"length_mm": round(abs(meant), 4), "direction_deg": direction(meant)},
+        }
+    sides = {name: line for name, line in lines.items() if name.startswith("side ")}
+    thin = [[xy(p), xy(q)] for p, q in sketch.construction.get(figure.name, [])]
+    return {**truth, "vectors": vectors, "missing": dict(missing), "sides": sides, "construction": thin}
+
+
+def scan_truth(view: View, frame: Frame | None, settings: Settings) -> dict[str, Any]:
+    """Where the paper lies among the pixels."""
+    grid = np.array([[x, y] for y in (10.0, 102.0, 194.0, 286.0) for x in np.linspace(10.0, 410.0, 6)])
+    pixels = view.to_px(grid)
+    lens = {"k1": view.k1, "centre": view.centre.tolist(), "r": view.radius} if view.k1 else None
+    scan = settings.scan
+    return {
+        "homography": [[float(cell) for cell in row] for row in view.homography],
+        "lens": lens,
+        "curl_mm": view.curl_mm,
+        "grid_mm_px": [[a.tolist(), np.round(b, 4).tolist()] for a, b in zip(grid, pixels, strict=True)],
+        "image_size": [view.size[1], view.size[0]],
+        "px_per_mm": round(view.px_per_mm, 5),
+        "rotation_deg": (-90 * view.turns) % 360,
+        "frame": None
+        if frame is None
+        else {
+            "kind": frame.kind,
+            "by": frame.by,
+            "corners_mm": None if frame.corners is None else [xy(c) for c in frame.corners],
+        },
+        "scan": {
+            "device": scan.device,
+            "dpi": scan.dpi,
+            "mode": scan.mode,
+            "dpi_tag": scan.dpi_tag,
+            "copy_scale": scan.copy_scale,
+            "quarter_turns": scan.quarter_turns,
+        },
+        "hand": {
+            "angle_deg": settings.hand.angle_deg,
+            "place_mm": settings.hand.place_mm,
+            "redraw_mm": settings.hand.redraw_mm,
+        },
+    }

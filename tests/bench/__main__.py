@@ -1,0 +1,62 @@
+"""The whole benchmark, run from a checkout: `python -m tests.bench --help`."""
+
+import argparse
+import json
+import sys
+
+from rich.console import Console
+from rich.progress import Progress
+
+from tests.bench.judging import JudgingBench
+from tests.bench.judging_class import measure_class
+from tests.bench.judging_scans import judged_scan
+from tests.bench.reading import ReadingBench
+from tests.bench.report import Report
+from tests.bench.solver import SolverBench
+
+PARTS = ("solver", "reading", "judging")
+
+
+def main(arguments: list[str]) -> None:
+    """Measure the parts asked for, all by default, and print the figures."""
+    asked = _parser().parse_args(arguments)
+    parts = [part for part in PARTS if getattr(asked, part)] or PARTS
+    quick, students = asked.quick, asked.students
+    solver = SolverBench(quick) if "solver" in parts else None
+    reading = ReadingBench(quick=quick, students=students) if "reading" in parts else None
+    judging = None
+    if "judging" in parts:
+        judging = JudgingBench(quick=quick, students=students, whole_class=measure_class, scan=judged_scan)
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        benches: list[SolverBench | ReadingBench | JudgingBench | None] = [solver, reading, judging]
+        for bench in benches:
+            if bench is None:
+                continue
+            bar = progress.add_task("", total=bench.steps)
+            for step in bench.run():
+                progress.update(bar, advance=1, description=step)
+    report = Report(
+        None if solver is None else solver.figures,
+        () if reading is None else tuple(reading.rows),
+        () if reading is None else tuple(reading.foreign),
+        None if reading is None else reading.lines,
+        None if judging is None else judging.figures,
+    )
+    print(json.dumps(report.as_json(), indent=2) if asked.json else report.as_text())
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser("python -m tests.bench", description=__doc__)
+    parser.add_argument(
+        "--solver", action="store_true", help="speed, errors, stability near singular positions"
+    )
+    parser.add_argument("--reading", action="store_true", help="simulated scenes, foreign pages, strokes")
+    parser.add_argument("--judging", action="store_true", help="verdicts, mistakes named, time")
+    parser.add_argument("--students", type=int, help="per scene of the reading, per kind of class")
+    parser.add_argument("--quick", action="store_true", help="a few sheets and cases only")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    return parser
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

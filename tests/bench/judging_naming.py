@@ -1,0 +1,132 @@
+"""Which mistakes a fair judge should name, and whether what it names was made.
+
+A mistake is *visible* where the drawing without it, by a perfect hand, differs in some observed vector by
+more than 2.5 tolerances (or in a declared scale, or in a vector that is not there); below that it need
+not be named, and naming it is no false accusation. In lengths alone only lengths count.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from grader.outcomes import Mistake as Named
+from reference.construction import Construction
+from reference.mistakes import Mistake
+from tests.bench.judging_redrawn import Asked, is_same, meant, vectors_of
+from tests.bench.judging_rules import CLEAR, Seen, off
+from tests.bench.judging_students import ON_SHEETS, Source, Work
+
+ALIKE_MM = 0.3
+"""Two mistakes whose drawings differ by less in every observed vector count as each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """One mistake that was made, and whether it can be named from what is seen.
+
+    `shows` is how far the drawing without it is off, in tolerances, at most; infinite where it shows
+    otherwise (a declared scale, a vector that is not there).
+    """
+
+    mistake: Mistake
+    shows: float
+
+    @property
+    def visible(self) -> bool:
+        """Whether it is to be named."""
+        return self.shows > CLEAR
+
+
+def mistakes_due(work: Work, source: Source, seen: Seen) -> list[Made]:
+    """The mistakes made, the first in order of construction first."""
+    order = sorted(work.task.mistakes, key=lambda one: _place(work.construction, one))
+    return [Made(one, _shows(work, source, seen, one)) for one in order]
+
+
+def _place(construction: Construction, mistake: Mistake) -> int:
+    """Where in the construction a mistake is made, as a number that grows along it."""
+    nodes = [step.node for step in construction.steps]
+    match mistake.code, mistake.at:
+        case "other_variant", _:
+            return -1
+        case _, "kL":
+            return -1
+        case "vector_missing", name:
+            return nodes.index(construction.vectors[name].head)
+        case "labels_swapped", _:
+            return min(nodes.index(node) for node in mistake.other)
+        case _, ("kv" | "ka") as scale:
+            return nodes.index(construction.poles["velocity_plan" if scale == "kv" else "acceleration_plan"])
+        case _, at if at in construction.poles:
+            return nodes.index(construction.poles[at])
+    return nodes.index(mistake.at)
+
+
+def _shows(work: Work, source: Source, seen: Seen, mistake: Mistake) -> float:
+    if mistake.code == "vector_missing":
+        needed = {one.name for one in work.rubric.criterion if not one.optional}
+        return math.inf if source in ON_SHEETS and mistake.at in needed else 0.0
+    if mistake.code == "rpm_not_converted":
+        return math.inf if work.declares else 0.0
+    if mistake.code == "scale_wrong" and not work.declares:
+        return 0.0
+    if mistake.code == "labels_swapped" and work.by_letters(source):
+        return math.inf
+    rest = [one for one in work.task.mistakes if one is not mistake]
+    return _most_apart(work, seen, as_handed_in(work, source, work.task.mistakes), _try(work, source, rest))
+
+
+def as_handed_in(work: Work, source: Source, mistakes: Sequence[Mistake]) -> dict[str, complex]:
+    """Vectors by a perfect hand with these mistakes in them, as this source tells them."""
+    if work.by_letters(source):
+        mistakes = [one for one in mistakes if one.code != "labels_swapped"]
+    return vectors_of(work.task.right, mistakes)
+
+
+def _try(work: Work, source: Source, mistakes: Sequence[Mistake]) -> dict[str, complex]:
+    """The same; nothing where they cannot all be made."""
+    try:
+        return as_handed_in(work, source, mistakes)
+    except ValueError:
+        return {}
+
+
+def _most_apart(work: Work, seen: Seen, one: Mapping[str, complex], other: Mapping[str, complex]) -> float:
+    """How far two drawings are apart in what is seen, in tolerances."""
+    return max(
+        (
+            off(one[name], other[name], work.rubric.tolerance, directed=directed)
+            for name, directed in seen.directed.items()
+            if name in other
+        ),
+        default=0.0,
+    )
+
+
+def is_named(work: Work, source: Source, seen: Seen, made: Mistake, named: Named) -> bool:
+    """Whether a report names this mistake, or one that gives the same drawing as seen."""
+    if is_same(made, named):
+        return True
+    if {made.code, named.code} & {"vector_missing", "rpm_not_converted"}:
+        return False
+    asked = Asked(work.assignment, work.variant, work.task.right)
+    really = as_handed_in(work, source, work.task.mistakes)
+    for other in meant(asked, named):
+        instead = [other if one is made else one for one in work.task.mistakes]
+        if _is_alike(seen, really, _try(work, source, instead)):
+            return True
+    return False
+
+
+def _is_alike(seen: Seen, one: Mapping[str, complex], other: Mapping[str, complex]) -> bool:
+    apart = (
+        abs(one[name] - other[name]) if directed else abs(abs(one[name]) - abs(other[name]))
+        for name, directed in seen.directed.items()
+        if name in other
+    )
+    return bool(other) and all(gap <= ALIKE_MM for gap in apart)
+
+
+def first_of(made: Iterable[Made]) -> Mistake | None:
+    """The first mistake that is to be named."""
+    return next((one.mistake for one in made if one.visible), None)

@@ -1,0 +1,120 @@
+"""A drawing with any mistakes in it, by a perfect hand: what a mistake looks like, and what looks like it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grader.outcomes import Mistake as Named
+from reference.assignment import Assignment, Variant
+from reference.construction import evaluate
+from reference.mistakes import RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
+from reference.parameters import parameters_of
+from samples.simulation.hand import scalars
+
+SCALES = ("kL", "kv", "ka")
+
+
+def with_mistakes(right: Drawing, mistakes: Sequence[Mistake]) -> Drawing:
+    """The drawing as somebody makes it who makes these mistakes; letters swapped are only written so.
+
+    Revolutions per minute taken for radians per second change the scales too: the plan keeps its size.
+    Raises ValueError where a mistake cannot be made.
+    """
+    drawing = right
+    for mistake in mistakes:
+        if mistake.code == "rpm_not_converted":
+            known = drawing.parameters
+            faster = {
+                "kv": np.asarray(known["kv"] * RPM_FACTOR),
+                "ka": np.asarray(known["ka"] * RPM_FACTOR**2),
+            }
+            drawing = Drawing(drawing.construction, {**known, **faster})
+        if mistake.code not in {"labels_swapped", "vector_missing"}:
+            drawing = commit(mistake, drawing)
+    return drawing
+
+
+def vectors_of(right: Drawing, mistakes: Sequence[Mistake]) -> dict[str, complex]:
+    """Every vector and link, mm, under the names written beside them. Raises ValueError as above."""
+    drawing = with_mistakes(right, mistakes)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    swaps = [(one.other[0], one.other[1]) for one in mistakes if one.code == "labels_swapped"]
+    named = relabelled({name: complex(place) for name, place in nodes.items()}, swaps)
+    vectors = {name: (one.tail, one.head) for name, one in right.construction.vectors.items()}
+    ends = {**vectors, **right.construction.links}
+    return {name: named[head] - named[tail] for name, (tail, head) in ends.items()}
+
+
+def relabelled(nodes: Mapping[str, complex], swaps: Sequence[tuple[str, str]]) -> dict[str, complex]:
+    """Nodes under the names that stand beside them."""
+    named = dict(nodes)
+    for first, second in swaps:
+        if first in named and second in named:
+            named[first], named[second] = named[second], named[first]
+    return named
+
+
+# What a report names ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Whose drawing it is."""
+
+    assignment: Assignment
+    variant: Variant
+    right: Drawing
+
+
+def meant(asked: Asked, named: Named) -> Iterator[Mistake]:
+    """What a mistake named in a report may mean: every operator that fits what is told."""
+    told, code, at = named.detail, named.code, named.at
+    construction = asked.right.construction
+    match code:
+        case "labels_swapped":
+            yield Mistake(code, at, other=(str(told.get("first", "")), str(told.get("second", ""))))
+        case "other_variant":
+            yield from _other_variant(asked, named)
+        case "figure_rotated":
+            yield Mistake(code, at, quarters=round(float(told.get("degrees", 0.0)) / 90.0) % 4)
+        case "vector_missing" | "rpm_not_converted":
+            yield Mistake(code, at, factor=RPM_FACTOR)
+        case "scale_wrong" | "arithmetic":
+            factor = float(told.get("factor", 0.5 if code == "arithmetic" else 1.0))
+            yield from (Mistake(code, at, factor=one) for one in (factor, 1.0 / factor if factor else 0.0))
+        case _:
+            other = told.get("other")
+            for figure in construction.figures:
+                for one in single_mistakes(asked.right, figure):
+                    fits = other is None or not one.other or "".join(one.other) == other
+                    if one.code == code and one.at == at and fits:
+                        yield one
+
+
+def _other_variant(asked: Asked, named: Named) -> Iterator[Mistake]:
+    n, position = (named.detail.get(name) for name in ("n", "position"))
+    other = Variant(None if n is None else int(n), None if position is None else int(position))
+    if other == asked.variant or other not in asked.assignment.variants():
+        return
+    scales = asked.assignment.scales([other])
+    parameters = parameters_of(asked.assignment.mechanism([other]), scales.kL, scales.kv, scales.ka)
+    yield Mistake("other_variant", "n", n=other.n, position=other.position, parameters=scalars(parameters))
+
+
+def is_same(made: Mistake, named: Named) -> bool:
+    """Whether a report names this mistake: its code and its place."""
+    if made.code != named.code:
+        return False
+    match made.code:
+        case "labels_swapped":
+            return set(made.other) == {named.detail.get("first"), named.detail.get("second")}
+        case "other_variant":
+            told = named.detail.get("n"), named.detail.get("position")
+            return told == (made.n, made.position)
+        case "rpm_not_converted":
+            return True
+        case "figure_rotated":
+            degrees = float(named.detail.get("degrees", 0.0))
+            return made.at == named.at and round(degrees / 90.0) % 4 == made.quarters % 4
+    return made.at == named.at

@@ -1,0 +1,314 @@
+"""What judging came to, student by student and summed up."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from grader.judging import Submission
+from grader.outcomes import Judgement, Mistake
+from reference import mistakes as operators
+from tests.bench.judging_naming import Made, first_of, is_named, mistakes_due
+from tests.bench.judging_rules import Due, Seen
+from tests.bench.judging_students import SOURCES, Key, Source, Work
+from tests.bench.judging_truth import charged_once, verdicts_due
+from tests.bench.judging_values import computed
+
+CHARGED, CREDITED = frozenset({"none", "partial"}), frozenset({"full", "follow_through"})
+
+
+@dataclass(frozen=True, slots=True)
+class Marked:
+    """One criterion: what was due, what the judge said."""
+
+    criterion: str
+    due: Due
+    verdict: str
+
+    @property
+    def counts(self) -> bool:
+        """Whether there was anything to judge."""
+        return self.due != "absent" and self.verdict != "not_judged"
+
+    @property
+    def is_false_charge(self) -> bool:
+        """Charged although right or following."""
+        return self.due in {"right", "follows"} and self.verdict in CHARGED
+
+    @property
+    def is_false_credit(self) -> bool:
+        """Credited although clearly wrong."""
+        return self.due == "wrong" and self.verdict in CREDITED
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """One submission judged, and held against what was due.
+
+    Attributes
+    ----------
+    first : the first mistake that is to be named, None without one
+    named : it was named; `surest` as the surest, `among_rivals` only as a rival of one named
+    not_made : what was named and not made
+    unpunished : something visible was done wrongly, cost nothing and goes to nobody
+    """
+
+    key: Key
+    source: Source
+    criteria: tuple[Marked, ...]
+    made: tuple[operators.Mistake, ...]
+    mistakes: tuple[Mistake, ...]
+    first: operators.Mistake | None
+    named: bool
+    surest: bool
+    among_rivals: bool
+    not_made: tuple[Mistake, ...]
+    unpunished: bool
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether there is nothing to look into."""
+        missed = self.first is not None and not self.named
+        return not (
+            missed or self.not_made or any(m.is_false_charge or m.is_false_credit for m in self.criteria)
+        )
+
+    def __str__(self) -> str:
+        wrong = [m for m in self.criteria if m.is_false_charge or m.is_false_credit]
+        parts = [
+            f"{self.key} {self.source}",
+            "made: " + ("; ".join(told(one) for one in self.made) or "nothing"),
+            "named: " + ("; ".join(_named(one) for one in self.mistakes) or "nothing"),
+        ]
+        if self.first is not None and not self.named:
+            parts.append(f"not named: {told(self.first)}" + (" (a rival)" if self.among_rivals else ""))
+        if wrong:
+            parts.append("verdicts: " + ", ".join(f"{m.criterion} {m.verdict} (due: {m.due})" for m in wrong))
+        return " | ".join(parts)
+
+
+def told(mistake: operators.Mistake) -> str:
+    """A mistake made, in one line."""
+    usual = operators.Mistake(mistake.code, mistake.at)
+    details = ("slot", "other", "factor", "quarters", "n", "position")
+    differ = [
+        (name, getattr(mistake, name)) for name in details if getattr(mistake, name) != getattr(usual, name)
+    ]
+    return " ".join([mistake.code, mistake.at, *(f"{name}={value}" for name, value in differ)])
+
+
+def _named(mistake: Mistake) -> str:
+    detail = " ".join(f"{name}={value}" for name, value in mistake.detail.items())
+    rivals = f" or {len(mistake.rivals)} rivals" if mistake.rivals else ""
+    return f"{mistake.code} {mistake.at} {detail} {mistake.confidence:.2f}{rivals}"
+
+
+def result_of(work: Work, source: Source, handed_in: Submission, judgement: Judgement) -> Result:
+    """A judgement held against the truth."""
+    seen = Seen.of(handed_in, work.construction.links)
+    due = verdicts_due(work, source, seen)
+    said = {one.criterion: one.verdict for one in judgement.outcomes}
+    due = charged_once(work, due, said)
+    marked = tuple(Marked(name, due[name], verdict) for name, verdict in said.items())
+    made = mistakes_due(work, source, seen)
+    told = computed(work)
+    if told.slip is not None and source in SOURCES:
+        made.append(Made(operators.Mistake("arithmetic", told.slip, factor=told.factor), math.inf))
+    first = first_of(made)
+
+    def names(mistake: Mistake, one: operators.Mistake) -> bool:
+        if told.slip is not None:
+            return mistake.code == one.code and one.at in {mistake.at, *mistake.explains}
+        return is_named(work, source, seen, one, mistake)
+
+    told_first = [first is not None and names(mistake, first) for mistake in judgement.mistakes]
+    if any(one.name == told.slip and one.mistake == "arithmetic" for one in judgement.outcomes):
+        told_first.append(True)
+    rivals = [rival for mistake in judgement.mistakes for rival in mistake.rivals]
+    not_made = [
+        mistake
+        for mistake, is_first in zip(judgement.mistakes, told_first, strict=False)
+        if not is_first and not any(names(mistake, one.mistake) for one in made)
+    ]
+    charged = any(one.verdict in CHARGED | {"review"} for one in judgement.outcomes)
+    by_letters = work.by_letters(source) and first is not None and first.code == "labels_swapped"
+    return Result(
+        work.key, source, marked, tuple(one.mistake for one in made), judgement.mistakes, first,
+        named=any(told_first),
+        surest=bool(told_first) and told_first[0],
+        among_rivals=first is not None and not any(told_first) and any(names(one, first) for one in rivals),
+        not_made=tuple(not_made),
+        unpunished=first is not None and not charged and not by_letters,
+    )  # fmt: skip
+
+
+@dataclass(slots=True)
+class Times:
+    """Processor milliseconds of one judgement each; of making the task apart."""
+
+    right: list[float] = field(default_factory=list)
+    wrong: list[float] = field(default_factory=list)
+    task: list[float] = field(default_factory=list)
+    scans: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class ClassTime:
+    """Seconds for a class's file of measurements.
+
+    Attributes
+    ----------
+    judging_s : of the processor, to read the file and judge every line
+    processor_s, wall_s : for all that `planmark grade` does with it, to pages and results written
+    """
+
+    assignment: str
+    rows: int
+    graded: int
+    judging_s: float
+    processor_s: float
+    wall_s: float
+
+
+@dataclass(slots=True)
+class Count:
+    """So many of so many."""
+
+    hits: int = 0
+    of: int = 0
+
+    def add(self, hit: bool) -> None:
+        """One more."""
+        self.hits += hit
+        self.of += 1
+
+    @property
+    def share(self) -> float | None:
+        """None of nothing."""
+        return self.hits / self.of if self.of else None
+
+
+@dataclass(slots=True)
+class Tally:
+    """All results of one kind of student and source.
+
+    Attributes
+    ----------
+    false_charges, false_credits : of the criteria due to be credited, and due to be charged
+    reviews : of criteria judged
+    followed : credit given for what follows from a mistake
+    missed : criteria off by the hand alone that were charged
+    blank : criteria with nothing to judge by that go to a person
+    named, surest, rivals : of drawings with a mistake to be named
+    accused : of right drawings; misnamed : of wrong ones, with a mistake named that was not made
+    """
+
+    students: int = 0
+    false_charges: Count = field(default_factory=Count)
+    false_credits: Count = field(default_factory=Count)
+    reviews: Count = field(default_factory=Count)
+    followed: Count = field(default_factory=Count)
+    missed: Count = field(default_factory=Count)
+    blank: Count = field(default_factory=Count)
+    named: Count = field(default_factory=Count)
+    surest: Count = field(default_factory=Count)
+    rivals: Count = field(default_factory=Count)
+    accused: Count = field(default_factory=Count)
+    misnamed: Count = field(default_factory=Count)
+    unpunished: Count = field(default_factory=Count)
+    codes: dict[str, Count] = field(default_factory=dict)
+    instead: Counter[tuple[str, str]] = field(default_factory=Counter)
+
+    def add(self, result: Result) -> None:
+        """One more submission."""
+        self.students += 1
+        for one in result.criteria:
+            self._add_criterion(one)
+        if not result.made:
+            self.accused.add(bool(result.mistakes))
+        else:
+            self.misnamed.add(bool(result.not_made))
+        if result.first is not None:
+            self.named.add(result.named)
+            self.surest.add(result.surest)
+            self.rivals.add(result.among_rivals)
+            self.unpunished.add(result.unpunished)
+            self.codes.setdefault(result.first.code, Count()).add(result.named)
+        made = "+".join(sorted(one.code for one in result.made)) or "nothing"
+        self.instead.update((made, named.code) for named in result.not_made)
+
+    def _add_criterion(self, one: Marked) -> None:
+        if one.due == "absent":
+            self.blank.add(one.verdict == "review")
+        if not one.counts:
+            return
+        self.reviews.add(one.verdict == "review")
+        match one.due:
+            case "right" | "follows":
+                self.false_charges.add(one.is_false_charge)
+            case "wrong":
+                self.false_credits.add(one.is_false_credit)
+            case "missed":
+                self.missed.add(one.verdict in CHARGED)
+        if one.due == "follows":
+            self.followed.add(one.verdict in CREDITED)
+
+    def as_json(self) -> dict[str, Any]:
+        """One JSON object."""
+        return {**asdict(self), "instead": [[*key, count] for key, count in self.instead.most_common()]}
+
+
+def summed(results: Iterable[Result], by: Sequence[str]) -> dict[tuple[str, ...], Tally]:
+    """Tallies by assignment, hand, kind or source."""
+    tallies: dict[tuple[str, ...], Tally] = {}
+    for result in results:
+        tallies.setdefault(where(result, by), Tally()).add(result)
+    return tallies
+
+
+def where(result: Result, by: Sequence[str]) -> tuple[str, ...]:
+    """Where a result is counted."""
+    return tuple(result.source if name == "source" else str(getattr(result.key, name)) for name in by)
+
+
+@dataclass(slots=True)
+class JudgingFigures:
+    """All that was measured; `refused` are students of whom no drawing came about."""
+
+    results: list[Result] = field(default_factory=list)
+    times: Times = field(default_factory=Times)
+    classes: list[ClassTime] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+
+    @property
+    def failures(self) -> list[Result]:
+        """All that went wrong, to be looked into one by one."""
+        return [result for result in self.results if not result.is_clean]
+
+    def as_json(self) -> dict[str, Any]:
+        """One JSON object: sums by assignment, hand, kind and source, and every failure in one line."""
+        by = ("assignment", "hand", "kind", "source")
+        rows = [
+            {**dict(zip(by, place, strict=True)), **tally.as_json()}
+            for place, tally in summed(self.results, by).items()
+        ]
+        return {
+            "rows": rows,
+            "milliseconds": {
+                name: _spread(getattr(self.times, name)) for name in ("right", "wrong", "task", "scans")
+            },
+            "classes": [asdict(one) for one in self.classes],
+            "failures": [str(result) for result in self.failures],
+            "refused": self.refused,
+        }
+
+
+def _spread(spent: Sequence[float]) -> dict[str, float] | None:
+    """Median and what 95 % keep within."""
+    if not spent:
+        return None
+    middle, most = np.percentile(spent, (50.0, 95.0))
+    return {"median": float(middle), "p95": float(most), "count": len(spent)}

@@ -1,0 +1,102 @@
+"""Reading measured on simulated sheets whose truth is known, scene by scene.
+
+What counts as right, and what as a silent misread, stands in `tests.bench.reading_truth`.
+`ReadingBench` adds pages without the drawing asked for, and strokes by themselves.
+"""
+
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import cv2
+
+from grader.pipeline import Place, Seen, read, see
+from grader.records import Reading
+from reference.derivation import construction_of
+from tests.bench.lines import LinesFigures, measure_lines
+from tests.bench.reading_foreign import BREAKDOWNS, ForeignRow, measure_foreign
+from tests.bench.reading_memory import peak_mb
+from tests.bench.reading_scenes import SCENES, Scene, Work, works
+from tests.bench.reading_tally import STAGES, ReadingRow, Tally, row_of
+from tests.bench.reading_truth import figures_of
+
+__all__ = ["SCENES", "STAGES", "STUDENTS", "ReadingBench", "ReadingRow", "measure_reading"]
+
+STUDENTS, STUDENTS_QUICK = 6, 1
+SCENES_QUICK = ("plain", "printed")
+
+
+class ReadingBench:
+    """The whole benchmark of reading; `run` tells what was measured, step by step.
+
+    Arguments: `students` per scene, by default 6, in a quick run 1 of two scenes only.
+    """
+
+    def __init__(self, *, quick: bool = False, students: int | None = None) -> None:
+        self.quick = quick
+        self.students = students or (STUDENTS_QUICK if quick else STUDENTS)
+        self.scenes = tuple(scene for scene in SCENES if not quick or scene.name in SCENES_QUICK)
+        self.rows: list[ReadingRow] = []
+        self.foreign: list[ForeignRow] = []
+        self.lines: LinesFigures | None = None
+        self.steps = len(self.scenes) + 2
+
+    def run(self) -> Iterator[str]:
+        """Measure, naming what was measured."""
+        # One core: what a class needs is sheets per core.
+        threads = cv2.getNumThreads()
+        cv2.setNumThreads(1)
+        try:
+            for scene in self.scenes:
+                self.rows.append(measure_scene(scene, self.students, memory=not self.quick))
+                yield f"reading: {scene.title}"
+            self.foreign.extend(measure_foreign(quick=self.quick))
+            yield "reading: foreign pages"
+            self.lines = measure_lines(quick=self.quick)
+            yield "lines"
+        finally:
+            cv2.setNumThreads(threads)
+
+
+def measure_reading(
+    *, students: int = STUDENTS, first_seed: int = 1, scenes: Sequence[Scene] = SCENES
+) -> Iterator[ReadingRow]:
+    """A row per scene; the same students in each run."""
+    for scene in scenes:
+        yield measure_scene(scene, students, first_seed)
+
+
+def measure_scene(scene: Scene, students: int, first_seed: int = 1, *, memory: bool = True) -> ReadingRow:
+    """Every student of a scene simulated, read and held against the truth; peak memory of the first."""
+    tally, peak = Tally(), None
+    with tempfile.TemporaryDirectory() as folder:
+        for work in works(scene, students, first_seed):
+            paths = [sheet.save(Path(folder) / f"{number}") for number, sheet in enumerate(work.sheets)]
+            _read_one(tally, work, paths)
+            if memory and peak is None:
+                peak = peak_mb(scene.assignment, work.variant, paths)
+    return row_of(scene.name, scene.title, tally, peak)
+
+
+def _read_one(tally: Tally, work: Work, paths: Sequence[Path]) -> None:
+    start, clock = time.process_time(), time.perf_counter()
+    seen = [see(Place(path, 1, path.name)) for path in paths]
+    readings, failed = read_all(seen, work)
+    spent, passed = time.process_time() - start, time.perf_counter() - clock
+    construction = construction_of(work.assignment.mechanism([work.variant]))
+    tally.students += 1
+    tally.failed += failed
+    for sheet, page, reading in zip(work.sheets, seen, readings, strict=True):
+        tally.add_times(page.timing_ms, spent / passed, 1000.0 * spent / len(seen))
+        figures = figures_of(sheet.truth, construction)
+        tally.add_sheet(sheet.truth, figures, work.rubric.vectors, page, reading)
+
+
+def read_all(seen: Sequence[Seen], work: Work) -> tuple[list[Reading], bool]:
+    """What is read on a student's pages; nothing, and True, where the reader breaks down."""
+    try:
+        wanted = work.rubric.vectors
+        return read(seen, work.assignment, work.variant, work.declared, wanted), False
+    except BREAKDOWNS:
+        return [Reading({}) for _ in seen], True

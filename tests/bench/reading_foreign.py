@@ -1,0 +1,207 @@
+"""Pages on which the drawing asked for is not: nothing is to be read into them."""
+
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grader.pipeline import Place, Seen, read, see
+from samples.simulation import Scan, Settings, SimulatedSheet, any_settings, simulate
+from samples.simulation.lettering import any_handwriting
+from samples.simulation.page import FRAMES_MM, draw_frame, print_squares
+from samples.simulation.scanner import Background, DrawnPaper, digitise
+from samples.simulation.sketch import Sketch
+from samples.simulation.view import view_of
+from samples.simulation.wording import CAPTIONS, WORDS
+from tests.bench.plain_text import Table
+from tests.bench.reading_scenes import answer_sheets, task_named
+from tests.bench.reading_truth import SURE
+
+PAGES, PAGES_QUICK = 2, 1
+READ_AS = ("pump", "press")
+OTHERS = ("press", "engine", "shaper", "piston")
+BREAKDOWNS = (ArithmeticError, LookupError, ValueError)
+"""What the reader must never raise; where it does, the page counts as one on which it broke down."""
+_FIRST_SEED = 700
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignRow:
+    """A kind of foreign page: how many, and what was read into them.
+
+    Attributes
+    ----------
+    readings : each page is read as several assignments
+    vectors, confident : reported, and reported with confidence
+    failed : readings in which the reader broke down
+    """
+
+    kind: str
+    readings: int
+    vectors: int
+    confident: int
+    failed: int = 0
+
+    def as_json(self) -> dict[str, Any]:
+        """For the report's JSON."""
+        return asdict(self)
+
+
+def measure_foreign(*, quick: bool = False) -> Iterator[ForeignRow]:
+    """Every kind of foreign page; a quick run reads one of each as one assignment, and few kinds."""
+    pages, names = (PAGES_QUICK, READ_AS[:1]) if quick else (PAGES, READ_AS)
+    seeds = range(_FIRST_SEED, _FIRST_SEED + pages)
+    for kind, draw in _WRITTEN.items():
+        yield _row(kind, [(_page(draw, seed), names) for seed in seeds])
+    if not quick:
+        yield _row("answer sheet left empty", [(_empty_form(_FIRST_SEED), READ_AS[:1])])
+    for other in OTHERS[: 1 if quick else None]:
+        foreign = [name for name in names if name != other]
+        drawn = [(sheet, foreign) for seed in seeds for sheet in _drawing(other, seed)]
+        yield _row(f"a drawing for {other}", drawn)
+
+
+def foreign_tables(rows: Sequence[ForeignRow]) -> Iterator[Table]:
+    """The rows as a table, where there are any."""
+    if rows:
+        heads = ["page", "readings", "vectors reported", "with confidence", "broken down"]
+        cells = [
+            [row.kind, *map(str, (row.readings, row.vectors, row.confident, row.failed))] for row in rows
+        ]
+        yield "Reading: pages without the drawing asked for", heads, cells
+
+
+def _row(kind: str, pages: Sequence[tuple[SimulatedSheet, Sequence[str]]]) -> ForeignRow:
+    """Each page read as each of the assignments named."""
+    row = ForeignRow(kind, 0, 0, 0)
+    with tempfile.TemporaryDirectory() as folder:
+        for number, (sheet, names) in enumerate(pages):
+            path = sheet.save(Path(folder) / f"{number}")
+            seen = see(Place(path, 1, path.name))
+            for name in names:
+                row = _counted(row, _confidences(seen, name, number))
+    return row
+
+
+def _counted(row: ForeignRow, found: Sequence[float] | None) -> ForeignRow:
+    """One reading more, by the confidences of what was reported; None where the reader broke down."""
+    sure = sum(confidence >= SURE for confidence in found or ())
+    return ForeignRow(
+        row.kind, row.readings + 1, row.vectors + len(found or ()), row.confident + sure,
+        row.failed + (found is None),
+    )  # fmt: skip
+
+
+def _confidences(seen: Seen, name: str, number: int) -> list[float] | None:
+    """Of everything that is reported of a page when it is read as some student's of an assignment."""
+    assignment, rubric = task_named(name)
+    variants = assignment.variants()
+    try:
+        reading = read([seen], assignment, variants[number % len(variants)], {}, rubric.vectors)[0]
+    except BREAKDOWNS:
+        return None
+    return [one.confidence for figure in reading.figures.values() for one in figure.vectors.values()]
+
+
+def _drawing(name: str, seed: int) -> list[SimulatedSheet]:
+    """Somebody's work for another assignment."""
+    assignment, _ = task_named(name)
+    variants = assignment.variants()
+    variant = variants[seed % len(variants)]
+    settings = any_settings(seed, device="flatbed", dpi=300.0, mistakes=0.0)
+    return simulate(assignment, variant, seed, settings)
+
+
+def _empty_form(seed: int) -> SimulatedSheet:
+    """A printed answer sheet as it was handed out."""
+    assignment, _ = task_named(READ_AS[0])
+    printed = answer_sheets(assignment, assignment.variants()[0])
+    return _page(lambda _: None, seed, next(iter(printed.values())).background)
+
+
+def _page(draw: Callable[[Sketch], None], seed: int, background: Background | None = None) -> SimulatedSheet:
+    """A page written on and scanned."""
+    rng = np.random.default_rng([seed, 11])
+    settings = any_settings(seed, device="flatbed", dpi=300.0, mistakes=0.0)
+    settings = replace(settings, scan=replace(settings.scan, dpi_tag=300.0))
+    sketch = Sketch(rng, settings.hand, settings.pen, settings.page, any_handwriting(rng))
+    draw(sketch)
+    return _scanned(sketch, settings, background)
+
+
+def _scanned(sketch: Sketch, settings: Settings, background: Background | None) -> SimulatedSheet:
+    scan: Scan = settings.scan
+    view = view_of(scan, sketch.rng)
+    image = digitise(DrawnPaper(sketch.strokes, settings.pen, background), scan, view, sketch.rng)
+    return SimulatedSheet(image, {}, settings)
+
+
+# What stands on them ---------------------------------------------------------------------------------
+
+
+def _text(sketch: Sketch) -> None:
+    """A page of notes inside a frame."""
+    draw_frame(sketch)
+    words = [word for texts in CAPTIONS.values() for kinds in texts.values() for word in kinds]
+    words += [word for told in WORDS.values() for word in told.values()]
+    x, y, w, h = FRAMES_MM["iso"]
+    height = 4.5
+    for row in range(round((h - 20.0) / (2.2 * height))):
+        at = x + 8.0
+        while at < x + w - 70.0:
+            word = str(sketch.rng.choice(words))
+            place = complex(at, -(y + 12.0 + 2.2 * height * row) - height)
+            at = sketch.text(place, word, height).high.real + 4.0
+
+
+def _table(sketch: Sketch) -> None:
+    """A ruled table with numbers in its cells."""
+    draw_frame(sketch)
+    x, y, w, h = FRAMES_MM["iso"]
+    columns = np.linspace(x + 15.0, x + w - 15.0, int(sketch.rng.integers(6, 12)))
+    rows = np.linspace(y + 15.0, y + h - 30.0, int(sketch.rng.integers(10, 20)))
+    pen = sketch.pen("line")
+    for at in columns:
+        sketch.line(pen, complex(at, -rows[0]), complex(at, -rows[-1]))
+    for at in rows:
+        sketch.line(pen, complex(columns[0], -at), complex(columns[-1], -at))
+    for left in columns[:-1]:
+        for top in rows[1:]:
+            sketch.text(complex(left + 3.0, -top + 3.0), f"{sketch.rng.uniform(0, 99):.2f}", 3.5)
+
+
+def _squares(sketch: Sketch) -> None:
+    """Squared paper with nothing on it."""
+    sketch.page = replace(sketch.page, squared_mm=5.0)
+    print_squares(sketch)
+
+
+def _curves(sketch: Sketch) -> None:
+    """Diagrams of curves over time, with axes: another part of the same course."""
+    draw_frame(sketch)
+    pen = sketch.pen("line")
+    for left in (40.0, 235.0):
+        for top in (25.0, 115.0, 205.0):
+            corner = complex(left, -top - 60.0)
+            sketch.line(pen, corner, corner + 65j)
+            sketch.line(pen, corner, corner + 165.0)
+            share = np.linspace(0.0, 1.0, 60)
+            wave = sum(
+                sketch.rng.normal(0.0, 12.0 / k) * np.sin(2 * np.pi * k * share + sketch.rng.uniform(0, 6))
+                for k in (1, 2, 3)
+            )
+            points = corner + 160.0 * share + 1j * (30.0 + np.clip(wave, -28.0, 28.0))
+            sketch.curve(pen, np.asarray(points, dtype=np.complex128))
+            sketch.text(corner + 68j, str(sketch.rng.choice(["s(t)", "v(t)", "a(t)"])), 4.5)
+
+
+_WRITTEN: Mapping[str, Callable[[Sketch], None]] = {
+    "blank paper": lambda _: None,
+    "text": _text,
+    "a table": _table,
+    "squared paper": _squares,
+    "curves with axes": _curves,
+}

@@ -1,0 +1,221 @@
+"""What was drawn, and how far a reading is from it: the rules by which a reading is judged.
+
+*Right*: the length within 0.3 mm of what was drawn, and the direction within 0.3 degrees or the end
+within 0.3 mm across. What was drawn is either the two nodes or the stroke between them, whichever is
+nearer: a hand's stroke may miss the nodes that it joins, and no reader can know which was meant.
+
+*Silent misread*: reported with confidence above 0.9 and wrong by more than 1 mm, which a wrong name
+is too. A vector that was **not** drawn is misread where it is reported with that confidence, with one
+exception: where real geometry stands in its place. Both nodes then exist, the reading is within 1 mm
+of what lies between them, and either they coincide (a vector of true length zero) or strokes of the
+same figure cover the way from one to the other (a vector on the same line as a longer one, the side
+of a similar triangle, a construction line that was not drawn over). Then the picture alone cannot
+say whether it was drawn as well, its value is that of the student's own nodes, and it counts neither
+for nor against. A vector that was left out and lies on bare paper stays a misread.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Figure, ReadVector
+from reference.construction import Construction
+
+RIGHT_MM, RIGHT_DEG = 0.3, 0.3
+MISREAD_MM = 1.0
+NEAR_MM = 0.5
+"""A confidence is the probability of lying within this."""
+LEAST_MM = 5.0
+"""Shorter vectors are counted apart: their ends lie under arrowheads and letters."""
+SURE = 0.9
+PLANS = (VELOCITY_PLAN, ACCELERATION_PLAN)
+
+_ZERO_MM = 0.8
+"""Nodes nearer than this are one point to a pen."""
+_COVER_MM, _COVER_RAD, _COVER_STEP_MM = 0.5, 0.1, 0.5
+_COVERED = 0.9
+
+Segment = tuple[complex, complex]
+
+
+@dataclass(frozen=True, slots=True)
+class TrueVector:
+    """A vector of a plan, drawn or not; complex sheet millimetres, y up.
+
+    Attributes
+    ----------
+    ends : its two nodes, None where one of them is not on the sheet
+    stroke : the stroke as ruled, None where it is not drawn (or not noted)
+    missing : why it is not drawn, empty where it is
+    covered : of one not drawn: whether real geometry stands in its place
+    """
+
+    name: str
+    figure: str
+    ends: Segment | None
+    stroke: Segment | None
+    missing: str = ""
+    covered: bool = False
+
+    @property
+    def ways(self) -> list[complex]:
+        """Node to node, and along the stroke."""
+        return [head - tail for tail, head in filter(None, (self.ends, self.stroke))]
+
+    @property
+    def length_mm(self) -> float:
+        """Node to node."""
+        return abs(self.ways[0]) if self.ways else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class TrueFigure:
+    """A plan as drawn: its nodes, its vectors, and every stroke known to belong to it."""
+
+    name: str
+    nodes: Mapping[str, complex]
+    vectors: Mapping[str, TrueVector]
+    strokes: Sequence[Segment]
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One vector held against the truth.
+
+    Attributes
+    ----------
+    counts : False for one that is neither drawn nor reported, and where real geometry stands in
+    error_mm : distance of its end from the true end, starts laid on one another; infinite if unread
+    node_error_mm, near_error_mm : of its length, against the nodes and against the nearer of nodes and
+        stroke; None if unread
+    confidence : 0 where it is unread
+    """
+
+    true: TrueVector
+    counts: bool = True
+    reported: bool = False
+    right: bool = False
+    error_mm: float = float("inf")
+    node_error_mm: float | None = None
+    near_error_mm: float | None = None
+    se_mm: float = 0.0
+    confidence: float = 0.0
+
+    @property
+    def short(self) -> bool:
+        """Whether it is counted apart."""
+        return self.true.length_mm < LEAST_MM
+
+    @property
+    def sure(self) -> bool:
+        """Whether it would be marked without a person."""
+        return self.confidence >= SURE
+
+    @property
+    def misread(self) -> bool:
+        """Whether it is a silent misread."""
+        return self.counts and self.confidence > SURE and self.error_mm > MISREAD_MM
+
+
+def figures_of(truth: Mapping[str, Any], construction: Construction) -> dict[str, TrueFigure]:
+    """The plans of one sheet from its truth.
+
+    Arguments: `truth` as `samples.simulation` writes it, or as a folder of sheets has it (there the
+    acceleration plan's nodes have no primes); `construction` names the ends of vectors not drawn.
+    """
+    return {
+        name: _figure(name, drawn, construction) for name, drawn in truth["figures"].items() if name in PLANS
+    }
+
+
+def _figure(name: str, drawn: Mapping[str, Any], construction: Construction) -> TrueFigure:
+    own = {step.node for step in construction.figures[name]}
+    nodes = {node if node in own else f"{node}'": _complex(at) for node, at in drawn["nodes"].items()}
+    lines = [vector["line_mm"] for vector in drawn["vectors"].values() if vector.get("line_mm")]
+    lines += [*drawn.get("sides", {}).values(), *drawn.get("construction", [])]
+    strokes = [_segment(line) for line in lines]
+    vectors = {}
+    for vector in construction.vectors_of(name):
+        ends = None
+        if vector.tail in nodes and vector.head in nodes:
+            ends = nodes[vector.tail], nodes[vector.head]
+        told = drawn["vectors"].get(vector.name)
+        if told is None:
+            missing = drawn.get("missing", {}).get(vector.name, "not part of this drawing")
+            stands = ends is not None and _stands_in(ends, strokes)
+            vectors[vector.name] = TrueVector(vector.name, name, ends, None, missing, stands)
+        else:
+            stroke = _segment(told["line_mm"]) if told.get("line_mm") else None
+            vectors[vector.name] = TrueVector(vector.name, name, ends, stroke)
+    return TrueFigure(name, nodes, vectors, strokes)
+
+
+def _complex(at: Sequence[float]) -> complex:
+    return complex(at[0], -at[1])
+
+
+def _segment(line: Sequence[Sequence[float]]) -> Segment:
+    return _complex(line[0]), _complex(line[1])
+
+
+def _stands_in(ends: Segment, strokes: Sequence[Segment]) -> bool:
+    """Whether the ends coincide, or strokes along the way between them cover it."""
+    tail, head = ends
+    length = abs(head - tail)
+    if length < _ZERO_MM:
+        return True
+    points = tail + (head - tail) * np.linspace(0.0, 1.0, max(2, round(length / _COVER_STEP_MM)))
+    covered = np.zeros(len(points), dtype=bool)
+    for start, end in strokes:
+        span = end - start
+        if abs(span) < _ZERO_MM or abs(np.sin(np.angle((head - tail) / span))) > _COVER_RAD:
+            continue
+        share = np.clip(((points - start) / span).real, 0.0, 1.0)
+        covered |= np.abs(points - start - share * span) < _COVER_MM
+    return bool(covered.mean() >= _COVERED)
+
+
+def judged(true: TrueVector, found: ReadVector | None) -> Judged:
+    """One vector's reading held against what was drawn."""
+    if found is None or found.length_mm is None:
+        return Judged(true, counts=not true.missing)
+    read = found.length_mm * complex(np.exp(1j * np.radians(found.direction_deg or 0.0)))
+    if not true.ways:
+        # Nothing of it is on the sheet: all of what was read is too much.
+        return Judged(true, reported=True, error_mm=abs(read), se_mm=found.se_mm, confidence=found.confidence)
+    error = min(abs(read - way) for way in true.ways)
+    stands_in = true.covered and error <= MISREAD_MM
+    off = [found.length_mm - abs(way) for way in true.ways]
+    return Judged(
+        true,
+        counts=not (true.missing and stands_in),
+        reported=True,
+        right=not true.missing and any(_is_right(read, way) for way in true.ways),
+        error_mm=error if not true.missing or stands_in else max(error, abs(read)),
+        node_error_mm=off[0],
+        near_error_mm=min(off, key=abs),
+        se_mm=found.se_mm,
+        confidence=found.confidence,
+    )
+
+
+def _is_right(read: complex, way: complex) -> bool:
+    if abs(abs(read) - abs(way)) > RIGHT_MM:
+        return False
+    if abs(way) == 0.0 or abs(read) == 0.0:
+        return True
+    turn = abs(float(np.angle(read / way)))
+    return turn <= np.radians(RIGHT_DEG) or (turn < 1.0 and abs(read) * np.sin(turn) <= RIGHT_MM)
+
+
+def each_vector(
+    figures: Mapping[str, TrueFigure], wanted: Sequence[str], read: Mapping[str, Figure]
+) -> Iterator[Judged]:
+    """Every vector asked for on a sheet; `read` has the figures of a reading by name."""
+    for name, figure in figures.items():
+        found = read.get(name)
+        for vector in figure.vectors.values():
+            if vector.name in wanted:
+                yield judged(vector, found.vectors.get(vector.name) if found else None)

@@ -1,0 +1,179 @@
+"""Run time per variant, side by side with another solver, with the error of each beside it.
+
+All solve the same mechanism, the pump (four-bar, plate, rod and slider), at so many crank angles between
+those of its first and its last variant. Building a mechanism is no part of the time, for none.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from reference.assembly import build_mechanism
+from reference.assignment import Assignment, load_assignment
+from reference.construction import evaluate
+from reference.derivation import construction_of
+from reference.geometry import FloatArray
+from reference.mechanism import Mechanism
+from reference.motion import Motion, move
+from reference.parameters import parameters_of
+from reference.plan import exact_plan
+from tests.bench.oracle import ExactMotion
+from tests.bench.peers import FSOLVE, Answer, Fsolve, Places, answer_of, error_of, sketch
+from tests.bench.timing import medians_us
+
+BATCHES = (1, 30, 10_000)
+CLASS = 30
+ROUNDS, ROUNDS_QUICK = 21, 5
+PEER_VARIANTS = 300
+"""fsolve takes as long for each of many variants: so many are timed for a larger batch."""
+ASSIGNMENT = "pump"
+PLANS = "a class with both plans"
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedRow:
+    """One solver: median microseconds per variant by batch size, and its largest errors in a class.
+
+    Attributes
+    ----------
+    accelerations : positions, velocities and accelerations; False: velocities only
+    us : by the number of variants at once
+    velocity_error, acceleration_error : of the joints, relative to the largest of each plan
+    """
+
+    solver: str
+    version: str | None
+    accelerations: bool
+    us: Mapping[int, float]
+    velocity_error: float | None = None
+    acceleration_error: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """What is to be timed for one row: by batch size, a run and how many variants it solves."""
+
+    solver: str
+    version: str | None
+    accelerations: bool
+    runs: Mapping[int, tuple[Callable[[], object], int]] = field(default_factory=dict)
+    answers: Sequence[Answer] = ()
+
+
+def measure_speed(*, quick: bool = False, batches: Sequence[int] = BATCHES) -> Iterator[SpeedRow]:
+    """Ours by each road, then scipy; the same for velocities alone; then a class's plans."""
+    bench = _Bench(load_assignment(ASSIGNMENT), batches)
+    entries = list(bench.entries())
+    runs = {(row, count): run for row, one in enumerate(entries) for count, (run, _) in one.runs.items()}
+    medians = medians_us(runs, ROUNDS_QUICK if quick else ROUNDS)
+    for row, entry in enumerate(entries):
+        us = {count: medians[row, count] / solved for count, (_, solved) in entry.runs.items()}
+        yield bench.row(entry, us)
+
+
+def speed_rows() -> int:
+    """How many rows `measure_speed` gives."""
+    return 7
+
+
+class _Bench:
+    """The mechanisms of each batch size, and the truth of a class."""
+
+    def __init__(self, assignment: Assignment, batches: Sequence[int]) -> None:
+        self.assignment = assignment
+        self.mechanisms = {count: spread(assignment, count) for count in batches}
+        self.reference = spread(assignment, CLASS)
+        self.truth = [_rounded(ExactMotion(self.reference, index)) for index in range(CLASS)]
+
+    def entries(self) -> Iterator[_Entry]:
+        """All rows in their order."""
+        for accelerations in (True, False):
+            yield self._by(move, "closed form", None, accelerations=accelerations)
+            yield self._construction(accelerations=accelerations)
+            yield self._fsolve(accelerations=accelerations)
+        variants = self.assignment.variants()[:CLASS]
+        run = partial(exact_plan, self.assignment, variants)
+        yield _Entry(PLANS, None, accelerations=True, runs={len(variants): (run, len(variants))})
+
+    def _by(
+        self, solve: Callable[..., Motion], name: str, release: str | None, *, accelerations: bool
+    ) -> _Entry:
+        runs = {
+            count: (partial(solve, one, accelerations=accelerations), count)
+            for count, one in self.mechanisms.items()
+        }
+        return _Entry(name, release, accelerations, runs, _answers(solve(self.reference)))
+
+    def _construction(self, *, accelerations: bool) -> _Entry:
+        """The steps of mechanism and plans, evaluated."""
+        runs, scale = {}, np.asarray(0.01)
+        for count, one in self.mechanisms.items():
+            steps = construction_of(one, accelerations=accelerations)
+            runs[count] = partial(evaluate, steps, parameters_of(one, scale, scale, scale)), count
+        return _Entry("construction", None, accelerations, runs)
+
+    def _fsolve(self, *, accelerations: bool) -> _Entry:
+        """One variant after another."""
+        solver, starts = Fsolve(self.reference), _starts(self.reference)
+        answers = [solver.solve(index, start)() for index, start in enumerate(starts)]
+        runs = {}
+        for count in self.mechanisms:
+            timed = spread(self.assignment, min(count, PEER_VARIANTS))
+            starts = _starts(timed)
+            run = _one_after_another(Fsolve(timed), starts, accelerations=accelerations)
+            runs[count] = run, len(starts)
+        return _Entry(FSOLVE, version("scipy"), accelerations, runs, answers)
+
+    def row(self, entry: _Entry, us: Mapping[int, float]) -> SpeedRow:
+        """What was measured of an entry."""
+        velocity = acceleration = None
+        if entry.answers:
+            pairs = list(zip(entry.answers, self.truth, strict=True))
+            velocity = max(error_of(found.velocity, exact.velocity) for found, exact in pairs)
+            if entry.accelerations:
+                acceleration = max(error_of(found.acceleration, exact.acceleration) for found, exact in pairs)
+        return SpeedRow(entry.solver, entry.version, entry.accelerations, us, velocity, acceleration)
+
+
+def spread(assignment: Assignment, count: int) -> Mechanism:
+    """The assignment's mechanism at so many crank angles between those of its first and last variant."""
+    variants = assignment.variants()
+    known = assignment.values(variants)
+
+    def between(values: FloatArray) -> FloatArray:
+        return np.linspace(values[0], values[-1], count)
+
+    values = {name: between(np.broadcast_to(value, (len(variants),))) for name, value in known.items()}
+    return build_mechanism(assignment.mechanism_file, values, count)
+
+
+def _rounded(motion: ExactMotion) -> Answer:
+    def read(rates: Mapping[str, Any]) -> Places:
+        return {joint: complex(rate) for joint, rate in rates.items()}
+
+    return Answer(read(motion.position), read(motion.velocity), read(motion.acceleration))
+
+
+def _starts(mechanism: Mechanism) -> list[Places]:
+    """By variant, where the joints are in a sketch."""
+    drawn = sketch(mechanism, move(mechanism, accelerations=False).position)
+    count = drawn[mechanism.driver.pin].size
+    return [{joint: complex(at[index]) for joint, at in drawn.items()} for index in range(count)]
+
+
+def _one_after_another(
+    solver: Fsolve, starts: Sequence[Places], *, accelerations: bool
+) -> Callable[[], None]:
+    def run() -> None:
+        for index, start in enumerate(starts):
+            solver.solve(index, start, accelerations=accelerations)
+
+    return run
+
+
+def _answers(motion: Motion) -> list[Answer]:
+    return [answer_of(motion, index) for index in range(motion.predicted_error.size)]

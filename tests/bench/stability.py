@@ -1,0 +1,215 @@
+"""Errors near singular positions, in units of what the position itself costs; wrong branches; silent NaN.
+
+At a relative distance delta from a singular position an error of one rounding, eps, in the data moves
+the velocities by about eps/delta of the largest: no solver in double precision that takes its
+data as known to eps does better. Here the doubles are taken as exact, and the truth is the exact motion
+for exactly these doubles, in 50 digits (`oracle`): errors are told in units of eps/delta. Where the
+motion is smooth through the position nothing need be lost, and errors are told in units of eps.
+"""
+
+import math
+import statistics
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from reference.errors import MechanismError
+from reference.mechanism import Dyad, Group, Mechanism, Slider, SlottedLink
+from reference.motion import Motion, move, move_where_possible
+from tests.bench.arrays import stacked
+from tests.bench.oracle import ExactMotion
+from tests.bench.peers import FSOLVE, Answer, Fsolve, NoAnswerError, answer_of, error_of, sketch
+from tests.bench.singular import KINDS, Case, Kind
+
+EPSILON = float(np.finfo(np.float64).eps)
+DISTANCES = tuple(10.0**-k for k in range(1, 15))
+DISTANCES_QUICK = (1e-1, 1e-4, 1e-8, 1e-12, 1e-14)
+CASES, CASES_QUICK = 30, 5
+OURS, OURS_ON_ARRAYS = "closed form", "on arrays"
+SEED = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """The exact motion of one case, rounded once, and where its mirrored assembly lies."""
+
+    position: Mapping[str, complex]
+    velocity: Mapping[str, complex]
+    acceleration: Mapping[str, complex]
+    mirrored: Mapping[str, complex] | None
+
+
+@dataclass(slots=True)
+class _Outcomes:
+    """What one solver made of the cases at one distance; errors in the kind's unit."""
+
+    velocity: list[float] = field(default_factory=list)
+    acceleration: list[float] = field(default_factory=list)
+    wrong: int = 0
+    refused: int = 0
+    silent: int = 0
+    beyond: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One solver at one distance from one kind of singular position.
+
+    Attributes
+    ----------
+    velocity, acceleration : median and largest error of the answers on the right branch, in units
+        of eps/delta (eps for a smooth kind); None where there is no such answer
+    wrong, refused, silent : answers on the mirrored branch; no answer, and said so; nan
+    beyond : answers whose error is larger than the solver predicts, and than one rounding
+    """
+
+    solver: str
+    cases: int
+    velocity: tuple[float, float] | None
+    acceleration: tuple[float, float] | None
+    wrong: int
+    refused: int
+    silent: int
+    beyond: int
+
+    @property
+    def worst(self) -> float:
+        """The largest error told; 0 where there is no answer to tell one of."""
+        return max(
+            self.velocity[1] if self.velocity else 0.0, self.acceleration[1] if self.acceleration else 0.0
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class StabilityRow:
+    """All solvers at one distance from one kind of singular position."""
+
+    kind: str
+    title: str
+    smooth: bool
+    delta: float
+    cells: tuple[Cell, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """For the report's JSON."""
+        return asdict(self)
+
+
+def measure_stability(*, quick: bool = False, kinds: Sequence[Kind] = KINDS) -> Iterator[StabilityRow]:
+    """Each kind at each distance; the same random cases for every solver."""
+    count = CASES_QUICK if quick else CASES
+    for kind in kinds:
+        rng = np.random.default_rng([SEED, *kind.id.encode()])
+        for delta in DISTANCES_QUICK if quick else DISTANCES:
+            yield _row(kind, delta, [kind.draw(rng, delta) for _ in range(count)])
+
+
+def _row(kind: Kind, delta: float, cases: Sequence[Case]) -> StabilityRow:
+    truths = [truth_of(case.mechanism) for case in cases]
+    mechanisms = [case.mechanism for case in cases]
+    answers = {
+        OURS: [_by_numbers(one) for one in mechanisms],
+        OURS_ON_ARRAYS: _all_at_once(move_where_possible(stacked(mechanisms))),
+    }
+    if kind.plain:
+        answers[FSOLVE] = [_by_fsolve(*pair) for pair in zip(mechanisms, truths, strict=True)]
+    cells = []
+    for name, told in answers.items():
+        outcomes = _Outcomes()
+        for answer, case, truth in zip(told, cases, truths, strict=True):
+            _count(outcomes, answer, truth, EPSILON if kind.smooth else EPSILON / case.delta)
+        cells.append(_cell(name, outcomes, len(cases)))
+    return StabilityRow(kind.id, kind.title, kind.smooth, delta, tuple(cells))
+
+
+def truth_of(mechanism: Mechanism) -> Truth:
+    """The exact motion of a mechanism of one variant, and its mirrored assembly where it has one."""
+    motion = ExactMotion(mechanism)
+    flipped = tuple(map(_flipped, mechanism.groups))
+    mirrored = None
+    if flipped != mechanism.groups:
+        mirrored = _rounded(ExactMotion(replace(mechanism, groups=flipped)).position)
+    return Truth(
+        _rounded(motion.position), _rounded(motion.velocity), _rounded(motion.acceleration), mirrored
+    )
+
+
+def _flipped(group: Group) -> Group:
+    """A group on its other side, where it has two."""
+    if isinstance(group, Dyad | Slider | SlottedLink):
+        return replace(group, side=-group.side)
+    return group
+
+
+def _rounded(exact: Mapping[str, Any]) -> dict[str, complex]:
+    return {joint: complex(number) for joint, number in exact.items()}
+
+
+def _by_numbers(mechanism: Mechanism) -> Answer | None:
+    """One variant by itself; None where it is refused."""
+    try:
+        return answer_of(move(mechanism), 0)
+    except MechanismError:
+        return None
+
+
+def _all_at_once(motion: Motion) -> list[Answer | None]:
+    """Every case's; None where it is refused."""
+    told = np.isfinite(motion.predicted_error)
+    return [answer_of(motion, index) if told[index] else None for index in range(told.size)]
+
+
+def _by_fsolve(mechanism: Mechanism, truth: Truth) -> Answer | None:
+    at = {joint: np.array([z]) for joint, z in truth.position.items()}
+    start = {joint: complex(z[0]) for joint, z in sketch(mechanism, at).items()}
+    try:
+        return Fsolve(mechanism).solve(0, start)()
+    except NoAnswerError:
+        return None
+
+
+def _count(outcomes: _Outcomes, answer: Answer | None, truth: Truth, unit: float) -> None:
+    if answer is None:
+        outcomes.refused += 1
+        return
+    errors = [
+        error_of(getattr(answer, rates), getattr(truth, rates)) for rates in ("velocity", "acceleration")
+    ]
+    if is_mirrored(answer.position, truth):
+        outcomes.wrong += 1
+    elif not all(math.isfinite(error) for error in errors):
+        outcomes.silent += 1
+    else:
+        predicted = answer.predicted_error
+        outcomes.beyond += predicted is not None and max(errors) > max(predicted, EPSILON)
+        outcomes.velocity.append(errors[0] / unit)
+        outcomes.acceleration.append(errors[1] / unit)
+
+
+def is_mirrored(found: Mapping[str, complex], truth: Truth) -> bool:
+    """Whether some joint lies plainly towards its mirrored place: beyond a quarter of the way."""
+    if truth.mirrored is None:
+        return False
+    for joint, right in truth.position.items():
+        way = truth.mirrored[joint] - right
+        if way and joint in found and ((found[joint] - right) / way).real > 0.75:
+            return True
+    return False
+
+
+def _cell(solver: str, outcomes: _Outcomes, cases: int) -> Cell:
+    def both(errors: list[float]) -> tuple[float, float] | None:
+        return (statistics.median(errors), max(errors)) if errors else None
+
+    return Cell(
+        solver=solver,
+        cases=cases,
+        velocity=both(outcomes.velocity),
+        acceleration=both(outcomes.acceleration),
+        wrong=outcomes.wrong,
+        refused=outcomes.refused,
+        silent=outcomes.silent,
+        beyond=outcomes.beyond,
+    )

@@ -1,0 +1,202 @@
+"""The oracle: it has the textbook's values, and the closed form agrees with it for every group."""
+
+import tomllib
+from typing import get_args
+
+import numpy as np
+import pytest
+from mpmath import mp, mpc
+
+from reference.assembly import build_mechanism
+from reference.authored import validate
+from reference.construction import Vector, evaluate
+from reference.derivation import construction_of
+from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, MovingGuide, Slider
+from reference.mechanism_file import MechanismFile
+from reference.motion import move
+from reference.parameters import parameters_of
+from reference.plan import _measured
+from tests.bench.oracle import DIGITS, ExactMotion, _root
+from tests.bench.singular import KINDS
+
+FAR = 0.1
+"""A distance from the singular position at which nothing is lost."""
+SHARE_OF_PLAN = 1e-11
+ROUNDING = 1e-50
+"""Metres, m/s, m/s^2: what is promised of numbers near 1."""
+
+
+ALL_GROUPS = """
+schema_version = 1
+id = "all"
+length_unit = "cm"
+[title]
+en = "All groups"
+[ground]
+O1 = [0, 0]
+O2 = [110.1, 0.7]
+O3 = [40.3, -10.9]
+[crank]
+link = "1"
+pivot = "O1"
+pin = "A"
+length = 30.3
+angle_deg = 40.1
+rpm = 1350
+gear_ratio = 23.5
+epsilon = -2.7
+[[group]]
+type = "RRR"
+node = "B"
+pins = ["A", "O2"]
+lengths = [90.7, 80.9]
+links = ["2", "3"]
+side = "left"
+[[group]]
+type = "plate"
+node = "C"
+base = ["A", "B"]
+link = "2"
+lengths = [35.7, 70.1]
+side = "right"
+[[group]]
+type = "point"
+node = "P"
+base = ["A", "B"]
+link = "2"
+at = [20.3, -7.7]
+[[group]]
+type = "point_on_line"
+node = "Q"
+base = ["A", "B"]
+link = "2"
+ratio = 0.3
+[[group]]
+type = "RRP"
+node = "D"
+pin = "O3"
+link = "4"
+length = 60.7
+guide = { joints = ["A", "B"], coincident = "D2" }
+side = "ahead"
+[[group]]
+type = "RPR"
+node = "C5"
+pin = "C"
+pivot = "O3"
+link = "5"
+offset = 1.1
+foot = "F"
+[[group]]
+type = "point"
+node = "S"
+base = ["O3", "C5"]
+link = "5"
+at = [33.3, 4.1]
+[[group]]
+type = "PRP"
+node = "X"
+guides = [{ joints = ["O1", "A"], coincident = "X1" }, { through = [70.1, 0], angle_deg = 80.3 }]
+[[group]]
+type = "RPP"
+node = "Y"
+pin = "P"
+slot_deg = 80.7
+guide = { through = [3.3, -20.1], angle_deg = 5.3 }
+"""
+
+
+def far(kind):
+    return kind.draw(np.random.default_rng(3), FAR).mechanism
+
+
+def one(*numbers):
+    return [np.array([number]) for number in numbers]
+
+
+def inverted_slider():
+    """A rod whose slider runs on the coupler of a four-bar: a guide on a moving link."""
+    crank = Crank("1", "O1", "A", *one(0.3, 0.7, 4.0, -9.0), accelerated=True)
+    dyad = Dyad("B", ("A", "O2"), ("2", "3"), tuple(one(0.9, 0.8)), 1)
+    guide = MovingGuide("2", ("A", "B"), "D2")
+    slider = Slider("D", "O3", "4", np.array([0.6]), guide, 1)
+    places = dict(zip(("O1", "O2", "O3"), one(0j, 1.1 + 0j, 0.4 - 0.1j), strict=True))
+    return Mechanism(places, crank, (dyad, slider))
+
+
+MECHANISMS = {kind.id: far(kind) for kind in KINDS} | {"moving_guide": inverted_slider()}
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_the_closed_form_agrees_with_the_closure_equations(name):
+    mechanism = MECHANISMS[name]
+    motion, truth = move(mechanism), ExactMotion(mechanism)
+    for ours, exact in (
+        (motion.position, truth.position),
+        (motion.velocity, truth.velocity),
+        (motion.acceleration, truth.acceleration),
+    ):
+        assert ours.keys() == exact.keys()
+        size = max(map(abs, exact.values()))
+        assert max(abs(ours[joint][0] - complex(z)) for joint, z in exact.items()) <= SHARE_OF_PLAN * size
+
+
+def test_a_slider_crank_moves_as_its_textbook_formula_differentiated_by_hand():
+    crank = Crank("1", "O1", "A", *one(0.3, 0.7, 4.0, 0.0), accelerated=True)
+    guide = FixedGuide(np.array([0j]), np.array([0.0]))
+    mechanism = Mechanism({"O1": np.array([0j])}, crank, (Slider("B", "A", "2", np.array([0.9]), guide, 1),))
+    motion = ExactMotion(mechanism)
+    with mp.workdps(DIGITS):
+        r, rod, angle, omega = (mp.mpmathify(number) for number in (0.3, 0.9, 0.7, 4.0))
+        sine, cosine = mp.sin(angle), mp.cos(angle)
+        across = mp.sqrt(rod**2 - (r * sine) ** 2)
+        slope = -(r**2) * sine * cosine / across
+        bend = -(r**2) * (cosine**2 - sine**2) / across - slope**2 / across
+        assert abs(motion.position["B"] - (r * cosine + across)) < ROUNDING
+        assert abs(motion.velocity["B"] - omega * (slope - r * sine)) < ROUNDING
+        assert abs(motion.acceleration["B"] - omega**2 * (bend - r * cosine)) < ROUNDING
+
+
+def test_a_point_on_a_moving_guide_slides_along_it_and_coriolis_is_across():
+    motion = ExactMotion(inverted_slider())
+    about = {part: motion.vector(Vector(f"a_DD2_{part}", "", "", "ka", ("D2", "D"), part)) for part in "cr"}
+    guide = complex(motion.position["B"] - motion.position["A"])
+    whole = complex(motion.acceleration["D"] - motion.acceleration["D2"])
+    assert about["c"] + about["r"] == pytest.approx(whole, rel=1e-12)
+    assert (about["r"] / guide).imag == pytest.approx(0.0, abs=1e-12 * abs(about["r"] / guide))
+    assert (about["c"] / guide).real == pytest.approx(0.0, abs=1e-12 * abs(about["c"] / guide))
+
+
+def test_every_vector_of_a_construction_of_all_groups_agrees_with_fifty_digits():
+    mechanism = build_mechanism(validate(MechanismFile, tomllib.loads(ALL_GROUPS), "all.toml"), {}, 1)
+    assert {type(group) for group in mechanism.groups} == set(get_args(Group))
+    construction, scale = construction_of(mechanism), np.array([0.01])
+    measured = _measured(construction, move(mechanism))
+    nodes = evaluate(construction, {**measured, **parameters_of(mechanism, scale, scale, scale)})
+    truth = ExactMotion(mechanism)
+    for figure in construction.poles:
+        vectors = construction.vectors_of(figure)
+        exact = np.array([truth.vector(vector) for vector in vectors])
+        drawn = np.array([(nodes[vector.head] - nodes[vector.tail])[0] * scale[0] for vector in vectors])
+        assert np.max(np.abs(drawn - exact)) <= SHARE_OF_PLAN * np.max(np.abs(exact))
+    assert {vector.part for vector in construction.vectors.values()} == {"", "n", "t", "c", "r"}
+
+
+def test_what_does_not_assemble_is_an_arithmetic_error():
+    crank = Crank("1", "O1", "A", *one(0.3, 0.7, 4.0, 0.0), accelerated=True)
+    guide = FixedGuide(np.array([2.0j]), np.array([0.0]))
+    far_off = Mechanism({"O1": np.array([0j])}, crank, (Slider("B", "A", "2", np.array([0.5]), guide, 1),))
+    with pytest.raises(ArithmeticError, match="does not assemble"):
+        ExactMotion(far_off)
+
+
+def test_closure_equations_without_a_root_are_an_arithmetic_error():
+    with pytest.raises(ArithmeticError, match="no root"):
+        _root([lambda node: abs(node) ** 2 + 1, lambda node: node.real], mpc("0.3", "0.2"))
+
+
+def test_a_vector_fixed_in_a_link_tells_how_it_turns():
+    crank = inverted_slider().crank
+    omega, epsilon = ExactMotion(inverted_slider()).turning("A", "O1")
+    assert float(omega) == pytest.approx(crank.omega[0])
+    assert float(epsilon) == pytest.approx(crank.epsilon[0])
