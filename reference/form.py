@@ -32,27 +32,22 @@ def _changed(part: Any, change: Callable[[Array], Any]) -> Any:  # noqa: ANN401 
     return type(part)(*[_changed(getattr(part, name), change) for name in part.__slots__])
 
 
-def leaves_of(mechanism: Mechanism) -> tuple[list[Array], tuple[object, ...]]:
-    """The arrays of a mechanism, and everything else about it.
-
-    Mechanisms alike in the latter have one construction and one program.
-    """
-    leaves: list[Array] = []
+def form_of(mechanism: Mechanism) -> tuple[object, ...]:
+    """All of a mechanism except the values of its arrays; equal for mechanisms with one construction."""
     form: list[object] = []
-    _collect(mechanism, leaves, form)
-    return leaves, tuple(form)
+    _collect(mechanism, form)
+    return tuple(form)
 
 
-def _collect(part: object, leaves: list[Array], form: list[object]) -> None:
+def _collect(part: object, form: list[object]) -> None:
     if isinstance(part, np.ndarray):
-        leaves.append(part)
         form.append(part.dtype.kind)
     elif isinstance(part, PLAIN):
         form.append(part)
     else:
         form.append(type(part))
         for inner in _inside(part):
-            _collect(inner, leaves, form)
+            _collect(inner, form)
 
 
 def _inside(part: Any) -> list[object]:  # noqa: ANN401 - a record, a tuple or a mapping

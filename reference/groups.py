@@ -1,7 +1,7 @@
 """The closed forms of the driven links and of the Assur groups: places, velocities, accelerations.
 
 Written once, on numbers of any kind (`reference.numbers`): arrays over variants, Python's own for a
-single variant, many digits near a singularity, or compiled. No inverse trigonometry, no absolute
+single variant, or many digits near a singularity. No inverse trigonometry, no absolute
 thresholds; every formula keeps its relative accuracy up to the conditioning of the figure itself.
 
 Complex numbers are vectors, x + i y in metres; a body turns by v_B = v_A + i omega (B - A) and

@@ -7,19 +7,17 @@ puts the group's node is told by the node's distance from the line of symmetry o
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from grader.bench.arrays import one_of
 from grader.bench.peers import PEERS, NoAnswerError, Package, Places, sketch
-from grader.bench.speed import has_numba
 from reference.geometry import ComplexArray, FloatArray, cross, direction, dot
 from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, Slider, SlotPoint, SlottedLink
-from reference.motion import Motion, move_where_possible
+from reference.motion import move_where_possible
 
 CASES, CASES_QUICK = 100_000, 2_000
 PEER_CASES, PEER_CASES_QUICK = 2_000, 100
@@ -41,26 +39,17 @@ class BranchRow:
 def count_branches(*, quick: bool = False) -> Iterator[BranchRow]:
     """Ours in many cases, then each installed peer in fewer: it takes a thousand times as long."""
     yield count_ours(quick=quick)
-    if has_numba():
-        from reference.compiled import by_machine  # noqa: PLC0415 - numba is an extra
-
-        yield count_ours(quick=quick, name="compiled", solve=partial(move_where_possible, solver=by_machine))
     for peer in PEERS:
         if peer.version is not None:
             yield count_peer(peer, quick=quick)
 
 
-def count_ours(
-    *,
-    quick: bool = False,
-    name: str = "closed form",
-    solve: Callable[[Mechanism], Motion] = move_where_possible,
-) -> BranchRow:
-    """By the closed form, on arrays or compiled."""
+def count_ours(*, quick: bool = False) -> BranchRow:
+    """By the closed form, on arrays."""
     count = CASES_QUICK if quick else CASES
     wrong = refused = silent = 0
     for mechanism in _all_kinds(count):
-        motion = solve(mechanism)
+        motion = move_where_possible(mechanism)
         told = np.isfinite(motion.predicted_error)
         numbers = (*motion.position.values(), *motion.velocity.values(), *motion.acceleration.values())
         finite = np.isfinite(sum(numbers))
@@ -68,7 +57,7 @@ def count_ours(
         refused += int(np.sum(~told))
         silent += int(np.sum(told & ~finite))
         wrong += int(np.sum(told & finite & (share < 0.0)))
-    return BranchRow(name, count, wrong, refused, silent)
+    return BranchRow("closed form", count, wrong, refused, silent)
 
 
 def count_peer(peer: Package, *, quick: bool = False) -> BranchRow:

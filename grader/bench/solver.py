@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from grader.bench.branches import BranchRow, count_branches
 from grader.bench.closure import ExactMotion, exact_motion
 from grader.bench.singular import KINDS
-from grader.bench.speed import SpeedRow, has_numba, measure_speed, speed_rows
+from grader.bench.speed import SpeedRow, measure_speed, speed_rows
 from grader.bench.stability import (
     DISTANCES,
     DISTANCES_QUICK,
@@ -70,7 +70,7 @@ class SolverBench:
     def steps(self) -> int:
         """How many rows there will be."""
         distances = DISTANCES_QUICK if self.quick else DISTANCES
-        branches = 1 + has_numba() + len(installed_peers())
+        branches = 1 + len(installed_peers())
         return speed_rows() + len(built_in()) + len(KINDS) * len(distances) + branches
 
     def run(self) -> Iterator[str]:

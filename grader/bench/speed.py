@@ -4,11 +4,9 @@ All solve the same mechanism, the pump (four-bar, plate, rod and slider), at so 
 those of its first and its last variant. Building a mechanism is no part of the time, for none.
 """
 
-import importlib.util
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from importlib.metadata import version
 
 import numpy as np
 
@@ -16,14 +14,12 @@ from grader.bench.closure import ExactMotion, exact_motion_of, rounded
 from grader.bench.jets import Pair
 from grader.bench.peers import (
     PEERS,
-    PYLINKAGE,
     Answer,
     Package,
     Peer,
     Places,
     answer_of,
     error_of,
-    plain,
     sketch,
 )
 from grader.bench.timing import medians_us
@@ -92,12 +88,7 @@ def measure_speed(*, quick: bool = False, batches: Sequence[int] = BATCHES) -> I
 
 def speed_rows() -> int:
     """How many rows `measure_speed` gives."""
-    return 8 + sum(1 + peer.velocities_alone for peer in PEERS)
-
-
-def has_numba() -> bool:
-    """Whether compiled roads can be measured here."""
-    return all(importlib.util.find_spec(name) for name in ("numba", "reference.compiled"))
+    return 5 + sum(1 + peer.velocities_alone for peer in PEERS)
 
 
 class _Bench:
@@ -112,33 +103,22 @@ class _Bench:
     def entries(self) -> Iterator[_Entry]:
         """All rows in their order."""
         for accelerations in (True, False):
-            yield self._by(move, "closed form", None, accelerations=accelerations)
-            yield self._compiled(accelerations=accelerations)
+            yield self._closed_form(accelerations=accelerations)
             yield self._construction(accelerations=accelerations)
             for peer in PEERS:
                 if accelerations or peer.velocities_alone:
                     yield self._peer(peer, accelerations=accelerations)
-        yield self._cycle()
         variants = self.assignment.variants()[:CLASS]
         run = partial(exact_plan, self.assignment, variants)
         yield _Entry(PLANS, None, accelerations=True, runs={len(variants): (run, len(variants))})
 
-    def _by(
-        self, solve: Callable[..., Motion], name: str, release: str | None, *, accelerations: bool
-    ) -> _Entry:
+    def _closed_form(self, *, accelerations: bool) -> _Entry:
+        """All variants of a batch by one call."""
         runs = {
-            count: (partial(solve, one, accelerations=accelerations), count)
+            count: (partial(move, one, accelerations=accelerations), count)
             for count, one in self.mechanisms.items()
         }
-        return _Entry(name, release, accelerations, runs, _answers(solve(self.reference)))
-
-    def _compiled(self, *, accelerations: bool) -> _Entry:
-        name = "closed form, compiled (numba)"
-        if not has_numba():
-            return _Entry(name, None, accelerations, note=NOT_INSTALLED)
-        from reference.compiled import move_compiled  # noqa: PLC0415 - numba is an extra
-
-        return self._by(move_compiled, name, version("numba"), accelerations=accelerations)
+        return _Entry("closed form", None, accelerations, runs, _answers(move(self.reference)))
 
     def _construction(self, *, accelerations: bool) -> _Entry:
         """The steps of mechanism and plans, evaluated."""
@@ -161,20 +141,6 @@ class _Bench:
             run = _one_after_another(peer.build(timed), starts, accelerations=accelerations)
             runs[count] = run, len(starts)
         return _Entry(peer.name, peer.version, accelerations, runs, answers)
-
-    def _cycle(self) -> _Entry:
-        """The compiled road of pylinkage, where numba is installed too."""
-        name, release = f"{PYLINKAGE.name}, a cycle (numba)", PYLINKAGE.version
-        if release is None or not has_numba():
-            return _Entry(name, release, accelerations=True, note=NOT_INSTALLED)
-        from grader.bench.adapters.pylinkage_adapter import PylinkageCycle  # noqa: PLC0415 - an extra
-
-        answers = PylinkageCycle(plain(self.reference)).answers(_starts(self.reference)[0])
-        runs = {
-            count: (partial(PylinkageCycle(plain(one)).run, _starts(one)[0]), count)
-            for count, one in self.mechanisms.items()
-        }
-        return _Entry(name, release, accelerations=True, runs=runs, answers=answers)
 
     def row(self, entry: _Entry, us: Mapping[int, float]) -> SpeedRow:
         """What was measured of an entry."""

@@ -20,7 +20,6 @@ from grader.bench.closure import exact_motion_of, rounded
 from grader.bench.jets import Pair
 from grader.bench.peers import PEERS, Answer, NoAnswerError, Package, answer_of, error_of, sketch
 from grader.bench.singular import KINDS, Case, Kind
-from grader.bench.speed import has_numba
 from reference.errors import MechanismError
 from reference.mechanism import Dyad, Group, Mechanism, Slider, SlottedLink
 from reference.motion import Motion, move, move_where_possible
@@ -29,7 +28,7 @@ EPSILON = float(np.finfo(np.float64).eps)
 DISTANCES = tuple(10.0**-k for k in range(1, 15))
 DISTANCES_QUICK = (1e-1, 1e-4, 1e-8, 1e-12, 1e-14)
 CASES, CASES_QUICK = 30, 5
-OURS, OURS_ON_ARRAYS, OURS_COMPILED = "closed form", "on arrays", "compiled"
+OURS, OURS_ON_ARRAYS = "closed form", "on arrays"
 SEED = 20
 
 
@@ -120,10 +119,6 @@ def _row(kind: Kind, delta: float, cases: Sequence[Case]) -> StabilityRow:
         OURS: [_by_numbers(one) for one in mechanisms],
         OURS_ON_ARRAYS: _all_at_once(move_where_possible(stacked(mechanisms))),
     }
-    if has_numba():
-        from reference.compiled import by_machine  # noqa: PLC0415 - numba is an extra
-
-        answers[OURS_COMPILED] = _all_at_once(move_where_possible(stacked(mechanisms), solver=by_machine))
     if kind.plain:
         for peer in installed_peers():
             answers[peer.name] = [_by(peer, *pair) for pair in zip(mechanisms, truths, strict=True)]

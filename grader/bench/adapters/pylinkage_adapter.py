@@ -5,7 +5,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from pylinkage.actuators import Crank
 from pylinkage.components import Ground
 from pylinkage.dyads import FixedDyad, RRPDyad, RRRDyad
@@ -73,41 +72,3 @@ class Pylinkage:
             return {joint: complex(*pair) if pair else complex(math.nan) for joint, pair in told.items()}
 
         return Answer(read("position"), read("velocity"), read("acceleration"))
-
-
-class PylinkageCycle:
-    """Its compiled road (numba): a cycle of equally spaced crank angles at one speed.
-
-    It has none for variants: their speeds are reckoned in afterwards, velocities being proportional to
-    the crank's speed, accelerations to its square (without an angular acceleration).
-    """
-
-    def __init__(self, plain: Plain) -> None:
-        self.single, self.plain = Pylinkage(plain), plain
-        self.count = len(plain.angle)
-        self.step = (plain.angle[-1] - plain.angle[0]) / max(self.count - 1, 1)
-        self.single.crank.angular_velocity = self.step
-        self.single.linkage.compile()
-        self.speeds = np.array(plain.omega)[:, None, None]
-
-    def run(self, start: Places) -> tuple[Any, Any, Any]:
-        """Positions, velocities and accelerations, (N, parts, 2); `start` is the first variant's sketch."""
-        plain, linkage = self.plain, self.single.linkage
-        before = cmath.rect(plain.length, plain.angle[0] - self.step)
-        self.single.put(plain.ground[plain.pivot] + before, start)
-        linkage.set_input_velocity(self.single.crank, 1.0)
-        place, turn, bend = linkage.step_fast_with_kinematics(self.count)
-        return place, turn * self.speeds, bend * self.speeds**2
-
-    def answers(self, start: Places) -> list[Answer]:
-        """By variant."""
-        place, velocity, acceleration = (rates[..., 0] + 1j * rates[..., 1] for rates in self.run(start))
-        names = tuple(self.single.parts)
-
-        def read(rates: Any) -> Places:  # noqa: ANN401 - an array
-            return dict(zip(names, rates.tolist(), strict=False))
-
-        return [
-            Answer(read(place[row]), read(velocity[row]), read(acceleration[row]))
-            for row in range(self.count)
-        ]

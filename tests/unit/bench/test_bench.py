@@ -40,7 +40,6 @@ def only_scipy(monkeypatch):
     scipy = next(peer for peer in PEERS if peer.module == "scipy")
     for module in (speed, stability, branches):
         monkeypatch.setattr(module, "PEERS", (ABSENT, scipy))
-    monkeypatch.setattr(speed, "PYLINKAGE", ABSENT)
 
 
 @pytest.mark.usefixtures("only_scipy")

@@ -98,20 +98,6 @@ def test_an_installed_peer_solves_the_pump_as_the_closed_form_does(peer):
             assert error_of(found, {joint: complex(at[index]) for joint, at in ours.items()}) <= PEER_ERROR
 
 
-def test_the_compiled_cycle_of_pylinkage_gives_every_variant():
-    pytest.importorskip("numba")
-    pytest.importorskip("pylinkage")
-    from grader.bench.adapters.pylinkage_adapter import PylinkageCycle  # noqa: PLC0415
-
-    mechanism = spread(load_assignment("pump"), 4)
-    motion = move(mechanism)
-    drawn = sketch(mechanism, motion.position)
-    answers = PylinkageCycle(plain(mechanism)).answers({joint: complex(at[0]) for joint, at in drawn.items()})
-    for index, answer in enumerate(answers):
-        ours = {joint: complex(at[index]) for joint, at in motion.acceleration.items()}
-        assert error_of(answer.acceleration, ours) <= PEER_ERROR
-
-
 def test_a_mechanism_that_no_peer_knows_is_no_answer():
     slotted = next(kind for kind in KINDS if not kind.plain)
     with pytest.raises(NoAnswerError, match="no adapter for SlottedLink"):
