@@ -140,8 +140,9 @@ class Plate:
 
     Attributes
     ----------
-    shape : (node - base[0]) / (base[1] - base[0]), constant in a rigid link; real where the three
-        points are in line, nan where no such triangle closes
+    shape : (node - base[0]) / (base[1] - base[0]), constant in a rigid link, rounded; real where the
+        three points are in line, nan where no such triangle closes
+    local_m : where the file gives coordinates instead of distances: x + i y, x along the base
     """
 
     node: str
@@ -150,6 +151,7 @@ class Plate:
     lengths_m: tuple[FloatArray, FloatArray]
     side: Side
     shape: ComplexArray
+    local_m: ComplexArray | None = None
 
     @property
     def line_ratio(self) -> FloatArray | None:
@@ -164,12 +166,16 @@ class Plate:
 
 @dataclass(frozen=True, slots=True)
 class PointOnLine:
-    """A point of a link on the line through `base`: node = base[0] + ratio (base[1] - base[0])."""
+    """A point of a link on the line through `base`: node = base[0] + ratio (base[1] - base[0]).
+
+    `local_m`, where the file gives coordinates: its distance from base[0]; `ratio` is then rounded.
+    """
 
     node: str
     base: Pins
     link: str
     ratio: FloatArray
+    local_m: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)

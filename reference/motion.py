@@ -20,7 +20,7 @@ from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import Crank, Driver, Mechanism, moved
 from reference.numbers import larger
 from reference.picking import a_stretch, each_number_once, one_variant
-from reference.precision import EPSILON, LOSSY, REFUSED, refine
+from reference.precision import EPSILON, LOSSY, refine
 from reference.refusal import reason
 from reference.solving import Solution, as_it_is, solve
 
@@ -69,7 +69,7 @@ def move(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
     group does not assemble, or that its velocities are not determined there.
     """
     motion = move_where_possible(mechanism, accelerations=accelerations)
-    if motion.predicted_error.max() > REFUSED:
+    if np.isinf(motion.predicted_error.max()):
         raise reason(mechanism, np.isinf(motion.predicted_error))
     return motion
 
@@ -102,7 +102,8 @@ def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
         _put(motion, solution, rows)
 
     predicted = motion.predicted_error
-    motion.recomputed[:] = refine(mechanism, predicted, put, accelerations=accelerations)
+    sine = reduce(np.minimum, motion.transmission.values(), np.ones(predicted.shape))
+    motion.recomputed[:] = refine(mechanism, predicted, sine, put, accelerations=accelerations)
     broken = np.isinf(predicted)
     if broken.any():
         for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):

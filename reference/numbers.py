@@ -76,6 +76,13 @@ def larger(x: Number, y: Number) -> Number:
     return x if x > y or x != x else y  # noqa: PLR0124 - only nan differs from itself
 
 
+def where(condition: Any, x: Number, y: Number) -> Number:  # noqa: ANN401 - one truth, or an array of them
+    """One number where a condition holds, another where it does not."""
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, x, y)
+    return x if condition else y
+
+
 def _mp() -> Any:  # noqa: ANN401 - mpmath has no types
     from mpmath import mp  # noqa: PLC0415 - only where many digits are needed
 

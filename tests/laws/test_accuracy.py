@@ -23,11 +23,14 @@ BARELY = 1e-9
 a_mechanism = st.from_type(Mechanism)
 
 
-def true_rates(mechanism):
-    """Velocities and accelerations in many digits; None where there is no motion."""
+def true_rates(mechanism, *, anew=True):
+    """Velocities and accelerations in many digits; None where there is no motion.
+
+    Shapes of links come from their lengths, or, not `anew`, as the mechanism holds them.
+    """
     with mp.workdps(TRUE_DIGITS):
         try:
-            joints = solve(mechanism, one_variant(0, mp.mpmathify)).joints
+            joints = solve(mechanism, one_variant(0, mp.mpmathify), anew=anew).joints
         except ZeroDivisionError:
             return None
         rates = [{name: getattr(joint, what) for name, joint in joints.items()} for what in ORDERS]
