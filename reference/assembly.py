@@ -7,10 +7,10 @@ import numpy as np
 
 from reference import groups
 from reference.authored import LENGTH_UNITS_M
-from reference.form import Array, with_arrays
 from reference.formula import Formula, FormulaError, Value
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import (
+    Array,
     Crank,
     CrossSlider,
     DrivenSlider,
@@ -27,6 +27,7 @@ from reference.mechanism import (
     SlotPoint,
     SlottedLink,
     Yoke,
+    with_arrays,
 )
 from reference.mechanism_file import (
     AnyGroupTable,

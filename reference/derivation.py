@@ -30,7 +30,6 @@ from reference.draft import (
     turning,
 )
 from reference.elements import Along, Fixed, FixedLine, Line, Normal, Scaled
-from reference.form import form_of
 from reference.mechanism import (
     Crank,
     CrossSlider,
@@ -45,6 +44,7 @@ from reference.mechanism import (
     SlotPoint,
     SlottedLink,
     Yoke,
+    form_of,
     moving_guides,
 )
 from reference.parameters import pair

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import Crank, Driver, Mechanism, moved
 from reference.numbers import larger
-from reference.picking import a_stretch, each_number_once, one_variant
 from reference.precision import EPSILON, LOSSY, refine
 from reference.refusal import reason
-from reference.solving import Solution, as_it_is, solve
+from reference.solving import Solution, a_stretch, as_it_is, each_number_once, one_variant, solve
 
 SAFETY = 32.0
 """Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from reference.geometry import FloatArray
 from reference.mechanism import Mechanism
-from reference.picking import one_variant, some_variants
-from reference.solving import Solution, solve
+from reference.solving import Solution, one_variant, solve, some_variants
 
 EPSILON = float(np.finfo(np.float64).eps)
 EXTENDED = float(np.finfo(np.longdouble).eps)

@@ -10,8 +10,7 @@ from mpmath import mp
 
 from reference.mechanism import Crank, Dyad, FixedGuide, Mechanism, Slider, SlottedLink
 from reference.motion import _on_arrays, move, move_where_possible
-from reference.picking import one_variant
-from reference.solving import solve
+from reference.solving import one_variant, solve
 from tests.laws.mechanisms import KINDS, after, array, random_mechanism
 
 TRUE_DIGITS = 60
