@@ -12,7 +12,6 @@ other languages. After a text has changed (more in `docs/translating.md`)::
 
 import gettext as gnu
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -98,11 +97,6 @@ def tongue(lang: str) -> Tongue:
         known = ", ".join(LANGUAGES)
         raise CallError("unknown_language", f"'{lang}' is no language of planmark; choose one of {known}")
     return Tongue(code, _catalogue(code))
-
-
-def translator(lang: str) -> Callable[[str], str]:
-    """The function that gives an English text in a language."""
-    return tongue(lang).gettext
 
 
 def _catalogue(code: str) -> gnu.NullTranslations:

@@ -7,10 +7,10 @@ import numpy as np
 
 from reference import groups
 from reference.authored import LENGTH_UNITS_M
-from reference.form import Array, with_arrays
 from reference.formula import Formula, FormulaError, Value
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import (
+    Array,
     Crank,
     CrossSlider,
     DrivenSlider,
@@ -27,6 +27,7 @@ from reference.mechanism import (
     SlotPoint,
     SlottedLink,
     Yoke,
+    with_arrays,
 )
 from reference.mechanism_file import (
     AnyGroupTable,
@@ -250,6 +251,7 @@ def _link_point(
         axes[node] = numbers.point(table.at)
         return SlotPoint(node, q, link, axes[node])
     base = axes[q] - axes[p]
+    local: ComplexArray | None = None
     match table:
         case PointOnLineTable():
             ratio = numbers.number(table.ratio)
@@ -263,15 +265,16 @@ def _link_point(
                 told = f"{node} may lie to the left or to the right of {p} -> {q}; say which: side"
                 raise FormulaError(f"side of {node} is missing: {told}")
         case PointTable():
-            shape = np.asarray(numbers.point(table.at) / np.abs(base))
+            local = numbers.point(table.at)
+            shape = np.asarray(local / np.abs(base))
             if np.all(shape.imag == 0.0):
                 axes[node] = axes[p] + shape * base
-                return PointOnLine(node, (p, q), link, np.asarray(shape.real))
+                return PointOnLine(node, (p, q), link, np.asarray(shape.real), np.asarray(local.real))
             sides = np.where(shape.imag < 0.0, -1, 1)
             side = int(sides[0]) if np.all(sides == sides[0]) else sides
             first, second = np.abs(shape * base), np.abs((1.0 - shape) * base)
     axes[node] = axes[p] + shape * base
-    return Plate(node, (p, q), link, (first, second), side, shape)
+    return Plate(node, (p, q), link, (first, second), side, shape, local)
 
 
 def _shape(base: FloatArray, first: FloatArray, second: FloatArray, side: int) -> ComplexArray:

@@ -48,11 +48,6 @@ class Vector:
     part: Part = ""
     turning: str | None = None
 
-    @property
-    def is_normal(self) -> bool:
-        """Whether it is a normal component."""
-        return self.part == "n"
-
 
 @dataclass(frozen=True, slots=True)
 class AngularRate:

@@ -25,8 +25,7 @@ from reference.mechanism import (
     Yoke,
 )
 from reference.motion import Motion, move, move_where_possible
-from reference.picking import one_variant
-from reference.solving import solve
+from reference.solving import one_variant, solve
 
 FEWEST, MOST = 3, 100_001
 LOOKED_AT = 1441

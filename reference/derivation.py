@@ -30,7 +30,6 @@ from reference.draft import (
     turning,
 )
 from reference.elements import Along, Fixed, FixedLine, Line, Normal, Scaled
-from reference.form import leaves_of
 from reference.mechanism import (
     Crank,
     CrossSlider,
@@ -45,6 +44,7 @@ from reference.mechanism import (
     SlotPoint,
     SlottedLink,
     Yoke,
+    form_of,
     moving_guides,
 )
 from reference.parameters import pair
@@ -91,7 +91,6 @@ _written: dict[tuple[object, ...], Construction] = {}
 
 def _form_of(mechanism: Mechanism) -> tuple[object, ...]:
     """All that the construction depends on: names, kinds, sides, and which points are in line."""
-    _, form = leaves_of(mechanism)
     in_line = tuple(
         (group.is_ever_flat, group.line_ratio is None)
         for group in mechanism.groups
@@ -102,7 +101,7 @@ def _form_of(mechanism: Mechanism) -> tuple[object, ...]:
         for group in mechanism.groups
         if isinstance(side := getattr(group, "side", 1), np.ndarray)
     )
-    return (form, in_line, sides)
+    return (form_of(mechanism), in_line, sides)
 
 
 def _write_down(mechanism: Mechanism, accelerations: bool, plate_by_similarity: bool) -> Construction:

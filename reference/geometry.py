@@ -11,7 +11,6 @@ from reference import numbers
 
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
-QUARTER_TURN = 1j
 
 
 def cross(u: ComplexArray, v: ComplexArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """The closed forms of the driven links and of the Assur groups: places, velocities, accelerations.
 
 Written once, on numbers of any kind (`reference.numbers`): arrays over variants, Python's own for a
-single variant, many digits near a singularity, or compiled. No inverse trigonometry, no absolute
+single variant, or many digits near a singularity. No inverse trigonometry, no absolute
 thresholds; every formula keeps its relative accuracy up to the conditioning of the figure itself.
 
 Complex numbers are vectors, x + i y in metres; a body turns by v_B = v_A + i omega (B - A) and
@@ -10,7 +10,21 @@ group is solved in the frame of `d`, where a kite's flat position (d -> 0) is as
 Derivations: the rigid-body equations of each group with one unknown eliminated, see docs/solver.md.
 """
 
-from reference.numbers import Complex, Number, cosine, cross, dot, nearest, quarters, root, sine
+import math
+
+from reference.numbers import (
+    Complex,
+    Number,
+    cosine,
+    cross,
+    dot,
+    larger,
+    nearest,
+    quarters,
+    root,
+    sine,
+    where,
+)
 
 
 def arm(length: Number, angle: Number) -> tuple[Complex, Complex]:
@@ -80,6 +94,16 @@ def rrr_accelerations(
     bend = (growth.real + first * first * along + second * second * (1.0 - along)) / across
     turn = growth.imag - stretch.real * (first + second)
     return turn + bend * (along - 1.0), turn + bend * along
+
+
+def plate_growth(shape: Complex) -> Number:
+    """By how much rounding of a triangle's sides grows in its shape: 1 / sine of the angle at its node.
+
+    1 where the three points are in line: there the shape is a ratio of two lengths.
+    """
+    height = abs(shape.imag)
+    flat = height == 0.0
+    return larger(1.0, abs(shape) * abs(1.0 - shape) / where(flat, math.inf, height))
 
 
 # RRP ----------------------------------------------------------------------------------------------

@@ -6,8 +6,10 @@ left of the directed line between the group's pins (for a slider: ahead along it
 right (behind); an array where it differs between variants.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from types import NoneType
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -140,8 +142,9 @@ class Plate:
 
     Attributes
     ----------
-    shape : (node - base[0]) / (base[1] - base[0]), constant in a rigid link; real where the three
-        points are in line, nan where no such triangle closes
+    shape : (node - base[0]) / (base[1] - base[0]), constant in a rigid link, rounded; real where the
+        three points are in line, nan where no such triangle closes
+    local_m : where the file gives coordinates instead of distances: x + i y, x along the base
     """
 
     node: str
@@ -150,6 +153,7 @@ class Plate:
     lengths_m: tuple[FloatArray, FloatArray]
     side: Side
     shape: ComplexArray
+    local_m: ComplexArray | None = None
 
     @property
     def line_ratio(self) -> FloatArray | None:
@@ -164,12 +168,16 @@ class Plate:
 
 @dataclass(frozen=True, slots=True)
 class PointOnLine:
-    """A point of a link on the line through `base`: node = base[0] + ratio (base[1] - base[0])."""
+    """A point of a link on the line through `base`: node = base[0] + ratio (base[1] - base[0]).
+
+    `local_m`, where the file gives coordinates: its distance from base[0]; `ratio` is then rounded.
+    """
 
     node: str
     base: Pins
     link: str
     ratio: FloatArray
+    local_m: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,3 +261,56 @@ def joints_of(group: Group) -> tuple[str, ...]:
     """The joints that a group adds: its node, the points that coincide with it, a guide's foot."""
     foot = (group.foot,) if isinstance(group, SlottedLink) and group.foot else ()
     return (*foot, group.node, *(guide.coincident for guide in moving_guides(group)))
+
+
+# A mechanism apart from its numbers ----------------------------------------------------------------
+
+
+Array = np.ndarray[Any, np.dtype[Any]]
+"""Real or complex: one number for all variants, or one for each."""
+Part = TypeVar("Part")
+PLAIN = (str, int, float, complex, NoneType)
+"""What a mechanism is made of besides records, tuples, mappings and arrays."""
+
+
+def with_arrays(part: Part, change: Callable[[Array], Any]) -> Part:
+    """A mechanism, or a part of it, with every array replaced, in the order of its fields."""
+    return cast("Part", _changed(part, change))
+
+
+def _changed(part: Any, change: Callable[[Array], Any]) -> Any:  # noqa: ANN401 - whatever a part is made of
+    if isinstance(part, np.ndarray):
+        return change(part)
+    if isinstance(part, PLAIN):
+        return part
+    if isinstance(part, tuple):
+        return tuple([_changed(inner, change) for inner in part])
+    if isinstance(part, Mapping):
+        return {name: _changed(inner, change) for name, inner in part.items()}
+    return type(part)(*[_changed(getattr(part, name), change) for name in part.__slots__])
+
+
+def form_of(mechanism: Mechanism) -> tuple[object, ...]:
+    """All of a mechanism except the values of its arrays; equal for mechanisms with one construction."""
+    form: list[object] = []
+    _collect(mechanism, form)
+    return tuple(form)
+
+
+def _collect(part: object, form: list[object]) -> None:
+    if isinstance(part, np.ndarray):
+        form.append(part.dtype.kind)
+    elif isinstance(part, PLAIN):
+        form.append(part)
+    else:
+        form.append(type(part))
+        for inner in _inside(part):
+            _collect(inner, form)
+
+
+def _inside(part: Any) -> list[object]:  # noqa: ANN401 - a record, a tuple or a mapping
+    if isinstance(part, tuple):
+        return [len(part), *part]
+    if isinstance(part, Mapping):
+        return [len(part), *part.keys(), *part.values()]
+    return [getattr(part, name) for name in part.__slots__]

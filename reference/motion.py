@@ -8,7 +8,7 @@ Many variants are solved on arrays, a few on Python's numbers (faster there). A 
 with every result; variants where digits are lost are solved again (`reference.precision`).
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any, cast
@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import Crank, Driver, Mechanism, moved
 from reference.numbers import larger
-from reference.picking import a_stretch, each_number_once, one_variant
-from reference.precision import EPSILON, LOSSY, REFUSED, refine
+from reference.precision import EPSILON, LOSSY, refine
 from reference.refusal import reason
-from reference.solving import Solution, as_it_is, solve
+from reference.solving import Solution, a_stretch, as_it_is, each_number_once, one_variant, solve
 
 SAFETY = 32.0
 """Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""
@@ -62,35 +61,27 @@ class Motion:
     recomputed: BoolArray
 
 
-Solver = Callable[[Mechanism, int, bool], Motion]
-"""Solves a mechanism of so many variants (with accelerations or without) in double precision, unchecked."""
-
-
-def move(mechanism: Mechanism, *, accelerations: bool = True, solver: Solver | None = None) -> Motion:
+def move(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
     """Solve the mechanism for every variant at once.
-
-    `solver` calculates in double precision; NumPy by default, see `reference.compiled` for another.
 
     Raises MechanismError naming the group, the first variant (by its index) and by how much the
     group does not assemble, or that its velocities are not determined there.
     """
-    motion = move_where_possible(mechanism, accelerations=accelerations, solver=solver)
-    if motion.predicted_error.max() > REFUSED:
+    motion = move_where_possible(mechanism, accelerations=accelerations)
+    if np.isinf(motion.predicted_error.max()):
         raise reason(mechanism, np.isinf(motion.predicted_error))
     return motion
 
 
-def move_where_possible(
-    mechanism: Mechanism, *, accelerations: bool = True, solver: Solver | None = None
-) -> Motion:
+def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
     """As `move`, but nan (and an infinite predicted error) for variants without a motion."""
     count, origin = _count(mechanism.driver), _origin(mechanism)
     if origin.any():
         # Far from the coordinates' origin, differences of places lose digits: solved about the driven link.
-        motion = (solver or _by_numpy)(moved(mechanism, -origin), count, accelerations)
+        motion = _in_doubles(moved(mechanism, -origin), count, accelerations)
         motion.position.update({name: place + origin for name, place in motion.position.items()})
     else:
-        motion = (solver or _by_numpy)(mechanism, count, accelerations)
+        motion = _in_doubles(mechanism, count, accelerations)
     if motion.predicted_error.max() > LOSSY:
         with np.errstate(all="ignore"):
             _refine(motion, mechanism, accelerations)
@@ -110,7 +101,8 @@ def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
         _put(motion, solution, rows)
 
     predicted = motion.predicted_error
-    motion.recomputed[:] = refine(mechanism, predicted, put, accelerations=accelerations)
+    sine = reduce(np.minimum, motion.transmission.values(), np.ones(predicted.shape))
+    motion.recomputed[:] = refine(mechanism, predicted, sine, put, accelerations=accelerations)
     broken = np.isinf(predicted)
     if broken.any():
         for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
@@ -145,7 +137,7 @@ def _count(driver: Driver) -> int:
     return max(driver.displacement_m.size, driver.speed.size, driver.acceleration.size)
 
 
-def _by_numpy(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+def _in_doubles(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
     if count <= FEW:
         return _one_by_one(mechanism, count, accelerations)
     with np.errstate(all="ignore"):
@@ -162,7 +154,7 @@ def _in_stretches(mechanism: Mechanism, count: int, accelerations: bool) -> Moti
         solution = solve(mechanism, a_stretch(rows), accelerations=accelerations)
         motion = motion or _room_for(solution, count, accelerations)
         _put(motion, solution, rows)
-        motion.predicted_error[rows] = predicted_error_of(_amplification(solution))
+        motion.predicted_error[rows] = _predicted_error(_amplification(solution))
     return cast("Motion", motion)
 
 
@@ -189,7 +181,7 @@ def _amplification(solution: Solution) -> Any:  # noqa: ANN401 - an array, or on
     return reduce(larger, [joint.amplification for joint in solution.joints.values()])
 
 
-def predicted_error_of(amplification: Any) -> FloatArray:  # noqa: ANN401 - an array, or one number
+def _predicted_error(amplification: Any) -> FloatArray:  # noqa: ANN401 - an array, or one number
     """What the growth of rounding errors up to a result says of it; infinite where it is nan."""
     predicted = np.atleast_1d(SAFETY * EPSILON * amplification)
     predicted[np.isnan(predicted)] = np.inf
@@ -206,7 +198,7 @@ def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
         return values if own else np.array(np.broadcast_to(values, shape))
 
     joints = solution.joints
-    predicted = predicted_error_of(wide(_amplification(solution)))
+    predicted = _predicted_error(wide(_amplification(solution)))
     return Motion(
         {name: wide(joint.position) for name, joint in joints.items()},
         {name: wide(joint.velocity) for name, joint in joints.items()},

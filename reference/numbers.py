@@ -1,11 +1,10 @@
-"""One arithmetic for four kinds of numbers: arrays, Python's own, many digits, and noted ones.
+"""One arithmetic for three kinds of numbers: arrays, Python's own, and many digits.
 
 The kernels of `reference.groups` are written once, with these few functions for what operators do
 not give. A root of a negative number is nan: the figure does not close there.
 """
 
 import math
-from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -16,40 +15,12 @@ Complex = Any
 """complex, mpc, or an array of shape (N,) of complex numbers."""
 
 
-class Noted(ABC):
-    """A real number that only notes what is done with it (`reference.program`), these functions included."""
-
-    __slots__ = ()
-
-    @abstractmethod
-    def root(self) -> Number:
-        """The square root."""
-
-    @abstractmethod
-    def sine(self) -> Number:
-        """The sine."""
-
-    @abstractmethod
-    def cosine(self) -> Number:
-        """The cosine."""
-
-    @abstractmethod
-    def nearest(self) -> Number:
-        """The nearest whole number."""
-
-    @abstractmethod
-    def larger(self, other: Number) -> Number:
-        """The larger of two."""
-
-
 def root(x: Number) -> Number:
     """The square root; nan below zero."""
     if isinstance(x, float):
         return math.sqrt(x) if x >= 0.0 else math.nan
     if isinstance(x, np.ndarray):
         return np.sqrt(x)
-    if isinstance(x, Noted):
-        return x.root()
     return x.sqrt() if x >= 0 else x * math.nan
 
 
@@ -59,7 +30,7 @@ def sine(x: Number) -> Number:
         return math.sin(x)
     if isinstance(x, np.ndarray):
         return np.sin(x)
-    return x.sine() if isinstance(x, Noted) else _mp().sin(x)
+    return _mp().sin(x)
 
 
 def cosine(x: Number) -> Number:
@@ -68,7 +39,7 @@ def cosine(x: Number) -> Number:
         return math.cos(x)
     if isinstance(x, np.ndarray):
         return np.cos(x)
-    return x.cosine() if isinstance(x, Noted) else _mp().cos(x)
+    return _mp().cos(x)
 
 
 def nearest(x: Number) -> Number:
@@ -77,7 +48,7 @@ def nearest(x: Number) -> Number:
         return float(round(x))
     if isinstance(x, np.ndarray):
         return np.rint(x)
-    return x.nearest() if isinstance(x, Noted) else _mp().nint(x)
+    return _mp().nint(x)
 
 
 IN_QUARTERS = 0.6366197723675814
@@ -88,7 +59,7 @@ QUARTER_1, QUARTER_2, QUARTER_3 = 1.5707963267341256, 6.077100506303966e-11, 2.0
 
 def quarters(angle: Number) -> tuple[Number, Number]:
     """The nearest number of quarter turns in an angle, and the rest, accurate by itself."""
-    if _has_many_digits(angle):
+    if not isinstance(angle, (float, np.ndarray)):  # a tuple: faster to ask than a union
         mp = _mp()
         turns = mp.nint(2 * angle / mp.pi)
         return turns, angle - turns * (mp.pi / 2)
@@ -102,15 +73,14 @@ def larger(x: Number, y: Number) -> Number:
         return x if x > y or x != x else y  # noqa: PLR0124 - only nan differs from itself
     if isinstance(x, np.ndarray) or isinstance(y, np.ndarray):
         return np.maximum(x, y)
-    if isinstance(x, Noted):
-        return x.larger(y)
-    if isinstance(y, Noted):
-        return y.larger(x)
     return x if x > y or x != x else y  # noqa: PLR0124 - only nan differs from itself
 
 
-def _has_many_digits(x: Number) -> bool:
-    return not isinstance(x, (float, np.ndarray, Noted))  # a tuple: faster to ask than a union
+def where(condition: Any, x: Number, y: Number) -> Number:  # noqa: ANN401 - one truth, or an array of them
+    """One number where a condition holds, another where it does not."""
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, x, y)
+    return x if condition else y
 
 
 def _mp() -> Any:  # noqa: ANN401 - mpmath has no types

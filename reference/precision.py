@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 
 from reference.geometry import FloatArray
 from reference.mechanism import Mechanism
-from reference.picking import one_variant, some_variants
-from reference.solving import Solution, solve
+from reference.solving import Solution, one_variant, solve, some_variants
 
 EPSILON = float(np.finfo(np.float64).eps)
 EXTENDED = float(np.finfo(np.longdouble).eps)
 """As `EPSILON` where the processor or compiler has no wider floats."""
-LOSSY = 3e-14
-"""A predicted relative error from which extended floats are used: a digit or two are gone."""
-DOUBTFUL = 1e-11
-"""A predicted relative error from which eighty digits are used."""
-REFUSED = 1e16
-"""A predicted relative error beyond which nothing is told: the sine of a transmission angle is then
-below 1e-15 (as between guides at 0 and 180 degrees), and the data's last digit decides how it moves."""
+LOSSY = 1e-9
+"""A predicted relative error from which a variant is solved again: 4e-7 mm in a plan of 400 mm, which nobody
+can draw. Ordinary mechanisms stay far below, and solving again takes ten times as long."""
+EXTENDED_ENOUGH = LOSSY * EPSILON / EXTENDED
+"""A predicted relative error up to which extended floats bring it below `LOSSY`; beyond, eighty digits."""
+LEAST_SINE = 8e-16
+"""Of a transmission angle; below it (as between guides at 0 and 180 degrees) nothing is told: the data's
+last digit decides how the mechanism moves."""
 DIGITS = 80
 
 Put = Callable[[Solution, NDArray[np.intp]], None]
@@ -32,27 +32,26 @@ Put = Callable[[Solution, NDArray[np.intp]], None]
 
 
 def refine(
-    mechanism: Mechanism, predicted: FloatArray, put: Put, *, accelerations: bool
+    mechanism: Mechanism, predicted: FloatArray, sine: FloatArray, put: Put, *, accelerations: bool
 ) -> NDArray[np.bool_]:
     """Solve again what has lost digits, and say which variants those were.
 
-    `predicted` (N,) is brought up to date in place: infinite where there is no solution.
+    `predicted` (N,) is brought up to date in place: infinite where there is no solution. `sine` (N,) is
+    the least of each variant's transmission angles.
     """
-    again = (predicted > LOSSY) & (predicted <= REFUSED)
-    if EXTENDED < EPSILON:
-        rows = np.flatnonzero(again & (predicted <= DOUBTFUL))
-        if rows.size:
-            put(solve(mechanism, some_variants(rows), accelerations=accelerations), rows)
-            predicted[rows] = np.maximum(predicted[rows] * (EXTENDED / EPSILON), EPSILON)
-    else:
-        again &= predicted > DOUBTFUL
-    for index in np.flatnonzero(again & (predicted > DOUBTFUL)):
+    predicted[~(sine >= LEAST_SINE)] = np.inf
+    again = (predicted > LOSSY) & np.isfinite(predicted)
+    wide = again & (predicted <= EXTENDED_ENOUGH)
+    rows = np.flatnonzero(wide)
+    if rows.size:
+        put(solve(mechanism, some_variants(rows), accelerations=accelerations, anew=True), rows)
+        predicted[rows] = np.maximum(predicted[rows] * (EXTENDED / EPSILON), EPSILON)
+    for index in np.flatnonzero(again & ~wide):
         row = np.array([index])
         solution = _in_digits(mechanism, int(index), accelerations)
         predicted[index] = EPSILON if solution is not None else np.inf
         if solution is not None:
             put(solution, row)
-    predicted[~(predicted <= REFUSED)] = np.inf
     return again
 
 
@@ -62,7 +61,9 @@ def _in_digits(mechanism: Mechanism, index: int, accelerations: bool) -> Solutio
 
     with mp.workdps(DIGITS):
         try:
-            solution = solve(mechanism, one_variant(index, mp.mpmathify), accelerations=accelerations)
+            solution = solve(
+                mechanism, one_variant(index, mp.mpmathify), accelerations=accelerations, anew=True
+            )
         except ZeroDivisionError:
             return None
     rates: list[Any] = [

@@ -18,8 +18,7 @@ from reference.mechanism import (
     Yoke,
 )
 from reference.numbers import cross
-from reference.picking import one_variant
-from reference.solving import Solution, rail_of, solve
+from reference.solving import Solution, one_variant, rail_of, solve
 
 ROUNDING = 1e-14
 """Relative to the mechanism's reach."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reference import groups
 from reference.mechanism import (
@@ -27,7 +28,7 @@ from reference.mechanism import (
     SlottedLink,
     Yoke,
 )
-from reference.numbers import Complex, Number, cross, dot, larger
+from reference.numbers import Complex, Number, cross, dot, larger, root, where
 
 Take = Callable[[Any], Any]
 """The number to calculate with, of one that the mechanism holds: the array, or one variant's."""
@@ -63,6 +64,8 @@ class Solution:
     slots: dict[str, tuple[str, Complex]] = field(default_factory=dict)
     """By a slotted link's node: its pivot, and the direction of its guide."""
     take: Take = as_it_is
+    anew: bool = False
+    """Whether shapes of links are calculated from their data, not taken as they were rounded."""
 
 
 @dataclass(slots=True)
@@ -93,9 +96,15 @@ class Rail:
         return self.joint.acceleration + swing
 
 
-def solve(mechanism: Mechanism, take: Take = as_it_is, *, accelerations: bool = True) -> Solution:
-    """Solve a mechanism in the numbers that `take` gives; epsilon stays empty without accelerations."""
-    solution = Solution(take=take)
+def solve(
+    mechanism: Mechanism, take: Take = as_it_is, *, accelerations: bool = True, anew: bool = False
+) -> Solution:
+    """Solve a mechanism in the numbers that `take` gives; epsilon stays empty without accelerations.
+
+    `anew` calculates the shapes of links in those numbers, from their lengths or coordinates: the
+    mechanism holds them rounded to doubles.
+    """
+    solution = Solution(take=take, anew=anew)
     for name, place in mechanism.ground_m.items():
         solution.joints[name] = Joint(take(place))
     _drive(solution, mechanism.driver, accelerations)
@@ -146,8 +155,8 @@ def _add(solution: Solution, group: Group, accelerations: bool) -> None:
             _add_crossing(solution, node, (rail_of(solution, group.guide), slot), accelerations)
         case SlotPoint():
             _add_slot_point(solution, group, solution.take(group.local_m))
-        case Plate(base=base, shape=shape) | PointOnLine(base=base, ratio=shape):
-            _add_point(solution, group.node, base, solution.take(shape))
+        case Plate() | PointOnLine():
+            _add_point(solution, group)
 
 
 def _between(p: Joint, q: Joint) -> Complex:
@@ -158,6 +167,11 @@ def _between(p: Joint, q: Joint) -> Complex:
     return d if p.rest is None else d - p.rest
 
 
+def _nearness(size2: Number, p: Joint, q: Joint) -> Number:
+    """A length (its square) over its distance from the origin: so much of a place's rounding it has."""
+    return root(size2 / (size2 + dot(p.position, p.position) + dot(q.position, q.position)))
+
+
 def _add_dyad(solution: Solution, group: Dyad, accelerations: bool) -> None:
     p, q = (solution.joints[pin] for pin in group.pins)
     link_p, link_q = group.links
@@ -165,7 +179,8 @@ def _add_dyad(solution: Solution, group: Dyad, accelerations: bool) -> None:
     along, across, sine = groups.rrr_place(d, *map(take, (*group.lengths_m, group.side)))
     corner = along + 1j * across
     arm = d * corner
-    inverse = d.conjugate() / dot(d, d)
+    square = dot(d, d)
+    inverse = d.conjugate() / square
     stretch = (q.velocity - p.velocity) * inverse
     omega = groups.rrr_turns(along, across, stretch)
     solution.omega[link_p], solution.omega[link_q] = omega
@@ -175,7 +190,8 @@ def _add_dyad(solution: Solution, group: Dyad, accelerations: bool) -> None:
         epsilon = groups.rrr_accelerations(along, across, stretch, growth, omega)
         solution.epsilon[link_p], solution.epsilon[link_q] = epsilon
         node.acceleration = p.acceleration + groups.turned(arm, omega[0], epsilon[0])
-    node.amplification = larger(p.amplification, q.amplification) / (sine * sine)
+    share = sine * sine * _nearness(square, p, q)
+    node.amplification = larger(p.amplification, q.amplification) / share
     solution.joints[group.node] = node
     solution.transmission[group.node] = sine
 
@@ -185,7 +201,8 @@ def _add_slider(solution: Solution, group: Slider, accelerations: bool) -> None:
     take, along, foot = solution.take, rail.along, rail.joint.position
     height = cross(along, pin.position - foot)
     lost = 0.0 if pin.rest is None else cross(along, pin.rest)
-    reach, height, sine = groups.rrp_place(height, lost, take(group.length_m), take(group.side))
+    length = take(group.length_m)
+    reach, height, sine = groups.rrp_place(height, lost, length, take(group.side))
     place = foot + along * (dot(along, pin.position - foot) + reach)
     under = rail.velocity(place)
     omega, speed = groups.rrp_velocity(reach, height, along, pin.velocity - under)
@@ -199,7 +216,8 @@ def _add_slider(solution: Solution, group: Slider, accelerations: bool) -> None:
         )
         solution.epsilon[group.link] = epsilon
         node.acceleration = under + along * (slide + 1j * coriolis)
-    node.amplification = larger(pin.amplification, rail.amplification) / (sine * sine)
+    share = sine * sine * _nearness(length * length, pin, rail.joint)
+    node.amplification = larger(pin.amplification, rail.amplification) / share
     solution.joints[group.node] = node
     solution.transmission[group.node] = sine
     _add_coincident(solution, group.guide, rail, group.node)
@@ -218,8 +236,8 @@ def _add_slotted(solution: Solution, group: SlottedLink, accelerations: bool) ->
         epsilon = groups.rpr_acceleration(reach, offset, along, relative, (omega, speed))
         solution.epsilon[group.link] = epsilon
         node.acceleration = pivot.acceleration + groups.turned(d, omega, epsilon)
-    nearness = abs(d) / (abs(d) + abs(pin.position) + abs(pivot.position))
-    node.amplification = larger(pin.amplification, pivot.amplification) / (sine * sine * nearness)
+    share = sine * sine * _nearness(dot(d, d), pin, pivot)
+    node.amplification = larger(pin.amplification, pivot.amplification) / share
     solution.joints[group.node] = node
     solution.transmission[group.node] = sine
     solution.slots[group.node] = (group.pivot, along)
@@ -238,15 +256,33 @@ def _add_slot_point(solution: Solution, group: SlotPoint, local: Complex) -> Non
     solution.joints[group.node] = node
 
 
-def _add_point(solution: Solution, name: str, base: tuple[str, str], shape: Complex) -> None:
+def _add_point(solution: Solution, group: Plate | PointOnLine) -> None:
     """A rigid link's point is the same combination of its base at every order."""
-    p, q = (solution.joints[joint] for joint in base)
-    solution.joints[name] = Joint(
-        p.position + shape * _between(p, q),
+    p, q = (solution.joints[joint] for joint in group.base)
+    shape = solution.take(group.shape if isinstance(group, Plate) else group.ratio)
+    d, growth = _between(p, q), 1.0 + abs(shape)
+    if isinstance(group, Plate) and group.local_m is None:
+        growth = growth * groups.plate_growth(shape)
+    if solution.anew:
+        shape = _shape_anew(solution.take, group, shape, d)
+    solution.joints[group.node] = Joint(
+        p.position + shape * d,
         p.velocity + shape * (q.velocity - p.velocity),
         p.acceleration + shape * (q.acceleration - p.acceleration),
-        amplification=larger(p.amplification, q.amplification) * (1.0 + abs(shape)),
+        amplification=larger(p.amplification, q.amplification) * growth,
     )
+
+
+def _shape_anew(take: Take, group: Plate | PointOnLine, shape: Complex, d: Complex) -> Complex:
+    """The shape of a link's point over its base `d`, from the data in the numbers of `d`."""
+    if group.local_m is not None:
+        return take(group.local_m) / abs(d)
+    if isinstance(group, PointOnLine):
+        return shape
+    first, second, side = map(take, (*group.lengths_m, group.side))
+    along, across, _ = groups.rrr_place(d, first, second, side)
+    in_line = first / abs(d)
+    return where(shape.imag == 0.0, where(shape.real < 0.0, -in_line, in_line), along + 1j * across)
 
 
 def rail_of(solution: Solution, guide: Guide) -> Rail:
@@ -256,7 +292,7 @@ def rail_of(solution: Solution, guide: Guide) -> Rail:
         return Rail(Joint(through), groups.heading(angle))
     g, h = (solution.joints[joint] for joint in guide.base)
     d = _between(g, h)
-    amplification = larger(g.amplification, h.amplification)
+    amplification = larger(g.amplification, h.amplification) / _nearness(dot(d, d), g, h)
     epsilon = solution.epsilon.get(guide.link, 0.0)
     return Rail(g, d / abs(d), amplification, solution.omega[guide.link], epsilon, turns=True)
 
@@ -292,3 +328,54 @@ def _add_crossing(solution: Solution, node: str, rails: tuple[Rail, Rail], accel
     joint.amplification = larger(first.amplification, second.amplification) / (sine * sine)
     solution.joints[node] = joint
     solution.transmission[node] = abs(sine)
+
+
+# Some variants of a mechanism, in other kinds of numbers -------------------------------------------
+
+
+def each_number_once(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
+    """Takes all variants at once; what they share and an array only repeats, one time."""
+    return values[:1] if type(values) is not int and values.strides == (0,) else values
+
+
+def a_stretch(rows: slice) -> Take:
+    """Takes neighbouring variants; what all variants share, one time."""
+
+    def take(values: Any) -> Any:  # noqa: ANN401 - as above
+        once = each_number_once(values)
+        return once if type(once) is int or once.size == 1 else once[rows]
+
+    return take
+
+
+def one_variant(index: int, number: Callable[[Any], Any] | None = None, *, among: int | None = None) -> Take:
+    """Takes the numbers of one variant out of arrays over variants (those of one entry hold for all).
+
+    Arguments: `number` makes another kind of number of a float or complex; `among`, where given, is the
+    number of variants, and an array of another size raises ValueError.
+    """
+
+    def take(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
+        if type(values) is int:
+            return values
+        if values.size == 1:
+            one = values.item()
+        elif among in {None, values.size}:
+            one = values.item(index)
+        else:
+            raise ValueError(f"data of {values.size} variants in a mechanism whose driver has {among}")
+        return one if number is None else number(one)
+
+    return take
+
+
+def some_variants(rows: NDArray[np.intp]) -> Take:
+    """Takes some variants out of arrays over variants, in the widest floats there are."""
+
+    def take(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
+        if type(values) is int:
+            return values
+        chosen = values if values.size == 1 else values[rows]
+        return chosen.astype(np.clongdouble if np.iscomplexobj(chosen) else np.longdouble)
+
+    return take

@@ -5,10 +5,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
-from grader.documents import ResultsDocument
+from grader.documents import SCHEMA_VERSION, ResultsDocument
 from grader.exports import (
     canvas_gradebook,
     canvas_rubric,
@@ -27,7 +28,6 @@ from grader.exports.grades import Grade, grades_of
 from grader.exports.options import TARGETS, Options
 from grader.exports.summary import criteria_text, summary_text
 from grader.files import write_whole
-from grader.versions import current
 from reference.errors import CallError, InputFileError
 
 
@@ -59,7 +59,7 @@ def read_results(out_dir: Path) -> ResultsDocument:
     """`results.json` of an output folder; InputFileError where it is missing or not one."""
     path = out_dir / "results.json"
     try:
-        return ResultsDocument.model_validate(current(json.loads(path.read_bytes()), str(path)))
+        return ResultsDocument.model_validate(_of_a_known_version(json.loads(path.read_bytes()), path))
     except FileNotFoundError as error:
         raise InputFileError(
             "results_missing", f"{path}: there is no such file; run planmark grade first"
@@ -72,6 +72,18 @@ def read_results(out_dir: Path) -> ResultsDocument:
         ) from error
     except (ValueError, RecursionError) as error:
         raise InputFileError("results_wrong", f"{path}: is not JSON ({error}); grade again") from error
+
+
+def _of_a_known_version(document: Any, path: Path) -> Any:  # noqa: ANN401 - whatever a JSON file holds
+    """The document; InputFileError where a later version of the program wrote it."""
+    version = document.get("schema_version") if isinstance(document, dict) else None
+    if isinstance(version, int) and version > SCHEMA_VERSION:
+        raise InputFileError(
+            "results_newer",
+            f"{path}: a later version of planmark wrote this (schema_version {version}, known"
+            f" is {SCHEMA_VERSION}); update planmark, or grade again with this one",
+        )
+    return document
 
 
 # What there is to deliver -------------------------------------------------------------------------

@@ -11,7 +11,6 @@ from grader.exports.grades import Person
 from reference.errors import CallError
 
 Target = Literal["csv", "moodle", "canvas", "gradescope", "lti"]
-What = Literal["grades", "marks", "rubric", "feedback"]
 TARGETS: tuple[Target, ...] = ("csv", "moodle", "canvas", "gradescope", "lti")
 
 

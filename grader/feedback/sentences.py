@@ -189,12 +189,6 @@ def one_mistake(mistake: Mistake, speaker: Tongue, level: Level, names: Mapping[
     return f"{speaker.gettext(what) % known} {speaker.gettext(words.redo) % where}"
 
 
-def mistake_title(mistake: Mistake, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
-    """Its name and place."""
-    title = speaker.gettext(words_of(mistake.code, mistake.at, line_of(mistake)).title)
-    return f"{title} ({place(mistake.at, speaker, names)})"
-
-
 def _known(mistake: Mistake, speaker: Tongue, level: Level, names: Mapping[str, str]) -> dict[str, str]:
     """What is known of a mistake, in words; numbers only where they may be told."""
     told = {

@@ -14,16 +14,12 @@ from numpy.typing import NDArray
 from grader.records import FloatArray
 from grader.sheet.longlines import LongLine
 
-USUAL_MM = (5.0, 10.0, 6.35, 4.0, 2.0, 1.0)
-PITCH_SE = 0.003
-"""Relative error of printed squares."""
 _LEAST_LINES = 8
 _ON_LATTICE = 0.12
 """Of the pitch: a line farther off is no line of the grid."""
 _MOSTLY = 0.6
 _DARKER = 1.35
 """A drawn line on a grid line is so much darker than the grid is."""
-_ALIKE = 0.03
 _FOLLOWS = 0.3
 _STRAYS, _FINE_PX = 4.0, 0.3
 """A line beside the lattice by more than four times the usual is a drawn one near it."""
@@ -72,11 +68,6 @@ class Grid:
     def unequal(self) -> float:
         """Relative difference of the scales along x and y, where the squares are square."""
         return self.pitch_px[0] / self.pitch_px[1] - 1.0
-
-    def nominal_mm(self, px_per_mm: float) -> float | None:
-        """The usual pitch that this one is by a resolution known to 3 %, or None."""
-        seen = float(np.mean(self.pitch_px)) / px_per_mm
-        return next((usual for usual in USUAL_MM if abs(seen / usual - 1.0) < _ALIKE), None)
 
 
 def find_grid(lines: list[LongLine], shape: tuple[int, int]) -> tuple[Grid | None, list[LongLine]]:

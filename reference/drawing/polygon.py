@@ -6,7 +6,7 @@ import numpy as np
 
 from reference.canvas import CONSTRUCTION, Shape, Stroke
 from reference.drawing import symbols
-from reference.drawing.letters import Style, letters
+from reference.drawing.labelling import Style, letters
 from reference.drawing.sketch import captioned
 from reference.drawing.subject import PLAN_COLOURS, Figure, Part, Subject
 from reference.drawing.symbols import HAIR_MM, point

@@ -7,8 +7,7 @@ import numpy as np
 from reference.canvas import INK, Area, Label, Stroke
 from reference.drawing import symbols
 from reference.drawing.drive import drive_arrow, drive_letter
-from reference.drawing.labelling import Wanted
-from reference.drawing.letters import Style, letters
+from reference.drawing.labelling import Style, Wanted, letters
 from reference.drawing.links import Bar, bars, blocks, hinged_on, unit
 from reference.drawing.subject import Figure, Part, Subject
 from reference.drawing.symbols import LINK_MM, point

@@ -7,6 +7,7 @@ the one asked for and its own distance is told exactly, from its doubles.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from reference.mechanism import (
     Group,
     Mechanism,
     MovingGuide,
+    Plate,
     Slider,
     SlotPoint,
     SlottedLink,
@@ -94,50 +96,63 @@ def _exact(z: complex) -> Any:
     return mp.mpc(z.real, z.imag)
 
 
+def _carried(crank: Crank, rng: np.random.Generator, *, by_plate: bool) -> tuple[tuple[Plate, ...], str, Any]:
+    """Groups, and the joint that the singular group hangs on, with its exact place: the pin, or a plate's."""
+    if not by_plate:
+        with mp.workdps(DIGITS):
+            return (), crank.pin, _exact_pin(crank)
+    base, side = float(crank.length_m[0]), _side(rng)
+    first, second = (base * rng.uniform(0.6, 1.2) for _ in range(2))
+    with mp.workdps(DIGITS):
+        along = (1 + (mpf(first) / base) ** 2 - (mpf(second) / base) ** 2) / 2
+        shape = mp.mpc(along, side * mp.sqrt((mpf(first) / base) ** 2 - along**2))
+        lengths = (_array(first), _array(second))
+        plate = Plate("C", (crank.pivot, crank.pin), crank.link, lengths, side, _array(complex(shape)))
+        return (plate,), "C", shape * _exact_pin(crank)
+
+
 def _side(rng: np.random.Generator) -> int:
     return int(rng.choice((-1, 1)))
 
 
-def _dyad(first: float, second: float, side: int) -> Dyad:
-    return Dyad("B", ("A", "O2"), ("2", "3"), (_array(first), _array(second)), side)
+def _dyad(first: float, second: float, side: int, pin: str = "A") -> Dyad:
+    return Dyad("B", (pin, "O2"), ("2", "3"), (_array(first), _array(second)), side)
 
 
-def _flat_dyad(rng: np.random.Generator, delta: float, *, stretched: bool) -> Case:
-    """A four-bar whose dyad is nearly in line: |A O2| = (l1 + l2)(1 - delta), |l1 - l2|(1 + delta)."""
+def _flat_dyad(rng: np.random.Generator, delta: float, *, stretched: bool, by_plate: bool = False) -> Case:
+    """A four-bar whose dyad is nearly in line: |A O2| = (l1 + l2)(1 - delta), |l1 - l2|(1 + delta).
+
+    `by_plate`: it hangs on a point of the crank instead of the crank's pin.
+    """
     crank = _crank(rng.uniform(0.2, 1.0), rng.uniform(-np.pi, np.pi), rng)
     first = rng.uniform(0.5, 2.0)
     second = first * rng.uniform(1.5, 3.0) ** _side(rng)
     flat = first + second if stretched else abs(first - second)
     span = flat * (1.0 - delta if stretched else 1.0 + delta)
-    pivot = complex(_pin(crank) + span * np.exp(1j * rng.uniform(-np.pi, np.pi)))
+    plates, pin, place = _carried(crank, rng, by_plate=by_plate)
+    pivot = complex(complex(place) + span * np.exp(1j * rng.uniform(-np.pi, np.pi)))
     with mp.workdps(DIGITS):
-        true_span = abs(_exact(pivot) - _exact_pin(crank))
+        true_span = abs(_exact(pivot) - place)
         true_flat = mpf(first) + mpf(second) if stretched else abs(mpf(first) - mpf(second))
         apart = float(abs(true_span - true_flat) / true_flat)
-    return Case(_mechanism(crank, {"O2": pivot}, _dyad(first, second, _side(rng))), apart)
+    dyad = _dyad(first, second, _side(rng), pin)
+    return Case(_mechanism(crank, {"O2": pivot}, *plates, dyad), apart)
 
 
-def _stretched(rng: np.random.Generator, delta: float) -> Case:
-    return _flat_dyad(rng, delta, stretched=True)
-
-
-def _folded(rng: np.random.Generator, delta: float) -> Case:
-    return _flat_dyad(rng, delta, stretched=False)
-
-
-def _upright_rod(rng: np.random.Generator, delta: float) -> Case:
+def _upright_rod(rng: np.random.Generator, delta: float, *, by_plate: bool = False) -> Case:
     """A slider-crank whose rod is nearly perpendicular to the guide: the pin's height is L (1 - delta)."""
     crank = _crank(rng.uniform(0.2, 1.0), rng.uniform(-np.pi, np.pi), rng)
     length, guide_angle = rng.uniform(0.5, 2.0), rng.uniform(-np.pi, np.pi)
     along = np.exp(1j * guide_angle)
     height = length * (1.0 - delta) * _side(rng)
-    through = complex(_pin(crank) - 1j * along * height + along * rng.uniform(-1.0, 1.0))
+    plates, pin, place = _carried(crank, rng, by_plate=by_plate)
+    through = complex(complex(place) - 1j * along * height + along * rng.uniform(-1.0, 1.0))
     with mp.workdps(DIGITS):
-        arm = (_exact_pin(crank) - _exact(through)) * mp.expj(-mpf(guide_angle))
+        arm = (place - _exact(through)) * mp.expj(-mpf(guide_angle))
         apart = float(abs(mpf(length) - abs(arm.imag)) / mpf(length))
     guide = FixedGuide(_array(through), _array(guide_angle))
-    slider = Slider("B", "A", "2", _array(length), guide, _side(rng))
-    return Case(_mechanism(crank, {}, slider), apart)
+    slider = Slider("B", pin, "2", _array(length), guide, _side(rng))
+    return Case(_mechanism(crank, {}, *plates, slider), apart)
 
 
 def _kite(rng: np.random.Generator, delta: float) -> Case:
@@ -241,8 +256,8 @@ def _parallel_slot(rng: np.random.Generator, delta: float) -> Case:
 
 
 KINDS = (
-    Kind("rrr_stretched", "RRR, coupler and rocker nearly stretched", _stretched),
-    Kind("rrr_folded", "RRR, coupler and rocker nearly folded", _folded),
+    Kind("rrr_stretched", "RRR, coupler and rocker nearly stretched", partial(_flat_dyad, stretched=True)),
+    Kind("rrr_folded", "RRR, coupler and rocker nearly folded", partial(_flat_dyad, stretched=False)),
     Kind("rrp_upright", "RRP, rod nearly perpendicular to the guide", _upright_rod),
     Kind("kite", "kite: crank = ground, coupler = rocker, pin near the rocker's pivot", _kite, smooth=True),
     Kind("kite_turned", "the kite with its ground along (3, 4)", _turned_kite),
@@ -252,4 +267,16 @@ KINDS = (
     Kind("rpr_offset", "RPR with offset, pin nearly at the guide's foot", _offset_slot, plain=False),
     Kind("prp_parallel", "PRP, guides nearly parallel", _parallel_guides, plain=False),
     Kind("rpp_parallel", "RPP, slot and guide nearly parallel", _parallel_slot, plain=False),
+    Kind(
+        "rrr_plate",
+        "RRR nearly stretched, behind a plate",
+        partial(_flat_dyad, stretched=True, by_plate=True),
+        plain=False,
+    ),
+    Kind(
+        "rrp_plate",
+        "RRP, rod nearly perpendicular, behind a plate",
+        partial(_upright_rod, by_plate=True),
+        plain=False,
+    ),
 )

@@ -92,21 +92,20 @@ class _Bench:
     def entries(self) -> Iterator[_Entry]:
         """All rows in their order."""
         for accelerations in (True, False):
-            yield self._by(move, "closed form", None, accelerations=accelerations)
+            yield self._closed_form(accelerations=accelerations)
             yield self._construction(accelerations=accelerations)
             yield self._fsolve(accelerations=accelerations)
         variants = self.assignment.variants()[:CLASS]
         run = partial(exact_plan, self.assignment, variants)
         yield _Entry(PLANS, None, accelerations=True, runs={len(variants): (run, len(variants))})
 
-    def _by(
-        self, solve: Callable[..., Motion], name: str, release: str | None, *, accelerations: bool
-    ) -> _Entry:
+    def _closed_form(self, *, accelerations: bool) -> _Entry:
+        """All variants of a batch by one call."""
         runs = {
-            count: (partial(solve, one, accelerations=accelerations), count)
+            count: (partial(move, one, accelerations=accelerations), count)
             for count, one in self.mechanisms.items()
         }
-        return _Entry(name, release, accelerations, runs, _answers(solve(self.reference)))
+        return _Entry("closed form", None, accelerations, runs, _answers(move(self.reference)))
 
     def _construction(self, *, accelerations: bool) -> _Entry:
         """The steps of mechanism and plans, evaluated."""

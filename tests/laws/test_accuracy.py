@@ -10,8 +10,7 @@ from mpmath import mp
 
 from reference.mechanism import Crank, Dyad, FixedGuide, Mechanism, Slider, SlottedLink
 from reference.motion import _on_arrays, move, move_where_possible
-from reference.picking import one_variant
-from reference.solving import solve
+from reference.solving import one_variant, solve
 from tests.laws.mechanisms import KINDS, after, array, random_mechanism
 
 TRUE_DIGITS = 60
@@ -23,11 +22,14 @@ BARELY = 1e-9
 a_mechanism = st.from_type(Mechanism)
 
 
-def true_rates(mechanism):
-    """Velocities and accelerations in many digits; None where there is no motion."""
+def true_rates(mechanism, *, anew=True):
+    """Velocities and accelerations in many digits; None where there is no motion.
+
+    Shapes of links come from their lengths, or, not `anew`, as the mechanism holds them.
+    """
     with mp.workdps(TRUE_DIGITS):
         try:
-            joints = solve(mechanism, one_variant(0, mp.mpmathify)).joints
+            joints = solve(mechanism, one_variant(0, mp.mpmathify), anew=anew).joints
         except ZeroDivisionError:
             return None
         rates = [{name: getattr(joint, what) for name, joint in joints.items()} for what in ORDERS]

@@ -13,7 +13,6 @@ from grader.exports.canvas_gradebook import fill as fill_gradebook
 from grader.exports.grades import grades_of
 from grader.exports.moodle_worksheet import fill as fill_worksheet
 from grader.exports.platform_ids import numbered, place_of, with_ids
-from grader.versions import current
 from reference.errors import PlanmarkError
 from tests.unit.exports import importers
 from tests.unit.exports.classroom import marked, report, results
@@ -115,8 +114,6 @@ def test_an_answer_of_any_shape_is_used_or_refused(tmp_path, told):
         numbered([], path)
     with suppress(PlanmarkError):
         place_of(path)
-    with suppress(PlanmarkError):
-        current(told, "f")
     (tmp_path / "results.json").write_text(json.dumps(told), encoding="utf-8")
     with suppress(PlanmarkError):
         read_results(tmp_path)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from reference.assignment import load_assignment
-from reference.form import with_arrays
+from reference.mechanism import with_arrays
 from reference.motion import move, move_where_possible
 from tests.laws.mechanisms import after, mechanisms
 

@@ -80,4 +80,3 @@ def test_a_real_pad_is_a_ruler(name, pitch_mm):
         if wanted is not None:
             assert measured == pytest.approx(wanted, rel=PITCH_SHARE)
     assert 0.0 < grid.unequal < 0.004
-    assert grid.nominal_mm(300.0 / INCH_MM) == 5.0
