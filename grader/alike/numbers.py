@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from grader.alike.handed import Handed
+from grader.alike.hands import centred
 from grader.records import FloatArray
 from reference.assignment import Assignment, Scales, Variant
 from reference.construction import evaluate
@@ -69,7 +70,8 @@ class _Table:
     entered : (students, fields) mm and degrees
     usable : (students, fields) what is near enough to the exact value to be a hand's error
     telling : (students, fields) what of it is further off than rounding alone would bring it
-    off_mm : (students, fields) from the exact values, directions as the vector's end across it
+    off_mm : (students, fields) from the exact values, directions as the vector's end across it; less
+        what all of one variant have in common
     grain_mm : (students, fields) step of the values
     by_act : (students, fields, acts) what a usual error of each act adds, mm
     """
@@ -153,7 +155,7 @@ def _table(assignment: Assignment, handed: Sequence[Handed]) -> _Table:
     turns = np.where(size >= LEAST_MM, turns, np.nan)
     known_mm, known_deg = _grain(lengths), _grain(turns)
     grain = np.concatenate([known_mm * np.ones_like(size), np.radians(known_deg) * size], axis=1)
-    off_mm = np.concatenate([lengths - size, np.radians(off) * size], axis=1)
+    off_mm = centred(np.concatenate([lengths - size, np.radians(off) * size], axis=1), variants)
     by_act = np.concatenate([acts.real, acts.imag], axis=1)
     spread = np.sqrt((by_act**2).sum(axis=2) + READ_OFF_MM**2 + grain**2 / 12.0)
     excused = np.tile([[name in one.excused for name in names] for one in handed], 2)
