@@ -76,7 +76,7 @@ def hands_of(
     placed = {figure: one.at[owner] for figure, one in drawn.items()}
     misses, by_scale = _misses(assignment, chosen, variants, placed)
     errors = _normed(misses - _scale(misses, by_scale) * by_scale)
-    return Hands(rows, centred(_without(errors, by_scale), variants))
+    return Hands(rows, _centred(_without(errors, by_scale), variants))
 
 
 # Misses -------------------------------------------------------------------------------------------
@@ -215,7 +215,7 @@ def _middle(values: FloatArray) -> FloatArray:
     return np.where(count > 0, middle, 0.0)[:, None]
 
 
-def centred(errors: FloatArray, variants: Sequence[Variant]) -> FloatArray:
+def _centred(errors: FloatArray, variants: Sequence[Variant]) -> FloatArray:
     """Errors less what all of a variant have in common, where they are many enough to tell."""
     errors = errors.copy()
     for variant in set(variants):
