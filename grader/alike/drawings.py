@@ -15,10 +15,6 @@ from grader.records import MECHANISM, FloatArray
 from reference.assignment import Assignment, Variant
 from reference.derivation import construction_of
 
-USUAL_SHARE = 0.45
-LARGEST_SHARE = 0.7
-"""Errors of a hand that count as independent, as a share of all; a class tells its own."""
-LEAST_CLASS = 10
 RARE = -9.0
 """Log of the chance below which two placements make it worth to hold each against the other's variant."""
 
@@ -63,7 +59,7 @@ def like_drawings(assignment: Assignment, handed: Sequence[Handed]) -> LikeDrawi
     rows = _rows(handed, fits, places)
     hands = hands_of(assignment, handed, drawn, rows)
     together = _together(rows, handed)
-    found = agreement(hands, _share(hands.errors, together))
+    found = agreement(hands, together)
     log_hands, cosine, count = _by_student(
         rows,
         len(handed),
@@ -106,21 +102,6 @@ def _together(rows: Sequence[Row], handed: Sequence[Handed]) -> NDArray[np.bool_
     variant = np.array([variants[row.variant] for row in rows])
     person = np.array([people[handed[row.owner].student_id] for row in rows])
     return np.asarray((variant[:, None] == variant[None, :]) & (person[:, None] != person[None, :]))
-
-
-def _share(errors: FloatArray, together: NDArray[np.bool_]) -> float:
-    """Which share of the errors is independent, from how widely the cosines of this class spread."""
-    rows, columns = np.nonzero(np.triu(together, 1))
-    if len(rows) < LEAST_CLASS * (LEAST_CLASS - 1) // 2:
-        return USUAL_SHARE
-    known = np.where(np.isfinite(errors), errors, 0.0)
-    mask = np.isfinite(errors).astype(np.float64)
-    size = (known**2) @ mask.T
-    with np.errstate(invalid="ignore", divide="ignore"):
-        cosine = np.nan_to_num((known @ known.T) / np.sqrt(size * size.T))[rows, columns]
-    low, high = np.percentile(cosine, [15.87, 84.13])
-    count = float((mask @ mask.T)[rows, columns].mean())
-    return float(np.clip(4.0 / max((high - low) ** 2 * count, 1e-9), 0.1, LARGEST_SHARE))
 
 
 def _by_student(

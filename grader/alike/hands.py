@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import betainc
 
 from grader.alike.handed import Handed
@@ -35,6 +36,10 @@ GROSS = 4.0
 TAIL = 2.5
 """Larger misses count as this: one bad slip does not make two drawings alike."""
 LEAST_SPREAD = 0.1
+USUAL_SHARE, LARGEST_SHARE = 0.45, 0.7
+"""Errors of a hand that count as independent, as a share of all; a class tells its own."""
+LEAST_PAIRS = 10
+"""So many tell what pushes the hands of all variants the same way."""
 LEAST_CLASS = 10
 """So many of one variant tell what they have in common (a copier's scale, a table's rounding)."""
 
@@ -240,19 +245,34 @@ class Agreement:
     log_chance: FloatArray
 
 
-def agreement(hands: Hands, share: float) -> Agreement:
+def agreement(hands: Hands, together: NDArray[np.bool_]) -> Agreement:
     """How the errors of every two drawings agree.
 
-    Arguments: `share` of the errors that counts as independent, in (0, 1].
+    Arguments: `together` (rows, rows) are the pairs that are compared.
+
+    What pushes every hand the same way (a protractor, a bent scan, the reading of a node) gives all
+    cosines one mean, by which they are reduced: two vectors with a part in common have the cosine
+    rho + (1 - rho) cos, where cos is that of their own parts.
     """
     known = np.isfinite(hands.errors)
     values = np.where(known, hands.errors, 0.0)
     mask = known.astype(np.float64)
     size = (values**2) @ mask.T
     with np.errstate(invalid="ignore", divide="ignore"):
-        cosine = np.nan_to_num((values @ values.T) / np.sqrt(size * size.T))
+        cosine = np.clip(np.nan_to_num((values @ values.T) / np.sqrt(size * size.T)), -1.0, 1.0)
     count = mask @ mask.T
-    return Agreement(np.clip(cosine, -1.0, 1.0), count, log_chance(np.clip(cosine, -1, 1), share * count))
+    pairs = np.triu(together, 1)
+    common = max(float(np.median(cosine[pairs])), 0.0) if pairs.sum() >= LEAST_PAIRS else 0.0
+    own = np.clip((cosine - common) / max(1.0 - common, 0.1), -1.0, 1.0)
+    return Agreement(cosine, count, log_chance(own, _share(own[pairs], count[pairs]) * count))
+
+
+def _share(cosine: FloatArray, count: FloatArray) -> float:
+    """Which share of the errors is independent, from how widely the cosines of this class spread."""
+    if len(cosine) < LEAST_CLASS * (LEAST_CLASS - 1) // 2:
+        return USUAL_SHARE
+    low, high = np.percentile(cosine, [15.87, 84.13])
+    return float(np.clip(4.0 / max((high - low) ** 2 * float(count.mean()), 1e-9), 0.1, LARGEST_SHARE))
 
 
 def log_chance(cosine: FloatArray, dimensions: FloatArray) -> FloatArray:

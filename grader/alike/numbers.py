@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from grader.alike.handed import Handed
+from grader.alike.hands import LEAST_CLASS
 from grader.records import FloatArray
 from reference.assignment import Assignment, Scales, Variant
 from reference.construction import evaluate
@@ -69,7 +70,8 @@ class _Table:
     entered : (students, fields) mm and degrees
     usable : (students, fields) what is near enough to the exact value to be a hand's error
     telling : (students, fields) what of it is further off than rounding alone would bring it
-    off_mm : (students, fields) from the exact values, directions as the vector's end across it
+    off_mm : (students, fields) from the exact values, directions as the vector's end across it; less what
+        all of one variant are off
     grain_mm : (students, fields) step of the values
     by_act : (students, fields, acts) what a usual error of each act adds, mm
     """
@@ -163,6 +165,7 @@ def _table(assignment: Assignment, handed: Sequence[Handed]) -> _Table:
         usable &= usable.sum(axis=1, keepdims=True) >= OWN_SHARE * np.isfinite(entered).sum(
             axis=1, keepdims=True
         )
+        off_mm = off_mm - _common(np.where(usable, off_mm, np.nan), variants)
         telling = usable & (np.abs(off_mm) > 0.5 * grain + ROUNDED_MM)
     return _Table(entered, usable, telling, off_mm, grain, by_act)
 
@@ -197,6 +200,22 @@ def _exact(
         for name, drawn in vectors.items():
             moved[name].append((SCALE_OFF * drawn * (name in of_plan))[:, None])
     return vectors, {name: np.nan_to_num(np.concatenate(parts, axis=1)) for name, parts in moved.items()}
+
+
+def _common(off_mm: FloatArray, variants: Sequence[Variant]) -> FloatArray:
+    """(students, fields) the mean of what those of the same variant are off, where they are many enough.
+
+    A protractor or a rounded table that all have makes all values wrong alike. Not the median: of values
+    in whole millimetres it is one of them.
+    """
+    common = np.zeros_like(off_mm)
+    for variant in set(variants):
+        same = np.array([one == variant for one in variants])
+        known = np.isfinite(off_mm[same])
+        count = known.sum(axis=0)
+        mean = np.where(known, off_mm[same], 0.0).sum(axis=0) / np.maximum(count, 1)
+        common[same] = np.where(count >= LEAST_CLASS, mean, 0.0)
+    return common
 
 
 def _grain(values: FloatArray) -> FloatArray:

@@ -32,13 +32,12 @@ LEAST_PARTS = 8
 """A sheet with ink in fewer parts shows too little to be recognised by."""
 LEAST_SHEETS = 7
 """Of six sheets two are a third: what they share would be taken for the page's."""
-LEAST_ALIKE = 0.5
-"""Mean correlation of the parts below which two sheets are never the same drawing."""
-
-LEAST_SPREAD = 0.015
 QUANTILES = 0.84, 0.95
 """The upper one leaves a copied pair out in a class of seven."""
 TAIL_DROP = float(np.log((1.0 - QUANTILES[0]) / (1.0 - QUANTILES[1])))
+LEAST_SPREAD = 0.015
+LEAST_ALIKE = 0.5
+"""Mean correlation of the parts below which two sheets are never the same drawing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,21 +94,23 @@ def like_pictures(
     np.maximum.at(overlap, (owner[:, None], owner[None, :]), _agreement(np.array(maps), printed[owner]))
     rows, columns = having[np.array(np.triu_indices(len(having), 1))]
     scaled = np.arctanh(np.minimum(overlap, 0.999))
+    tail = _log_tail(scaled, scaled[rows, columns], LEAST_SPREAD)
     # A few printed sheets among plain ones (or the reverse) are each other's like by their print.
     many = np.bincount(printed[having], minlength=2)[printed.astype(np.int64)] >= LEAST_SHEETS
     compared = (printed[:, None] != printed[None, :]) | many
-    log = np.where((overlap > LEAST_ALIKE) & compared, _log_tail(scaled, scaled[rows, columns]), 0.0)
+    log = np.where((overlap > LEAST_ALIKE) & compared, tail, 0.0)
     return LikePictures(log, overlap, len(rows))
 
 
-def _log_tail(values: FloatArray, known: FloatArray) -> FloatArray:
+def _log_tail(values: FloatArray, known: FloatArray, least: float) -> FloatArray:
     """Log of the chance of values as large, by an exponential tail through upper quantiles of the known ones.
 
     The tail is heavier than a normal one, as resemblances are, and no steeper than the class shows: where
-    all follow one layout some pairs are much more like each other than others.
+    all follow one layout some pairs are much more like each other than others. `least` is its scale at
+    the least, in the unit of the values.
     """
     middle, high, higher = np.quantile(known, [0.5, *QUANTILES])
-    scale = max((high - middle) / 2.0, (higher - high) / TAIL_DROP, LEAST_SPREAD)
+    scale = max((high - middle) / 2.0, (higher - high) / TAIL_DROP, least)
     return np.asarray(np.minimum(np.log(1.0 - QUANTILES[1]) - (values - higher) / scale, 0.0))
 
 

@@ -81,6 +81,30 @@ def test_values_that_are_exact_are_no_evidence_though_all_have_them(step_mm, mon
     assert found("press", made) == {}
 
 
+def test_nodes_that_are_read_with_the_same_errors_make_nobody_alike():
+    """Six careful students of each of five variants, too few of one variant to see what they share."""
+    made = []
+    for seed in range(30):
+        one = scanned(drawing("pump", seed // 6, seed, "careful"), seed)
+        read = {}
+        for figure, nodes in one.sheets[0].items():
+            off = {node: np.random.default_rng([len(figure), *map(ord, node)]) for node in nodes}
+            read[figure] = {node: at + complex(*off[node].normal(0.0, 0.15, 2)) for node, at in nodes.items()}
+        made.append(replace(one, sheets=(read,)))
+    assert found("pump", made) == {}
+
+
+def test_values_that_all_of_a_variant_have_wrong_alike_make_nobody_alike():
+    """One table of rounded lengths, one wrong protractor: all values of all students are off by the same."""
+    made = []
+    for seed in range(30):
+        one = measured(drawing("pump", 1, seed, "careful"), seed, directions=False)
+        off = np.random.default_rng(8).choice([-1.0, 1.0], len(one.numbers))
+        values = {name: value + more for (name, value), more in zip(one.numbers.items(), off, strict=True)}
+        made.append(replace(one, numbers=values))
+    assert found("pump", made) == {}
+
+
 def test_positions_of_one_student_are_not_held_against_each_other():
     one = drawing("press", 1, 0)
     again = replace(scanned(one, 1), variant=replace(one.variant, position=2))
