@@ -5,16 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from grader.files import write_whole
 from grader.i18n import tongue
 from grader.plan_document import plan_document
 from reference.assignment import Assignment, load_assignment
-from reference.canvas import svg as as_svg
-from reference.draw import reference_drawing
-from reference.drawing.subject import Subject
 from reference.errors import CallError
 from reference.plan import Plan, exact_plan
 
@@ -85,6 +80,9 @@ def _draw(assignment: Assignment, plan: Plan, drawings: Drawings) -> None:
         return
     from grader.plan_pdf import pdf as as_pdf
     from grader.plan_steps import html_page, pdf_pages, wording_of
+    from reference.canvas import svg as as_svg
+    from reference.draw import reference_drawing
+    from reference.drawing.subject import Subject
 
     speaker = tongue(drawings.lang)
     subject = Subject(assignment, plan, 0, wording_of(speaker))
@@ -104,6 +102,9 @@ def _draw(assignment: Assignment, plan: Plan, drawings: Drawings) -> None:
 
 
 def _print_table(assignment: Assignment, plan: Plan) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
     document = plan_document(assignment, plan)
     scales = document.scales
     console = Console()
