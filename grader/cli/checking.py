@@ -6,7 +6,9 @@ from rich.console import Console
 from rich.table import Table
 
 from grader.cli.grading import check_language, checked_level
-from grader.feedback import About, mistake_feedback, reason_sentence, write_leaflet
+from grader.feedback.leaflet import About
+from grader.feedback.pages import write_leaflet
+from grader.feedback.sentences import mistake_feedback, reason_sentence
 from grader.i18n import Tongue, tongue
 from grader.judging import Submission, judge, task_of
 from grader.measurements import Measurements, names_of, read_measurements

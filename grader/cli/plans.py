@@ -79,7 +79,8 @@ def _draw(assignment: Assignment, plan: Plan, drawings: Drawings) -> None:
     if not drawings.files:
         return
     from grader.plan_pdf import pdf as as_pdf
-    from grader.plan_steps import html_page, pdf_pages, wording_of
+    from grader.plan_steps.pages import html_page, pdf_pages
+    from grader.plan_steps.words import wording_of
     from reference.canvas import svg as as_svg
     from reference.draw import reference_drawing
     from reference.drawing.subject import Subject

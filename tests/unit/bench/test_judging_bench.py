@@ -21,7 +21,7 @@ from grader.bench.judging_truth import verdicts_due
 from grader.bench.judging_values import computed, exact_rates
 from grader.bench.plain_text import as_text
 from grader.judging import judge, task_of
-from grader.lint import lint
+from grader.lint.inspection import lint
 from grader.outcomes import Mistake as Named
 from grader.records import Reading
 from grader.simulation.hand import draw
