@@ -11,7 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from grader import __version__
-from reference.errors import PlanmarkError
+from reference.errors import CallError, PlanmarkError
 
 
 class Commands(TyperGroup):
@@ -65,3 +65,11 @@ NumberOption = Annotated[
 ]
 PositionOption = Annotated[int | None, typer.Option("--position", help="The position, where there are some.")]
 LanguageOption = Annotated[str, typer.Option("--lang", help="Language of feedback: en, ro or ru.")]
+
+
+def check_language(lang: str) -> None:
+    """Refuse a language that there is no feedback in."""
+    from grader.i18n import LANGUAGES
+
+    if lang not in LANGUAGES:
+        raise CallError("unknown_language", f"--lang {lang}: known are {', '.join(LANGUAGES)}")

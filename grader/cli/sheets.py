@@ -9,7 +9,8 @@ import typer
 
 from grader.answer_sheet.calibration import make_calibration
 from grader.answer_sheet.sheets import make_sheets
-from grader.cli.grading import check_language, progress
+from grader.cli.app import check_language
+from grader.cli.progress import progress
 from grader.contact_sheet import Thumbnail, contact_sheet, thumbnail
 from grader.files import write_whole
 from grader.folder import submissions, told_name
