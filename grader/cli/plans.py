@@ -78,8 +78,6 @@ def _draw(assignment: Assignment, plan: Plan, drawings: Drawings) -> None:
     """Draw everything before the first file is written: what fails leaves none behind."""
     if not drawings.files:
         return
-    from grader.plan_pdf import pdf as as_pdf
-    from grader.plan_steps.pages import html_page, pdf_pages
     from grader.plan_steps.words import wording_of
     from reference.canvas import svg as as_svg
     from reference.draw import reference_drawing
@@ -94,8 +92,12 @@ def _draw(assignment: Assignment, plan: Plan, drawings: Drawings) -> None:
         if drawings.svg is not None:
             written[drawings.svg] = as_svg(sheets)
         if drawings.pdf is not None:
+            from grader.plan_pdf import pdf as as_pdf
+
             written[drawings.pdf] = as_pdf(sheets, subject.title)
     if drawings.steps is not None:
+        from grader.plan_steps.pages import html_page, pdf_pages
+
         printed = drawings.steps.suffix.lower() == ".pdf"
         written[drawings.steps] = pdf_pages(subject, speaker) if printed else html_page(subject, speaker)
     for file, content in written.items():
