@@ -8,7 +8,10 @@ from pydantic import ValidationError
 
 from grader.documents import ReportDocument, ResultsDocument, UnmatchedDocument
 from grader.exports import write_summary
-from grader.feedback import About, Level, write_feedback, write_index
+from grader.feedback.class_page import write_index
+from grader.feedback.leaflet import About
+from grader.feedback.pages import write_feedback
+from grader.feedback.sentences import Level
 from grader.files import make_folder, write_whole
 from grader.folder import submissions, told_name
 from grader.jobs import Job, alike_of_run, folders_of, inputs_of_run

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from grader.answer_sheet import calibration_segments
+from grader.answer_sheet.calibration import calibration_segments
 from grader.documents import CalibrationDocument, CalibrationPoint, CalibrationSegments
 from grader.ink import find_ink
 from grader.intake import page_of

@@ -9,13 +9,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from grader.platform_documents import (
-    CanvasMarksDocument,
-    GradescopeDocument,
-    LtiDocument,
-    MoodleMarksDocument,
-    MoodleRubricDocument,
-)
 from reference.assignment_file import AssignmentFile
 from reference.errors import CallError
 from reference.mechanism_file import MechanismFile
@@ -37,7 +30,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 class Document(BaseModel):
     """A table of a JSON document: frozen, nothing unknown, only finite numbers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 # Measurements: what a student measured ------------------------------------------------------------
@@ -504,6 +497,7 @@ class CalibrationDocument(Document):
 
 
 def _models() -> dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]]:
+    from grader import platform_documents as platforms  # noqa: PLC0415 - most commands write none of them
     from grader.rubric import RubricFile  # noqa: PLC0415 - rubrics know nothing of documents
 
     return {
@@ -514,11 +508,11 @@ def _models() -> dict[str, tuple[type[BaseModel], Literal["validation", "seriali
         "plan": (PlanDocument, "serialization"),
         "lint": (LintDocument, "serialization"),
         "calibration": (CalibrationDocument, "serialization"),
-        "moodle-rubric": (MoodleRubricDocument, "serialization"),
-        "moodle-marks": (MoodleMarksDocument, "serialization"),
-        "canvas-marks": (CanvasMarksDocument, "serialization"),
-        "gradescope": (GradescopeDocument, "serialization"),
-        "lti": (LtiDocument, "serialization"),
+        "moodle-rubric": (platforms.MoodleRubricDocument, "serialization"),
+        "moodle-marks": (platforms.MoodleMarksDocument, "serialization"),
+        "canvas-marks": (platforms.CanvasMarksDocument, "serialization"),
+        "gradescope": (platforms.GradescopeDocument, "serialization"),
+        "lti": (platforms.LtiDocument, "serialization"),
         "mechanism": (MechanismFile, "validation"),
         "assignment": (AssignmentFile, "validation"),
         "rubric": (RubricFile, "validation"),

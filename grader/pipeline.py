@@ -14,7 +14,8 @@ from pathlib import Path
 
 from grader.declaring import Declarations, Source, declarations, sure_texts
 from grader.documents import ReadingDocument, ReportDocument
-from grader.feedback import Level, criterion_feedback, with_mistakes_told
+from grader.feedback.sentences import Level, criterion_feedback
+from grader.feedback.telling import with_mistakes_told
 from grader.ink import find_ink
 from grader.intake import changed, is_blank, load, page_of
 from grader.judging import Submission, Task, judge, task_of
@@ -157,7 +158,7 @@ def _lengths(one: Seen, assignment: Assignment, rubric: RubricFile) -> dict[str,
     """The measured lengths that stand in a printed sheet's cells."""
     if one.page is None or one.sheet is None or not one.sheet.zones:
         return {}
-    from grader.answer_sheet import cells_of  # noqa: PLC0415 - brings the PDF writer; plain sheets do without
+    from grader.answer_sheet.sheets import cells_of  # noqa: PLC0415 - brings the PDF writer; plain sheets do without
 
     return written_lengths(one.page, one.sheet, cells_of(assignment, tuple(one.sheet.zones), rubric.vectors))
 

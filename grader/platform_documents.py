@@ -25,7 +25,7 @@ CLOSE = 1e-4
 class Payload(BaseModel):
     """A table that a platform takes: frozen, nothing unknown, only finite numbers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 def _once(names: Iterable[object], what: str) -> None:

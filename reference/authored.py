@@ -36,7 +36,9 @@ Model = TypeVar("Model", bound=BaseModel)
 class Authored(BaseModel):
     """A table of an authored file: frozen, nothing unknown, nothing coerced."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, arbitrary_types_allowed=True, defer_build=True
+    )
 
 
 def _read_formula(value: object) -> Formula:

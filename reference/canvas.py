@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from xml.sax.saxutils import escape
+from html import escape
 
 from reference.lettering import Text, rise_and_fall, set_pieces, width_of
 
@@ -198,10 +198,10 @@ def _text(label: Label) -> str:
     look = f'font-size="{label.size:g}" fill="{label.colour}"{style}'
     if len(placed) == 1:
         anchor = f'x="{label.at[0]:.3f}" y="{y:.3f}" text-anchor="{label.anchor}"'
-        return f"<text {anchor} {look}>{escape(placed[0].text)}</text>"
+        return f"<text {anchor} {look}>{escape(placed[0].text, quote=False)}</text>"
     spans = (
         f'<tspan x="{x + piece.right:.3f}" y="{y - piece.above:.3f}" font-size="{piece.size:g}">'
-        f"{escape(piece.text)}</tspan>"
+        f"{escape(piece.text, quote=False)}</tspan>"
         for piece in placed
     )
     return f'<text x="{x:.3f}" y="{y:.3f}" {look}>{"".join(spans)}</text>'

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from grader.answer_sheet import make_sheets
+from grader.answer_sheet.sheets import make_sheets
 from grader.roster import RosterRow
 from reference.assignment import Assignment, load_assignment
 from samples.simulation import (

@@ -11,11 +11,20 @@ import typer
 from typer.core import TyperGroup
 
 from grader import __version__
-from reference.errors import PlanmarkError
+from reference.errors import CallError, PlanmarkError
+
+LONGEST = 500
+"""Letters of a command's first sentence in the list of commands: no sentence is cut."""
 
 
 class Commands(TyperGroup):
     """The group of commands; errors of planmark end in one message and their exit status."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - click's own signature
+        """List every command with the whole of its first sentence."""
+        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, one.get_short_help_str(LONGEST)) for name, one in commands if one])
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - click's own signature
         """Run a command, and tell a known error in words instead of a traceback."""
@@ -32,6 +41,7 @@ class Commands(TyperGroup):
 app = typer.Typer(
     cls=Commands,
     no_args_is_help=True,
+    rich_markup_mode=None,  # frames around the help cost more time than all else that --help does
     add_completion=False,
     pretty_exceptions_enable=False,
     help="Marks velocity and acceleration plans of planar mechanisms drawn on A3 sheets.",
@@ -65,3 +75,11 @@ NumberOption = Annotated[
 ]
 PositionOption = Annotated[int | None, typer.Option("--position", help="The position, where there are some.")]
 LanguageOption = Annotated[str, typer.Option("--lang", help="Language of feedback: en, ro or ru.")]
+
+
+def check_language(lang: str) -> None:
+    """Refuse a language that there is no feedback in."""
+    from grader.i18n import LANGUAGES
+
+    if lang not in LANGUAGES:
+        raise CallError("unknown_language", f"--lang {lang}: known are {', '.join(LANGUAGES)}")

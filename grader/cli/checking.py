@@ -5,15 +5,14 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from grader.cli.grading import check_language, checked_level
-from grader.feedback import About, mistake_feedback, reason_sentence, write_leaflet
+from grader.cli.app import check_language
+from grader.feedback.sentences import mistake_feedback, reason_sentence
 from grader.i18n import Tongue, tongue
 from grader.judging import Submission, judge, task_of
 from grader.measurements import Measurements, names_of, read_measurements
 from grader.outcomes import Mistake, Quantity
-from grader.pipeline import Work, mark_looked
 from grader.rubric import RubricFile, rubric_of
-from grader.selfcheck import Checked, Level, is_all_right, likely_mistakes, told
+from grader.selfcheck import LEVELS, Checked, Level, is_all_right, likely_mistakes, told
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError
 
@@ -61,6 +60,14 @@ def check_measured(
     return not all_right
 
 
+def checked_level(level: str) -> Level:
+    """A level of feedback; raises CallError for another word."""
+    wanted = next((known for known in LEVELS if known == level), None)
+    if wanted is None:
+        raise CallError("unknown_level", f"--level {level}: known are {', '.join(LEVELS)}")
+    return wanted
+
+
 def _check_page(page: Path | None) -> None:
     if page is not None and page.suffix.lower() not in PAGE_FILES:
         raise CallError("page_file", f"--page {page}: the name must end in {' or '.join(PAGE_FILES)}")
@@ -76,6 +83,10 @@ def _write_page(
     level: Level,
 ) -> None:
     """The same as a page, with the plans drawn as measured."""
+    from grader.feedback.leaflet import About
+    from grader.feedback.pages import write_leaflet
+    from grader.pipeline import Work, mark_looked
+
     work = Work(entered.student_id or "", variant, measured=entered, lang=lang)
     marked = mark_looked(work, assignment, rubric, (), level)
     about = About(assignment.file.title.in_language(lang), "", assignment.file.names)

@@ -4,21 +4,24 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from grader.class_sheet import Tell, class_csv, class_pages, numbered, table_pages
-from grader.cli.grading import check_language, progress
+from grader.class_sheet.columns import class_csv
+from grader.cli.app import check_language
 from grader.cli.plans import check_crank
+from grader.cli.progress import progress
 from grader.files import write_whole
 from grader.i18n import tongue
-from grader.lint import broken_findings, broken_variants
+from grader.lint.broken import broken_findings, broken_variants
 from grader.plan_document import plan_documents
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, MechanismError
 from reference.plan import Plan, exact_plan
+
+if TYPE_CHECKING:
+    from grader.class_sheet.pages import Tell
 
 LONG = 20
 """So many drawings take seconds: their progress is shown."""
@@ -84,8 +87,9 @@ def _sound(assignment: Assignment) -> list[Variant]:
 
 
 def _print_pages(assignment: Assignment, plan: Plan, pdf: Path, *, drawings: bool, lang: str) -> None:
+    from grader.class_sheet.pages import class_pages, numbered, table_pages
     from grader.plan_pdf import pdf as as_pdf
-    from grader.plan_steps import wording_of
+    from grader.plan_steps.words import wording_of
 
     words = tongue(lang)
     pages = table_pages(assignment, plan, words)
@@ -96,7 +100,7 @@ def _print_pages(assignment: Assignment, plan: Plan, pdf: Path, *, drawings: boo
 
 
 @contextmanager
-def _told(is_long: bool) -> Iterator[Tell | None]:
+def _told(is_long: bool) -> "Iterator[Tell | None]":
     if not is_long:
         yield None
         return
@@ -106,6 +110,9 @@ def _told(is_long: bool) -> Iterator[Tell | None]:
 
 def _show_table(assignment: Assignment, plan: Plan) -> None:
     """Scales, and the drawn lengths of absolute vectors: what is asked for most while correcting."""
+    from rich.console import Console
+    from rich.table import Table
+
     console = Console()
     console.print(f"[bold]{assignment.file.title.en}[/bold], drawn lengths in mm", highlight=False)
     joints = {joint for joint in plan.motion.position if not plan.mechanism.is_ground(joint)}

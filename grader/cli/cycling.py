@@ -3,11 +3,10 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from grader.cycle import Asked, Extreme, Subject, cycle_csv, extremes, strokes_of
 from grader.cycle.page import Setting
@@ -16,6 +15,9 @@ from grader.i18n import tongue
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.canvas import svg as as_svg
 from reference.cycle import cycle
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 DECIMAL_COMMA = frozenset({"ro", "ru"})
 CONSTANT = 1e-9
@@ -70,6 +72,9 @@ def _draw(setting: Setting, subject: Subject, asked: Asked, files: tuple[Path | 
 
 def _print(assignment: Assignment, variant: Variant, subject: Subject, asked: Asked) -> None:
     """The range, strokes, and the extremes of what is asked for."""
+    from rich.console import Console
+    from rich.table import Table
+
     console = Console()
     console.print(f"[bold]{assignment.file.title.en}[/bold], {variant}", highlight=False)
     for line in (*_range(subject), *_strokes(subject)):
@@ -95,7 +100,7 @@ def _print(assignment: Assignment, variant: Variant, subject: Subject, asked: As
     console.print("every position: --csv FILE; as a diagram: --svg FILE, --pdf FILE", style="dim")
 
 
-def _path_rows(subject: Subject, point: str, table: Table) -> None:
+def _path_rows(subject: Subject, point: str, table: "Table") -> None:
     """How far a point's path reaches each way, by its samples."""
     place = np.broadcast_to(subject.cycle.motion.position[point], subject.cycle.driven.shape)
     here = complex(subject.motion_at(np.array([subject.cycle.start])).position[point][0])

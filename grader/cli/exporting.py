@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.app import LanguageOption, PositionOption, app
+from grader.cli.app import LanguageOption, PositionOption, app, check_language
 from grader.cli.commands import RosterOption
 
 if TYPE_CHECKING:
@@ -94,7 +94,6 @@ def _export(
     """Write the export file and tell who is not in it; whether anybody is missing."""
     from dataclasses import replace
 
-    from grader.cli.grading import check_language
     from grader.exports import Person, read_results, usual_name, with_ids
     from grader.exports import export as deliver
     from grader.roster import read_roster

@@ -2,24 +2,21 @@
 
 import json
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from grader.batch import Batch, grade, needs_person
+from grader.cli.app import check_language
+from grader.cli.checking import checked_level
+from grader.cli.progress import progress
 from grader.cli.telling import tell_class
 from grader.documents import ReadingDocument
-from grader.i18n import LANGUAGES
 from grader.intake import count_pages
 from grader.pipeline import Place, Seen, documents_of, read, see
 from grader.rubric import rubric_of
 from grader.samples_folder import samples_folder
-from grader.selfcheck import LEVELS, Level
-from grader.survey import Progress as Tell
 from grader.workers import Limits, Workers, result_of
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, InputFileError
@@ -54,35 +51,6 @@ def grade_folder(
         results = grade(batch, tell)
     tell_class(results, out)
     return needs_person(results)
-
-
-def check_language(lang: str) -> None:
-    """Refuse a language that there is no feedback in."""
-    if lang not in LANGUAGES:
-        raise CallError("unknown_language", f"--lang {lang}: known are {', '.join(LANGUAGES)}")
-
-
-def checked_level(level: str) -> Level:
-    """A level of feedback; raises CallError for another word."""
-    wanted = next((known for known in LEVELS if known == level), None)
-    if wanted is None:
-        raise CallError("unknown_level", f"--level {level}: known are {', '.join(LEVELS)}")
-    return wanted
-
-
-@contextmanager
-def progress() -> Iterator[Tell]:
-    """A progress bar on the terminal; what it gives tells it how far each kind of work is."""
-    columns = (TextColumn("{task.description:>8}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        tasks: dict[str, TaskID] = {}
-
-        def tell(what: str, done: int, total: int) -> None:
-            if what not in tasks:
-                tasks[what] = bar.add_task(what, total=total)
-            bar.update(tasks[what], completed=done, total=total)
-
-        yield tell
 
 
 def demo(out: Path, lang: str, jobs: int | None) -> None:
@@ -150,6 +118,7 @@ def _doubtful(document: ReadingDocument) -> bool:
 
 
 def _print_reading(document: ReadingDocument) -> None:
+    from rich.console import Console
     from rich.table import Table
 
     console = Console()

@@ -10,9 +10,11 @@ from rich.console import Console
 from rich.table import Table
 
 from grader.files import write_whole
-from grader.lint import Least, Lint, Proposal, Row, lint, lint_document, named
+from grader.lint.document import lint_document
+from grader.lint.findings import named
+from grader.lint.inspection import Least, Lint, Row, lint
 from grader.lint.lengths import WELL_READ_MM
-from grader.lint.scales import ratio_text
+from grader.lint.scales import Proposal, ratio_text
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
 from reference.canvas import Label

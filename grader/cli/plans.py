@@ -5,16 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from grader.files import write_whole
 from grader.i18n import tongue
 from grader.plan_document import plan_document
 from reference.assignment import Assignment, load_assignment
-from reference.canvas import svg as as_svg
-from reference.draw import reference_drawing
-from reference.drawing.subject import Subject
 from reference.errors import CallError
 from reference.plan import Plan, exact_plan
 
@@ -83,8 +78,10 @@ def _draw(assignment: Assignment, plan: Plan, drawings: Drawings) -> None:
     """Draw everything before the first file is written: what fails leaves none behind."""
     if not drawings.files:
         return
-    from grader.plan_pdf import pdf as as_pdf
-    from grader.plan_steps import html_page, pdf_pages, wording_of
+    from grader.plan_steps.words import wording_of
+    from reference.canvas import svg as as_svg
+    from reference.draw import reference_drawing
+    from reference.drawing.subject import Subject
 
     speaker = tongue(drawings.lang)
     subject = Subject(assignment, plan, 0, wording_of(speaker))
@@ -95,8 +92,12 @@ def _draw(assignment: Assignment, plan: Plan, drawings: Drawings) -> None:
         if drawings.svg is not None:
             written[drawings.svg] = as_svg(sheets)
         if drawings.pdf is not None:
+            from grader.plan_pdf import pdf as as_pdf
+
             written[drawings.pdf] = as_pdf(sheets, subject.title)
     if drawings.steps is not None:
+        from grader.plan_steps.pages import html_page, pdf_pages
+
         printed = drawings.steps.suffix.lower() == ".pdf"
         written[drawings.steps] = pdf_pages(subject, speaker) if printed else html_page(subject, speaker)
     for file, content in written.items():
@@ -104,6 +105,9 @@ def _draw(assignment: Assignment, plan: Plan, drawings: Drawings) -> None:
 
 
 def _print_table(assignment: Assignment, plan: Plan) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
     document = plan_document(assignment, plan)
     scales = document.scales
     console = Console()

@@ -25,8 +25,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from grader.answer_sheet import make_sheets
-from grader.lint import lint
+from grader.answer_sheet.sheets import make_sheets
+from grader.lint.inspection import lint
 from grader.pipeline import Place, read, see
 from grader.roster import RosterRow
 from grader.rubric import load_rubric

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from grader import pipeline
-from grader.answer_sheet import make_sheets
+from grader.answer_sheet.sheets import make_sheets
 from grader.batch import Batch, grade
 from grader.roster import RosterRow
 from grader.rubric import load_rubric

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.comparison import Submission, compare
-from grader.feedback import criterion_feedback
+from grader.feedback.sentences import criterion_feedback
 from grader.judging import judge
 from grader.outcomes import Outcome, Quantity, Tolerance
 from grader.records import Figure, Reading, ReadNode

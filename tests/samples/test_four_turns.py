@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from grader.answer_sheet import make_sheets
+from grader.answer_sheet.sheets import make_sheets
 from grader.pipeline import Place, read, see
 from grader.roster import RosterRow
 from grader.rubric import rubric_of

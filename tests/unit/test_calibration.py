@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from grader.answer_sheet import make_calibration
+from grader.answer_sheet.calibration import make_calibration
 from grader.calibration import calibrate, residual_map
 from grader.cli.app import app
 from grader.records import Unread

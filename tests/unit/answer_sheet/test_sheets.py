@@ -6,14 +6,9 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.answer_sheet import (
-    calibration_segments,
-    cells_of,
-    make_calibration,
-    make_sheets,
-    page_layouts,
-)
+from grader.answer_sheet.calibration import calibration_segments, make_calibration
 from grader.answer_sheet.fit import best_template, extents_mm, places_mm, poles_mm
+from grader.answer_sheet.sheets import cells_of, make_sheets, page_layouts
 from grader.answer_sheet.words import number, width_mm, wrap
 from grader.ink import find_ink
 from grader.layout import (

@@ -14,7 +14,7 @@ from grader.authoring.explained import KEYS, TABLES
 from grader.authoring.rubric import joints_of, rubric_for
 from grader.authoring.toml import commented, inline, quoted
 from grader.files import OutputError
-from grader.lint import lint
+from grader.lint.inspection import lint
 from grader.rubric import CriterionTable, RubricFile, load_rubric, rubric_of
 from reference.assignment import built_in, load_assignment
 from reference.assignment_file import AssignmentFile

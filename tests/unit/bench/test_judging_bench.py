@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from grader.judging import judge, task_of
-from grader.lint import lint
+from grader.lint.inspection import lint
 from grader.outcomes import Mistake as Named
 from grader.records import Reading
 from reference.mistakes import Mistake, commit

@@ -3,9 +3,9 @@
 import pytest
 
 from grader.comparison import Submission
-from grader.feedback import criterion_feedback, mistake_feedback
 from grader.feedback.mistakes import words_of
 from grader.feedback.pages import feedback_page
+from grader.feedback.sentences import criterion_feedback, mistake_feedback
 from grader.judging import judge
 from grader.reports import report_of
 from reference.mistakes import Drawing, Mistake, single_mistakes

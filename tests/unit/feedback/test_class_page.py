@@ -13,8 +13,7 @@ from grader.documents import (
     ReadSheets,
     StandingDocument,
 )
-from grader.feedback import write_index
-from grader.feedback.class_page import folders_of, index_page
+from grader.feedback.class_page import folders_of, index_page, write_index
 from grader.i18n import LANGUAGES
 from tests.unit.feedback.parsed import Page
 from tests.unit.feedback.works import HOSTILE, criterion, report, results

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from grader.documents import MistakeDocument, ToleranceDocument
-from grader.feedback import About
+from grader.feedback.leaflet import About
 from grader.feedback.leaflets import leaflet_of
 from grader.i18n import tongue
 from grader.scene import Arrow

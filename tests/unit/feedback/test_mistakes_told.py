@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from grader.feedback import mistake_feedback
 from grader.feedback.mistakes import PRECISE, PRECISE_ALONG_GUIDE
+from grader.feedback.sentences import mistake_feedback
 from grader.i18n import LANGUAGES
 from grader.outcomes import Mistake
 

@@ -5,9 +5,9 @@ import re
 import pytest
 
 from grader.documents import ProblemDocument, ReadingDocument, ReadSheets, SheetDocument
-from grader.feedback import About, write_feedback
 from grader.feedback.class_page import index_page
-from grader.feedback.pages import feedback_page
+from grader.feedback.leaflet import About
+from grader.feedback.pages import feedback_page, write_feedback
 from grader.i18n import LANGUAGES
 from grader.scene import MARKS
 from tests.unit.feedback.parsed import Page

@@ -6,9 +6,9 @@ import pypdfium2
 import pytest
 
 from grader.documents import RivalDocument
-from grader.feedback import About, write_feedback
+from grader.feedback.leaflet import About
 from grader.feedback.leaflets import leaflet_of
-from grader.feedback.pages import page_of
+from grader.feedback.pages import page_of, write_feedback
 from grader.feedback.printed import pdf_of
 from grader.i18n import LANGUAGES, tongue
 from tests.unit.feedback.test_pages import Page

@@ -6,10 +6,12 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.feedback import About, criterion_feedback, with_mistakes_told
+from grader.feedback.leaflet import About
 from grader.feedback.leaflets import leaflet_of
 from grader.feedback.pages import page_of
 from grader.feedback.printed import pdf_of
+from grader.feedback.sentences import criterion_feedback
+from grader.feedback.telling import with_mistakes_told
 from grader.i18n import LANGUAGES, tongue
 from grader.judging import Submission, judge, task_of
 from grader.records import Figure, Reading, ReadVector

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from grader.answer_sheet import make_sheets
+from grader.answer_sheet.sheets import make_sheets
 from grader.letters import written_scales
 from grader.letters.boxes import read_scale
 from grader.letters.grammar import moves, start

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from grader.documents import schema
-from grader.lint import lint, lint_document, named
+from grader.lint.document import lint_document
+from grader.lint.findings import named
+from grader.lint.inspection import lint
 from grader.rubric import load_rubric
 from reference.assignment import Variant, built_in, library, load_assignment
 from reference.plan import exact_plan

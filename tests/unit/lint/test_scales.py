@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grader.lint import lint, suggestions
-from grader.lint.scales import LENGTH_STEPS, RATE_STEPS, ratio_text, round_up
+from grader.lint.inspection import lint
+from grader.lint.scales import LENGTH_STEPS, RATE_STEPS, ratio_text, round_up, suggestions
 from grader.rubric import load_rubric
 from reference.assignment import built_in, library, load_assignment
 

@@ -6,7 +6,7 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.answer_sheet import make_sheets
+from grader.answer_sheet.sheets import make_sheets
 from grader.intake import page_of
 from grader.records import Page, Sheet
 from grader.roster import RosterRow

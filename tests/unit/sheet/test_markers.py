@@ -8,7 +8,8 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.answer_sheet import make_calibration, make_sheets
+from grader.answer_sheet.calibration import make_calibration
+from grader.answer_sheet.sheets import make_sheets
 from grader.intake import pages_of
 from grader.layout import MARKER_CORNERS, TEMPLATES
 from grader.records import Identity, Page

@@ -1,0 +1,85 @@
+"""What a command imports: no heavy library for work that is not asked for. mpmath refines dead points."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.functional.conftest import ROOT
+
+HEAVY = frozenset(
+    "scipy cv2 skimage reportlab pikepdf pypdfium2 PIL tifffile imagecodecs simplejpeg zxingcpp jinja2 rich"
+    " mpmath pebble psutil segno babel".split()
+)
+SCANS = frozenset("scipy cv2 PIL pikepdf pypdfium2 tifffile imagecodecs simplejpeg zxingcpp".split())
+PAGES = frozenset({"jinja2", "reportlab"})
+
+PROGRAM = """
+import atexit, sys
+
+def tell():
+    with open("imported.txt", "w") as file:
+        file.write("\\n".join(sys.modules))
+
+atexit.register(tell)
+from grader.cli import main
+main()
+"""
+
+
+def imported(folder, *arguments):
+    """The heavy modules that a command has imported when it ends."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "COLUMNS": "120"}
+    run = subprocess.run(  # noqa: S603 - our own program
+        [sys.executable, "-c", PROGRAM, *arguments], cwd=folder, env=environment, capture_output=True,
+        text=True, encoding="utf-8", timeout=300, check=False,
+    )  # fmt: skip
+    assert run.returncode in {0, 1}, run.stderr
+    modules = (folder / "imported.txt").read_text().split("\n")
+    assert "grader.cli.commands" in modules
+    return HEAVY & set(modules)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with one student's measurements to check, and a class's to grade."""
+    (tmp_path / "class").mkdir()
+    measured = {"student_id": "s07", "n": 7, "segments_mm": {"v_A": 60.0}}
+    for path in (tmp_path / "measured.json", tmp_path / "class" / "s07.json"):
+        path.write_text(json.dumps(measured), encoding="utf-8")
+    (tmp_path / "class" / "roster.csv").write_text("student_id,name,n\ns07,Ana,7\n", encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("command", "allowed"),
+    [
+        ("--help", set()),
+        ("plan pump --n 7 --json", set()),
+        ("plan pump --n 7", {"rich"}),
+        ("plan pump --n 7 --svg plan.svg", {"rich"}),
+        ("plan pump --all --csv all.csv", set()),
+        ("plan pump --all", {"rich"}),
+        ("check pump --measured measured.json", {"rich"}),
+        ("lint pump", {"rich", "scipy"}),
+        ("schema report", set()),
+        ("cycle pump --n 7 --csv cycle.csv", set()),
+        ("cycle pump --n 7", {"rich", "mpmath"}),
+        ("cycle pump --n 7 --svg cycle.svg", {"mpmath"}),
+    ],
+)
+def test_a_command_imports_no_heavy_library_that_it_does_not_use(folder, command, allowed):
+    assert imported(folder, *command.split()) <= allowed
+
+
+def test_grading_imports_no_heavy_library_beyond_those_of_scans_pages_and_processes(folder):
+    allowed = {*SCANS, *PAGES, "rich", "pebble", "psutil"}
+    assert (
+        imported(
+            folder, "grade", "class", "--assignment", "pump", "--roster", "class/roster.csv", "--out", "out",
+            "--jobs", "1",
+        )
+        <= allowed
+    )  # fmt: skip
