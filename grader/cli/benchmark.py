@@ -19,7 +19,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from grader.cli.grading import progress
+from grader.cli.progress import progress
 from grader.pipeline import Place, read, see
 from grader.records import Reading
 from grader.roster import read_roster
