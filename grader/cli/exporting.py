@@ -9,7 +9,7 @@ from grader.cli.app import LanguageOption, PositionOption, app
 from grader.cli.commands import RosterOption
 
 if TYPE_CHECKING:
-    from grader.exports import Delivery, Options
+    from grader.lms import Delivery, Options
 
 
 @app.command()
@@ -73,7 +73,7 @@ def export(
     lang: LanguageOption = "en",
 ) -> None:
     """Write the results for a learning platform, validated before anything is written."""
-    from grader.exports import Options
+    from grader.lms import Options
     from reference.errors import CallError
 
     if worksheet is not None and (gradebook is not None or to != "moodle"):
@@ -95,8 +95,8 @@ def _export(
     from dataclasses import replace
 
     from grader.cli.grading import check_language
-    from grader.exports import Person, read_results, usual_name, with_ids
-    from grader.exports import export as deliver
+    from grader.lms import Person, read_results, usual_name, with_ids
+    from grader.lms import export as deliver
     from grader.roster import read_roster
     from reference.errors import CallError
 

@@ -12,7 +12,7 @@ import typer.main
 from typer.testing import CliRunner
 
 from grader.cli import app
-from grader.documents import schema
+from grader.cli.schemas import schema
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "tests" / "unit" / "older" / "2026-11-22-0304" / "results.json"

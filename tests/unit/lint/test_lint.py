@@ -7,7 +7,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from grader.documents import schema
+from grader.cli.schemas import schema
 from grader.lint import lint, lint_document, named
 from grader.rubric import load_rubric
 from reference.assignment import Variant, built_in, library, load_assignment

@@ -8,8 +8,9 @@ import jsonschema
 import pytest
 
 from grader.batch import Batch, grade
-from grader.documents import SCHEMA_VERSION, ReportDocument, ResultsDocument, schema
-from grader.exports import Options, export, read_results
+from grader.cli.schemas import schema
+from grader.documents import SCHEMA_VERSION, ReportDocument, ResultsDocument
+from grader.lms import Options, export, read_results
 from grader.rubric import rubric_of
 from grader.versions import STEPS, current
 from reference.assignment import load_assignment

@@ -1,0 +1,390 @@
+"""Canvas: gradebook, rubric, and points in it."""
+
+import csv
+import io
+import json
+
+import jsonschema
+import pytest
+
+from grader.cli.schemas import schema
+from grader.lms import Options, Person, export
+from reference.errors import CallError, InputFileError
+from tests.unit.lms import importers
+from tests.unit.lms.classroom import marked, report, results
+
+EXPORTED = (
+    "Student,ID,SIS User ID,SIS Login ID,Section,Quiz (7),Pump (12345),Current Score,Final Score\r\n"
+    "    Points Possible,,,,,5,10.00,(read only),(read only)\r\n"
+    '"Popescu, Ion",4711,s01,ion@x.ro,"Group ""A"", 2",3,,55,55\r\n'
+    '"Șerban, Țuțu",4712,S-02,tutu@x.ro,1,4,6.00,,\r\n'
+    '"Student, Test",4713,,abcdef,1,,,,\r\n'
+)
+
+
+def canvas(out, *reports, form=None, text=EXPORTED, what=None, **how):
+    if form is not None:
+        form.write_bytes(text if isinstance(text, bytes) else text.encode())
+    delivery = export(results(*reports), out, Options(to="canvas", what=what, form=form, **how))
+    return delivery, out.read_bytes().decode()
+
+
+def filled(tmp_path, *reports, text=EXPORTED, **how):
+    how.setdefault("item", "Pump (12345)")
+    return canvas(tmp_path / "out.csv", *reports, form=tmp_path / "in.csv", text=text, **how)
+
+
+# The teacher's own file ---------------------------------------------------------------------------
+
+
+def test_only_the_cells_of_those_who_have_a_grade_change(tmp_path):
+    delivery, text = filled(tmp_path, report("s01", 7.5), report("s02", None, status="needs_review"))
+    assert text == EXPORTED.replace('2",3,,55', '2",3,7.5,55')
+    assert (delivery.written, delivery.withheld) == (("s01",), {"s02": "needs review"})
+
+
+def test_a_mark_and_bare_line_ends_are_kept(tmp_path):
+    data = b"\xef\xbb\xbf" + EXPORTED.replace("\r\n", "\n").encode()
+    _, text = filled(tmp_path, report("s01", 7.5), text=data)
+    assert text.encode() == data.replace(b'2",3,,55', b'2",3,7.5,55')
+
+
+def test_a_semicolon_file_with_decimal_commas_is_understood(tmp_path):
+    semi = (
+        "Student;ID;SIS User ID;SIS Login ID;Section;Pump (12345)\n"
+        "    Points Possible;;;;;10,00\n"
+        "Popescu, Ion;4711;s01;ion@x.ro;1;7,50\n"
+        "Popa, Ana;4712;s02;ana@x.ro;1;\n"
+    )
+    delivery, text = filled(tmp_path, report("s01", 7.5), report("s02", 2.25), text=semi)
+    assert text == semi.replace("ana@x.ro;1;", "ana@x.ro;1;2.25")
+    assert delivery.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("student", "person"),
+    [
+        ("x1", Person(platform_id="4712")),
+        ("x1", Person(username="TUTU@x.ro")),
+        ("x1", Person(email="tutu@x.ro")),
+        ("s-02", Person()),
+        ("x1", Person(name="Țuțu Șerban")),
+        ("x1", Person(name="Șerban, Țuțu")),
+    ],
+)
+def test_students_are_found_by_number_login_and_name(tmp_path, student, person):
+    delivery, text = filled(tmp_path, report(student, 7.5), people={student: person})
+    assert delivery.written == (student,)
+    assert "1,4,7.5,," in text
+    assert delivery.notes[0] == "1 grade(s) that Canvas holds already are changed"
+    assert ("found by name alone" in delivery.notes[-1]) == bool(person.name)
+
+
+def test_who_is_not_there_or_shares_a_row_is_told(tmp_path):
+    people = {
+        "s01": Person(username="ion@x.ro"),
+        "s02": Person(platform_id="4712"),
+        "S-02": Person(),
+        "s08": Person(name="Popescu, Ion"),
+        "s09": Person(name="Nobody"),
+    }
+    delivery, text = filled(tmp_path, *(report(one, 7.5) for one in people), people=people)
+    assert text == EXPORTED.replace('2",3,,55', '2",3,7.5,55')
+    assert delivery.written == ("s01",)
+    assert "fits s02 and S-02 alike" in delivery.not_found["s02"]
+    assert "has the name, but another SIS User ID" in delivery.not_found["s08"]
+    assert "nobody in the gradebook has" in delivery.not_found["s09"]
+
+
+def test_a_grade_that_canvas_holds_for_a_withheld_student_stays_and_is_told(tmp_path):
+    delivery, text = filled(tmp_path, report("S-02", None, status="needs_review"))
+    assert text == EXPORTED
+    assert "withheld, and a grade is there already, which stays: S-02 (6.00)" in delivery.notes
+
+
+@pytest.mark.parametrize("cell", ["EX", "ex", "N/A"])
+def test_excused_students_are_left(tmp_path, cell):
+    text = EXPORTED.replace('2",3,,55', f'2",3,{cell},55')
+    delivery, after = filled(tmp_path, report("s01", 7.5), text=text)
+    assert after == text
+    assert "excused" in delivery.not_found["s01"]
+
+
+@pytest.mark.parametrize("item", ["Pump (12345)", "Pump", "12345"])
+def test_the_assignment_is_named_by_header_title_or_number(tmp_path, item):
+    assert filled(tmp_path, report("s01", 7.5), item=item)[0].written == ("s01",)
+
+
+@pytest.mark.parametrize(
+    ("item", "told"),
+    [
+        ("", r"which assignment\? Name it with --item: 'Quiz \(7\)', 'Pump \(12345\)'"),
+        ("Press", "0 assignments fit 'Press'"),
+    ],
+)
+def test_an_assignment_that_is_not_told_is_refused(tmp_path, item, told):
+    with pytest.raises(CallError, match=told):
+        filled(tmp_path, report("s01", 7.5), item=item)
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_another_maximum_needs_leave_to_rescale(tmp_path):
+    with pytest.raises(CallError, match="maximum there is 10, the rubric's is 40"):
+        filled(tmp_path, report("s01", 30.0, max_score=40.0))
+    _, text = filled(tmp_path, report("s01", 30.0, max_score=40.0), rescale=True)
+    assert '2",3,7.5,55' in text
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "no students"),
+        ("a,b\n1,2\n", "not the columns"),
+        (EXPORTED.replace("    Points Possible", "x"), "no row 'Points Possible'"),
+        (EXPORTED.replace("10.00", "(read only)"), "has '\\(read only\\)' points possible"),
+        (EXPORTED.replace("10.00", "0"), "has '0' points possible"),
+        (EXPORTED.replace("55,55", "55"), "row 3: has 8 cells"),
+        (EXPORTED.encode("utf-16"), "not UTF-8"),
+        (EXPORTED + '"open', "never closed"),
+    ],
+)
+def test_a_file_that_is_no_exported_gradebook_is_refused(tmp_path, text, told):
+    with pytest.raises(InputFileError, match=told):
+        filled(tmp_path, report("s01", 7.5), text=text)
+    assert not (tmp_path / "out.csv").exists()
+
+
+# A new file ---------------------------------------------------------------------------------------
+
+
+def test_canvas_reads_a_new_file_as_it_is_meant(tmp_path):
+    people = {
+        "s01": Person(name="Popescu, Ion", platform_id="4711", username="ion"),
+        "s02": Person(name="Țuțu"),
+    }
+    _, text = canvas(
+        tmp_path / "out.csv",
+        report("s01", 1234.5, max_score=2000.0),
+        report("s02", 0.0, max_score=2000.0),
+        report("s03", None, status="needs_review", max_score=2000.0),
+        item="Pump (12345)",
+        people=people,
+    )
+    possible, found = importers.canvas_gradebook(
+        text, "Pump (12345)", by_id={"4711": "Ion"}, by_sis={"s02": "T"}
+    )
+    assert possible == 2000.0
+    assert found == {"Ion": "1234.5", "T": "0"}
+
+
+def test_a_title_without_its_number_is_told_to_be_a_new_assignment(tmp_path):
+    delivery, _ = canvas(tmp_path / "out.csv", report("s01", 7.5))
+    assert any("new assignment" in note for note in delivery.notes)
+    delivery, _ = canvas(tmp_path / "out.csv", report("s01", 7.5), item="Pump (12345)")
+    assert not any("new assignment" in note for note in delivery.notes)
+
+
+@pytest.mark.parametrize(
+    ("student", "person", "item", "told"),
+    [
+        ("1.2.3", Person(), "", "takes this for a number"),
+        ("s01", Person(platform_id="x"), "", "no number of a Canvas user"),
+        ("s01", Person(name="Points Possible"), "", "the row of points"),
+        ("s01", Person(name="=cmd()"), "", "formula"),
+        ("s01", Person(), "=Pump", "no title"),
+        ("s01", Person(), "Section", "no title"),
+    ],
+)
+def test_what_canvas_would_misread_is_refused(tmp_path, student, person, item, told):
+    with pytest.raises(CallError, match=told):
+        canvas(tmp_path / "out.csv", report(student, 7.5), people={student: person}, item=item)
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_two_students_with_one_number_are_refused(tmp_path):
+    people = {"s01": Person(platform_id="1"), "s02": Person(platform_id="1")}
+    with pytest.raises(CallError, match="the same number as s01"):
+        canvas(tmp_path / "out.csv", report("s01", 7.5), report("s02", 7.5), people=people)
+
+
+# Rubric -------------------------------------------------------------------------------------------
+
+
+def test_the_rubric_has_a_range_of_points_for_each_criterion(tmp_path):
+    delivery, text = canvas(
+        tmp_path / "out.csv", marked("s01", 5.0, 2.5), marked("s02", 5.0, None), what="rubric", item="Pump"
+    )
+    assert not text.startswith("\ufeff")
+    assert importers.canvas_rubric(text) == {
+        "Pump": [
+            ("c1: Vector 1", True, [("Full marks", 5.0), ("No marks", 0.0)]),
+            ("c2: Vector 2", True, [("Full marks", 5.0), ("No marks", 0.0)]),
+        ]
+    }
+    assert delivery.is_complete
+
+
+def test_a_rubric_is_known_before_anybody_has_a_grade(tmp_path):
+    _, text = canvas(tmp_path / "out.csv", marked("s01", 5.0, 2.5, status="needs_review"), what="rubric")
+    assert len(text.splitlines()) == 3
+
+
+def test_points_that_canvas_would_round_are_refused(tmp_path):
+    rough = marked("s01", 5.0)
+    rough = rough.model_copy(
+        update={"criteria": [one.model_copy(update={"max_points": 1.125}) for one in rough.criteria]}
+    )
+    with pytest.raises(CallError, match="two decimals"):
+        canvas(tmp_path / "out.csv", rough, what="rubric")
+
+
+# Points in it -------------------------------------------------------------------------------------
+
+RUBRIC = {
+    "id": 1,
+    "title": "Pump",
+    "data": [
+        {"id": "_1", "description": "c1: Vector 1", "points": 5.0, "ratings": [{"id": "a", "points": 5.0}]},
+        {"id": "_2", "description": "Vector 2", "points": 5.0, "ratings": []},
+    ],
+}
+
+
+@pytest.fixture
+def rubric(tmp_path):
+    path = tmp_path / "rubric.json"
+    path.write_text(json.dumps(RUBRIC), encoding="utf-8")
+    return path
+
+
+def points(tmp_path, rubric, *reports, **how):
+    return canvas(tmp_path / "marks.json", *reports, what="marks", criteria=rubric, **how)
+
+
+def test_points_add_up_to_the_grade_and_go_to_canvass_own_criteria(tmp_path, rubric):
+    delivery, text = points(
+        tmp_path, rubric, marked("s01", 5.0, 2.5), marked("s02", 3.0, None), course_id=12, assignment_id=345
+    )
+    told = json.loads(text)
+    jsonschema.validate(told, schema("canvas-marks"))
+    first, second = told["calls"]
+    assert first["path"] == "/api/v1/courses/12/assignments/345/submissions/sis_user_id:s01"
+    assert first["body"]["submission"] == {"posted_grade": "7.5"}
+    assert first["body"]["rubric_assessment"]["_2"]["points"] == 2.5
+    assert "Told <why> & how." in first["body"]["rubric_assessment"]["_2"]["comments"]
+    assert {name: one["points"] for name, one in second["body"]["rubric_assessment"].items()} == {
+        "_1": 3.0, "_2": 3.0,
+    }  # fmt: skip
+    assert second["body"]["submission"] == {"posted_grade": "6"}
+    assert second["body"]["rubric_assessment"]["_2"]["comments"].startswith("– not judged: ")
+    bulk = told["bulk"]
+    assert bulk["path"].endswith("/345/submissions/update_grades")
+    assert list(bulk["body"]["grade_data"]) == ["sis_user_id:s01", "sis_user_id:s02"]
+    assert delivery.notes == ()
+
+
+def test_paths_have_canvass_own_placeholders_where_numbers_are_not_told(tmp_path, rubric):
+    delivery, text = points(
+        tmp_path, rubric, marked("s01", 5.0, 2.5), people={"s01": Person(platform_id="9")}
+    )
+    path = json.loads(text)["calls"][0]["path"]
+    assert path == "/api/v1/courses/:course_id/assignments/:assignment_id/submissions/9"
+    assert "--course-id" in delivery.notes[0]
+
+
+@pytest.mark.parametrize("number", ["0", "a/b", "sis_user_id:", "sis_user_id:a/../b", "name"])
+def test_a_number_that_canvas_would_not_take_is_refused(tmp_path, rubric, number):
+    with pytest.raises(InputFileError, match="grade_data"):
+        points(tmp_path, rubric, marked("s01", 5.0, 2.5), people={"s01": Person(platform_id=number)})
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        {"rubric": RUBRIC["data"], "id": 345, "description": "<p>", "points_possible": 10},
+        RUBRIC["data"],
+        {"criteria": RUBRIC["data"], "id": 1},
+        {"rubric": {"id": 1, "title": "x", "criteria": RUBRIC["data"]}},
+    ],
+)
+def test_canvass_answers_of_every_shape_are_understood(tmp_path, rubric, answer):
+    rubric.write_text(json.dumps(answer), encoding="utf-8")
+    assert points(tmp_path, rubric, marked("s01", 5.0, 2.5))[0].written == ("s01",)
+
+
+def test_criteria_may_be_told_in_a_table(tmp_path):
+    table = tmp_path / "criteria.csv"
+    table.write_text("criterion,id\nc1,_8\nc2,_9\n", encoding="utf-8")
+    _, text = points(tmp_path, table, marked("s01", 5.0, 2.5))
+    assert list(json.loads(text)["calls"][0]["body"]["rubric_assessment"]) == ["_8", "_9"]
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"description": "v_X"}, "c1: Vector 1: not there .*'v_X': there, and not in the rubric"),
+        ({"points": 4.0}, "4 points there, 5 in the rubric"),
+        ({"description": "c2: Vector 2"}, "2 times"),
+        ({"id": "_2"}, "two criteria have one number"),
+    ],
+)
+def test_criteria_that_are_not_the_rubrics_are_refused(tmp_path, rubric, change, told):
+    first, second = RUBRIC["data"]
+    rubric.write_text(json.dumps([{**first, **change}, second]), encoding="utf-8")
+    with pytest.raises(InputFileError, match=f"(?s){told}"):
+        points(tmp_path, rubric, marked("s01", 5.0, 2.5))
+    assert not (tmp_path / "marks.json").exists()
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"id": 1}', "nonsense", "[" * 100_000])
+def test_an_answer_without_criteria_is_refused(tmp_path, rubric, content):
+    rubric.write_text(content, encoding="utf-8")
+    with pytest.raises(InputFileError, match=r"rubric\.json"):
+        points(tmp_path, rubric, marked("s01", 5.0, 2.5))
+
+
+def test_criteria_need_their_numbers(tmp_path):
+    with pytest.raises(CallError, match="numbers of the criteria are needed"):
+        canvas(tmp_path / "out.json", marked("s01", 5.0, 2.5), what="marks")
+
+
+def test_points_that_do_not_add_up_to_the_score_are_refused(tmp_path, rubric):
+    wrong = marked("s01", 5.0, 2.5).model_copy(update={"score": 9.0})
+    with pytest.raises(InputFileError, match=r"the criteria give 7\.5 points together, the score is 9"):
+        points(tmp_path, rubric, wrong)
+
+
+def test_students_marked_by_other_criteria_are_refused(tmp_path, rubric):
+    other = marked("s02", 5.0, 2.5)
+    other = other.model_copy(
+        update={"criteria": [one.model_copy(update={"id": f"x_{one.id}"}) for one in other.criteria]}
+    )
+    with pytest.raises(InputFileError, match="s02: other criteria or points than s01"):
+        points(tmp_path, rubric, marked("s01", 5.0, 2.5), other)
+
+
+def test_titles_in_several_languages_are_one_criterion(tmp_path, rubric):
+    delivery, _ = points(
+        tmp_path, rubric, marked("s01", 5.0, 2.5), marked("s02", 5.0, 0.0, title="Vectorul {}")
+    )
+    assert delivery.written == ("s01", "s02")
+
+
+def test_positions_are_summed_or_averaged_criterion_by_criterion(tmp_path, rubric):
+    both = marked("s01", 5.0, 2.5, position=1), marked("s01", 0.0, 5.0, position=2)
+    _, text = points(tmp_path, rubric, *both, combine="mean")
+    body = json.loads(text)["calls"][0]["body"]
+    assert [one["points"] for one in body["rubric_assessment"].values()] == [2.5, 3.75]
+    assert body["submission"]["posted_grade"] == "6.25"
+    assert "1: ✓" in body["rubric_assessment"]["_1"]["comments"]
+    with pytest.raises(InputFileError, match="5 points there, 10 in the rubric"):
+        points(tmp_path, rubric, *both, combine="sum")
+
+
+def test_the_rows_of_a_new_file_are_what_a_spreadsheet_shows(tmp_path):
+    _, text = canvas(tmp_path / "out.csv", report("s01", 7.5), item="Pump (1)")
+    assert list(csv.reader(io.StringIO(text, newline=""))) == [
+        ["Student", "ID", "SIS User ID", "SIS Login ID", "Section", "Pump (1)"],
+        ["    Points Possible", "", "", "", "", "10"],
+        ["s01", "", "s01", "", "", "7.5"],
+    ]
