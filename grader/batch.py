@@ -12,7 +12,7 @@ from grader.files import make_folder, write_whole
 from grader.folder import submissions, told_name
 from grader.jobs import Job, alike_of_run, folders_of, inputs_of_run
 from grader.kept import digest_of, keep_looked, keep_maps, kept_looked
-from grader.lms import write_summary
+from grader.lms.table import write_summary
 from grader.measurements import names_of
 from grader.moved import earlier, moved, note_inputs, noted_inputs
 from grader.ownership import Unmatched, assign_pages

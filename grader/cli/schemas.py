@@ -14,13 +14,9 @@ from grader.documents import (
     ReportDocument,
     ResultsDocument,
 )
-from grader.lms.documents import (
-    CanvasMarksDocument,
-    GradescopeDocument,
-    LtiDocument,
-    MoodleMarksDocument,
-    MoodleRubricDocument,
-)
+from grader.lms.canvas import CanvasMarksDocument
+from grader.lms.moodle_guide import MoodleMarksDocument, MoodleRubricDocument
+from grader.lms.scores import GradescopeDocument, LtiDocument
 from grader.rubric import RubricFile
 from reference.assignment_file import AssignmentFile
 from reference.errors import CallError

@@ -1,22 +1,31 @@
-"""One grade per student for a gradebook, and which ones are held back."""
+"""One grade for each student, or why there is none yet; and what an export is given and gives back."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from types import MappingProxyType
 
 from grader.documents import ReportDocument, ResultsDocument
 from grader.roster import why_no_id
-from reference.errors import CallError, InputFileError
+from reference.errors import CallError, InputFileError, lines_of
+
+Content = Mapping[str, bytes | Path]
+"""Names, and the content of each: bytes, or a file that is read when it is written."""
+COMBINE = ("sum", "mean")
+_MOST_NAMES = 20
+"""A line of more names is not read."""
 
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """Who a student is outside; what is not known is empty.
+    """A student as platforms know one; what is not known is empty.
 
     Attributes
     ----------
     platform_id : the platform's own number or name of the student
     participant : number in the assignment's worksheet
-    lang : in which the feedback is
+    lang : language of the feedback
     """
 
     name: str = ""
@@ -27,12 +36,61 @@ class Person:
     lang: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Grade:
-    """A student's grade, or why there is none yet.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """The options of ``planmark export`` by their names; None or empty where not given.
 
     Attributes
     ----------
+    out : the folder of results; only ``feedback`` needs it
+    people : names, addresses and the platform's numbers by student_id
+    form : the platform's own file to fill in: Moodle's worksheet, Canvas's exported gradebook
+    item : the grade item's name; the assignment's id where empty
+    now : time of the export; the clock's if None
+    """
+
+    to: str
+    what: str | None = None
+    out: Path | None = None
+    people: Mapping[str, Person] = field(default_factory=lambda: MappingProxyType({}))
+    form: Path | None = None
+    criteria: Path | None = None
+    identity: str | None = None
+    item: str = ""
+    position: int | None = None
+    combine: str | None = None
+    maximum: float | None = None
+    rescale: bool = False
+    visibility: str | None = None
+    course_id: int | None = None
+    assignment_id: int | None = None
+    cmid: int | None = None
+    context_id: int | None = None
+    lang: str = "en"
+    now: datetime | None = None
+
+    @property
+    def moment(self) -> datetime:
+        """The time of the export, with its zone."""
+        return self.now or datetime.now(UTC)
+
+    def person(self, student_id: str) -> Person:
+        """A student as far as known."""
+        return self.people.get(student_id, Person())
+
+    def lang_of(self, student_id: str) -> str:
+        """The language of a student's comments."""
+        return self.person(student_id).lang or self.lang
+
+
+@dataclass(frozen=True, slots=True)
+class Grade:
+    """A student's grade.
+
+    Attributes
+    ----------
+    score : None where there is none yet
+    withheld : why there is none yet
     folders : of each report below the results: the student's, with several positions one for each
     """
 
@@ -43,8 +101,72 @@ class Grade:
     withheld: str = ""
     folders: tuple[str, ...] = ()
 
+    def out_of(self, maximum: float, *, rescale: bool) -> float:
+        """The score out of a platform's maximum.
 
-COMBINE = ("sum", "mean")
+        Raises CallError where the maxima differ and nobody asked for rescaling: a silent 9 of 10 would
+        become a 9 of 100.
+        """
+        score = self.score or 0.0
+        if abs(maximum - self.max_score) <= 1e-6 * max(1.0, maximum):
+            return score
+        if not rescale:
+            raise CallError(
+                "maximum_differs",
+                f"the grade's maximum there is {maximum:g}, the rubric's is {self.max_score:g}:"
+                " set the same maximum there, or ask for rescaling (--rescale)",
+            )
+        return score * maximum / self.max_score
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """An export's content, and who is not in it.
+
+    Attributes
+    ----------
+    content : the file's; of several files by their names, for an archive or a folder
+    written : students with a grade in it
+    withheld : students without one, with why (they wait for a person, or handed in nothing)
+    unplaced : students for whom the platform's file has no place, with why
+    notes : what the person who uploads it should know
+    """
+
+    content: str | bytes | Content
+    written: tuple[str, ...] = ()
+    withheld: Mapping[str, str] = field(default_factory=dict)
+    unplaced: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether everybody's grade is in the file."""
+        return not self.withheld and not self.unplaced
+
+    def among(self, grades: Sequence[Grade]) -> "Delivery":
+        """The same, with who of these students is written and who is withheld."""
+        students = [grade.student_id for grade in ready(grades)]
+        return replace(
+            self,
+            written=tuple(student for student in students if student not in self.unplaced),
+            withheld={grade.student_id: grade.withheld for grade in grades if grade.score is None},
+        )
+
+
+def ready(grades: Sequence[Grade]) -> list[Grade]:
+    """The grades that have a score."""
+    return [grade for grade in grades if grade.score is not None]
+
+
+def assignment_of(grades: Sequence[Grade]) -> str:
+    """The assignment's id."""
+    return grades[0].reports[0].assignment
+
+
+def in_a_row(names: Sequence[str]) -> str:
+    """Names in one line, the first of many."""
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return ", ".join(names[:_MOST_NAMES]) + more
 
 
 def grades_of(
@@ -64,9 +186,12 @@ def grades_of(
     if position is not None and combine is not None:
         raise CallError("combine", "either one position or a way to combine them, not both")
     _check(results.reports)
-    found = []
-    for student_id, reports in _by_student(results.reports).items():
-        chosen = tuple(r for r in reports if position is None or r.position == position)
+    students: dict[str, list[ReportDocument]] = {}
+    for report in results.reports:
+        students.setdefault(report.student_id, []).append(report)
+    grades = []
+    for student_id, reports in students.items():
+        chosen = tuple(report for report in reports if position in (None, report.position))
         if len(chosen) > 1 and combine is None:
             raise CallError(
                 "several_positions",
@@ -75,86 +200,56 @@ def grades_of(
             )
         if chosen:
             folders = tuple(_folder(report, len(reports)) for report in chosen)
-            found.append(_grade(student_id, chosen, combine, folders))
-    if not found:
+            grades.append(_grade(student_id, chosen, combine, folders))
+    if not grades:
         raise CallError("nothing_to_export", "the results hold no report that could be exported")
-    return found
+    return grades
 
 
 def _check(reports: Sequence[ReportDocument]) -> None:
-    """Results that somebody has changed by hand, or a program has mixed up."""
+    """InputFileError for results that somebody has changed by hand, or a program has mixed up."""
     faults = []
-    seen = set()
+    keys = set()
     for report in reports:
         who = report.student_id if report.position is None else f"{report.student_id} at {report.position}"
         if why_no_id(report.student_id) is not None:
             faults.append(f"'{report.student_id}' is no student_id")
-        if (report.student_id, report.position) in seen:
+        if (report.student_id, report.position) in keys:
             faults.append(f"{who}: has two reports")
-        seen.add((report.student_id, report.position))
+        keys.add((report.student_id, report.position))
         if report.score is not None and not 0.0 <= report.score <= report.max_score + 1e-9:
             faults.append(f"{who}: the score {report.score:g} is not between 0 and {report.max_score:g}")
         if report.max_score <= 0.0:
             faults.append(f"{who}: the maximum is {report.max_score:g}")
     if faults:
-        told = "\n".join(f"  {fault}" for fault in faults)
-        raise InputFileError("results_wrong", f"results.json contradicts itself; grade again\n{told}")
+        message = f"results.json contradicts itself; grade again\n{lines_of(faults)}"
+        raise InputFileError("results_wrong", message)
 
 
-def _by_student(reports: Sequence[ReportDocument]) -> Mapping[str, list[ReportDocument]]:
-    students: dict[str, list[ReportDocument]] = {}
-    for report in reports:
-        students.setdefault(report.student_id, []).append(report)
-    return students
-
-
-def _folder(report: ReportDocument, of_the_student: int) -> str:
-    if of_the_student == 1:
+def _folder(report: ReportDocument, positions: int) -> str:
+    if positions == 1:
         return report.student_id
     return f"{report.student_id}/{'unknown' if report.position is None else report.position}"
+
+
+_WHY = {
+    "needs_review": "needs review",
+    "unreadable": "unreadable",
+    "missing": "nothing handed in",
+    "graded": "has no score",
+}
+"""Why a report of each status has no grade yet, for the terminal."""
 
 
 def _grade(
     student_id: str, reports: tuple[ReportDocument, ...], combine: str | None, folders: tuple[str, ...]
 ) -> Grade:
     maximum = sum(report.max_score for report in reports)
+    score = sum(report.score or 0.0 for report in reports)
     parts = len(reports) if combine == "mean" else 1
-    waiting = [report for report in reports if report.status != "graded" or report.score is None]
-    if waiting:
-        return Grade(student_id, None, maximum / parts, reports, _why(waiting), folders)
-    score = sum(report.score for report in reports if report.score is not None)
-    return Grade(student_id, score / parts, maximum / parts, reports, folders=folders)
-
-
-def _why(waiting: list[ReportDocument]) -> str:
-    """In words for the terminal."""
-    words = {
-        "needs_review": "needs review",
-        "unreadable": "unreadable",
-        "missing": "nothing handed in",
-        "graded": "has no score",
-    }
-    told = []
-    for report in waiting:
-        where = "" if report.position is None else f"position {report.position}: "
-        told.append(where + words[report.status])
-    return ", ".join(told)
-
-
-def rescaled(grade: Grade, maximum: float, *, rescale: bool) -> float | None:
-    """The score out of another maximum.
-
-    Raises CallError where the maxima differ and nobody asked for rescaling: a silent 9 of 10 would
-    become a 9 of 100.
-    """
-    if grade.score is None:
-        return None
-    if abs(maximum - grade.max_score) <= 1e-6 * max(1.0, maximum):
-        return grade.score
-    if not rescale:
-        raise CallError(
-            "maximum_differs",
-            f"the grade's maximum there is {maximum:g}, the rubric's is {grade.max_score:g}:"
-            " set the same maximum there, or ask for rescaling (--rescale)",
-        )
-    return grade.score * maximum / grade.max_score
+    why = ", ".join(
+        ("" if report.position is None else f"position {report.position}: ") + _WHY[report.status]
+        for report in reports
+        if report.status != "graded" or report.score is None
+    )
+    return Grade(student_id, None if why else score / parts, maximum / parts, reports, why, folders)

@@ -8,11 +8,13 @@ from contextlib import suppress
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from grader.lms import Options, Person, export, read_results
-from grader.lms.canvas_gradebook import fill as fill_gradebook
-from grader.lms.grades import grades_of
-from grader.lms.moodle_worksheet import fill as fill_worksheet
-from grader.lms.platform_ids import numbered, place_of, with_ids
+from grader.lms.canvas import fill_gradebook
+from grader.lms.export import export, read_results
+from grader.lms.grades import Options, Person, grades_of
+from grader.lms.marks import numbered
+from grader.lms.moodle import fill_worksheet
+from grader.lms.moodle_guide import guide
+from grader.lms.table import with_ids
 from grader.versions import current
 from reference.errors import PlanmarkError
 from tests.unit.lms import importers
@@ -114,7 +116,7 @@ def test_an_answer_of_any_shape_is_used_or_refused(tmp_path, told):
     with suppress(PlanmarkError):
         numbered([], path)
     with suppress(PlanmarkError):
-        place_of(path)
+        guide(grades_of(results(marked("s01", 5.0))), Options(to="moodle", criteria=path))
     with suppress(PlanmarkError):
         current(told, "f")
     (tmp_path / "results.json").write_text(json.dumps(told), encoding="utf-8")

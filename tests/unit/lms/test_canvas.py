@@ -8,7 +8,8 @@ import jsonschema
 import pytest
 
 from grader.cli.schemas import schema
-from grader.lms import Options, Person, export
+from grader.lms.export import export
+from grader.lms.grades import Options, Person
 from reference.errors import CallError, InputFileError
 from tests.unit.lms import importers
 from tests.unit.lms.classroom import marked, report, results
@@ -91,9 +92,9 @@ def test_who_is_not_there_or_shares_a_row_is_told(tmp_path):
     delivery, text = filled(tmp_path, *(report(one, 7.5) for one in people), people=people)
     assert text == EXPORTED.replace('2",3,,55', '2",3,7.5,55')
     assert delivery.written == ("s01",)
-    assert "fits s02 and S-02 alike" in delivery.not_found["s02"]
-    assert "has the name, but another SIS User ID" in delivery.not_found["s08"]
-    assert "nobody in the gradebook has" in delivery.not_found["s09"]
+    assert "fits s02 and S-02 alike" in delivery.unplaced["s02"]
+    assert "has the name, but another SIS User ID" in delivery.unplaced["s08"]
+    assert "nobody in the gradebook has" in delivery.unplaced["s09"]
 
 
 def test_a_grade_that_canvas_holds_for_a_withheld_student_stays_and_is_told(tmp_path):
@@ -107,7 +108,7 @@ def test_excused_students_are_left(tmp_path, cell):
     text = EXPORTED.replace('2",3,,55', f'2",3,{cell},55')
     delivery, after = filled(tmp_path, report("s01", 7.5), text=text)
     assert after == text
-    assert "excused" in delivery.not_found["s01"]
+    assert "excused" in delivery.unplaced["s01"]
 
 
 @pytest.mark.parametrize("item", ["Pump (12345)", "Pump", "12345"])

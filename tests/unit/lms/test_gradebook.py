@@ -5,10 +5,10 @@ import io
 
 import pytest
 
-from grader.lms import Options, Person, export, read_results
-from grader.lms.comments import comment
-from grader.lms.grades import grades_of
-from grader.lms.moodle_gradebook import gradebook as drafted
+from grader.lms.export import export, read_results
+from grader.lms.grades import Options, Person, grades_of
+from grader.lms.marks import comment
+from grader.lms.moodle import gradebook as drafted
 from reference.errors import CallError, InputFileError
 from tests.unit.lms.classroom import criterion, report, results
 

@@ -10,9 +10,10 @@ import pytest
 from pydantic import ValidationError
 
 from grader.cli.schemas import schema
-from grader.lms import Options, Person, export
-from grader.lms.documents import GradescopeDocument, LtiScore
-from grader.lms.draft import document
+from grader.lms.export import export
+from grader.lms.grades import Options, Person
+from grader.lms.marks import json_document
+from grader.lms.scores import GradescopeDocument, LtiScore
 from reference.errors import CallError, InputFileError
 from tests.unit.lms.classroom import marked, report, results
 
@@ -98,7 +99,7 @@ def test_points_that_belie_the_score_are_refused(tmp_path):
     told = json.loads((tmp_path / "out" / "s01" / "results.json").read_bytes())
     for score in (7.0, 8.0, 10.5):
         with pytest.raises(InputFileError, match="points"):
-            document(GradescopeDocument, {**told, "score": score}, "results.json")
+            json_document(GradescopeDocument, {**told, "score": score}, "results.json")
 
 
 def test_a_status_that_belies_its_points_is_refused(tmp_path):
@@ -106,7 +107,7 @@ def test_a_status_that_belies_its_points_is_refused(tmp_path):
     told = json.loads((tmp_path / "out" / "s01" / "results.json").read_bytes())
     told["tests"][0]["status"] = "failed"
     with pytest.raises(InputFileError, match=r"\$\.tests\[0\]: 'failed' with 5 of 5 points"):
-        document(GradescopeDocument, told, "results.json")
+        json_document(GradescopeDocument, told, "results.json")
 
 
 # LTI ----------------------------------------------------------------------------------------------
@@ -163,7 +164,7 @@ def test_users_are_named_by_the_table_of_ids_and_who_is_not_in_it_is_told(tmp_pa
     people = {"s01": Person(platform_id="a-b"), "s02": Person(name="Somebody")}
     delivery, scores = lti(tmp_path, *CLASS, people=people)
     assert [one["userId"] for one in scores] == ["a-b"]
-    assert set(delivery.not_found) == {"s02", "s03"}
+    assert set(delivery.unplaced) == {"s02", "s03"}
     assert "userId is the student_id" not in " ".join(delivery.notes)
 
 

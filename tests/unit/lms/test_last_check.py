@@ -6,16 +6,14 @@ import pytest
 from pydantic import ValidationError
 
 from grader.files import OutputError
-from grader.lms import Options, Person, export, table
-from grader.lms.documents import (
-    CanvasMarksDocument,
-    GradescopeTest,
-    LtiDocument,
-    MoodleFilled,
-    MoodleGuide,
-    PlatformCriterion,
-)
-from grader.lms.raw_csv import RawTable
+from grader.lms import table
+from grader.lms.canvas import CanvasMarksDocument
+from grader.lms.export import export
+from grader.lms.grades import Options, Person
+from grader.lms.marks import PlatformCriterion
+from grader.lms.moodle_guide import MoodleFilled, MoodleGuide
+from grader.lms.scores import GradescopeTest, LtiDocument
+from grader.lms.table import RawTable
 from reference.errors import CallError
 from tests.unit.lms.classroom import marked, report, results
 

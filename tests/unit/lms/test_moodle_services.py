@@ -8,7 +8,8 @@ import jsonschema
 import pytest
 
 from grader.cli.schemas import schema
-from grader.lms import Options, Person, export
+from grader.lms.export import export
+from grader.lms.grades import Options, Person
 from reference.errors import CallError, InputFileError
 from tests.unit.lms import importers
 from tests.unit.lms.classroom import marked, report, results
@@ -144,7 +145,7 @@ def test_points_fill_every_criterion_of_the_guide(tmp_path, answer):
     assert [
         one["fillings"][0]["score"] for one in second["arguments"]["advancedgradingdata"]["guide"]["criteria"]
     ] == [3.0, 3.0]
-    assert list(delivery.not_found) == ["s03"]
+    assert list(delivery.unplaced) == ["s03"]
     assert delivery.written == ("s01", "s02")
 
 
@@ -236,8 +237,8 @@ def test_moodle_finds_everybodys_pages_in_the_archive(tmp_path):
     }
     assert delivery.written == ("s01", "s_3")
     assert delivery.withheld == {"s04": "needs review"}
-    assert "cannot be changed" in delivery.not_found["s02"]
-    assert set(delivery.not_found) == {"s02", "s09"}
+    assert "cannot be changed" in delivery.unplaced["s02"]
+    assert set(delivery.unplaced) == {"s02", "s09"}
     with zipfile.ZipFile(path) as opened:
         assert all("_" not in name.partition("/")[2] for name in opened.namelist())
 
@@ -317,7 +318,7 @@ def test_moodle_stores_the_worksheets_grades_as_they_are_meant(tmp_path):
     delivery, path = moodle(tmp_path, "grades", *reports, name="o.csv", form=form, people=BY_MAIL)
     stored = importers.moodle_worksheet(path.read_bytes(), 10.0)
     assert stored == {101: (7.5, "<ul><li>~ <b>Vector 2</b>: Told &lt;why&gt; &amp; how.</li></ul>")}
-    assert set(delivery.not_found) == {"s02"}
+    assert set(delivery.unplaced) == {"s02"}
     assert set(delivery.withheld) == {"s_3"}
 
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from grader.lms import Person, with_ids
+from grader.lms.grades import Person
+from grader.lms.table import with_ids
 from reference.errors import InputFileError
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.lms.raw_csv import parse, quoted
+from grader.lms.table import parse, quoted
 from reference.errors import InputFileError
 
 cells = st.text(alphabet=st.sampled_from('ab,;"\n\r é'), max_size=6)

@@ -5,9 +5,7 @@ import io
 
 import pytest
 
-from grader.lms import write_summary
-from grader.lms.summary import criteria_text, summary_text
-from grader.lms.table import csv_text, guarded, number
+from grader.lms.table import criteria_text, csv_text, guarded, number, summary_text, write_summary
 from tests.unit.lms.classroom import criterion, report, results
 
 

@@ -5,9 +5,9 @@ import io
 
 import pytest
 
-from grader.lms import Options, Person, export
-from grader.lms.grades import grades_of
-from grader.lms.moodle_worksheet import LOCKED, fill
+from grader.lms.export import export
+from grader.lms.grades import Options, Person, grades_of
+from grader.lms.moodle import LOCKED, fill_worksheet
 from reference.errors import CallError, InputFileError
 from tests.unit.lms.classroom import criterion, report, results
 
@@ -38,7 +38,8 @@ def graded(*reports):
 
 def filled_in(data, *reports, people=PEOPLE, comments=None, **how):
     options = Options(to="moodle", people=people, **how)
-    return fill(data, "grades.csv", graded(*reports), options, comments or {})
+    grades = graded(*reports)
+    return fill_worksheet(data, "grades.csv", grades, options, comments or {}).among(grades)
 
 
 def rows(data):
@@ -109,25 +110,25 @@ def test_names_that_two_rows_bear_are_nobodys_and_told():
     data = worksheet(line(101, email="a@x.ro"), line(102, email="b@x.ro"))
     found = filled_in(data, report("s01", 5.0), people={"s01": Person(name="ion  popescu")})
     assert found.written == ()
-    assert "rows 2, 3" in found.not_found["s01"]
+    assert "rows 2, 3" in found.unplaced["s01"]
 
 
 def test_a_row_that_fits_two_students_is_given_to_neither():
     twin = {"s01": Person(email="ion@x.ro"), "s02": Person(name="Ion Popescu")}
     found = filled_in(worksheet(line(101)), report("s01", 5.0), report("s02", 6.0), people=twin)
     assert found.written == ()
-    assert set(found.not_found) == {"s01", "s02"}
+    assert set(found.unplaced) == {"s01", "s02"}
 
 
 def test_students_who_are_not_in_the_worksheet_are_told():
     found = filled_in(worksheet(line(101)), report("s01", 5.0), report("s09", 6.0))
-    assert list(found.not_found) == ["s09"]
+    assert list(found.unplaced) == ["s09"]
 
 
 def test_a_locked_grade_is_left_and_told():
     data = worksheet(line(101, changeable="No"))
     found = filled_in(data, report("s01", 5.0))
-    assert (found.content, found.not_found) == (data, {"s01": LOCKED})
+    assert (found.content, found.unplaced) == (data, {"s01": LOCKED})
 
 
 def test_another_maximum_is_refused_unless_rescaling_is_asked_for():
@@ -159,7 +160,7 @@ def test_columns_of_people_are_known_by_what_stands_in_them_where_their_names_ar
     )
     found = filled_in(data, report("s01", 8.5), report("s02", 6.0), comments={"s01": "<p>a</p>"})
     assert found.written == ("s02",)
-    assert "another email" in found.not_found["s01"]
+    assert "another email" in found.unplaced["s01"]
     people = {"s01": Person(name="Ion Popescu")}
     found = filled_in(data, report("s01", 8.5), people=people, comments={"s01": "<p>a</p>"})
     assert b'x@x.ro,8.5,"10,00",-,<p>a</p>' in found.content

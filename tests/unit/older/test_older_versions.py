@@ -10,7 +10,8 @@ import pytest
 from grader.batch import Batch, grade
 from grader.cli.schemas import schema
 from grader.documents import SCHEMA_VERSION, ReportDocument, ResultsDocument
-from grader.lms import Options, export, read_results
+from grader.lms.export import export, read_results
+from grader.lms.grades import Options
 from grader.rubric import rubric_of
 from grader.versions import STEPS, current
 from reference.assignment import load_assignment
