@@ -1,7 +1,5 @@
 """Canvas: gradebook, rubric, and points in it."""
 
-import csv
-import io
 import json
 
 import jsonschema
@@ -153,6 +151,18 @@ def test_a_file_that_is_no_exported_gradebook_is_refused(tmp_path, text, told):
     with pytest.raises(InputFileError, match=told):
         filled(tmp_path, report("s01", 7.5), text=text)
     assert not (tmp_path / "out.csv").exists()
+
+
+NAMES_APART = (
+    "LastName,FirstName,ID,SIS User ID,SIS Login ID,Section,Pump (1)\n"
+    "    Points Possible,,,,,,10\nPopescu,Ion,1,s01,,1,\n"
+)
+
+
+def form(tmp_path, text):
+    path = tmp_path / "form.csv"
+    path.write_text(text)
+    return path
 
 
 # A new file ---------------------------------------------------------------------------------------
@@ -382,10 +392,22 @@ def test_positions_are_summed_or_averaged_criterion_by_criterion(tmp_path, rubri
         points(tmp_path, rubric, *both, combine="sum")
 
 
-def test_the_rows_of_a_new_file_are_what_a_spreadsheet_shows(tmp_path):
-    _, text = canvas(tmp_path / "out.csv", report("s01", 7.5), item="Pump (1)")
-    assert list(csv.reader(io.StringIO(text, newline=""))) == [
-        ["Student", "ID", "SIS User ID", "SIS Login ID", "Section", "Pump (1)"],
-        ["    Points Possible", "", "", "", "", "10"],
-        ["s01", "", "s01", "", "", "7.5"],
-    ]
+def test_a_gradebook_with_names_apart_is_filled_in(tmp_path):
+    path = form(tmp_path, NAMES_APART)
+    for people in ({}, {"x1": Person(name="Ion Popescu")}, {"x1": Person(name="Popescu, Ion")}):
+        student = next(iter(people), "s01")
+        export(
+            results(report(student, 7.5)), tmp_path / "o.csv", Options(to="canvas", form=path, people=people)
+        )
+        assert (tmp_path / "o.csv").read_text() == NAMES_APART.replace("s01,,1,", "s01,,1,7.5")
+
+
+def test_two_students_of_one_number_have_no_place_in_canvas(tmp_path):
+    people = {"s01": Person(platform_id="1"), "s02": Person(platform_id="1")}
+    criteria = form(tmp_path, "criterion,id\nc1,_1\n")
+    with pytest.raises(CallError, match="same number in Canvas"):
+        export(
+            results(marked("s01", 5.0), marked("s02", 5.0)),
+            tmp_path / "o.json",
+            Options(to="canvas", what="marks", criteria=criteria, people=people),
+        )
