@@ -16,7 +16,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from grader.lms.grades import Delivery, Grade, Options, Person, assignment_of, ready
+from grader.lms.grades import Delivery, Grade, Options, Person, ready
 from grader.lms.marks import (
     CLOSE,
     Filled,
@@ -32,7 +32,7 @@ from grader.lms.marks import (
     plain_comment,
     platform_marks,
 )
-from grader.lms.table import Evidence, Form, csv_text, fill_in, is_formula, number, parse
+from grader.lms.table import Evidence, Form, bytes_of, csv_text, fill_in, is_formula, number, parse
 from reference.errors import CallError, InputFileError, lines_of
 
 HEADER = ("Student", "ID", "SIS User ID", "SIS Login ID", "Section")
@@ -52,16 +52,16 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
 
     Raises CallError with every student whom Canvas would not find.
     """
-    item = options.item.strip() or assignment_of(grades)
-    faults = list(_faults(ready(grades), options))
+    item = options.item.strip() or grades[0].assignment
+    faults = list(_faults(ready(grades)))
     if is_formula(item) or item in _ABOUT:
         faults.append(f"'{item}' is no title of an assignment")
     if faults:
         raise CallError("gradebook", f"Canvas would misread this; nothing was written\n{lines_of(faults)}")
     table = [["    " + _POINTS, "", "", "", "", number(options.maximum or grades[0].max_score)]]
     for grade in ready(grades):
-        person = options.person(grade.student_id)
-        score = grade.out_of(options.maximum or grade.max_score, rescale=options.rescale)
+        person = grade.person
+        score = grade.out_of(options.maximum, rescale=options.rescale)
         name = person.name or grade.student_id
         table.append([name, person.platform_id, grade.student_id, person.username, "", number(score)])
     notes = ["Canvas sets the assignment's points possible to those of the file's second row"]
@@ -73,10 +73,10 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
     return Delivery(csv_text([*HEADER, item], table), notes=tuple(notes))
 
 
-def _faults(grades: Sequence[Grade], options: Options) -> Iterator[str]:
+def _faults(grades: Sequence[Grade]) -> Iterator[str]:
     owner: dict[str, str] = {}
     for grade in grades:
-        person = options.person(grade.student_id)
+        person = grade.person
         if _MANGLED.fullmatch(grade.student_id) and not person.platform_id:
             yield f"{grade.student_id}: Canvas takes this for a number; give Canvas's own (--ids)"
         if person.platform_id and not re.fullmatch(r"[1-9][0-9]*", person.platform_id):
@@ -136,6 +136,13 @@ class Gradebook(Form):
             ("name", person.name),
             ("name turned", person.name),
         )
+
+
+def grades_file(grades: Sequence[Grade], options: Options) -> Delivery:
+    """The exported gradebook filled in where there is one, else one made anew."""
+    if options.form is None:
+        return gradebook(grades, options)
+    return fill_gradebook(bytes_of(options.form, "form_missing"), options.form.name, grades, options)
 
 
 def fill_gradebook(data: bytes, file: str, grades: Sequence[Grade], options: Options) -> Delivery:
@@ -221,7 +228,7 @@ def rubric(grades: Sequence[Grade], options: Options) -> Delivery:
     if rough:
         message = "Canvas keeps two decimals of a rubric's points; nothing was written"
         raise CallError("points", f"{message}\n{lines_of(rough)}")
-    name = options.item.strip() or assignment_of(grades)
+    name = options.item.strip() or grades[0].assignment
     rows = [
         [
             name,
@@ -348,9 +355,9 @@ def assessments(grades: Sequence[Grade], options: Options) -> Delivery:
     calls, bulk = [], {}
     for grade, marks in marked:
         # By Canvas's own number, else by the institution's.
-        user = options.person(grade.student_id).platform_id or f"sis_user_id:{grade.student_id}"
+        user = grade.person.platform_id or f"sis_user_id:{grade.student_id}"
         score = {"posted_grade": number(grade.score or 0.0)}
-        remark = {"text_comment": plain_comment(grade.reports, options.lang_of(grade.student_id))}
+        remark = {"text_comment": plain_comment(grade)}
         points = {each: {"points": mark.points, "comments": mark.remark} for each, mark in marks.items()}
         body = {"submission": score, "comment": remark, "rubric_assessment": points}
         calls.append({"student_id": grade.student_id, "path": f"{path}/{user}", "body": body})
@@ -358,7 +365,7 @@ def assessments(grades: Sequence[Grade], options: Options) -> Delivery:
     if len(bulk) < len(calls):
         raise CallError("ids", "two students have the same number in Canvas (--ids)")
     content = {
-        "assignment": assignment_of(grades),
+        "assignment": grades[0].assignment,
         "criteria": criteria,
         "calls": calls,
         "bulk": {"path": f"{path}/update_grades", "body": {"grade_data": bulk}},

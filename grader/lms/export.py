@@ -15,7 +15,7 @@ from grader.documents import ResultsDocument
 from grader.files import OutputError, create_whole, write_whole
 from grader.lms import canvas, moodle, moodle_guide, scores
 from grader.lms.grades import Content, Delivery, Grade, Options, grades_of, in_a_row, ready
-from grader.lms.marks import comment, faults_of
+from grader.lms.marks import faults_of
 from grader.lms.table import criteria_text, not_as_meant, summary_text
 from grader.versions import current
 from reference.errors import CallError, InputFileError, lines_of
@@ -42,33 +42,6 @@ def read_results(out_dir: Path) -> ResultsDocument:
 # What there is to deliver -------------------------------------------------------------------------
 
 
-def _moodle_grades(grades: list[Grade], options: Options) -> Delivery:
-    if options.form is None:
-        return moodle.gradebook(grades, options)
-    comments = {
-        grade.student_id: comment(grade.reports, options.lang_of(grade.student_id)) for grade in ready(grades)
-    }
-    return moodle.fill_worksheet(_bytes_of(options.form), options.form.name, grades, options, comments)
-
-
-def _moodle_feedback(grades: list[Grade], options: Options) -> Delivery:
-    worksheet = None if options.form is None else _bytes_of(options.form)
-    return moodle.feedback_files(grades, options, worksheet)
-
-
-def _canvas_grades(grades: list[Grade], options: Options) -> Delivery:
-    if options.form is None:
-        return canvas.gradebook(grades, options)
-    return canvas.fill_gradebook(_bytes_of(options.form), options.form.name, grades, options)
-
-
-def _bytes_of(form: Path) -> bytes:
-    try:
-        return form.read_bytes()
-    except OSError as error:
-        raise InputFileError("form_missing", f"{form}: cannot be read ({error.strerror})") from error
-
-
 @dataclass(frozen=True, slots=True)
 class _Kind:
     """A file that a platform takes: its ending, and what makes it out of grades or else of the results."""
@@ -87,11 +60,11 @@ def _of_grades(ending: str, make: Callable[[list[Grade], Options], Delivery], op
 KINDS: Mapping[tuple[str, str], _Kind] = {
     ("csv", "marks"): _Kind(".csv", of_results=criteria_text),
     ("csv", "grades"): _Kind(".csv", of_results=summary_text),
-    ("moodle", "grades"): _of_grades(".csv", _moodle_grades, "maximum rescale form identity item"),
-    ("moodle", "feedback"): _of_grades(".zip", _moodle_feedback, "form"),
+    ("moodle", "grades"): _of_grades(".csv", moodle.grades_file, "maximum rescale form identity item"),
+    ("moodle", "feedback"): _of_grades(".zip", moodle.feedback_files, "form"),
     ("moodle", "rubric"): _of_grades(".json", moodle_guide.guide, "criteria cmid context_id item"),
     ("moodle", "marks"): _of_grades(".json", moodle_guide.fillings, "criteria assignment_id"),
-    ("canvas", "grades"): _of_grades(".csv", _canvas_grades, "maximum rescale form item"),
+    ("canvas", "grades"): _of_grades(".csv", canvas.grades_file, "maximum rescale form item"),
     ("canvas", "rubric"): _of_grades(".csv", canvas.rubric, "item"),
     ("canvas", "marks"): _of_grades(".json", canvas.assessments, "criteria course_id assignment_id"),
     ("gradescope", "marks"): _of_grades(".zip", scores.results, "visibility"),
@@ -139,7 +112,7 @@ def draft(results: ResultsDocument, options: Options) -> Delivery:
     students = tuple(dict.fromkeys(report.student_id for report in results.reports))
     if kind.of_grades is None:
         return Delivery(kind.of_results(results) if kind.of_results else "", students)
-    grades = grades_of(results, position=options.position, combine=options.combine)
+    grades = grades_of(results, options)
     _check_maxima(grades, options, what)
     delivery = kind.of_grades(grades, options)
     if what != "rubric":

@@ -74,14 +74,6 @@ class Options:
         """The time of the export, with its zone."""
         return self.now or datetime.now(UTC)
 
-    def person(self, student_id: str) -> Person:
-        """A student as far as known."""
-        return self.people.get(student_id, Person())
-
-    def lang_of(self, student_id: str) -> str:
-        """The language of a student's comments."""
-        return self.person(student_id).lang or self.lang
-
 
 @dataclass(frozen=True, slots=True)
 class Grade:
@@ -90,6 +82,7 @@ class Grade:
     Attributes
     ----------
     score : None where there is none yet
+    person : the student, with the language of the comments
     withheld : why there is none yet
     folders : of each report below the results: the student's, with several positions one for each
     """
@@ -98,17 +91,23 @@ class Grade:
     score: float | None
     max_score: float
     reports: tuple[ReportDocument, ...]
+    person: Person = Person()
     withheld: str = ""
     folders: tuple[str, ...] = ()
 
-    def out_of(self, maximum: float, *, rescale: bool) -> float:
-        """The score out of a platform's maximum.
+    @property
+    def assignment(self) -> str:
+        """The assignment's id."""
+        return self.reports[0].assignment
+
+    def out_of(self, maximum: float | None, *, rescale: bool) -> float:
+        """The score out of a platform's maximum; None is the rubric's own.
 
         Raises CallError where the maxima differ and nobody asked for rescaling: a silent 9 of 10 would
         become a 9 of 100.
         """
         score = self.score or 0.0
-        if abs(maximum - self.max_score) <= 1e-6 * max(1.0, maximum):
+        if maximum is None or abs(maximum - self.max_score) <= 1e-6 * max(1.0, maximum):
             return score
         if not rescale:
             raise CallError(
@@ -158,20 +157,13 @@ def ready(grades: Sequence[Grade]) -> list[Grade]:
     return [grade for grade in grades if grade.score is not None]
 
 
-def assignment_of(grades: Sequence[Grade]) -> str:
-    """The assignment's id."""
-    return grades[0].reports[0].assignment
-
-
 def in_a_row(names: Sequence[str]) -> str:
     """Names in one line, the first of many."""
     more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
     return ", ".join(names[:_MOST_NAMES]) + more
 
 
-def grades_of(
-    results: ResultsDocument, *, position: int | None = None, combine: str | None = None
-) -> list[Grade]:
+def grades_of(results: ResultsDocument, options: Options) -> list[Grade]:
     """A grade per student.
 
     A student with several positions needs a choice: one `position`, or `combine` by ``sum`` or
@@ -180,6 +172,7 @@ def grades_of(
     Raises CallError where the choice is missing or not one, InputFileError for results that
     contradict themselves.
     """
+    position, combine = options.position, options.combine
     if combine is not None and combine not in COMBINE:
         known = " or ".join(COMBINE)
         raise CallError("combine", f"'{combine}' is no way to combine positions: choose {known}")
@@ -200,7 +193,7 @@ def grades_of(
             )
         if chosen:
             folders = tuple(_folder(report, len(reports)) for report in chosen)
-            grades.append(_grade(student_id, chosen, combine, folders))
+            grades.append(_grade(student_id, chosen, options, folders))
     if not grades:
         raise CallError("nothing_to_export", "the results hold no report that could be exported")
     return grades
@@ -242,14 +235,16 @@ _WHY = {
 
 
 def _grade(
-    student_id: str, reports: tuple[ReportDocument, ...], combine: str | None, folders: tuple[str, ...]
+    student_id: str, reports: tuple[ReportDocument, ...], options: Options, folders: tuple[str, ...]
 ) -> Grade:
+    person = options.people.get(student_id, Person())
+    person = replace(person, lang=person.lang or options.lang)
     maximum = sum(report.max_score for report in reports)
     score = sum(report.score or 0.0 for report in reports)
-    parts = len(reports) if combine == "mean" else 1
+    parts = len(reports) if options.combine == "mean" else 1
     why = ", ".join(
         ("" if report.position is None else f"position {report.position}: ") + _WHY[report.status]
         for report in reports
         if report.status != "graded" or report.score is None
     )
-    return Grade(student_id, None if why else score / parts, maximum / parts, reports, why, folders)
+    return Grade(student_id, None if why else score / parts, maximum / parts, reports, person, why, folders)

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from grader.documents import CriterionDocument, ReportDocument, Verdict
 from grader.i18n import Tongue, tongue
 from grader.lms.grades import Grade, Options, ready
-from grader.lms.table import not_as_meant, read_table
+from grader.lms.table import bytes_of, not_as_meant, read_table
 from grader.scene import MARKS
 from reference.errors import CallError, InputFileError, lines_of
 
@@ -102,45 +102,38 @@ _COMMENTED = {"partial", "none", "review", "follow_through"}
 """The verdicts that are worth a comment."""
 
 
-def comment(reports: Sequence[ReportDocument], lang: str) -> str:
+def comment(grade: Grade) -> str:
     """Feedback on what is not simply right, in a few lines that go beside a grade: HTML, one line."""
     html = Markup("")
-    for heading, remarks in _comments(reports, lang):
+    for heading, remarks in _comments(grade):
         if heading:
             html += Markup("<p><b>{}</b></p>").format(heading)
         items = [Markup("<li>{} <b>{}</b>: {}</li>").format(*remark) for remark in remarks]
-        html += Markup("<ul>{}</ul>").format(Markup("").join(items)) if items else _right(lang)
+        html += Markup("<ul>{}</ul>").format(Markup("").join(items)) if items else ""
+        html += "" if items else Markup("<p>{}</p>").format(_everything_is_right(grade))
     return str(html)
 
 
-def _right(lang: str) -> Markup:
-    return Markup("<p>{}</p>").format(tongue(lang).gettext("Everything is right."))
+def _everything_is_right(grade: Grade) -> str:
+    return tongue(grade.person.lang).gettext("Everything is right.")
 
 
-def plain_comment(reports: Sequence[ReportDocument], lang: str) -> str:
+def plain_comment(grade: Grade) -> str:
     """The same as plain text, a line for each remark."""
     lines = []
-    for heading, remarks in _comments(reports, lang):
+    for heading, remarks in _comments(grade):
         lines += [heading] if heading else []
-        lines += [f"{mark} {title}: {text}" for mark, title, text in remarks]
-        lines += [] if remarks else [tongue(lang).gettext("Everything is right.")]
+        lines += [f"{mark} {title}: {text}" for mark, title, text in remarks] or [_everything_is_right(grade)]
     return "\n".join(lines)
 
 
-def _comments(
-    reports: Sequence[ReportDocument], lang: str
-) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
+def _comments(grade: Grade) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
     """For each report: a heading where there are several, and marks, titles and sentences."""
-    for report in reports:
-        heading = f"{tongue(lang).gettext('Position')} {report.position}" if len(reports) > 1 else ""
-        yield (
-            heading,
-            [
-                (MARKS[each.verdict], each.title, _one_line(each.feedback))
-                for each in report.criteria
-                if each.verdict in _COMMENTED
-            ],
-        )
+    position = tongue(grade.person.lang).gettext("Position")
+    for report in grade.reports:
+        commented = [each for each in report.criteria if each.verdict in _COMMENTED]
+        remarks = [(MARKS[each.verdict], each.title, _one_line(each.feedback)) for each in commented]
+        yield f"{position} {report.position}" if len(grade.reports) > 1 else "", remarks
 
 
 def _one_line(text: str) -> str:
@@ -174,12 +167,12 @@ class Mark:
         return math.isclose(self.points, self.max_points, abs_tol=CLOSE)
 
 
-def marks_of(grade: Grade, lang: str) -> list[Mark]:
-    """The marks behind a grade, report by report; `lang` is the language of the remarks' own words.
+def marks_of(grade: Grade) -> list[Mark]:
+    """The marks behind a grade, report by report.
 
     Raises InputFileError where they do not add up to the score.
     """
-    marks = outline(grade, lang)
+    marks = outline(grade)
     total = math.fsum(mark.points for mark in marks)
     score = math.fsum(report.score or 0.0 for report in grade.reports)
     if not math.isclose(total, score, abs_tol=CLOSE):
@@ -191,9 +184,9 @@ def marks_of(grade: Grade, lang: str) -> list[Mark]:
     return marks
 
 
-def outline(grade: Grade, lang: str = "en") -> list[Mark]:
+def outline(grade: Grade) -> list[Mark]:
     """The marks of a grade that may still be open: what is under review counts nothing here."""
-    speaker = tongue(lang)
+    speaker = tongue(grade.person.lang)
     return [_mark(each, report, speaker) for report in grade.reports for each in report.criteria]
 
 
@@ -292,10 +285,7 @@ def platform_marks(
 
     Raises InputFileError where the platform's criteria are not the rubric's.
     """
-    marked = [
-        (grade, together(marks_of(grade, options.lang_of(grade.student_id)), options.combine))
-        for grade in ready(grades)
-    ]
+    marked = [(grade, together(marks_of(grade), options.combine)) for grade in ready(grades)]
     criteria = numbered(class_criteria(grades, options), path)
     numbers = {each.criterion: each.id for each in criteria}
     return criteria, [(grade, {numbers[mark.criterion]: mark for mark in marks}) for grade, marks in marked]
@@ -361,9 +351,7 @@ def _known(path: Path) -> list[Known]:
 def read_answer(path: Path) -> Any:  # noqa: ANN401 - whatever a platform answers
     """A platform's JSON; InputFileError for what is none."""
     try:
-        return json.loads(path.read_bytes())
-    except OSError as error:
-        raise InputFileError("criteria", f"{path}: cannot be read ({error.strerror})") from error
+        return json.loads(bytes_of(path, "criteria"))
     except (ValueError, RecursionError) as error:
         raise InputFileError("criteria", f"{path}: is not JSON ({error})") from error
 

@@ -18,9 +18,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.lms.grades import Delivery, Grade, Options, Person, assignment_of, ready
+from grader.lms.grades import Delivery, Grade, Options, Person, ready
 from grader.lms.marks import comment
-from grader.lms.table import NO_GRADE, Evidence, Form, RawTable, csv_text, fill_in, is_formula, number, parse
+from grader.lms.table import (
+    NO_GRADE,
+    Evidence,
+    Form,
+    RawTable,
+    bytes_of,
+    csv_text,
+    fill_in,
+    is_formula,
+    number,
+    parse,
+)
 from reference.errors import CallError, InputFileError, lines_of
 
 # The worksheet ------------------------------------------------------------------------------------
@@ -93,6 +104,15 @@ class Worksheet(Form):
             ("username", person.username),
             ("name", person.name),
         )
+
+
+def grades_file(grades: Sequence[Grade], options: Options) -> Delivery:
+    """The worksheet filled in where there is one, else the gradebook import."""
+    if options.form is None:
+        return gradebook(grades, options)
+    comments = {grade.student_id: comment(grade) for grade in ready(grades)}
+    data = bytes_of(options.form, "form_missing")
+    return fill_worksheet(data, options.form.name, grades, options, comments)
 
 
 def fill_worksheet(
@@ -222,12 +242,12 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
     identity = options.identity or "idnumber"
     if identity not in IDENTITIES:
         raise CallError("identity", f"users are found by {', '.join(IDENTITIES)}, not by '{identity}'")
-    item = options.item.strip() or assignment_of(grades)
+    item = options.item.strip() or grades[0].assignment
     if is_formula(item):
         raise CallError("gradebook", f"'{item}' is no name for a grade item: a spreadsheet would run it")
     graded = ready(grades)
-    comments = [comment(grade.reports, options.lang_of(grade.student_id)) for grade in graded]
-    faults = list(_faults(graded, options, identity))
+    comments = [comment(grade) for grade in graded]
+    faults = list(_faults(graded, identity))
     faults += [
         f"{grade.student_id}: the comment has more than {_LONGEST_COMMENT} characters"
         for grade, text in zip(graded, comments, strict=True)
@@ -236,8 +256,8 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
     if faults:
         message = "Moodle would abort this import; nothing was written"
         raise CallError("gradebook", f"{message}\n{lines_of(faults)}")
-    scores = [each.out_of(options.maximum or each.max_score, rescale=options.rescale) for each in graded]
-    users = [_user(grade.student_id, options, identity) for grade in graded]
+    scores = [grade.out_of(options.maximum, rescale=options.rescale) for grade in graded]
+    users = [_user(grade, identity) for grade in graded]
     rows = zip(users, map(number, scores), comments, strict=True)
     notes = []
     if len(graded) < len(grades):
@@ -247,17 +267,17 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
     return Delivery(csv_text([identity, item, f"{item} (feedback)"], rows), notes=tuple(notes))
 
 
-def _user(student_id: str, options: Options, identity: str) -> str:
-    person = options.person(student_id)
+def _user(grade: Grade, identity: str) -> str:
+    person, student_id = grade.person, grade.student_id
     names = {"email": person.email, "username": person.username, "id": person.platform_id or student_id}
     return names.get(identity, student_id)
 
 
-def _faults(grades: Sequence[Grade], options: Options, identity: str) -> Iterator[str]:
+def _faults(grades: Sequence[Grade], identity: str) -> Iterator[str]:
     owner: dict[str, str] = {}
     source = {"email": "the roster gives", "username": "the table of ids gives"}.get(identity, "there is")
     for grade in grades:
-        name, shape = _user(grade.student_id, options, identity), _SHAPES.get(identity)
+        name, shape = _user(grade, identity), _SHAPES.get(identity)
         if not name:
             yield f"{grade.student_id}: {source} no {identity}"
         elif is_formula(name):
@@ -275,17 +295,16 @@ FEEDBACK_FILES = ("feedback.html", "feedback.pdf")
 """The page must be there; the PDF may."""
 
 
-def feedback_files(grades: Sequence[Grade], options: Options, worksheet: bytes | None) -> Delivery:
+def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
     """The archive's files.
 
-    `worksheet` is the teacher's: it has the number that Moodle gave each participant; without it the
-    table of ids must.
+    The worksheet has the number that Moodle gave each participant; without it the table of ids must.
 
-    Raises CallError where nothing has the numbers, InputFileError for pages that are missing or of
+    Raises CallError where neither has the numbers, InputFileError for pages that are missing or of
     another run.
     """
     graded = ready(grades)
-    numbers, why, notes = _participants(grades, options, worksheet)
+    numbers, why, notes = _participants(grades, options)
     missing = {grade.student_id: why[grade.student_id] for grade in graded if grade.student_id in why}
     files: dict[str, Path] = {}
     faults: list[str] = []
@@ -304,24 +323,21 @@ def feedback_files(grades: Sequence[Grade], options: Options, worksheet: bytes |
 
 
 def _participants(
-    grades: Sequence[Grade], options: Options, worksheet: bytes | None
+    grades: Sequence[Grade], options: Options
 ) -> tuple[dict[str, int], dict[str, str], list[str]]:
     """Moodle's number of each participant, why others have none, and what a person should check."""
-    people = {grade.student_id: options.person(grade.student_id) for grade in grades}
-    if worksheet is None:
-        numbers = {who: one.participant for who, one in people.items() if one.participant is not None}
+    people = {grade.student_id: grade.person for grade in grades}
+    if options.form is None:
+        numbers = {student: who.participant for student, who in people.items() if who.participant is not None}
         if all(person.participant is None for person in options.people.values()):
             raise CallError(
                 "worksheet_needed",
                 "Moodle's numbers of participants are needed: give the downloaded grading worksheet"
                 " (--worksheet), or a table with the columns student_id,participant (--ids)",
             )
-        return (
-            numbers,
-            {who: "the table of ids has no participant" for who in people if who not in numbers},
-            [],
-        )
-    sheet = open_worksheet(worksheet, options.form.name if options.form else "worksheet")
+        others = people.keys() - numbers.keys()
+        return numbers, dict.fromkeys(others, "the table of ids has no participant"), []
+    sheet = open_worksheet(bytes_of(options.form, "form_missing"), options.form.name)
     matches = sheet.match(grades, options)
     rows = {student: row for student, row in matches.rows.items() if student in people}
     locked = {student: why for student, row in rows.items() if (why := sheet.why_fixed(row))}

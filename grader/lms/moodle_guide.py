@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from grader.lms.grades import Delivery, Grade, Options, assignment_of
+from grader.lms.grades import Delivery, Grade, Options
 from grader.lms.marks import (
     Criterion,
     Filled,
@@ -209,7 +209,7 @@ def guide(grades: Sequence[Grade], options: Options) -> Delivery:
     moment = int(options.moment.timestamp())
     criteria = class_criteria(grades, options)
     definition = {
-        "name": (options.item.strip() or assignment_of(grades)).translate(_NO_TAGS),
+        "name": (options.item.strip() or grades[0].assignment).translate(_NO_TAGS),
         "timecreated": moment,
         "timemodified": moment,
         "guide": {
@@ -218,7 +218,7 @@ def guide(grades: Sequence[Grade], options: Options) -> Delivery:
         },
     }
     content = {
-        "assignment": assignment_of(grades),
+        "assignment": grades[0].assignment,
         "arguments": {"areas": [{"cmid": cmid, "contextid": context_id, "definitions": [definition]}]},
     }
     return Delivery(json_document(MoodleRubricDocument, content, "the marking guide"))
@@ -292,7 +292,7 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
     criteria, marked = platform_marks(grades, options, options.criteria)
     calls, missing = [], {}
     for grade, marks in marked:
-        user = options.person(grade.student_id).platform_id
+        user = grade.person.platform_id
         if not user:
             missing[grade.student_id] = "the table of ids (--ids) has no id: Moodle's number of the user"
             continue
@@ -307,7 +307,7 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
         raise CallError(
             "ids_needed", "nobody's number in Moodle is known: give a table student_id,id (--ids)"
         )
-    content = {"assignment": assignment_of(grades), "criteria": criteria, "calls": calls}
+    content = {"assignment": grades[0].assignment, "criteria": criteria, "calls": calls}
     return Delivery(
         json_document(MoodleMarksDocument, content, "the marking guide's points"), unplaced=missing
     )

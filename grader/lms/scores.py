@@ -15,7 +15,7 @@ from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from grader.lms.grades import Delivery, Grade, Options, assignment_of, ready
+from grader.lms.grades import Delivery, Grade, Options, ready
 from grader.lms.marks import (
     CLOSE,
     Filled,
@@ -115,18 +115,17 @@ def results(grades: Sequence[Grade], options: Options) -> Delivery:
 
 
 def _results(grade: Grade, visibility: str, options: Options) -> str:
-    lang = options.lang_of(grade.student_id)
     parts = len(grade.reports) if options.combine == "mean" else 1
-    marks = marks_of(grade, lang)
+    marks = marks_of(grade)
     judged = [mark for mark in marks if mark.verdict != "not_judged"]
     others = [f"{_name(mark)}: {mark.remark}" for mark in marks if mark.verdict == "not_judged"]
     content = {
         "score": float(number(grade.score or 0.0)),
-        "output": "\n".join([plain_comment(grade.reports, lang), *others]),
+        "output": "\n".join([plain_comment(grade), *others]),
         "visibility": visibility,
         "tests": [_test(str(place), mark, parts, visibility) for place, mark in enumerate(judged, start=1)],
         "extra_data": {
-            "assignment": grade.reports[0].assignment,
+            "assignment": grade.assignment,
             "student_id": grade.student_id,
             "max_score": grade.max_score,
         },
@@ -199,7 +198,7 @@ def scores(grades: Sequence[Grade], options: Options) -> Delivery:
     is_mapped = any(person.platform_id for person in options.people.values())
     missing, posted = {}, []
     for grade in grades:
-        user = options.person(grade.student_id).platform_id
+        user = grade.person.platform_id
         if grade.score is None and all(report.status == "missing" for report in grade.reports):
             continue
         if is_mapped and not user:
@@ -218,17 +217,16 @@ def scores(grades: Sequence[Grade], options: Options) -> Delivery:
         notes.append("userId is the student_id: where the platform knows users otherwise, give --ids")
     if pending := sum("scoreGiven" not in score for score in posted):
         notes.append(f"{pending} of the withheld are told as PendingManual: the platform shows no grade")
-    content = {"assignment": assignment_of(grades), "scores": posted}
+    content = {"assignment": grades[0].assignment, "scores": posted}
     return Delivery(json_document(LtiDocument, content, "the Scores"), unplaced=missing, notes=tuple(notes))
 
 
 def _graded(grade: Grade, options: Options) -> dict[str, object]:
     if grade.score is None:
         return {"gradingProgress": "PendingManual"}
-    maximum = options.maximum or grade.max_score
     return {
         "gradingProgress": "FullyGraded",
-        "scoreGiven": round(grade.out_of(maximum, rescale=options.rescale), _DECIMALS),
-        "scoreMaximum": maximum,
-        "comment": plain_comment(grade.reports, options.lang_of(grade.student_id)),
+        "scoreGiven": round(grade.out_of(options.maximum, rescale=options.rescale), _DECIMALS),
+        "scoreMaximum": options.maximum or grade.max_score,
+        "comment": plain_comment(grade),
     }

@@ -161,9 +161,7 @@ def read_table(path: Path, columns: Sequence[str]) -> list[tuple[int, dict[str, 
     Raises InputFileError with the file's faults.
     """
     try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise InputFileError("ids", f"{path}: cannot be read ({error.strerror})") from error
+        text = bytes_of(path, "ids").decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputFileError("ids", f"{path}: is not UTF-8 text; save it as CSV in UTF-8") from error
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter_of(text), strict=True)
@@ -185,6 +183,14 @@ def read_table(path: Path, columns: Sequence[str]) -> list[tuple[int, dict[str, 
     if faults:
         raise InputFileError("ids", f"{path}: {len(header)} columns are named\n{lines_of(faults)}")
     return [(line, dict(zip(header, cells, strict=True))) for line, cells in lines[1:]]
+
+
+def bytes_of(path: Path, code: str) -> bytes:
+    """A file's content; InputFileError of this code where it cannot be read."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputFileError(code, f"{path}: cannot be read ({error.strerror})") from error
 
 
 def _repeated(rows: Sequence[tuple[int, Mapping[str, str]]]) -> Iterator[str]:
@@ -305,7 +311,8 @@ class Matches:
 
     def notes_on(self, students: Iterable[str]) -> list[str]:
         """What a person should check among these students."""
-        doubtful = [student for student in self.by_name if student in set(students)]
+        chosen = set(students)
+        doubtful = [student for student in self.by_name if student in chosen]
         return [f"found by name alone, look whether they are these: {in_a_row(doubtful)}"] if doubtful else []
 
 
@@ -427,8 +434,7 @@ class Form(ABC):
 
     def match(self, grades: Sequence[Grade], options: Options) -> Matches:
         """The rows of students, among the whole class: a row that fits two of them is given to neither."""
-        here = {grade.student_id: options.person(grade.student_id) for grade in grades}
-        students = {**options.people, **here}
+        students = {**options.people, **{grade.student_id: grade.person for grade in grades}}
         return match_rows(
             {row: cells for row in self.people if (cells := self.identity(row))},
             {student: self.evidence(student, person) for student, person in students.items()},
@@ -480,8 +486,7 @@ def _put_grades(
             unplaced[grade.student_id] = why
         if row is None or why:
             continue
-        maximum = form.maximum(row) or grade.max_score
-        texts[row] = number(grade.out_of(maximum, rescale=options.rescale))
+        texts[row] = number(grade.out_of(form.maximum(row), rescale=options.rescale))
         before = form.value(row, "grade")
         amount = form.amount(before)
         if amount is None or number(amount) != texts[row]:

@@ -115,14 +115,14 @@ def test_the_assignment_is_named_by_header_title_or_number(tmp_path, item):
 
 
 @pytest.mark.parametrize(
-    ("item", "told"),
+    ("item", "message"),
     [
         ("", r"which assignment\? Name it with --item: 'Quiz \(7\)', 'Pump \(12345\)'"),
         ("Press", "0 assignments fit 'Press'"),
     ],
 )
-def test_an_assignment_that_is_not_told_is_refused(tmp_path, item, told):
-    with pytest.raises(CallError, match=told):
+def test_an_assignment_that_is_not_told_is_refused(tmp_path, item, message):
+    with pytest.raises(CallError, match=message):
         filled(tmp_path, report("s01", 7.5), item=item)
     assert not (tmp_path / "out.csv").exists()
 
@@ -135,7 +135,7 @@ def test_another_maximum_needs_leave_to_rescale(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("", "no students"),
         ("a,b\n1,2\n", "not the columns"),
@@ -147,8 +147,8 @@ def test_another_maximum_needs_leave_to_rescale(tmp_path):
         (EXPORTED + '"open', "never closed"),
     ],
 )
-def test_a_file_that_is_no_exported_gradebook_is_refused(tmp_path, text, told):
-    with pytest.raises(InputFileError, match=told):
+def test_a_file_that_is_no_exported_gradebook_is_refused(tmp_path, text, message):
+    with pytest.raises(InputFileError, match=message):
         filled(tmp_path, report("s01", 7.5), text=text)
     assert not (tmp_path / "out.csv").exists()
 
@@ -181,11 +181,11 @@ def test_canvas_reads_a_new_file_as_it_is_meant(tmp_path):
         item="Pump (12345)",
         people=people,
     )
-    possible, found = importers.canvas_gradebook(
+    possible, stored = importers.canvas_gradebook(
         text, "Pump (12345)", by_id={"4711": "Ion"}, by_sis={"s02": "T"}
     )
     assert possible == 2000.0
-    assert found == {"Ion": "1234.5", "T": "0"}
+    assert stored == {"Ion": "1234.5", "T": "0"}
 
 
 def test_a_title_without_its_number_is_told_to_be_a_new_assignment(tmp_path):
@@ -196,7 +196,7 @@ def test_a_title_without_its_number_is_told_to_be_a_new_assignment(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("student", "person", "item", "told"),
+    ("student", "person", "item", "message"),
     [
         ("1.2.3", Person(), "", "takes this for a number"),
         ("s01", Person(platform_id="x"), "", "no number of a Canvas user"),
@@ -206,8 +206,8 @@ def test_a_title_without_its_number_is_told_to_be_a_new_assignment(tmp_path):
         ("s01", Person(), "Section", "no title"),
     ],
 )
-def test_what_canvas_would_misread_is_refused(tmp_path, student, person, item, told):
-    with pytest.raises(CallError, match=told):
+def test_what_canvas_would_misread_is_refused(tmp_path, student, person, item, message):
+    with pytest.raises(CallError, match=message):
         canvas(tmp_path / "out.csv", report(student, 7.5), people={student: person}, item=item)
     assert not (tmp_path / "out.csv").exists()
 
@@ -276,9 +276,9 @@ def test_points_add_up_to_the_grade_and_go_to_canvass_own_criteria(tmp_path, rub
     delivery, text = points(
         tmp_path, rubric, marked("s01", 5.0, 2.5), marked("s02", 3.0, None), course_id=12, assignment_id=345
     )
-    told = json.loads(text)
-    jsonschema.validate(told, schema("canvas-marks"))
-    first, second = told["calls"]
+    document = json.loads(text)
+    jsonschema.validate(document, schema("canvas-marks"))
+    first, second = document["calls"]
     assert first["path"] == "/api/v1/courses/12/assignments/345/submissions/sis_user_id:s01"
     assert first["body"]["submission"] == {"posted_grade": "7.5"}
     assert first["body"]["rubric_assessment"]["_2"]["points"] == 2.5
@@ -288,7 +288,7 @@ def test_points_add_up_to_the_grade_and_go_to_canvass_own_criteria(tmp_path, rub
     }  # fmt: skip
     assert second["body"]["submission"] == {"posted_grade": "6"}
     assert second["body"]["rubric_assessment"]["_2"]["comments"].startswith("– not judged: ")
-    bulk = told["bulk"]
+    bulk = document["bulk"]
     assert bulk["path"].endswith("/345/submissions/update_grades")
     assert list(bulk["body"]["grade_data"]) == ["sis_user_id:s01", "sis_user_id:s02"]
     assert delivery.notes == ()
@@ -331,7 +331,7 @@ def test_criteria_may_be_told_in_a_table(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         ({"description": "v_X"}, "c1: Vector 1: not there .*'v_X': there, and not in the rubric"),
         ({"points": 4.0}, "4 points there, 5 in the rubric"),
@@ -339,10 +339,10 @@ def test_criteria_may_be_told_in_a_table(tmp_path):
         ({"id": "_2"}, "two criteria have one number"),
     ],
 )
-def test_criteria_that_are_not_the_rubrics_are_refused(tmp_path, rubric, change, told):
+def test_criteria_that_are_not_the_rubrics_are_refused(tmp_path, rubric, change, message):
     first, second = RUBRIC["data"]
     rubric.write_text(json.dumps([{**first, **change}, second]), encoding="utf-8")
-    with pytest.raises(InputFileError, match=f"(?s){told}"):
+    with pytest.raises(InputFileError, match=f"(?s){message}"):
         points(tmp_path, rubric, marked("s01", 5.0, 2.5))
     assert not (tmp_path / "marks.json").exists()
 

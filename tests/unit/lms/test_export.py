@@ -63,7 +63,7 @@ def test_files_are_called_by_platform_and_thing(options, name):
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "message"),
     [
         (Options(to="lti", item="x"), "--item has no meaning for lti grades"),
         (Options(to="csv", position=1), "--position has no meaning for csv marks"),
@@ -74,8 +74,8 @@ def test_files_are_called_by_platform_and_thing(options, name):
         (Options(to="moodle", what="rubric", assignment_id=5), "--assignment-id has no meaning"),
     ],
 )
-def test_an_option_without_meaning_is_refused_not_passed_over(options, told, tmp_path):
-    with pytest.raises(CallError, match=told):
+def test_an_option_without_meaning_is_refused_not_passed_over(options, message, tmp_path):
+    with pytest.raises(CallError, match=message):
         export(results(marked("s01", 5.0)), tmp_path / "x", options)
 
 
@@ -133,9 +133,9 @@ def test_two_students_with_a_row_between_them_have_none_even_if_one_is_withheld(
 
 
 def test_export_writes_one_file_and_says_who_is_in_it(tmp_path):
-    told = export(a_class(), tmp_path / "moodle.csv", Options(to="moodle", item="Pump"))
-    assert told.written == ("s01",)
-    assert told.withheld == {"s02": "needs review", "s03": "nothing handed in", "s04": "unreadable"}
+    delivery = export(a_class(), tmp_path / "moodle.csv", Options(to="moodle", item="Pump"))
+    assert delivery.written == ("s01",)
+    assert delivery.withheld == {"s02": "needs review", "s03": "nothing handed in", "s04": "unreadable"}
     text = (tmp_path / "moodle.csv").read_text(encoding="utf-8")
     header, first = csv.reader(io.StringIO(text, newline=""))
     assert header == ["idnumber", "Pump", "Pump (feedback)"]
@@ -222,7 +222,7 @@ GUIDED = {"shortname": "a", "description": "", "descriptionmarkers": "", "maxsco
 
 
 @pytest.mark.parametrize(
-    ("model", "told", "why"),
+    ("model", "document", "why"),
     [
         (GradescopeTest, TEST, "6 of 5 points"),
         (MoodleFilled, {"criterionid": 1, "fillings": [FILLING]}, "as 2"),
@@ -262,6 +262,6 @@ GUIDED = {"shortname": "a", "description": "", "descriptionmarkers": "", "maxsco
         (PlatformCriterion, {**CRITERION, "more": 1}, "more"),
     ],
 )  # fmt: skip
-def test_documents_that_a_platform_would_misread_are_none(model, told, why):
+def test_documents_that_a_platform_would_misread_are_none(model, document, why):
     with pytest.raises(ValidationError, match=why):
-        model.model_validate(told)
+        model.model_validate(document)

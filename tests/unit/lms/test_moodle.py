@@ -35,13 +35,9 @@ def worksheet(*lines, header=HEADER, end="\r\n"):
     return end.join([header, *lines, ""]).encode()
 
 
-def graded(*reports):
-    return grades_of(results(*reports))
-
-
 def filled_in(data, *reports, people=PEOPLE, comments=None, **how):
     options = Options(to="moodle", people=people, **how)
-    grades = graded(*reports)
+    grades = grades_of(results(*reports), options)
     return fill_worksheet(data, "grades.csv", grades, options, comments or {}).among(grades)
 
 
@@ -52,11 +48,11 @@ def rows(data):
 def test_only_grade_and_feedback_change_and_the_rest_stays_to_the_byte():
     data = worksheet(line(101, text='"a\n""b"", c"'), line(102, "=Ana", "ana@x.ro"), end="\r\n")
     data = b"\xef\xbb\xbf" + data
-    found = filled_in(data, report("s01", 7.5), comments={"s01": "<p>Good, mostly</p>"})
+    delivery = filled_in(data, report("s01", 7.5), comments={"s01": "<p>Good, mostly</p>"})
     expected = data.decode().replace(',,10.00,Yes,-,"a', ',7.5,10.00,Yes,-,"a')
     expected = expected.replace('""b"", c",-,', '""b"", c",-,"<p>Good, mostly</p>"', 1)
-    assert found.content.decode() == expected
-    assert found.written == ("s01",)
+    assert delivery.content.decode() == expected
+    assert delivery.written == ("s01",)
 
 
 def test_a_worksheet_without_changes_comes_back_as_it_was():
@@ -65,51 +61,51 @@ def test_a_worksheet_without_changes_comes_back_as_it_was():
 
 
 def test_grades_that_moodle_holds_already_are_changed_and_told():
-    found = filled_in(worksheet(line(101, grade="3.00")), report("s01", 5.0))
-    assert rows(found.content)[0]["Grade"] == "5"
-    assert found.notes[0].startswith("1 grade(s) that Moodle holds already")
+    delivery = filled_in(worksheet(line(101, grade="3.00")), report("s01", 5.0))
+    assert rows(delivery.content)[0]["Grade"] == "5"
+    assert delivery.notes[0].startswith("1 grade(s) that Moodle holds already")
 
 
 def test_a_grade_that_moodle_holds_already_stays_as_it_is_written():
     data = worksheet(line(101, grade="5.00"))
-    found = filled_in(data, report("s01", 5.0))
-    assert (found.content, found.written, found.notes) == (data, ("s01",), ())
+    delivery = filled_in(data, report("s01", 5.0))
+    assert (delivery.content, delivery.written, delivery.notes) == (data, ("s01",), ())
 
 
 def test_a_grade_that_moodle_holds_for_a_withheld_student_stays_and_is_told():
     data = worksheet(line(101, grade="3.00"), line(102, "Ana Ionescu", "ana@x.ro"))
     waiting = report("s01", None, status="needs_review"), report("s02", None, status="missing")
-    found = filled_in(data, *waiting)
-    assert found.content == data
-    assert found.notes == ("withheld, and a grade is there already, which stays: s01 (3.00)",)
+    delivery = filled_in(data, *waiting)
+    assert delivery.content == data
+    assert delivery.notes == ("withheld, and a grade is there already, which stays: s01 (3.00)",)
 
 
 def test_comments_that_moodle_holds_already_are_replaced_and_told():
     data = worksheet(line(101) + "well done", line(102, "Ana Ionescu", "ana@x.ro"))
     comments = {"s01": "<p>a</p>", "s02": "<p>b</p>"}
-    found = filled_in(data, report("s01", 5.0), report("s02", 5.0), comments=comments)
-    assert found.notes == ("1 comment(s) that Moodle holds already are replaced",)
-    again = filled_in(found.content, report("s01", 5.0), report("s02", 5.0), comments=comments)
+    delivery = filled_in(data, report("s01", 5.0), report("s02", 5.0), comments=comments)
+    assert delivery.notes == ("1 comment(s) that Moodle holds already are replaced",)
+    again = filled_in(delivery.content, report("s01", 5.0), report("s02", 5.0), comments=comments)
     assert again.notes == ()
 
 
 def test_students_are_found_by_address_before_name():
     data = worksheet(line(101, "Ana Ionescu", "ion@x.ro"), line(102, "Ion Popescu", "ana@x.ro"))
-    found = filled_in(data, report("s01", 5.0), report("s02", 6.0))
-    assert [row["Grade"] for row in rows(found.content)] == ["5", "6"]
+    delivery = filled_in(data, report("s01", 5.0), report("s02", 6.0))
+    assert [row["Grade"] for row in rows(delivery.content)] == ["5", "6"]
 
 
 def test_names_that_two_rows_bear_are_nobodys_and_told():
     data = worksheet(line(101, email="a@x.ro"), line(102, email="b@x.ro"))
-    found = filled_in(data, report("s01", 5.0), people={"s01": Person(name="ion  popescu")})
-    assert found.written == ()
-    assert "rows 2, 3" in found.unplaced["s01"]
+    delivery = filled_in(data, report("s01", 5.0), people={"s01": Person(name="ion  popescu")})
+    assert delivery.written == ()
+    assert "rows 2, 3" in delivery.unplaced["s01"]
 
 
 def test_a_locked_grade_is_left_and_told():
     data = worksheet(line(101, changeable="No"))
-    found = filled_in(data, report("s01", 5.0))
-    assert (found.content, found.unplaced) == (data, {"s01": LOCKED})
+    delivery = filled_in(data, report("s01", 5.0))
+    assert (delivery.content, delivery.unplaced) == (data, {"s01": LOCKED})
 
 
 def test_another_maximum_is_refused_unless_rescaling_is_asked_for():
@@ -139,12 +135,12 @@ def test_columns_of_people_are_known_by_what_stands_in_them_where_their_names_ar
         'Participant 8,Ana Ionescu,ana@x.ro,,"10,00",-,',
         header=header,
     )
-    found = filled_in(data, report("s01", 8.5), report("s02", 6.0), comments={"s01": "<p>a</p>"})
-    assert found.written == ("s02",)
-    assert "another email" in found.unplaced["s01"]
+    delivery = filled_in(data, report("s01", 8.5), report("s02", 6.0), comments={"s01": "<p>a</p>"})
+    assert delivery.written == ("s02",)
+    assert "another email" in delivery.unplaced["s01"]
     people = {"s01": Person(name="Ion Popescu")}
-    found = filled_in(data, report("s01", 8.5), people=people, comments={"s01": "<p>a</p>"})
-    assert b'x@x.ro,8.5,"10,00",-,<p>a</p>' in found.content
+    delivery = filled_in(data, report("s01", 8.5), people=people, comments={"s01": "<p>a</p>"})
+    assert b'x@x.ro,8.5,"10,00",-,<p>a</p>' in delivery.content
 
 
 @pytest.mark.parametrize(
@@ -191,7 +187,7 @@ def lines(text):
 
 def gradebook(*reports, people=None, item="Pump", **how):
     options = Options(to="moodle", people=people or {}, item=item, **how)
-    return drafted(grades_of(results(*reports)), options).content
+    return drafted(grades_of(results(*reports), options), options).content
 
 
 def users_and_grades(text):
@@ -209,7 +205,7 @@ def test_users_by_address_come_from_the_roster():
 
 
 @pytest.mark.parametrize(
-    ("people", "identity", "told"),
+    ("people", "identity", "message"),
     [
         ({}, "email", "s01: the roster gives no email"),
         ({"s01": Person(email="ion")}, "email", "is no email"),
@@ -220,8 +216,8 @@ def test_users_by_address_come_from_the_roster():
         ({}, "phone", "not by 'phone'"),
     ],
 )
-def test_a_row_that_would_abort_moodles_import_is_refused(people, identity, told):
-    with pytest.raises(CallError, match=told):
+def test_a_row_that_would_abort_moodles_import_is_refused(people, identity, message):
+    with pytest.raises(CallError, match=message):
         gradebook(report("s01", 7.5), people=people, identity=identity)
 
 
@@ -244,7 +240,7 @@ def test_a_grade_item_is_called_as_the_assignment_where_nothing_is_said_and_neve
 
 def test_grades_above_a_hundred_are_told_to_be_more_than_most_sites_allow():
     options = Options(to="moodle")
-    draft = drafted(grades_of(results(report("s01", 150.0, max_score=200.0))), options)
+    draft = drafted(grades_of(results(report("s01", 150.0, max_score=200.0)), options), options)
     assert "above 100" in draft.notes[0]
 
 

@@ -39,8 +39,8 @@ def answer(tmp_path):
     path = tmp_path / "definitions.json"
 
     def write(*definitions, **area):
-        told = {"areas": [{**AREA, "definitions": list(definitions), **area}], "warnings": []}
-        path.write_text(json.dumps(told), encoding="utf-8")
+        document = {"areas": [{**AREA, "definitions": list(definitions), **area}], "warnings": []}
+        path.write_text(json.dumps(document), encoding="utf-8")
         return path
 
     return write
@@ -49,10 +49,10 @@ def answer(tmp_path):
 def test_the_rubric_becomes_a_marking_guide_of_the_activity(tmp_path, answer):
     reports = marked("s01", 5.0, 2.5), marked("s02", 5.0, 0.0, status="needs_review")
     delivery, path = moodle(tmp_path, "rubric", *reports, criteria=answer(), item="Pump")
-    told = json.loads(path.read_bytes())
-    jsonschema.validate(told, schema("moodle-rubric"))
-    assert told["wsfunction"] == "core_grading_save_definitions"
-    (area,) = told["arguments"]["areas"]
+    document = json.loads(path.read_bytes())
+    jsonschema.validate(document, schema("moodle-rubric"))
+    assert document["wsfunction"] == "core_grading_save_definitions"
+    (area,) = document["arguments"]["areas"]
     assert {key: area[key] for key in AREA if key != "definitions"} == {
         key: AREA[key] for key in AREA if key != "definitions"
     }
@@ -103,10 +103,12 @@ def test_another_way_of_grading_is_never_put_aside(tmp_path, answer):
     moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=answer(activemethod=None))
 
 
-@pytest.mark.parametrize("told", ["[]", "{}", '{"areas": []}', '{"areas": [1]}', '{"areas": [{}, {}]}', "x"])
-def test_an_answer_that_is_not_moodles_is_refused(tmp_path, told):
+@pytest.mark.parametrize(
+    "document", ["[]", "{}", '{"areas": []}', '{"areas": [1]}', '{"areas": [{}, {}]}', "x"]
+)
+def test_an_answer_that_is_not_moodles_is_refused(tmp_path, document):
     path = tmp_path / "definitions.json"
-    path.write_text(told)
+    path.write_text(document)
     with pytest.raises(InputFileError, match=r"definitions\.json"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=path)
 
@@ -116,9 +118,9 @@ def test_points_fill_every_criterion_of_the_guide(tmp_path, answer):
         tmp_path, "marks", marked("s01", 5.0, 2.5), marked("s02", 3.0, None), marked("s03", 1.0, 1.0),
         criteria=answer(GUIDE), people=PEOPLE, assignment_id=17,
     )  # fmt: skip
-    told = json.loads(path.read_bytes())
-    jsonschema.validate(told, schema("moodle-marks"))
-    first, second = told["calls"]
+    document = json.loads(path.read_bytes())
+    jsonschema.validate(document, schema("moodle-marks"))
+    first, second = document["calls"]
     assert first["wsfunction"] == "mod_assign_save_grade"
     arguments = first["arguments"]
     assert (arguments["assignmentid"], arguments["userid"], arguments["grade"]) == (17, 101, -1)
@@ -136,29 +138,29 @@ def test_points_fill_every_criterion_of_the_guide(tmp_path, answer):
 
 
 @pytest.mark.parametrize(
-    ("how", "told"),
+    ("how", "message"),
     [
         ({"assignment_id": None}, "--assignment-id"),
         ({"criteria": None}, "--criteria"),
         ({"people": {}}, "nobody's number in Moodle is known"),
     ],
 )
-def test_places_and_people_that_nobody_tells_are_asked_for(tmp_path, answer, how, told):
+def test_places_and_people_that_nobody_tells_are_asked_for(tmp_path, answer, how, message):
     known = {"criteria": answer(GUIDE), "people": PEOPLE, "assignment_id": 17, **how}
-    with pytest.raises(CallError, match=told):
+    with pytest.raises(CallError, match=message):
         moodle(tmp_path, "marks", marked("s01", 5.0, 2.5), **known)
 
 
 @pytest.mark.parametrize(
-    ("people", "told"),
+    ("people", "message"),
     [
         ({"s01": Person(platform_id="x")}, r"calls\[0\]\.arguments\.userid"),
         ({"s01": Person(platform_id="0")}, r"calls\[0\]\.arguments\.userid"),
         ({"s01": Person(platform_id="5"), "s02": Person(platform_id="05")}, "user 5 stands twice"),
     ],
 )
-def test_numbers_that_are_none_are_refused_with_the_place(tmp_path, answer, people, told):
-    with pytest.raises(InputFileError, match=told):
+def test_numbers_that_are_none_are_refused_with_the_place(tmp_path, answer, people, message):
+    with pytest.raises(InputFileError, match=message):
         moodle(
             tmp_path, "marks", marked("s01", 5.0, 2.5), marked("s02", 5.0, 2.5),
             criteria=answer(GUIDE), people=people, assignment_id=17,

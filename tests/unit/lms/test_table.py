@@ -34,16 +34,19 @@ def rows(text):
 
 def test_a_row_per_student_with_points_per_criterion(tmp_path):
     write_summary(a_class(), tmp_path / "summary.csv")
-    found = rows((tmp_path / "summary.csv").read_bytes().decode("utf-8"))
-    assert [row["student_id"] for row in found] == ["s01", "s02", "s03", "s04"]
-    assert found[0] | {"v_A": "5", "v_B": "2.5", "score": "7.5", "mistakes": "sense_reversed@v_B"} == found[0]
-    assert found[3]["problems"] == "pdf_encrypted"
+    table_rows = rows((tmp_path / "summary.csv").read_bytes().decode("utf-8"))
+    assert [row["student_id"] for row in table_rows] == ["s01", "s02", "s03", "s04"]
+    assert (
+        table_rows[0] | {"v_A": "5", "v_B": "2.5", "score": "7.5", "mistakes": "sense_reversed@v_B"}
+        == table_rows[0]
+    )
+    assert table_rows[3]["problems"] == "pdf_encrypted"
 
 
 def test_a_score_under_review_is_blank_with_its_range():
     waiting = rows(summary_text(a_class()))[1]
-    found = [waiting[name] for name in ("score", "score_low", "score_high", "v_B")]
-    assert found == ["", "5", "10", ""]
+    table_rows = [waiting[name] for name in ("score", "score_low", "score_high", "v_B")]
+    assert table_rows == ["", "5", "10", ""]
 
 
 def test_each_position_has_its_row():
@@ -232,6 +235,7 @@ def test_addresses_of_another_kind_do_not_speak_against_names_which_are_all_ther
     assert matches.rows == {"s01": 1, "s02": 2}
     assert matches.notes_on(["s01"]) == ["found by name alone, look whether they are these: s01"]
     assert matches.notes_on([]) == []
+    assert matches.notes_on(iter(["s01", "s02"]))[0].endswith(": s01, s02")
 
 
 def test_the_work_of_matching_grows_with_the_class_not_with_its_square(monkeypatch):
