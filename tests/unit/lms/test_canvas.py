@@ -134,6 +134,16 @@ def test_another_maximum_needs_leave_to_rescale(tmp_path):
     assert '2",3,7.5,55' in text
 
 
+def test_the_gradebook_states_its_own_maximum(tmp_path):
+    with pytest.raises(CallError, match="--maximum has no meaning beside --gradebook"):
+        filled(tmp_path, report("s01", 7.5), maximum=10.0)
+
+
+def test_a_row_of_nobody_below_the_points_is_left(tmp_path):
+    text = EXPORTED.replace('"Popescu, Ion"', 'Manual Posting,,,,,,,,\r\n"Popescu, Ion"', 1)
+    assert filled(tmp_path, report("s01", 7.5), text=text)[1] == text.replace('2",3,,55', '2",3,7.5,55')
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -238,6 +248,11 @@ def test_the_rubric_has_a_range_of_points_for_each_criterion(tmp_path):
 def test_a_rubric_is_known_before_anybody_has_a_grade(tmp_path):
     _, text = canvas(tmp_path / "out.csv", marked("s01", 5.0, 2.5, status="needs_review"), what="rubric")
     assert len(text.splitlines()) == 3
+
+
+def test_a_class_without_criteria_has_no_rubric(tmp_path):
+    with pytest.raises(CallError, match="no report has criteria"):
+        canvas(tmp_path / "out.csv", report("s01", 7.5), what="rubric")
 
 
 def test_points_that_canvas_would_round_are_refused(tmp_path):

@@ -11,7 +11,7 @@ from grader.lms.moodle import LOCKED, fill_worksheet
 from grader.lms.moodle import gradebook as drafted
 from reference.errors import CallError, InputFileError
 from tests.unit.lms import importers
-from tests.unit.lms.classroom import marked, moodle, report, results
+from tests.unit.lms.classroom import criterion, marked, moodle, report, results
 
 # The worksheet -------------------------------------------------------------------------------------
 HEADER = (
@@ -242,6 +242,12 @@ def test_grades_above_a_hundred_are_told_to_be_more_than_most_sites_allow():
     options = Options(to="moodle")
     draft = drafted(grades_of(results(report("s01", 150.0, max_score=200.0)), options), options)
     assert "above 100" in draft.notes[0]
+
+
+def test_a_comment_longer_than_moodle_stores_is_refused():
+    long = report("s01", 5.0, criteria=[criterion("v_A", "none", 0.0, 61_000 * "x")])
+    with pytest.raises(CallError, match="s01: the comment has more than 60000 characters"):
+        gradebook(long)
 
 
 def test_another_maximum_needs_leave_to_rescale():
