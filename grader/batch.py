@@ -7,7 +7,6 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from grader.documents import ReportDocument, ResultsDocument, UnmatchedDocument
-from grader.exports import write_summary
 from grader.feedback.class_page import write_index
 from grader.feedback.leaflet import About
 from grader.feedback.pages import write_feedback
@@ -16,6 +15,7 @@ from grader.files import make_folder, write_whole
 from grader.folder import submissions, told_name
 from grader.jobs import Job, alike_of_run, folders_of, inputs_of_run
 from grader.kept import digest_of, keep_looked, keep_maps, kept_looked
+from grader.lms.table import write_summary
 from grader.measurements import names_of
 from grader.moved import earlier, moved, note_inputs, noted_inputs
 from grader.ownership import Unmatched, assign_pages

@@ -5,13 +5,10 @@ nodes of an exact plan are relative to their pole, y up. Directions are degrees 
 from +x, 0 <= d < 360. Real values are SI; scales are real units per millimetre on paper.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from reference.assignment_file import AssignmentFile
-from reference.errors import CallError
-from reference.mechanism_file import MechanismFile
 from reference.mistakes import Code
 
 SCHEMA_VERSION = 1
@@ -491,48 +488,3 @@ class CalibrationDocument(Document):
     segments: CalibrationSegments
     points: list[CalibrationPoint]
     advice: list[str]
-
-
-# Schemas ------------------------------------------------------------------------------------------
-
-
-def _models() -> dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]]:
-    from grader import platform_documents as platforms  # noqa: PLC0415 - most commands write none of them
-    from grader.rubric import RubricFile  # noqa: PLC0415 - rubrics know nothing of documents
-
-    return {
-        "measurements": (MeasurementsDocument, "validation"),
-        "reading": (ReadingDocument, "serialization"),
-        "report": (ReportDocument, "serialization"),
-        "results": (ResultsDocument, "serialization"),
-        "plan": (PlanDocument, "serialization"),
-        "lint": (LintDocument, "serialization"),
-        "calibration": (CalibrationDocument, "serialization"),
-        "moodle-rubric": (platforms.MoodleRubricDocument, "serialization"),
-        "moodle-marks": (platforms.MoodleMarksDocument, "serialization"),
-        "canvas-marks": (platforms.CanvasMarksDocument, "serialization"),
-        "gradescope": (platforms.GradescopeDocument, "serialization"),
-        "lti": (platforms.LtiDocument, "serialization"),
-        "mechanism": (MechanismFile, "validation"),
-        "assignment": (AssignmentFile, "validation"),
-        "rubric": (RubricFile, "validation"),
-    }
-
-
-def schema_names() -> list[str]:
-    """The names that `schema` knows."""
-    return list(_models())
-
-
-def schema(name: str) -> dict[str, Any]:
-    """The JSON Schema (draft 2020-12) of a document or authored file; CallError for an unknown name."""
-    models = _models()
-    if name not in models:
-        raise CallError("unknown_schema", f"there is no schema '{name}': known are {', '.join(models)}")
-    model, mode = models[name]
-    found = model.model_json_schema(mode=mode)
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": f"urn:planmark:{name}:{SCHEMA_VERSION}",
-        **found,
-    }

@@ -138,9 +138,9 @@ def schema(name: Annotated[str, typer.Argument(help="report, results, reading, m
     """The JSON Schema of a document or authored file."""
     import json
 
-    from grader import documents
+    from grader.cli import schemas
 
-    typer.echo(json.dumps(documents.schema(name), indent=2, ensure_ascii=False))
+    typer.echo(json.dumps(schemas.schema(name), indent=2, ensure_ascii=False))
 
 
 FolderArgument = Annotated[Path, typer.Argument(help="The folder with what was handed in.")]

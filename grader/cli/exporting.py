@@ -9,7 +9,7 @@ from grader.cli.app import LanguageOption, PositionOption, app, check_language
 from grader.cli.commands import RosterOption
 
 if TYPE_CHECKING:
-    from grader.exports import Delivery, Options
+    from grader.lms.grades import Delivery, Options
 
 
 @app.command()
@@ -73,7 +73,7 @@ def export(
     lang: LanguageOption = "en",
 ) -> None:
     """Write the results for a learning platform, validated before anything is written."""
-    from grader.exports import Options
+    from grader.lms.grades import Options
     from reference.errors import CallError
 
     if worksheet is not None and (gradebook is not None or to != "moodle"):
@@ -91,18 +91,20 @@ def export(
 def _export(
     folder: Path, file: Path | None, options: "Options", roster: Path | None, ids: Path | None
 ) -> bool:
-    """Write the export file and tell who is not in it; whether anybody is missing."""
+    """Write the export file and report who is not in it; whether anybody is missing."""
     from dataclasses import replace
 
-    from grader.exports import Person, read_results, usual_name, with_ids
-    from grader.exports import export as deliver
+    from grader.lms.export import export as deliver
+    from grader.lms.export import read_results, usual_name
+    from grader.lms.grades import Person
+    from grader.lms.table import with_ids
     from grader.roster import read_roster
     from reference.errors import CallError
 
     check_language(options.lang)
     path = file or folder / usual_name(options)
-    for read in (folder / "results.json", options.form, options.criteria, roster, ids):
-        if read is not None and path.resolve() == read.resolve():
+    for source in (folder / "results.json", options.form, options.criteria, roster, ids):
+        if source is not None and path.resolve() == source.resolve():
             raise CallError("file_exists", f"{path}: is read for this export; name another file (--file)")
     results = read_results(folder)
     people = {}
@@ -114,16 +116,16 @@ def _export(
     if ids is not None:
         people = with_ids(people, ids)
     delivery = deliver(results, path, replace(options, people=people, out=folder))
-    _tell(delivery)
+    _report(delivery, path)
     return not delivery.is_complete
 
 
-def _tell(delivery: "Delivery") -> None:
-    is_of_students = delivery.written or delivery.withheld or delivery.not_found
+def _report(delivery: "Delivery", path: Path) -> None:
+    is_of_students = delivery.written or delivery.withheld or delivery.unplaced
     who = f"{len(delivery.written)} students " if is_of_students else ""
-    typer.echo(f"{who}written to {delivery.path}")
-    for told, students in (("withheld", delivery.withheld), ("no place in the file", delivery.not_found)):
+    typer.echo(f"{who}written to {path}")
+    for reason, students in (("withheld", delivery.withheld), ("no place in the file", delivery.unplaced)):
         for student, why in students.items():
-            typer.echo(f"  {student}: {told}: {why}")
+            typer.echo(f"  {student}: {reason}: {why}")
     for note in delivery.notes:
         typer.echo(f"  note: {note}")

@@ -9,7 +9,7 @@ import typer
 from pydantic import BaseModel
 
 from grader.cli.app import app
-from grader.documents import schema_names
+from grader.cli.schemas import schema_names
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference import assignment_file, mechanism_file
 from reference.errors import PlanmarkError

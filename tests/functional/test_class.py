@@ -7,7 +7,7 @@ import jsonschema
 import pypdfium2
 import pytest
 
-from grader.documents import schema
+from grader.cli.schemas import schema
 from reference.assignment import library
 
 

@@ -12,7 +12,7 @@ import typer.main
 from typer.testing import CliRunner
 
 from grader.cli import app
-from grader.documents import schema
+from grader.cli.schemas import schema
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "tests" / "unit" / "older" / "2026-11-22-0304" / "results.json"
@@ -101,7 +101,7 @@ def test_every_option_is_documented():
 
 
 @pytest.mark.parametrize(
-    ("command", "told"),
+    ("command", "message"),
     [
         ("export marks --to blackboard", "'blackboard' is no export target"),
         ("export marks --to moodle --what results", "moodle is given no 'results'"),
@@ -140,25 +140,25 @@ def test_every_option_is_documented():
         ),
     ],
 )
-def test_a_wrong_call_is_told_in_words_and_nothing_is_written(desk, command, told):
+def test_a_wrong_call_is_told_in_words_and_nothing_is_written(desk, command, message):
     before = {path: path.stat().st_mtime_ns for path in desk.rglob("*")}
     ran = planmark(command)
     assert ran.exit_code in {2, 5}, ran.output
-    assert told in " ".join(ran.output.split())
+    assert message in " ".join(ran.output.split())
     assert ran.exception is None or isinstance(ran.exception, SystemExit)
     assert {path: path.stat().st_mtime_ns for path in desk.rglob("*")} == before
 
 
 def test_a_second_export_after_the_review_fills_in_the_rest(desk):
-    told = results()
+    document = results()
     command = "export marks --to moodle --worksheet Grades-Pump.csv --roster roster.csv"
     assert planmark(command).exit_code == 1
     first = (desk / "marks" / "export-moodle.csv").read_text(encoding="utf-8")
-    for report in told["reports"]:
+    for report in document["reports"]:
         if report["student_id"] == "s02":
             report.update(status="graded", score=30.0, score_range=[30.0, 30.0])
-    told["reports"] = [report for report in told["reports"] if report["student_id"] != "s10"]
-    (desk / "marks" / "results.json").write_text(json.dumps(told), encoding="utf-8")
+    document["reports"] = [report for report in document["reports"] if report["student_id"] != "s10"]
+    (desk / "marks" / "results.json").write_text(json.dumps(document), encoding="utf-8")
     shutil.copy(desk / "marks" / "export-moodle.csv", desk / "Grades-Pump.csv")
     assert planmark(command).exit_code == 0
     second = (desk / "marks" / "export-moodle.csv").read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ import numpy as np
 import pikepdf
 import pytest
 
-from grader.documents import schema
+from grader.cli.schemas import schema
 from reference.assignment import built_in, load_assignment
 from reference.mistakes import Mistake
 from reference.plan import exact_plan

@@ -9,7 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 from grader.cli.app import app
-from grader.documents import schema, schema_names
+from grader.cli.schemas import schema, schema_names
 from reference.assignment import library
 
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from grader.cli.schemas import schema
 from grader.comparison import Submission
-from grader.documents import schema
 from grader.judging import judge
 from grader.records import Figure, Reading, ReadVector
 from grader.reports import report_of

@@ -6,6 +6,7 @@ import jsonschema
 import pytest
 from pydantic import ValidationError
 
+from grader.cli.schemas import schema, schema_names
 from grader.comparison import Submission
 from grader.documents import (
     SCHEMA_VERSION,
@@ -13,8 +14,6 @@ from grader.documents import (
     ReportDocument,
     ResultsDocument,
     SheetDocument,
-    schema,
-    schema_names,
 )
 from grader.judging import judge
 from grader.records import Problem

@@ -7,7 +7,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from grader.documents import schema
+from grader.cli.schemas import schema
 from grader.lint.document import lint_document
 from grader.lint.findings import named
 from grader.lint.inspection import lint

@@ -8,8 +8,10 @@ import jsonschema
 import pytest
 
 from grader.batch import Batch, grade
-from grader.documents import ReportDocument, ResultsDocument, schema
-from grader.exports import Options, export, read_results
+from grader.cli.schemas import schema
+from grader.documents import ReportDocument, ResultsDocument
+from grader.lms.export import export, read_results
+from grader.lms.grades import Options
 from grader.rubric import rubric_of
 from reference.assignment import load_assignment
 from reference.errors import InputFileError

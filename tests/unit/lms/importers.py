@@ -11,7 +11,7 @@ CANVAS_NUMBER = re.compile(r"-?[0-9.,]+%?")
 def moodle_worksheet(data, maximum, word="Participant "):
     """Grades and comments by participant, as Moodle stores them; who is skipped is not there."""
     header, *rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""))
-    found = {}
+    stored = {}
     for row in (row for row in rows if row):
         cells = dict(zip(header, row, strict=True))
         grade = cells["Grade"].replace(" ", "")
@@ -23,25 +23,25 @@ def moodle_worksheet(data, maximum, word="Participant "):
         if 0.0 <= value <= maximum:
             place = header.index("Feedback comments") if "Feedback comments" in header else 0
             comment = row[place] if place else None
-            found[int(cells["Identifier"][len(word) :])] = (value, comment)
-    return found
+            stored[int(cells["Identifier"][len(word) :])] = (value, comment)
+    return stored
 
 
 def moodle_gradebook(text, users, column=1):
     """Grades by user of a new grade item; one unknown user aborts all."""
     _, *rows = csv.reader(io.StringIO(text, newline=""))
-    found = {}
+    stored = {}
     for row in rows:
         if row[0] not in users:
             return {}
         # A blank is stored as 0 in a new item, and only a dash is none.
-        found[row[0]] = None if row[column].strip() == "-" else float(row[column] or 0)
-    return found
+        stored[row[0]] = None if row[column].strip() == "-" else float(row[column] or 0)
+    return stored
 
 
 def moodle_feedback(data, participants):
     """Files by participant: a path's part with three underscores says whose and for which plugin."""
-    found = {}
+    stored = {}
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         for name in archive.namelist():
             parts = name.split("/")
@@ -51,9 +51,9 @@ def moodle_feedback(data, participants):
                 if len(info) >= 4 and info[1].isdigit() and int(info[1]) in participants:
                     assert info[2:4] == ["assignfeedback", "file"]
                     rest = "/".join([*info[4:5], *parts])
-                    found.setdefault(int(info[1]), {})[rest] = archive.read(name)
+                    stored.setdefault(int(info[1]), {})[rest] = archive.read(name)
                     break
-    return found
+    return stored
 
 
 def canvas_cell(text):
@@ -74,15 +74,15 @@ def canvas_gradebook(text, assignment, by_id=(), by_sis=(), by_login=(), by_name
     assert "SIS Login ID" in header[3]
     assert "Section" in header[4]
     column = header.index(assignment)
-    possible, found = None, {}
+    possible, stored = None, {}
     for row in rows[1:]:
         if "Points Possible" in row[0]:
             possible = float(row[column])
         elif any(cell.strip() and not cell.startswith("Manual Posting") for cell in row):
             known = (by_id, row[1]), (by_sis, row[2]), (by_login, row[3]), (by_name, row[0])
             who = next((dict(users)[cell] for users, cell in known if cell in dict(users)), None)
-            found[who] = row[column].strip()
-    return possible, found
+            stored[who] = row[column].strip()
+    return possible, stored
 
 
 def canvas_rubric(text):
@@ -90,9 +90,9 @@ def canvas_rubric(text):
     header, *rows = csv.reader(io.StringIO(text, newline=""))
     assert header[0] == "Rubric Name"
     names = [place for place, title in enumerate(header) if title == "Rating Name"]
-    found = {}
+    stored = {}
     for row in rows:
         ratings = [(row[place], round(float(row[place + 2].replace(",", ".")), 2)) for place in names]
         is_range = row[header.index("Criteria Enable Range")].lower() in {"true", "1"}
-        found.setdefault(row[0], []).append((row[1], is_range, ratings))
-    return found
+        stored.setdefault(row[0], []).append((row[1], is_range, ratings))
+    return stored

@@ -9,12 +9,13 @@ import jsonschema
 import pytest
 from pydantic import ValidationError
 
-from grader.documents import schema
-from grader.exports import Options, Person, export
-from grader.exports.draft import document
-from grader.platform_documents import GradescopeDocument, LtiScore
+from grader.cli.schemas import schema
+from grader.lms.export import export
+from grader.lms.grades import Options, Person
+from grader.lms.marks import json_document
+from grader.lms.scores import GradescopeDocument, LtiScore
 from reference.errors import CallError, InputFileError
-from tests.unit.exports.classroom import marked, report, results
+from tests.unit.lms.classroom import marked, report, results
 
 WAITING = report("s02", None, status="needs_review", score_range=(1.0, 2.0))
 UNREADABLE = report("s03", None, status="unreadable")
@@ -33,18 +34,22 @@ def test_each_student_with_a_grade_has_a_results_file(tmp_path):
     delivery = gradescope(tmp_path / "out.zip", *CLASS)
     with zipfile.ZipFile(tmp_path / "out.zip") as archive:
         assert archive.namelist() == ["s01/results.json"]
-        told = json.loads(archive.read("s01/results.json"))
-    jsonschema.validate(told, schema("gradescope"))
-    assert (told["score"], told["visibility"], told["stdout_visibility"]) == (11.25, "visible", "hidden")
-    assert [(one["score"], one["max_score"], one["status"]) for one in told["tests"]] == [
+        document = json.loads(archive.read("s01/results.json"))
+    jsonschema.validate(document, schema("gradescope"))
+    assert (document["score"], document["visibility"], document["stdout_visibility"]) == (
+        11.25,
+        "visible",
+        "hidden",
+    )
+    assert [(one["score"], one["max_score"], one["status"]) for one in document["tests"]] == [
         (5.0, 5.0, "passed"),
         (2.5, 5.0, "failed"),
     ]
-    assert [one["number"] for one in told["tests"]] == ["1", "2"]
-    assert {one["output_format"] for one in told["tests"]} == {"text"}
-    assert told["tests"][1]["output"] == "~ Told <why> & how."
-    assert told["output"].splitlines()[-1] == "c3: Vector 3: – not judged: Told <why> & how."
-    assert told["extra_data"]["schema_version"] == 1
+    assert [one["number"] for one in document["tests"]] == ["1", "2"]
+    assert {one["output_format"] for one in document["tests"]} == {"text"}
+    assert document["tests"][1]["output"] == "~ Told <why> & how."
+    assert document["output"].splitlines()[-1] == "c3: Vector 3: – not judged: Told <why> & how."
+    assert document["extra_data"]["schema_version"] == 1
     assert list(delivery.withheld) == ["s02", "s03", "s04"]
 
 
@@ -76,37 +81,37 @@ def test_comments_are_in_the_students_own_language(tmp_path):
 def test_positions_are_tests_of_their_own(tmp_path):
     both = marked("s01", 5.0, position=1), marked("s01", 2.5, position=2)
     gradescope(tmp_path / "sum", *both, combine="sum")
-    told = json.loads((tmp_path / "sum" / "s01" / "results.json").read_bytes())
-    assert told["score"] == 7.5
-    assert [one["name"] for one in told["tests"]] == ["c1: Vector 1 (1)", "c1: Vector 1 (2)"]
+    document = json.loads((tmp_path / "sum" / "s01" / "results.json").read_bytes())
+    assert document["score"] == 7.5
+    assert [one["name"] for one in document["tests"]] == ["c1: Vector 1 (1)", "c1: Vector 1 (2)"]
     gradescope(tmp_path / "mean", *both, combine="mean")
-    told = json.loads((tmp_path / "mean" / "s01" / "results.json").read_bytes())
-    assert (told["score"], told["extra_data"]["max_score"]) == (3.75, 5.0)
-    assert [one["status"] for one in told["tests"]] == ["passed", "failed"]
+    document = json.loads((tmp_path / "mean" / "s01" / "results.json").read_bytes())
+    assert (document["score"], document["extra_data"]["max_score"]) == (3.75, 5.0)
+    assert [one["status"] for one in document["tests"]] == ["passed", "failed"]
 
 
 def test_an_unknown_visibility_is_refused(tmp_path):
     with pytest.raises(CallError, match="choose hidden, after_due_date, visible, after_published"):
         gradescope(tmp_path / "out.zip", *CLASS, visibility="shown")
     gradescope(tmp_path / "out", *CLASS, visibility="after_published")
-    told = json.loads((tmp_path / "out" / "s01" / "results.json").read_bytes())
-    assert {told["visibility"], *(one["visibility"] for one in told["tests"])} == {"after_published"}
+    document = json.loads((tmp_path / "out" / "s01" / "results.json").read_bytes())
+    assert {document["visibility"], *(one["visibility"] for one in document["tests"])} == {"after_published"}
 
 
 def test_points_that_belie_the_score_are_refused(tmp_path):
     gradescope(tmp_path / "out", marked("s01", 5.0, 2.5))
-    told = json.loads((tmp_path / "out" / "s01" / "results.json").read_bytes())
+    document = json.loads((tmp_path / "out" / "s01" / "results.json").read_bytes())
     for score in (7.0, 8.0, 10.5):
         with pytest.raises(InputFileError, match="points"):
-            document(GradescopeDocument, {**told, "score": score}, "results.json")
+            json_document(GradescopeDocument, {**document, "score": score}, "results.json")
 
 
 def test_a_status_that_belies_its_points_is_refused(tmp_path):
     gradescope(tmp_path / "out", *CLASS)
-    told = json.loads((tmp_path / "out" / "s01" / "results.json").read_bytes())
-    told["tests"][0]["status"] = "failed"
+    document = json.loads((tmp_path / "out" / "s01" / "results.json").read_bytes())
+    document["tests"][0]["status"] = "failed"
     with pytest.raises(InputFileError, match=r"\$\.tests\[0\]: 'failed' with 5 of 5 points"):
-        document(GradescopeDocument, told, "results.json")
+        json_document(GradescopeDocument, document, "results.json")
 
 
 # LTI ----------------------------------------------------------------------------------------------
@@ -117,9 +122,9 @@ NOW = datetime(2026, 11, 22, 7, 1, 2, 345678, tzinfo=timezone(timedelta(hours=2)
 def lti(tmp_path, *reports, **how):
     path = tmp_path / "lti.json"
     delivery = export(results(*reports), path, Options(to="lti", now=NOW, **how))
-    told = json.loads(path.read_bytes())
-    jsonschema.validate(told, schema("lti"))
-    return delivery, told["scores"]
+    document = json.loads(path.read_bytes())
+    jsonschema.validate(document, schema("lti"))
+    return delivery, document["scores"]
 
 
 def test_a_score_is_given_only_when_fully_graded(tmp_path):
@@ -163,7 +168,7 @@ def test_users_are_named_by_the_table_of_ids_and_who_is_not_in_it_is_told(tmp_pa
     people = {"s01": Person(platform_id="a-b"), "s02": Person(name="Somebody")}
     delivery, scores = lti(tmp_path, *CLASS, people=people)
     assert [one["userId"] for one in scores] == ["a-b"]
-    assert set(delivery.not_found) == {"s02", "s03"}
+    assert set(delivery.unplaced) == {"s02", "s03"}
     assert "userId is the student_id" not in " ".join(delivery.notes)
 
 

@@ -1,5 +1,7 @@
 """Results of a small class."""
 
+from datetime import UTC, datetime
+
 from grader.documents import (
     CriterionDocument,
     MistakeDocument,
@@ -9,6 +11,8 @@ from grader.documents import (
     ResultsDocument,
     ToleranceDocument,
 )
+from grader.lms.export import export
+from grader.lms.grades import Options
 
 
 def criterion(name, verdict, points, feedback=""):
@@ -77,3 +81,12 @@ def marked(student_id, *points, position=None, status="graded", title="Vector {}
         student_id, score, status=status, position=position, max_score=5.0 * len(points), criteria=criteria,
         score_range=(0.0, 5.0 * len(points)), **more,
     )  # fmt: skip
+
+
+NOW = datetime(2026, 11, 22, 5, 0, tzinfo=UTC)
+
+
+def moodle(tmp_path, what, *reports, name="out.json", **how):
+    path = tmp_path / name
+    delivery = export(results(*reports), path, Options(to="moodle", what=what, now=NOW, **how))
+    return delivery, path

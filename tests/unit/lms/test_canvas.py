@@ -1,17 +1,16 @@
 """Canvas: gradebook, rubric, and points in it."""
 
-import csv
-import io
 import json
 
 import jsonschema
 import pytest
 
-from grader.documents import schema
-from grader.exports import Options, Person, export
+from grader.cli.schemas import schema
+from grader.lms.export import export
+from grader.lms.grades import Options, Person
 from reference.errors import CallError, InputFileError
-from tests.unit.exports import importers
-from tests.unit.exports.classroom import marked, report, results
+from tests.unit.lms import importers
+from tests.unit.lms.classroom import marked, report, results
 
 EXPORTED = (
     "Student,ID,SIS User ID,SIS Login ID,Section,Quiz (7),Pump (12345),Current Score,Final Score\r\n"
@@ -91,9 +90,9 @@ def test_who_is_not_there_or_shares_a_row_is_told(tmp_path):
     delivery, text = filled(tmp_path, *(report(one, 7.5) for one in people), people=people)
     assert text == EXPORTED.replace('2",3,,55', '2",3,7.5,55')
     assert delivery.written == ("s01",)
-    assert "fits s02 and S-02 alike" in delivery.not_found["s02"]
-    assert "has the name, but another SIS User ID" in delivery.not_found["s08"]
-    assert "nobody in the gradebook has" in delivery.not_found["s09"]
+    assert "fits s02 and S-02 alike" in delivery.unplaced["s02"]
+    assert "has the name, but another SIS User ID" in delivery.unplaced["s08"]
+    assert "nobody in the gradebook has" in delivery.unplaced["s09"]
 
 
 def test_a_grade_that_canvas_holds_for_a_withheld_student_stays_and_is_told(tmp_path):
@@ -107,7 +106,7 @@ def test_excused_students_are_left(tmp_path, cell):
     text = EXPORTED.replace('2",3,,55', f'2",3,{cell},55')
     delivery, after = filled(tmp_path, report("s01", 7.5), text=text)
     assert after == text
-    assert "excused" in delivery.not_found["s01"]
+    assert "excused" in delivery.unplaced["s01"]
 
 
 @pytest.mark.parametrize("item", ["Pump (12345)", "Pump", "12345"])
@@ -116,14 +115,14 @@ def test_the_assignment_is_named_by_header_title_or_number(tmp_path, item):
 
 
 @pytest.mark.parametrize(
-    ("item", "told"),
+    ("item", "message"),
     [
         ("", r"which assignment\? Name it with --item: 'Quiz \(7\)', 'Pump \(12345\)'"),
         ("Press", "0 assignments fit 'Press'"),
     ],
 )
-def test_an_assignment_that_is_not_told_is_refused(tmp_path, item, told):
-    with pytest.raises(CallError, match=told):
+def test_an_assignment_that_is_not_told_is_refused(tmp_path, item, message):
+    with pytest.raises(CallError, match=message):
         filled(tmp_path, report("s01", 7.5), item=item)
     assert not (tmp_path / "out.csv").exists()
 
@@ -135,8 +134,18 @@ def test_another_maximum_needs_leave_to_rescale(tmp_path):
     assert '2",3,7.5,55' in text
 
 
+def test_the_gradebook_states_its_own_maximum(tmp_path):
+    with pytest.raises(CallError, match="--maximum has no meaning beside --gradebook"):
+        filled(tmp_path, report("s01", 7.5), maximum=10.0)
+
+
+def test_a_row_of_nobody_below_the_points_is_left(tmp_path):
+    text = EXPORTED.replace('"Popescu, Ion"', 'Manual Posting,,,,,,,,\r\n"Popescu, Ion"', 1)
+    assert filled(tmp_path, report("s01", 7.5), text=text)[1] == text.replace('2",3,,55', '2",3,7.5,55')
+
+
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("", "no students"),
         ("a,b\n1,2\n", "not the columns"),
@@ -148,10 +157,22 @@ def test_another_maximum_needs_leave_to_rescale(tmp_path):
         (EXPORTED + '"open', "never closed"),
     ],
 )
-def test_a_file_that_is_no_exported_gradebook_is_refused(tmp_path, text, told):
-    with pytest.raises(InputFileError, match=told):
+def test_a_file_that_is_no_exported_gradebook_is_refused(tmp_path, text, message):
+    with pytest.raises(InputFileError, match=message):
         filled(tmp_path, report("s01", 7.5), text=text)
     assert not (tmp_path / "out.csv").exists()
+
+
+NAMES_APART = (
+    "LastName,FirstName,ID,SIS User ID,SIS Login ID,Section,Pump (1)\n"
+    "    Points Possible,,,,,,10\nPopescu,Ion,1,s01,,1,\n"
+)
+
+
+def form(tmp_path, text):
+    path = tmp_path / "form.csv"
+    path.write_text(text)
+    return path
 
 
 # A new file ---------------------------------------------------------------------------------------
@@ -170,11 +191,11 @@ def test_canvas_reads_a_new_file_as_it_is_meant(tmp_path):
         item="Pump (12345)",
         people=people,
     )
-    possible, found = importers.canvas_gradebook(
+    possible, stored = importers.canvas_gradebook(
         text, "Pump (12345)", by_id={"4711": "Ion"}, by_sis={"s02": "T"}
     )
     assert possible == 2000.0
-    assert found == {"Ion": "1234.5", "T": "0"}
+    assert stored == {"Ion": "1234.5", "T": "0"}
 
 
 def test_a_title_without_its_number_is_told_to_be_a_new_assignment(tmp_path):
@@ -185,7 +206,7 @@ def test_a_title_without_its_number_is_told_to_be_a_new_assignment(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("student", "person", "item", "told"),
+    ("student", "person", "item", "message"),
     [
         ("1.2.3", Person(), "", "takes this for a number"),
         ("s01", Person(platform_id="x"), "", "no number of a Canvas user"),
@@ -195,8 +216,8 @@ def test_a_title_without_its_number_is_told_to_be_a_new_assignment(tmp_path):
         ("s01", Person(), "Section", "no title"),
     ],
 )
-def test_what_canvas_would_misread_is_refused(tmp_path, student, person, item, told):
-    with pytest.raises(CallError, match=told):
+def test_what_canvas_would_misread_is_refused(tmp_path, student, person, item, message):
+    with pytest.raises(CallError, match=message):
         canvas(tmp_path / "out.csv", report(student, 7.5), people={student: person}, item=item)
     assert not (tmp_path / "out.csv").exists()
 
@@ -227,6 +248,11 @@ def test_the_rubric_has_a_range_of_points_for_each_criterion(tmp_path):
 def test_a_rubric_is_known_before_anybody_has_a_grade(tmp_path):
     _, text = canvas(tmp_path / "out.csv", marked("s01", 5.0, 2.5, status="needs_review"), what="rubric")
     assert len(text.splitlines()) == 3
+
+
+def test_a_class_without_criteria_has_no_rubric(tmp_path):
+    with pytest.raises(CallError, match="no report has criteria"):
+        canvas(tmp_path / "out.csv", report("s01", 7.5), what="rubric")
 
 
 def test_points_that_canvas_would_round_are_refused(tmp_path):
@@ -265,9 +291,9 @@ def test_points_add_up_to_the_grade_and_go_to_canvass_own_criteria(tmp_path, rub
     delivery, text = points(
         tmp_path, rubric, marked("s01", 5.0, 2.5), marked("s02", 3.0, None), course_id=12, assignment_id=345
     )
-    told = json.loads(text)
-    jsonschema.validate(told, schema("canvas-marks"))
-    first, second = told["calls"]
+    document = json.loads(text)
+    jsonschema.validate(document, schema("canvas-marks"))
+    first, second = document["calls"]
     assert first["path"] == "/api/v1/courses/12/assignments/345/submissions/sis_user_id:s01"
     assert first["body"]["submission"] == {"posted_grade": "7.5"}
     assert first["body"]["rubric_assessment"]["_2"]["points"] == 2.5
@@ -277,7 +303,7 @@ def test_points_add_up_to_the_grade_and_go_to_canvass_own_criteria(tmp_path, rub
     }  # fmt: skip
     assert second["body"]["submission"] == {"posted_grade": "6"}
     assert second["body"]["rubric_assessment"]["_2"]["comments"].startswith("– not judged: ")
-    bulk = told["bulk"]
+    bulk = document["bulk"]
     assert bulk["path"].endswith("/345/submissions/update_grades")
     assert list(bulk["body"]["grade_data"]) == ["sis_user_id:s01", "sis_user_id:s02"]
     assert delivery.notes == ()
@@ -320,7 +346,7 @@ def test_criteria_may_be_told_in_a_table(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         ({"description": "v_X"}, "c1: Vector 1: not there .*'v_X': there, and not in the rubric"),
         ({"points": 4.0}, "4 points there, 5 in the rubric"),
@@ -328,10 +354,10 @@ def test_criteria_may_be_told_in_a_table(tmp_path):
         ({"id": "_2"}, "two criteria have one number"),
     ],
 )
-def test_criteria_that_are_not_the_rubrics_are_refused(tmp_path, rubric, change, told):
+def test_criteria_that_are_not_the_rubrics_are_refused(tmp_path, rubric, change, message):
     first, second = RUBRIC["data"]
     rubric.write_text(json.dumps([{**first, **change}, second]), encoding="utf-8")
-    with pytest.raises(InputFileError, match=f"(?s){told}"):
+    with pytest.raises(InputFileError, match=f"(?s){message}"):
         points(tmp_path, rubric, marked("s01", 5.0, 2.5))
     assert not (tmp_path / "marks.json").exists()
 
@@ -381,10 +407,22 @@ def test_positions_are_summed_or_averaged_criterion_by_criterion(tmp_path, rubri
         points(tmp_path, rubric, *both, combine="sum")
 
 
-def test_the_rows_of_a_new_file_are_what_a_spreadsheet_shows(tmp_path):
-    _, text = canvas(tmp_path / "out.csv", report("s01", 7.5), item="Pump (1)")
-    assert list(csv.reader(io.StringIO(text, newline=""))) == [
-        ["Student", "ID", "SIS User ID", "SIS Login ID", "Section", "Pump (1)"],
-        ["    Points Possible", "", "", "", "", "10"],
-        ["s01", "", "s01", "", "", "7.5"],
-    ]
+def test_a_gradebook_with_names_apart_is_filled_in(tmp_path):
+    path = form(tmp_path, NAMES_APART)
+    for people in ({}, {"x1": Person(name="Ion Popescu")}, {"x1": Person(name="Popescu, Ion")}):
+        student = next(iter(people), "s01")
+        export(
+            results(report(student, 7.5)), tmp_path / "o.csv", Options(to="canvas", form=path, people=people)
+        )
+        assert (tmp_path / "o.csv").read_text() == NAMES_APART.replace("s01,,1,", "s01,,1,7.5")
+
+
+def test_two_students_of_one_number_have_no_place_in_canvas(tmp_path):
+    people = {"s01": Person(platform_id="1"), "s02": Person(platform_id="1")}
+    criteria = form(tmp_path, "criterion,id\nc1,_1\n")
+    with pytest.raises(CallError, match="same number in Canvas"):
+        export(
+            results(marked("s01", 5.0), marked("s02", 5.0)),
+            tmp_path / "o.json",
+            Options(to="canvas", what="marks", criteria=criteria, people=people),
+        )

@@ -8,17 +8,20 @@ from contextlib import suppress
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from grader.exports import Options, Person, export, read_results
-from grader.exports.canvas_gradebook import fill as fill_gradebook
-from grader.exports.grades import grades_of
-from grader.exports.moodle_worksheet import fill as fill_worksheet
-from grader.exports.platform_ids import numbered, place_of, with_ids
+from grader.lms.canvas import fill_gradebook
+from grader.lms.export import draft, export, read_results
+from grader.lms.grades import Options, Person, grades_of
+from grader.lms.marks import numbered
+from grader.lms.moodle import fill_worksheet
+from grader.lms.table import with_ids
 from reference.errors import PlanmarkError
-from tests.unit.exports import importers
-from tests.unit.exports.classroom import marked, report, results
+from tests.unit.lms import importers
+from tests.unit.lms.classroom import marked, report, results
 
 HEADER = ("Identifier", "Full name", "Grade", "Maximum grade", "Last modified (grade)", "Feedback comments")
 CANVAS = ("Student", "ID", "SIS User ID", "SIS Login ID", "Section", "Pump (1)", "Final Score")
+
+CANVAS_OPTIONS = Options(to="canvas")
 
 texts = st.text(alphabet=st.sampled_from("ăȘИя<>&;,\"'\n\r =+-@0"), max_size=8)
 scores = st.integers(0, 1_000_000).map(lambda one: one / 100_000)
@@ -46,7 +49,7 @@ def test_moodle_stores_what_was_meant_in_any_worksheet(people, style, mark):
     comments = {student: f"<p>{student}, said</p>" for student in known}
     data = written([HEADER, *rows], style, mark)
     options = Options(to="moodle", people=known)
-    filled = fill_worksheet(data, "w.csv", grades_of(results(*graded)), options, comments)
+    filled = fill_worksheet(data, "w.csv", grades_of(results(*graded), options), options, comments)
     stored = importers.moodle_worksheet(filled.content, 10.0)
     assert stored == {at: (people[at][2], comments[f"s{at}"]) for at in range(len(people))}
     for before, after in zip(read(data)[1:], read(filled.content)[1:], strict=True):
@@ -61,9 +64,11 @@ def test_canvas_reads_what_was_meant_in_any_gradebook(people, style, mark):
         for at, (name, login, _) in enumerate(people)
     ]
     points = ["    Points Possible", "", "", "", "", "10.00", "(read only)"]
-    graded = grades_of(results(*(report(f"s{at}", score) for at, (*_, score) in enumerate(people))))
+    graded = grades_of(
+        results(*(report(f"s{at}", score) for at, (*_, score) in enumerate(people))), CANVAS_OPTIONS
+    )
     data = written([CANVAS, points, *rows], style, mark)
-    draft = fill_gradebook(data, "g.csv", graded, Options(to="canvas"))
+    draft = fill_gradebook(data, "g.csv", graded, CANVAS_OPTIONS)
     after = read(draft.content)
     assert [row[:5] + row[6:] for row in after] == [row[:5] + row[6:] for row in read(data)]
     assert [float(row[5]) for row in after[2:]] == [score for *_, score in people]
@@ -83,11 +88,11 @@ anything = st.one_of(
 def test_a_file_of_any_content_is_used_or_refused(tmp_path, data):
     path = tmp_path / "file.csv"
     path.write_bytes(data)
-    graded = grades_of(results(report("s0", 5.0)))
+    graded = grades_of(results(report("s0", 5.0)), CANVAS_OPTIONS)
     with suppress(PlanmarkError):
         fill_worksheet(data, "w.csv", graded, Options(to="moodle"), {})
     with suppress(PlanmarkError):
-        fill_gradebook(data, "g.csv", graded, Options(to="canvas"))
+        fill_gradebook(data, "g.csv", graded, CANVAS_OPTIONS)
     with suppress(PlanmarkError):
         with_ids({}, path)
     with suppress(PlanmarkError):
@@ -107,14 +112,14 @@ answers = st.recursive(
 
 @quick
 @given(answers)
-def test_an_answer_of_any_shape_is_used_or_refused(tmp_path, told):
+def test_an_answer_of_any_shape_is_used_or_refused(tmp_path, document):
     path = tmp_path / "answer.json"
-    path.write_text(json.dumps(told), encoding="utf-8")
+    path.write_text(json.dumps(document), encoding="utf-8")
     with suppress(PlanmarkError):
         numbered([], path)
     with suppress(PlanmarkError):
-        place_of(path)
-    (tmp_path / "results.json").write_text(json.dumps(told), encoding="utf-8")
+        draft(results(marked("s01", 5.0)), Options(to="moodle", what="rubric", criteria=path))
+    (tmp_path / "results.json").write_text(json.dumps(document), encoding="utf-8")
     with suppress(PlanmarkError):
         read_results(tmp_path)
 

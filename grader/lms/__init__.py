@@ -1,0 +1,1 @@
+"""Tables for people and for learning management systems, validated before anything is written."""

@@ -1,0 +1,238 @@
+"""Exports: read the results, choose what a platform takes, validate it, write it whole or not at all."""
+
+import contextlib
+import json
+import math
+import secrets
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from grader.documents import SCHEMA_VERSION, ResultsDocument
+from grader.files import OutputError, create_whole, write_whole
+from grader.lms import canvas, moodle, moodle_guide, scores
+from grader.lms.grades import Content, Delivery, Grade, Options, grades_of, in_a_row, ready
+from grader.lms.marks import faults_of
+from grader.lms.table import criteria_text, not_as_meant, summary_text
+from reference.errors import CallError, InputFileError, lines_of
+
+
+def read_results(out_dir: Path) -> ResultsDocument:
+    """`results.json` of an output folder; InputFileError where it is missing or not one."""
+    path = out_dir / "results.json"
+    try:
+        return ResultsDocument.model_validate(_of_a_known_version(json.loads(path.read_bytes()), path))
+    except FileNotFoundError as error:
+        raise InputFileError(
+            "results_missing", f"{path}: there is no such file; run planmark grade first"
+        ) from error
+    except OSError as error:
+        raise InputFileError("results_missing", f"{path}: cannot be read ({error.strerror})") from error
+    except ValidationError as error:
+        message = f"{path}: is not a planmark results file; grade again\n{faults_of(error)}"
+        raise InputFileError("results_wrong", message) from error
+    except (ValueError, RecursionError) as error:
+        raise InputFileError("results_wrong", f"{path}: is not JSON ({error}); grade again") from error
+
+
+def _of_a_known_version(document: Any, path: Path) -> Any:  # noqa: ANN401 - whatever a JSON file holds
+    """The document; InputFileError where a later version of the program wrote it."""
+    version = document.get("schema_version") if isinstance(document, dict) else None
+    if isinstance(version, int) and version > SCHEMA_VERSION:
+        raise InputFileError(
+            "results_newer",
+            f"{path}: a later version of planmark wrote this (schema_version {version}, known"
+            f" is {SCHEMA_VERSION}); update planmark, or grade again with this one",
+        )
+    return document
+
+
+# What there is to deliver -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """A file that a platform takes: its ending, and what makes it out of grades or else of the results."""
+
+    ending: str
+    used: frozenset[str] = frozenset()
+    """The options that it heeds, besides those that all do."""
+    of_grades: Callable[[list[Grade], Options], Delivery] | None = None
+    of_results: Callable[[ResultsDocument], str] | None = None
+
+
+def _of_grades(ending: str, make: Callable[[list[Grade], Options], Delivery], options: str) -> _Kind:
+    return _Kind(ending, frozenset({"position", "combine", *options.split()}), make)
+
+
+KINDS: Mapping[tuple[str, str], _Kind] = {
+    ("csv", "marks"): _Kind(".csv", of_results=criteria_text),
+    ("csv", "grades"): _Kind(".csv", of_results=summary_text),
+    ("moodle", "grades"): _of_grades(".csv", moodle.grades_file, "maximum rescale form identity item"),
+    ("moodle", "feedback"): _of_grades(".zip", moodle.feedback_files, "form"),
+    ("moodle", "rubric"): _of_grades(".json", moodle_guide.guide, "criteria cmid context_id item"),
+    ("moodle", "marks"): _of_grades(".json", moodle_guide.fillings, "criteria assignment_id"),
+    ("canvas", "grades"): _of_grades(".csv", canvas.grades_file, "maximum rescale form item"),
+    ("canvas", "rubric"): _of_grades(".csv", canvas.rubric, "item"),
+    ("canvas", "marks"): _of_grades(".json", canvas.assessments, "criteria course_id assignment_id"),
+    ("gradescope", "marks"): _of_grades(".zip", scores.results, "visibility"),
+    ("lti", "grades"): _of_grades(".json", scores.scores, "maximum rescale"),
+}
+"""By platform and what; a platform's first is what it is given where nothing is said."""
+
+TARGETS = tuple(dict.fromkeys(to for to, _ in KINDS))
+_COMMON = frozenset({"to", "what", "out", "people", "lang", "now"})
+"""Options of every export."""
+
+
+def what_of(options: Options) -> str:
+    """What is delivered; CallError for a target or a thing that there is not."""
+    known = [what for to, what in KINDS if to == options.to]
+    if not known:
+        raise CallError(
+            "unknown_target", f"'{options.to}' is no export target: known are {', '.join(TARGETS)}"
+        )
+    if options.what is not None and options.what not in known:
+        raise CallError(
+            "unknown_target", f"{options.to} is given no '{options.what}': known are {', '.join(known)}"
+        )
+    return options.what or known[0]
+
+
+def usual_name(options: Options) -> str:
+    """The file's name where nobody gives one."""
+    what = what_of(options)
+    is_first = what == what_of(replace(options, what=None))
+    return f"export-{options.to}{'' if is_first else '-' + what}{KINDS[options.to, what].ending}"
+
+
+def draft(results: ResultsDocument, options: Options) -> Delivery:
+    """An export before it is written; raises as `export` does."""
+    what = what_of(options)
+    kind = KINDS[options.to, what]
+    for each in fields(options):
+        is_given = getattr(options, each.name) not in (None, "", False)
+        if is_given and each.name not in kind.used | _COMMON:
+            name = "a file to fill in" if each.name == "form" else "--" + each.name.replace("_", "-")
+            raise CallError("option_unused", f"{name} has no meaning for {options.to} {what}: leave it out")
+    if options.maximum is not None and not (math.isfinite(options.maximum) and options.maximum > 0.0):
+        raise CallError("maximum", f"a grade's maximum is a positive number, not {options.maximum:g}")
+    students = tuple(dict.fromkeys(report.student_id for report in results.reports))
+    if kind.of_grades is None:
+        return Delivery(kind.of_results(results) if kind.of_results else "", students)
+    grades = grades_of(results, options)
+    _check_maxima(grades, options, what)
+    delivery = kind.of_grades(grades, options)
+    if what != "rubric":
+        delivery = delivery.among(grades)
+    here = {grade.student_id for grade in grades}
+    others = [student for student in students if student not in here]
+    why = f"has no position {options.position}"
+    return replace(delivery, withheld={**delivery.withheld, **dict.fromkeys(others, why)})
+
+
+def _check_maxima(grades: Sequence[Grade], options: Options, what: str) -> None:
+    """Points out of 10 and out of 20 are no column of one gradebook; CallError unless all are converted."""
+    maxima: dict[float, list[str]] = {}
+    for grade in ready(grades):
+        maxima.setdefault(round(grade.max_score, 6), []).append(grade.student_id)
+    is_converted = options.rescale and (options.maximum is not None or options.form is not None)
+    if len(maxima) > 1 and not is_converted and what != "feedback":
+        lines = lines_of([f"{most:g}: {in_a_row(students)}" for most, students in sorted(maxima.items())])
+        raise CallError(
+            "maximum_differs",
+            "students' maxima differ: choose one position, combine them by mean, or convert all to one"
+            f" maximum (--maximum and --rescale, where the platform is given grades)\n{lines}",
+        )
+
+
+_AGAIN = (
+    "this file was made before: if Moodle has it already, it skips what it holds, unless the worksheet was"
+    " downloaded afresh or the box for updating records is ticked at the upload"
+)
+
+
+def export(results: ResultsDocument, path: Path, options: Options) -> Delivery:
+    """Write an export file, or of several files an archive; into a folder where `path` has no ``.zip``.
+
+    Raises CallError for a call that cannot be carried out, InputFileError for a file of the platform
+    or results that cannot be used, OutputError where nothing can be written. Nothing is written then.
+    """
+    delivery = draft(results, options)
+    kind = options.to, what_of(options)
+    is_again = kind == ("moodle", "grades") and options.form is not None and path.exists()
+    if isinstance(delivery.content, Mapping):
+        if kind == ("moodle", "feedback") and path.suffix.lower() != ".zip":
+            raise CallError("archive_name", f"{path}: Moodle takes an archive; let its name end with .zip")
+        _write_files(path, delivery.content)
+    else:
+        write_whole(path, delivery.content)
+    notes = [*delivery.notes, *([_AGAIN] if is_again else []), *_similar(results, delivery.written)]
+    if kind == ("moodle", "feedback"):
+        notes.insert(0, f"{path.stat().st_size / 1e6:.1f} MB: the site's upload limit must allow it")
+    if delivery.withheld and not delivery.written:
+        notes.insert(0, "nobody has a grade yet: there is nothing to upload")
+    return replace(delivery, notes=tuple(notes))
+
+
+def _similar(results: ResultsDocument, written: Sequence[str]) -> list[str]:
+    """Notes on similar sheets among those whose grades go out."""
+    pairs = [list(dict.fromkeys(pair.students)) for pair in results.alike]
+    return [
+        f"the sheets of {' and '.join(students)} look alike: look at them before their grades are out"
+        for students in pairs
+        if set(students) & set(written)
+    ]
+
+
+# Several files ------------------------------------------------------------------------------------
+
+
+def _write_files(path: Path, content: Content) -> None:
+    """Write an archive where the name ends with ``.zip``, else files below a new folder; one alone as it is.
+
+    Raises CallError for a folder that holds such a file already and for a file's name for several,
+    OutputError with the system's reason.
+    """
+    if path.suffix.lower() == ".zip":
+        _write_archive(path, content)
+    elif path.suffix.lower() in {".json", ".csv"}:
+        if len(content) != 1:
+            raise CallError("archive_name", f"{path}: {len(content)} files; name a .zip, or a folder")
+        write_whole(path, *(_bytes(data) for data in content.values()))
+    else:
+        create_whole({path / name: _bytes(data).decode("utf-8") for name, data in content.items()})
+
+
+def _bytes(data: bytes | Path) -> bytes:
+    return data if isinstance(data, bytes) else data.read_bytes()
+
+
+def _write_archive(path: Path, content: Content) -> None:
+    """A class's pages may be a gigabyte: one at a time goes through the memory, twice to be compared."""
+    temporary = path.with_name(f".{path.name[:40]}.{secrets.token_hex(6)}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with zipfile.ZipFile(temporary, "x", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+            for name, data in content.items():
+                # Of a fixed date: the same files make the same archive. Unpacked, all may read it.
+                entry = zipfile.ZipInfo(name)
+                entry.external_attr = 0o644 << 16
+                archive.writestr(entry, _bytes(data), zipfile.ZIP_DEFLATED, 1)
+        with zipfile.ZipFile(temporary) as archive:
+            is_same = archive.namelist() == list(content)
+            if not is_same or any(archive.read(name) != _bytes(data) for name, data in content.items()):
+                raise not_as_meant("the archive")
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(
+            "cannot_write",
+            f"{path}: cannot be written ({error.strerror or error}); choose another place or make room",
+        ) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink()

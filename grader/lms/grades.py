@@ -1,0 +1,250 @@
+"""One grade for each student, or why there is none yet; and what an export is given and gives back."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from types import MappingProxyType
+
+from grader.documents import ReportDocument, ResultsDocument
+from grader.roster import why_no_id
+from reference.errors import CallError, InputFileError, lines_of
+
+Content = Mapping[str, bytes | Path]
+"""Names, and the content of each: bytes, or a file that is read when it is written."""
+COMBINE = ("sum", "mean")
+_MOST_NAMES = 20
+"""A line of more names is not read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """A student as platforms know one; what is not known is empty.
+
+    Attributes
+    ----------
+    platform_id : the platform's own number or name of the student
+    participant : number in the assignment's worksheet
+    lang : language of the feedback
+    """
+
+    name: str = ""
+    email: str = ""
+    username: str = ""
+    platform_id: str = ""
+    participant: int | None = None
+    lang: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """The options of ``planmark export`` by their names; None or empty where not given.
+
+    Attributes
+    ----------
+    out : the folder of results; only ``feedback`` needs it
+    people : names, addresses and the platform's numbers by student_id
+    form : the platform's own file to fill in: Moodle's worksheet, Canvas's exported gradebook
+    item : the grade item's name; the assignment's id where empty
+    now : time of the export; the clock's if None
+    """
+
+    to: str
+    what: str | None = None
+    out: Path | None = None
+    people: Mapping[str, Person] = field(default_factory=lambda: MappingProxyType({}))
+    form: Path | None = None
+    criteria: Path | None = None
+    identity: str | None = None
+    item: str = ""
+    position: int | None = None
+    combine: str | None = None
+    maximum: float | None = None
+    rescale: bool = False
+    visibility: str | None = None
+    course_id: int | None = None
+    assignment_id: int | None = None
+    cmid: int | None = None
+    context_id: int | None = None
+    lang: str = "en"
+    now: datetime | None = None
+
+    @property
+    def moment(self) -> datetime:
+        """The time of the export, with its zone."""
+        return self.now or datetime.now(UTC)
+
+
+@dataclass(frozen=True, slots=True)
+class Grade:
+    """A student's grade.
+
+    Attributes
+    ----------
+    score : None where there is none yet
+    person : the student, with the language of the comments
+    withheld : why there is none yet
+    folders : of each report below the results: the student's, with several positions one for each
+    """
+
+    student_id: str
+    score: float | None
+    max_score: float
+    reports: tuple[ReportDocument, ...]
+    person: Person = Person()
+    withheld: str = ""
+    folders: tuple[str, ...] = ()
+
+    @property
+    def assignment(self) -> str:
+        """The assignment's id."""
+        return self.reports[0].assignment
+
+    def out_of(self, maximum: float | None, *, rescale: bool) -> float:
+        """The score out of a platform's maximum; None is the rubric's own.
+
+        Raises CallError where the maxima differ and nobody asked for rescaling: a silent 9 of 10 would
+        become a 9 of 100.
+        """
+        score = self.score or 0.0
+        if maximum is None or abs(maximum - self.max_score) <= 1e-6 * max(1.0, maximum):
+            return score
+        if not rescale:
+            raise CallError(
+                "maximum_differs",
+                f"the grade's maximum there is {maximum:g}, the rubric's is {self.max_score:g}:"
+                " set the same maximum there, or ask for rescaling (--rescale)",
+            )
+        return score * maximum / self.max_score
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """An export's content, and who is not in it.
+
+    Attributes
+    ----------
+    content : the file's; of several files by their names, for an archive or a folder
+    written : students with a grade in it
+    withheld : students without one, with why (they wait for a person, or handed in nothing)
+    unplaced : students for whom the platform's file has no place, with why
+    notes : what the person who uploads it should know
+    """
+
+    content: str | bytes | Content
+    written: tuple[str, ...] = ()
+    withheld: Mapping[str, str] = field(default_factory=dict)
+    unplaced: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether everybody's grade is in the file."""
+        return not self.withheld and not self.unplaced
+
+    def among(self, grades: Sequence[Grade]) -> "Delivery":
+        """The same, with who of these students is written and who is withheld."""
+        students = [grade.student_id for grade in ready(grades)]
+        return replace(
+            self,
+            written=tuple(student for student in students if student not in self.unplaced),
+            withheld={grade.student_id: grade.withheld for grade in grades if grade.score is None},
+        )
+
+
+def ready(grades: Sequence[Grade]) -> list[Grade]:
+    """The grades that have a score."""
+    return [grade for grade in grades if grade.score is not None]
+
+
+def in_a_row(names: Sequence[str]) -> str:
+    """Names in one line, the first of many."""
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return ", ".join(names[:_MOST_NAMES]) + more
+
+
+def grades_of(results: ResultsDocument, options: Options) -> list[Grade]:
+    """A grade per student.
+
+    A student with several positions needs a choice: one `position`, or `combine` by ``sum`` or
+    ``mean``. A sum or mean waits for all of its parts.
+
+    Raises CallError where the choice is missing or not one, InputFileError for results that
+    contradict themselves.
+    """
+    position, combine = options.position, options.combine
+    if combine is not None and combine not in COMBINE:
+        known = " or ".join(COMBINE)
+        raise CallError("combine", f"'{combine}' is no way to combine positions: choose {known}")
+    if position is not None and combine is not None:
+        raise CallError("combine", "either one position or a way to combine them, not both")
+    _check(results.reports)
+    students: dict[str, list[ReportDocument]] = {}
+    for report in results.reports:
+        students.setdefault(report.student_id, []).append(report)
+    grades = []
+    for student_id, reports in students.items():
+        chosen = tuple(report for report in reports if position in (None, report.position))
+        if len(chosen) > 1 and combine is None:
+            raise CallError(
+                "several_positions",
+                f"{student_id} has {len(chosen)} positions and the file has room for one grade:"
+                " choose a position, or combine them by sum or mean",
+            )
+        if chosen:
+            folders = tuple(_folder(report, len(reports)) for report in chosen)
+            grades.append(_grade(student_id, chosen, options, folders))
+    if not grades:
+        raise CallError("nothing_to_export", "the results hold no report that could be exported")
+    return grades
+
+
+def _check(reports: Sequence[ReportDocument]) -> None:
+    """InputFileError for results that somebody has changed by hand, or a program has mixed up."""
+    faults = []
+    keys = set()
+    for report in reports:
+        who = report.student_id if report.position is None else f"{report.student_id} at {report.position}"
+        if why_no_id(report.student_id) is not None:
+            faults.append(f"'{report.student_id}' is no student_id")
+        if (report.student_id, report.position) in keys:
+            faults.append(f"{who}: has two reports")
+        keys.add((report.student_id, report.position))
+        if report.score is not None and not 0.0 <= report.score <= report.max_score + 1e-9:
+            faults.append(f"{who}: the score {report.score:g} is not between 0 and {report.max_score:g}")
+        if report.max_score <= 0.0:
+            faults.append(f"{who}: the maximum is {report.max_score:g}")
+    if faults:
+        message = f"results.json contradicts itself; grade again\n{lines_of(faults)}"
+        raise InputFileError("results_wrong", message)
+
+
+def _folder(report: ReportDocument, positions: int) -> str:
+    if positions == 1:
+        return report.student_id
+    return f"{report.student_id}/{'unknown' if report.position is None else report.position}"
+
+
+_WHY = {
+    "needs_review": "needs review",
+    "unreadable": "unreadable",
+    "missing": "nothing handed in",
+    "graded": "has no score",
+}
+"""Why a report of each status has no grade yet, for the terminal."""
+
+
+def _grade(
+    student_id: str, reports: tuple[ReportDocument, ...], options: Options, folders: tuple[str, ...]
+) -> Grade:
+    person = options.people.get(student_id, Person())
+    person = replace(person, lang=person.lang or options.lang)
+    maximum = sum(report.max_score for report in reports)
+    score = sum(report.score or 0.0 for report in reports)
+    parts = len(reports) if options.combine == "mean" else 1
+    why = ", ".join(
+        ("" if report.position is None else f"position {report.position}: ") + _WHY[report.status]
+        for report in reports
+        if report.status != "graded" or report.score is None
+    )
+    return Grade(student_id, None if why else score / parts, maximum / parts, reports, person, why, folders)

@@ -1,0 +1,378 @@
+"""What a grade is made of: points and remarks by criterion, comments, and the platform's own criteria."""
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from markupsafe import Markup
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from grader.documents import CriterionDocument, ReportDocument, Verdict
+from grader.i18n import Tongue, tongue
+from grader.lms.grades import Grade, Options, ready
+from grader.lms.table import bytes_of, not_as_meant, read_table
+from grader.scene import MARKS
+from reference.errors import CallError, InputFileError, lines_of
+
+DECIMALS = 6
+"""Of points: finer than any platform stores, and coarser than rounding errors."""
+CLOSE = 1e-4
+"""Sums of points that are written with five decimals agree to this."""
+
+
+# Documents that platforms take --------------------------------------------------------------------
+
+Version = Literal[1]
+Filled = Annotated[str, Field(min_length=1)]
+Id = Annotated[int, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Positive = Annotated[float, Field(gt=0.0)]
+Number = Annotated[str, Field(pattern=r"^[0-9]+(\.[0-9]{1,5})?$")]
+"""Decimal dot, no grouping, no sign."""
+
+
+class Payload(BaseModel):
+    """A table that a platform takes: frozen, nothing unknown, only finite numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
+
+
+class PlatformCriterion(Payload):
+    """A criterion, and its number on the platform."""
+
+    criterion: str
+    id: Filled
+    max_points: Positive
+
+
+def json_document(model: type[BaseModel], content: Mapping[str, object], name: str) -> str:
+    """A document as JSON, without what is not given, read back once.
+
+    Raises InputFileError with everything that does not hold to the model; `name` says what it is.
+    """
+    try:
+        document = model.model_validate(content)
+    except ValidationError as error:
+        message = f"{name} would not be what the platform takes; nothing was written\n{faults_of(error)}"
+        raise InputFileError("export_refused", message) from error
+    text = document.model_dump_json(indent=2, exclude_none=True)
+    if model.model_validate_json(text) != document:
+        raise not_as_meant("the document")
+    return text + "\n"
+
+
+def faults_of(error: ValidationError) -> str:
+    """What a model refuses, a line each with the path in the document."""
+    return lines_of([f"{_path(each['loc'])}: {_plain(each['msg'])}" for each in error.errors()])
+
+
+def _path(parts: Sequence[int | str]) -> str:
+    return "$" + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts)
+
+
+def _plain(message: str) -> str:
+    return message.removeprefix("Value error, ")
+
+
+def check_unique(names: Iterable[object], what: str) -> None:
+    """Raises ValueError, for a model, where a name stands twice."""
+    known = set()
+    for name in names:
+        if name in known:
+            raise ValueError(f"{what} {name} stands twice")
+        known.add(name)
+
+
+def check_points(criteria: Iterable[PlatformCriterion], points: Mapping[str, float]) -> None:
+    """Raises ValueError, for a model, unless every criterion has points up to its maximum."""
+    maxima = {criterion.id: criterion.max_points for criterion in criteria}
+    if set(points) != set(maxima):
+        raise ValueError(f"criteria {sorted(points)} are filled, {sorted(maxima)} are there")
+    for name, value in points.items():
+        if value > maxima[name] + CLOSE:
+            raise ValueError(f"criterion {name}: {value:g} is above its maximum {maxima[name]:g}")
+
+
+# Comments -----------------------------------------------------------------------------------------
+
+_COMMENTED = {"partial", "none", "review", "follow_through"}
+"""The verdicts that are worth a comment."""
+
+
+def comment(grade: Grade) -> str:
+    """Feedback on what is not simply right, in a few lines that go beside a grade: HTML, one line."""
+    html = Markup("")
+    for heading, remarks in _comments(grade):
+        if heading:
+            html += Markup("<p><b>{}</b></p>").format(heading)
+        items = [Markup("<li>{} <b>{}</b>: {}</li>").format(*remark) for remark in remarks]
+        html += Markup("<ul>{}</ul>").format(Markup("").join(items)) if items else ""
+        html += "" if items else Markup("<p>{}</p>").format(_everything_is_right(grade))
+    return str(html)
+
+
+def _everything_is_right(grade: Grade) -> str:
+    return tongue(grade.person.lang).gettext("Everything is right.")
+
+
+def plain_comment(grade: Grade) -> str:
+    """The same as plain text, a line for each remark."""
+    lines = []
+    for heading, remarks in _comments(grade):
+        lines += [heading] if heading else []
+        lines += [f"{mark} {title}: {text}" for mark, title, text in remarks] or [_everything_is_right(grade)]
+    return "\n".join(lines)
+
+
+def _comments(grade: Grade) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
+    """For each report: a heading where there are several, and marks, titles and sentences."""
+    position = tongue(grade.person.lang).gettext("Position")
+    for report in grade.reports:
+        commented = [each for each in report.criteria if each.verdict in _COMMENTED]
+        remarks = [(MARKS[each.verdict], each.title, _one_line(each.feedback)) for each in commented]
+        yield f"{position} {report.position}" if len(grade.reports) > 1 else "", remarks
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+# Points -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A criterion's points for one student.
+
+    Attributes
+    ----------
+    points : for what was not judged its share of the rest, as the total is scaled
+    remark : plain text
+    """
+
+    criterion: str
+    title: str
+    points: float
+    max_points: float
+    verdict: Verdict
+    remark: str
+    position: int | None = None
+
+    @property
+    def is_full(self) -> bool:
+        """Whether nothing is lost."""
+        return math.isclose(self.points, self.max_points, abs_tol=CLOSE)
+
+
+def marks_of(grade: Grade) -> list[Mark]:
+    """The marks behind a grade, report by report.
+
+    Raises InputFileError where they do not add up to the score.
+    """
+    marks = outline(grade)
+    total = math.fsum(mark.points for mark in marks)
+    score = math.fsum(report.score or 0.0 for report in grade.reports)
+    if not math.isclose(total, score, abs_tol=CLOSE):
+        raise InputFileError(
+            "results_wrong",
+            f"{grade.student_id}: the criteria give {total:g} points together, the score is {score:g};"
+            " grade again, or export grades without criteria",
+        )
+    return marks
+
+
+def outline(grade: Grade) -> list[Mark]:
+    """The marks of a grade that may still be open: what is under review counts nothing here."""
+    speaker = tongue(grade.person.lang)
+    return [_mark(each, report, speaker) for report in grade.reports for each in report.criteria]
+
+
+def _mark(criterion: CriterionDocument, report: ReportDocument, speaker: Tongue) -> Mark:
+    share = (report.score or 0.0) / report.max_score * criterion.max_points
+    points = share if criterion.points is None else criterion.points
+    words = [speaker.gettext("not judged") if criterion.verdict == "not_judged" else ""]
+    words.append(_one_line(criterion.feedback))
+    remark = f"{MARKS[criterion.verdict]} {': '.join(filter(None, words))}".strip()
+    return Mark(
+        criterion.id, criterion.title, round(points, DECIMALS), criterion.max_points, criterion.verdict,
+        remark, report.position,
+    )  # fmt: skip
+
+
+def together(marks: Sequence[Mark], combine: str | None) -> list[Mark]:
+    """One mark for each criterion, of all positions: their sum, or their mean."""
+    by_criterion: dict[str, list[Mark]] = {}
+    for mark in marks:
+        by_criterion.setdefault(mark.criterion, []).append(mark)
+    return [_combined(same, combine) for same in by_criterion.values()]
+
+
+def _combined(marks: Sequence[Mark], combine: str | None) -> Mark:
+    first, parts = marks[0], len(marks) if combine == "mean" else 1
+    is_single = len(marks) == 1
+    return Mark(
+        first.criterion,
+        first.title,
+        round(math.fsum(mark.points for mark in marks) / parts, DECIMALS),
+        round(math.fsum(mark.max_points for mark in marks) / parts, DECIMALS),
+        first.verdict if is_single else "partial",
+        first.remark if is_single else "\n".join(f"{mark.position}: {mark.remark}" for mark in marks),
+    )
+
+
+# The criteria of a class --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Criterion:
+    """A criterion of the rubric; `titles` are those of all languages that students read."""
+
+    id: str
+    titles: tuple[str, ...]
+    max_points: float
+
+    @property
+    def name(self) -> str:
+        """On a platform: the id tells it from others, in whatever language the title is."""
+        return f"{self.id}: {self.titles[0]}"
+
+    def is_named(self, name: str) -> bool:
+        """Whether a criterion of a platform is this one, by its name there."""
+        head = name.partition(":")[0]
+        return self.id in (name.strip(), head.strip()) or name.strip() in self.titles
+
+
+def class_criteria(grades: Sequence[Grade], options: Options) -> list[Criterion]:
+    """The rubric as the reports show it, those under review too.
+
+    Raises CallError where no report has criteria, InputFileError where students were marked by others.
+    """
+    students = {
+        grade.student_id: together(outline(grade), options.combine)
+        for grade in grades
+        if all(report.criteria for report in grade.reports)
+    }
+    if not students:
+        raise CallError("nothing_to_export", "no report has criteria: nothing was handed in that was read")
+    first = next(iter(students))
+    maxima = {mark.criterion: mark.max_points for mark in students[first]}
+    faults = []
+    titles: dict[str, list[str]] = {criterion: [] for criterion in maxima}
+    for student, marks in students.items():
+        if {mark.criterion: mark.max_points for mark in marks} != maxima:
+            faults.append(f"{student}: other criteria or points than {first}")
+            continue
+        for mark in marks:
+            titles[mark.criterion].append(mark.title)
+    if faults:
+        message = "one rubric cannot hold all; grade all with one rubric, or choose a position"
+        raise InputFileError("criteria_differ", f"{message}\n{lines_of(faults)}")
+    return [
+        Criterion(
+            each, tuple(sorted(dict.fromkeys(titles[each]), key=titles[each].count, reverse=True)), most
+        )
+        for each, most in maxima.items()
+    ]
+
+
+def platform_marks(
+    grades: Sequence[Grade], options: Options, path: Path
+) -> tuple[list[PlatformCriterion], list[tuple[Grade, dict[str, Mark]]]]:
+    """The criteria with the platform's numbers from `path`, and the marks of graded students by number.
+
+    Raises InputFileError where the platform's criteria are not the rubric's.
+    """
+    marked = [(grade, together(marks_of(grade), options.combine)) for grade in ready(grades)]
+    criteria = numbered(class_criteria(grades, options), path)
+    numbers = {each.criterion: each.id for each in criteria}
+    return criteria, [(grade, {numbers[mark.criterion]: mark for mark in marks}) for grade, marks in marked]
+
+
+# The platform's criteria --------------------------------------------------------------------------
+
+CRITERION_COLUMNS = ("criterion", "id")
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """A criterion in a platform's answer."""
+
+    id: str
+    name: str
+    max_points: float | None = None
+
+
+def numbered(criteria: Sequence[Criterion], path: Path) -> list[PlatformCriterion]:
+    """The platform's number of each criterion, from a table ``criterion,id`` or the platform's own JSON.
+
+    Raises InputFileError where one is missing, stands there twice, or has other points there.
+    """
+    known = _known(path)
+    faults: list[str] = []
+    result: list[PlatformCriterion] = []
+    for criterion in criteria:
+        same = [each for each in known if criterion.is_named(each.name)]
+        if len(same) != 1:
+            names = ", ".join(f"'{each.name}'" for each in known)
+            faults.append(
+                f"{criterion.name}: " + (f"there ({len(same)} times)" if same else f"not there ({names})")
+            )
+            continue
+        points, most = same[0].max_points, criterion.max_points
+        if points is not None and abs(points - most) > CLOSE:
+            faults.append(f"{criterion.name}: {points:g} points there, {most:g} in the rubric")
+        result.append(PlatformCriterion(criterion=criterion.id, id=same[0].id, max_points=most))
+    numbers = {each.id for each in result}
+    faults += [f"'{each.name}': there, and not in the rubric" for each in known if each.id not in numbers]
+    if len(numbers) < len(result):
+        faults.append("two criteria have one number")
+    if faults:
+        raise InputFileError("criteria", f"{path}: these are not the rubric's criteria\n{lines_of(faults)}")
+    return result
+
+
+def _known(path: Path) -> list[Known]:
+    if path.suffix.lower() == ".csv":
+        rows = read_table(path, CRITERION_COLUMNS)
+        return [Known(row.get("id", ""), row["criterion"]) for _, row in rows if row.get("id")]
+    known = list(criteria_in(read_answer(path)))
+    if not known:
+        raise InputFileError(
+            "criteria",
+            f"{path}: no criteria are in this answer; ask Moodle for core_grading_get_definitions, Canvas for"
+            " the rubric, or write a CSV table with the columns criterion,id",
+        )
+    return known
+
+
+def read_answer(path: Path) -> Any:  # noqa: ANN401 - whatever a platform answers
+    """A platform's JSON; InputFileError for what is none."""
+    try:
+        return json.loads(bytes_of(path, "criteria"))
+    except (ValueError, RecursionError) as error:
+        raise InputFileError("criteria", f"{path}: is not JSON ({error})") from error
+
+
+_LISTS = ("guide_criteria", "criteria", "data", "rubric")
+_NESTS = ("areas", "definitions", "guide", "rubric")
+
+
+def criteria_in(answer: object) -> Iterator[Known]:
+    """Criteria in an answer: Moodle's of a marking guide, Canvas's of a rubric or of an assignment."""
+    if isinstance(answer, list):
+        for each in answer:
+            yield from criteria_in(each)
+    if not isinstance(answer, dict):
+        return
+    name, number = answer.get("shortname", answer.get("description")), answer.get("id")
+    if isinstance(name, str) and isinstance(number, str | int) and {"maxscore", "points"} & set(answer):
+        points = answer.get("maxscore", answer.get("points"))
+        yield Known(str(number), name, float(points) if isinstance(points, int | float) else None)
+        return
+    # A Canvas rubric has its criteria as `data` and again as `criteria`: the first that is there counts.
+    lists = [answer[key] for key in _LISTS if isinstance(answer.get(key), list)]
+    for inner in lists[:1] or [answer[key] for key in _NESTS if key in answer]:
+        yield from criteria_in(inner)

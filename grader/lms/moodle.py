@@ -1,0 +1,364 @@
+"""Moodle's tables: the offline grading worksheet filled in, the gradebook import, the archive of feedback.
+
+Worksheet: only the cells of *Grade* and *Feedback comments* change. Moodle takes `7,5` for 7, `abc` for
+0, skips what is above the maximum and rejects ragged files without saying what is wrong: all of that
+is refused here.
+
+Gradebook: the first bad row aborts Moodle's whole import, so every row is checked here. Who has no
+grade yet has no row: in a new grade item Moodle would store a blank as 0, and in an old one `-` takes
+back what a teacher has entered. Decimal dots, whatever the language of the site.
+
+Feedback: a folder `Participant_<n>_assignfeedback_file` for each student. Underscores part a folder's
+name into what Moodle reads, so a file's own name has none.
+"""
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.lms.grades import Delivery, Grade, Options, Person, ready
+from grader.lms.marks import comment
+from grader.lms.table import (
+    NO_GRADE,
+    Evidence,
+    Form,
+    RawTable,
+    bytes_of,
+    csv_text,
+    fill_in,
+    is_formula,
+    number,
+    parse,
+)
+from reference.errors import CallError, InputFileError, lines_of
+
+# The worksheet ------------------------------------------------------------------------------------
+
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "identifier": ("Identifier", "Identificator", "Идентификатор"),
+    "name": ("Full name", "Nume complet", "Nume / Prenume", "Полное имя", "ФИО", "Имя / Фамилия"),
+    "id": ("ID number", "Număr ID", "Cod numeric", "Индивидуальный номер"),
+    "username": ("Username", "Nume utilizator", "Логин"),
+    "email": ("Email address", "Adresă de email", "Adresa de email", "Адрес электронной почты"),
+    "grade": ("Grade", "Notă", "Nota", "Оценка"),
+    "maximum": ("Maximum grade", "Notă maximă", "Nota maximă", "Максимальная оценка"),
+    "scale": ("Scale", "Scală", "Scala", "Шкала"),
+    "changeable": ("Grade can be changed", "Nota poate fi schimbată", "Оценка может быть изменена"),
+    "modified": (
+        "Last modified (grade)", "Ultima modificare (nota)", "Ultima modificare (notă)",
+        "Последнее изменение (оценка)",
+    ),
+    "feedback": (
+        "Feedback comments", "Comentarii de feedback", "Comentarii feedback",
+        "Feedback sub formă de comentarii", "Отзыв в виде комментария", "Отзыв в виде комментариев",
+    ),
+}  # fmt: skip
+"""Moodle's column names in the languages in which worksheets are likely to be downloaded."""
+
+_REQUIRED = ("identifier", "grade", "modified")
+_NO = {"no", "nu", "нет"}
+_PARTICIPANT = re.compile(r"\s*\D*?(\d+)\s*")
+LOCKED = "Moodle says that this grade cannot be changed"
+
+
+@dataclass(slots=True)
+class Worksheet(Form):
+    """A worksheet that Moodle would take."""
+
+    name = "the worksheet"
+    platform = "Moodle"
+    replaced = (
+        ": it skips them unless the box for updating records is ticked at the upload, or the worksheet was"
+        " downloaded afresh"
+    )
+
+    @staticmethod
+    def amount(text: str) -> float | None:
+        """A number that is not negative as Moodle writes it: 10.00, or 10,00 in many languages."""
+        plain = text.strip().replace("\u00a0", "").replace(",", ".")
+        return float(plain) if re.fullmatch(r"\d+(\.\d+)?", plain) else None
+
+    def why_fixed(self, row: int) -> str:
+        """Whether Moodle says that the grade cannot be changed."""
+        return LOCKED if self.value(row, "changeable").casefold() in _NO else ""
+
+    def participant(self, row: int) -> int | None:
+        """The participant's number, by which Moodle knows the row."""
+        match = _PARTICIPANT.fullmatch(self.value(row, "identifier"))
+        return None if match is None else int(match[1])
+
+    def identity(self, row: int) -> Mapping[str, str]:
+        """Participant's number, address, ID number, username and name."""
+        known = [name for name in ("email", "id", "username", "name") if name in self.columns]
+        return {"participant": str(self.participant(row)), **{name: self.value(row, name) for name in known}}
+
+    @staticmethod
+    def evidence(student_id: str, person: Person) -> Evidence:
+        """Names are the weakest."""
+        return (
+            ("participant", "" if person.participant is None else str(person.participant)),
+            ("email", person.email),
+            ("id", student_id),
+            ("username", person.username),
+            ("name", person.name),
+        )
+
+
+def grades_file(grades: Sequence[Grade], options: Options) -> Delivery:
+    """The worksheet filled in where there is one, else the gradebook import."""
+    if options.form is None:
+        return gradebook(grades, options)
+    comments = {grade.student_id: comment(grade) for grade in ready(grades)}
+    data = bytes_of(options.form, "form_missing")
+    return fill_worksheet(data, options.form.name, grades, options, comments)
+
+
+def fill_worksheet(
+    data: bytes, file: str, grades: Sequence[Grade], options: Options, comments: Mapping[str, str]
+) -> Delivery:
+    """Fill in a worksheet; `comments` are HTML by student_id, not written where there is no column for them.
+
+    Raises InputFileError with everything that is wrong with the worksheet, CallError for options that
+    mean nothing here.
+    """
+    for name in ("item", "identity", "maximum"):
+        if getattr(options, name):
+            raise CallError("option_unused", f"--{name} has no meaning beside --worksheet: leave it out")
+    sheet = open_worksheet(data, file)
+    if "feedback" not in sheet.columns:
+        sheet.notes.append("the worksheet has no column for feedback comments: only grades are filled in")
+    return fill_in(sheet, lambda content: open_worksheet(content, file), grades, options, comments)
+
+
+def open_worksheet(data: bytes, file: str) -> Worksheet:
+    """A worksheet as downloaded; InputFileError with everything that Moodle would not take."""
+    table = parse(data, file)
+    if not table.rows:
+        raise InputFileError("worksheet", f"{file}: the worksheet is empty; download it from Moodle again")
+    columns, faults = _columns([table.value(0, column).strip() for column in range(len(table.rows[0]))])
+    faults += table.ragged()
+    sheet = Worksheet(table, {**_unnamed(table, columns), **columns})
+    if not faults:
+        faults += _row_faults(sheet)
+    if faults:
+        raise InputFileError(
+            "worksheet",
+            f"{file}: Moodle would not take this worksheet; download it again, with Moodle in English,"
+            f" Romanian or Russian, and do not resave it\n{lines_of(faults)}",
+        )
+    if "maximum" not in columns:
+        sheet.notes.append("the worksheet does not state its maximum grade: taken to be the rubric's")
+    return sheet
+
+
+def _columns(header: list[str]) -> tuple[dict[str, int], list[str]]:
+    columns: dict[str, int] = {}
+    faults: list[str] = []
+    for name, known in COLUMNS.items():
+        places = [place for place, title in enumerate(header) if title in known]
+        if len(places) > 1:
+            faults.append(f"row 1: there are {len(places)} columns '{header[places[0]]}'")
+        if places:
+            columns[name] = places[0]
+        elif name in _REQUIRED:
+            faults.append(f"row 1: there is no column '{known[0]}' (columns: {', '.join(header)})")
+    if "scale" in columns:
+        faults.append(
+            "row 1: the assignment is graded by a scale, and Moodle would skip points: let it be points"
+        )
+    if columns.get("feedback") == 0:
+        faults.append("row 1: feedback comments stand in the first column, where Moodle drops them")
+    return columns, faults
+
+
+def _unnamed(table: RawTable, columns: Mapping[str, int]) -> dict[str, int]:
+    """Columns of people that bear other names than those known, by what stands in them.
+
+    Full names follow the identifier, unless the worksheet is anonymous; addresses have an @.
+    """
+    others = [place for place in range(len(table.rows[0])) if place not in columns.values()]
+    after = columns.get("identifier", -2) + 1
+    unnamed = {"name": after} if after in others else {}
+    for place in others:
+        rows = [row for row in range(1, len(table.rows)) if place < len(table.rows[row])]
+        cells = {table.value(row, place).strip() for row in rows} - NO_GRADE
+        if cells and all(re.fullmatch(r"[^@\s]+@[^@\s]+", cell) for cell in cells):
+            unnamed.setdefault("email", place)
+    return unnamed
+
+
+def _row_faults(sheet: Worksheet) -> Iterator[str]:
+    rows: dict[int, int] = {}
+    comma = sheet.value(0, "grade") != COLUMNS["grade"][0]
+    for row in sheet.people:
+        participant, maximum = sheet.participant(row), sheet.maximum(row)
+        if participant is None:
+            yield f"row {row + 1}: '{sheet.value(row, 'identifier')}' is not 'Participant' and a number"
+            continue
+        if participant in rows:
+            yield f"row {row + 1}: the same participant as in row {rows[participant] + 1}"
+        rows[participant] = row
+        if "maximum" in sheet.columns and not maximum:
+            yield f"row {row + 1}: the maximum grade '{sheet.value(row, 'maximum')}' is no positive number"
+        why = _misread(sheet.value(row, "grade"), maximum, comma=comma)
+        if why:
+            yield f"row {row + 1}: the grade '{sheet.value(row, 'grade')}' {why}"
+
+
+def _misread(text: str, maximum: float | None, *, comma: bool) -> str:
+    """What Moodle would misread in a grade that stands there already."""
+    value = Worksheet.amount(text)
+    if text in NO_GRADE:
+        return ""
+    if value is None:
+        return "is no number; Moodle would store 0"
+    if "," in text and not comma:
+        return f"has a comma; Moodle would store {text.partition(',')[0]}"
+    return "is above the maximum; Moodle would skip it" if maximum and value > maximum else ""
+
+
+# The gradebook ------------------------------------------------------------------------------------
+
+IDENTITIES = ("idnumber", "email", "username", "id")
+_SHAPES = {
+    "email": re.compile(r"[^@\s]+@[^@\s]+\.[^@\s]+"),
+    "id": re.compile(r"[1-9][0-9]*"),
+    # Moodle's own rule for usernames: lower case, digits, and these marks.
+    "username": re.compile(r"[a-z0-9._@-]+"),
+}
+_USUAL_LIMIT = 100.0
+"""Above it Moodle aborts the import, unless the site allows unlimited grades."""
+_LONGEST_COMMENT = 60_000
+"""Characters; MySQL's text columns hold 65,535 bytes."""
+
+
+def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
+    """The import file: a row per user, users by idnumber, email, username or id.
+
+    Raises CallError with every student who cannot be named, named twice, or whose grade does not fit.
+    """
+    identity = options.identity or "idnumber"
+    if identity not in IDENTITIES:
+        raise CallError("identity", f"users are found by {', '.join(IDENTITIES)}, not by '{identity}'")
+    item = options.item.strip() or grades[0].assignment
+    if is_formula(item):
+        raise CallError("gradebook", f"'{item}' is no name for a grade item: a spreadsheet would run it")
+    graded = ready(grades)
+    comments = [comment(grade) for grade in graded]
+    faults = list(_faults(graded, identity))
+    faults += [
+        f"{grade.student_id}: the comment has more than {_LONGEST_COMMENT} characters"
+        for grade, text in zip(graded, comments, strict=True)
+        if len(text) > _LONGEST_COMMENT
+    ]
+    if faults:
+        message = "Moodle would abort this import; nothing was written"
+        raise CallError("gradebook", f"{message}\n{lines_of(faults)}")
+    scores = [grade.out_of(options.maximum, rescale=options.rescale) for grade in graded]
+    users = [_user(grade, identity) for grade in graded]
+    rows = zip(users, map(number, scores), comments, strict=True)
+    notes = []
+    if len(graded) < len(grades):
+        notes.append("who is withheld has no row: the import leaves their grade as it is")
+    if any(score > _USUAL_LIMIT for score in scores):
+        notes.append("some grades are above 100: Moodle takes them only where the site allows it")
+    return Delivery(csv_text([identity, item, f"{item} (feedback)"], rows), notes=tuple(notes))
+
+
+def _user(grade: Grade, identity: str) -> str:
+    person, student_id = grade.person, grade.student_id
+    names = {"email": person.email, "username": person.username, "id": person.platform_id or student_id}
+    return names.get(identity, student_id)
+
+
+def _faults(grades: Sequence[Grade], identity: str) -> Iterator[str]:
+    owner: dict[str, str] = {}
+    source = {"email": "the roster gives", "username": "the table of ids gives"}.get(identity, "there is")
+    for grade in grades:
+        name, shape = _user(grade, identity), _SHAPES.get(identity)
+        if not name:
+            yield f"{grade.student_id}: {source} no {identity}"
+        elif is_formula(name):
+            yield f"{grade.student_id}: {identity} '{name}' would be run as a formula by a spreadsheet"
+        elif shape is not None and not shape.fullmatch(name):
+            yield f"{grade.student_id}: '{name}' is no {identity} that Moodle knows"
+        elif name.casefold() in owner:
+            yield f"{grade.student_id}: has the same {identity} as {owner[name.casefold()]}, '{name}'"
+        owner.setdefault(name.casefold(), grade.student_id)
+
+
+# Feedback files -----------------------------------------------------------------------------------
+
+FEEDBACK_FILES = ("feedback.html", "feedback.pdf")
+"""The page must be there; the PDF may."""
+
+
+def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
+    """The archive's files.
+
+    The worksheet has the number that Moodle gave each participant; without it the table of ids must.
+
+    Raises CallError where neither has the numbers, InputFileError for pages that are missing or of
+    another run.
+    """
+    graded = ready(grades)
+    numbers, why, notes = _participants(grades, options)
+    missing = {grade.student_id: why[grade.student_id] for grade in graded if grade.student_id in why}
+    files: dict[str, Path] = {}
+    faults: list[str] = []
+    for grade in graded:
+        if grade.student_id in numbers:
+            folder = f"Participant_{numbers[grade.student_id]}_assignfeedback_file"
+            files.update(_pages(grade, options.out or Path(), folder, faults))
+    if faults:
+        message = "not all feedback is there; grade again, nothing was written"
+        raise InputFileError("feedback_missing", f"{message}\n{lines_of(faults)}")
+    if missing and not files:
+        lines = lines_of([f"{student}: {reason}" for student, reason in missing.items()])
+        raise CallError("nothing_to_export", f"no student has a number in Moodle\n{lines}")
+    first = "upload grades before feedback files: they make Moodle take a worksheet for outdated"
+    return Delivery(files, unplaced=missing, notes=(first, *notes))
+
+
+def _participants(
+    grades: Sequence[Grade], options: Options
+) -> tuple[dict[str, int], dict[str, str], list[str]]:
+    """Moodle's number of each participant, why others have none, and what a person should check."""
+    people = {grade.student_id: grade.person for grade in grades}
+    if options.form is None:
+        numbers = {student: who.participant for student, who in people.items() if who.participant is not None}
+        if all(person.participant is None for person in options.people.values()):
+            raise CallError(
+                "worksheet_needed",
+                "Moodle's numbers of participants are needed: give the downloaded grading worksheet"
+                " (--worksheet), or a table with the columns student_id,participant (--ids)",
+            )
+        others = people.keys() - numbers.keys()
+        return numbers, dict.fromkeys(others, "the table of ids has no participant"), []
+    sheet = open_worksheet(bytes_of(options.form, "form_missing"), options.form.name)
+    matches = sheet.match(grades, options)
+    rows = {student: row for student, row in matches.rows.items() if student in people}
+    locked = {student: why for student, row in rows.items() if (why := sheet.why_fixed(row))}
+    numbers = {student: sheet.participant(row) or 0 for student, row in rows.items() if student not in locked}
+    doubtful = matches.notes_on(grade.student_id for grade in ready(grades) if grade.student_id in numbers)
+    return numbers, {**matches.missing, **locked}, doubtful
+
+
+def _pages(grade: Grade, out: Path, folder: str, faults: list[str]) -> Iterator[tuple[str, Path]]:
+    """A student's pages by their names in the archive; what is missing or of another run goes to `faults`."""
+    for report, where in zip(grade.reports, grade.folders, strict=True):
+        before = "" if len(grade.reports) == 1 else f"position-{where.rpartition('/')[2]}-"
+        try:
+            written = json.loads((out / where / "report.json").read_bytes())
+            if (written["status"], written["score"]) != (report.status, report.score):
+                faults.append(f"{grade.student_id}: {out / where} holds another result than results.json")
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            faults.append(f"{grade.student_id}: {out / where}: {getattr(error, 'strerror', None) or error}")
+        page, *printable = (out / where / name for name in FEEDBACK_FILES)
+        if not page.is_file():
+            faults.append(f"{grade.student_id}: {page} is not there")
+        for file in (page, *printable):
+            if file.is_file():
+                yield f"{folder}/{before}{file.name}", file

@@ -1,0 +1,498 @@
+"""Tables: CSV as programs want it, platforms' own CSV files filled in, and which of their rows is whose."""
+
+import csv
+import io
+import re
+import unicodedata
+from abc import ABC, abstractmethod
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import ClassVar
+
+from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
+from grader.files import OutputError, write_whole
+from grader.lms.grades import Delivery, Grade, Options, Person, in_a_row, ready
+from grader.roster import delimiter_of
+from reference.errors import InputFileError, lines_of
+
+Cell = str | int | float | None
+
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
+"""What makes spreadsheets take a text for a formula; the full-width forms do so too."""
+NO_GRADE = {"", "-"}
+"""How platforms write that there is no grade."""
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+    """A table as CSV: UTF-8 without a mark, commas, decimal dots, CRLF; read back once.
+
+    Texts that a spreadsheet would run as formulas get an apostrophe before.
+    """
+    table = [[guarded(name) for name in header], *([written(cell) for cell in row] for row in rows)]
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\r\n").writerows(table)
+    text = buffer.getvalue()
+    if list(csv.reader(io.StringIO(text, newline=""), strict=True)) != table:
+        raise not_as_meant("the table")
+    return text
+
+
+def written(cell: Cell) -> str:
+    """A cell's text: numbers with a dot and without needless digits, texts guarded."""
+    if cell is None:
+        return ""
+    if isinstance(cell, float):
+        return number(cell)
+    return str(cell) if isinstance(cell, int) else guarded(cell)
+
+
+def guarded(text: str) -> str:
+    """The text, with an apostrophe where a spreadsheet would take it for a formula."""
+    return f"'{text}" if is_formula(text) else text
+
+
+def is_formula(text: str) -> bool:
+    """Whether a spreadsheet would run this text."""
+    return text.lstrip(" \u00a0\ufeff").startswith(FORMULA_STARTS)
+
+
+def number(value: float) -> str:
+    """A decimal dot, at most five decimals, no exponent, no grouping, no trailing zeros: 7.5, 10, 0.33333."""
+    text = f"{value:.5f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def not_as_meant(what: str) -> OutputError:
+    """The error of a file that is read back before it is written, and differs."""
+    return OutputError("not_as_meant", f"{what} does not read back as it was meant; nothing was written")
+
+
+# Plain tables of the results ----------------------------------------------------------------------
+
+_FIXED = ("student_id", "n", "position", "status", "score", "max_score", "score_low", "score_high")
+_LAST = ("mistakes", "problems")
+
+
+def write_summary(results: ResultsDocument, path: Path) -> None:
+    """Write a row per student and position, with a column per criterion; raises OutputError."""
+    write_whole(path, summary_text(results))
+
+
+def summary_text(results: ResultsDocument) -> str:
+    """The summary as CSV text; points are blank where a criterion is under review or not judged."""
+    criteria = list(dict.fromkeys(each.id for report in results.reports for each in report.criteria))
+    # A criterion that is named as a fixed column must not hide it.
+    names = [f"criterion_{name}" if name in {*_FIXED, *_LAST} else name for name in criteria]
+    return csv_text([*_FIXED, *names, *_LAST], (_summary_row(report, criteria) for report in results.reports))
+
+
+def _summary_row(report: ReportDocument, criteria: list[str]) -> list[Cell]:
+    points = {criterion.id: criterion.points for criterion in report.criteria}
+    return [
+        report.student_id, report.variant.get("n"), report.position, report.status,
+        report.score, report.max_score, *(report.score_range or (None, None)),
+        *(points.get(criterion) for criterion in criteria),
+        " ".join(f"{mistake.code}@{mistake.at}" for mistake in report.mistakes),
+        " ".join(dict.fromkeys(problem.code for problem in report.problems)),
+    ]  # fmt: skip
+
+
+_LONG = (
+    "student_id", "n", "position", "status", "criterion", "title", "name", "verdict", "points", "max_points",
+    "measured_mm", "measured_deg", "measured_value", "expected_mm", "expected_deg", "expected_value", "unit",
+    "tolerance_mm", "tolerance_deg", "confidence", "mistake", "feedback",
+)  # fmt: skip
+
+
+def criteria_text(results: ResultsDocument) -> str:
+    """A row per student, position and criterion, with all that was measured and expected."""
+    rows = (_criterion_row(report, criterion) for report in results.reports for criterion in report.criteria)
+    return csv_text(_LONG, rows)
+
+
+def _criterion_row(report: ReportDocument, criterion: CriterionDocument) -> list[Cell]:
+    measured, expected, tolerance = criterion.measured, criterion.expected, criterion.tolerance
+    return [
+        report.student_id, report.variant.get("n"), report.position, report.status,
+        criterion.id, criterion.title, criterion.vector, criterion.verdict,
+        criterion.points, criterion.max_points,
+        measured.length_mm, measured.direction_deg, measured.value,
+        expected.length_mm, expected.direction_deg, expected.value, expected.unit or measured.unit,
+        tolerance.length_mm, tolerance.direction_deg,
+        criterion.confidence, criterion.mistake, criterion.feedback,
+    ]  # fmt: skip
+
+
+# Small tables that the instructor writes ----------------------------------------------------------
+
+STUDENT_COLUMNS = ("student_id", "id", "username", "participant")
+
+
+def with_ids(people: Mapping[str, Person], path: Path) -> dict[str, Person]:
+    """People with the platform's numbers: ``student_id``, and ``id``, ``username`` or ``participant``.
+
+    Raises InputFileError with every fault of the table.
+    """
+    rows = read_table(path, STUDENT_COLUMNS)
+    faults = list(_repeated(rows))
+    joined = dict(people)
+    for line, row in rows:
+        participant = row.get("participant", "")
+        if participant and not (participant.isascii() and participant.isdigit()):
+            faults.append(f"line {line}: '{participant}' is no participant's number")
+            continue
+        person = joined.get(row["student_id"], Person())
+        joined[row["student_id"]] = replace(
+            person,
+            platform_id=row.get("id", ""),
+            username=row.get("username", "") or person.username,
+            participant=int(participant) if participant else None,
+        )
+    if faults:
+        raise InputFileError("ids", f"{path}: is no table of the platform's numbers\n{lines_of(faults)}")
+    return joined
+
+
+def read_table(path: Path, columns: Sequence[str]) -> list[tuple[int, dict[str, str]]]:
+    """Rows of a small table, with their lines; blank lines are passed over, the first column is required.
+
+    Raises InputFileError with the file's faults.
+    """
+    try:
+        text = bytes_of(path, "ids").decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputFileError("ids", f"{path}: is not UTF-8 text; save it as CSV in UTF-8") from error
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter_of(text), strict=True)
+    try:
+        lines = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
+    except csv.Error as error:
+        raise InputFileError("ids", f"{path}, line {reader.line_num}: {error}") from error
+    lines = [(line, cells) for line, cells in lines if any(cells)]
+    header, key = lines[0][1] if lines else [], columns[0]
+    is_wrong = any(name not in columns or header.count(name) > 1 for name in header)
+    if key not in header or is_wrong or len(lines) < 2:
+        raise InputFileError(
+            "ids",
+            f"{path}: the first line must name columns out of {', '.join(columns)}, {key} among them, and a"
+            f" row follow for each (found: {', '.join(header) or 'nothing'}; rows: {max(len(lines) - 1, 0)})",
+        )
+    faults = [f"line {line}: has {len(cells)} cells" for line, cells in lines if len(cells) != len(header)]
+    faults += [f"line {line}: no {key}" for line, cells in lines if not cells[header.index(key)]]
+    if faults:
+        raise InputFileError("ids", f"{path}: {len(header)} columns are named\n{lines_of(faults)}")
+    return [(line, dict(zip(header, cells, strict=True))) for line, cells in lines[1:]]
+
+
+def bytes_of(path: Path, code: str) -> bytes:
+    """A file's content; InputFileError of this code where it cannot be read."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputFileError(code, f"{path}: cannot be read ({error.strerror})") from error
+
+
+def _repeated(rows: Sequence[tuple[int, Mapping[str, str]]]) -> Iterator[str]:
+    first: dict[tuple[str, str], int] = {}
+    for line, row in rows:
+        for column, cell in row.items():
+            before = first.setdefault((column, cell.casefold()), line)
+            if cell and before != line:
+                yield f"line {line}: the same {column} '{cell}' as in line {before}"
+
+
+# Files changed in single cells, everything else the same to the byte ------------------------------
+
+
+@dataclass(slots=True)
+class RawTable:
+    """Cells as they stand in the file, quotes included, with what stands between them.
+
+    Attributes
+    ----------
+    mark : a byte order mark, or nothing
+    rows : raw cells
+    ends : each row's line end; nothing after the last where the file has none
+    """
+
+    mark: str
+    delimiter: str
+    rows: list[list[str]] = field(default_factory=list)
+    ends: list[str] = field(default_factory=list)
+
+    def value(self, row: int, column: int) -> str:
+        """A cell's meaning."""
+        cell = self.rows[row][column]
+        return cell[1:-1].replace('""', '"') if cell.startswith('"') else cell
+
+    def put(self, row: int, column: int, text: str) -> None:
+        """Change one cell; one that already means this text stays as it is written."""
+        if self.value(row, column) != text:
+            self.rows[row][column] = quoted(text, self.delimiter)
+
+    def text(self) -> str:
+        """The whole file."""
+        lines = (self.delimiter.join(row) + end for row, end in zip(self.rows, self.ends, strict=True))
+        return self.mark + "".join(lines)
+
+    def ragged(self) -> list[str]:
+        """Faults of rows that have more or fewer cells than the first; empty lines are none."""
+        wide = len(self.rows[0])
+        return [
+            f"row {row + 1}: has {len(cells)} cells, the first row has {wide}"
+            for row, cells in enumerate(self.rows)
+            if len(cells) != wide and cells != [""]
+        ]
+
+
+def quoted(text: str, delimiter: str) -> str:
+    """A raw cell that means this text."""
+    if any(mark in text for mark in (delimiter, '"', "\n", "\r")) or text != text.strip():
+        return '"' + text.replace('"', '""') + '"'
+    return text
+
+
+_QUOTED = r'"[^"]*+(?:""[^"]*+)*+"'
+
+
+def parse(data: bytes, file: str, delimiter: str | None = ",") -> RawTable:
+    """Split a file into raw cells; where the delimiter is None, at the one that its first line has.
+
+    Raises InputFileError for text that is not UTF-8, for an open quote and for text after a closed one.
+    """
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputFileError(
+            "not_utf8",
+            f"{file}: is not UTF-8 text (byte {error.start}); download it again and do not resave it",
+        ) from error
+    delimiter = delimiter or delimiter_of(text)
+    pattern = re.compile(rf'({_QUOTED}|[^"{delimiter}\r\n][^{delimiter}\r\n]*+|)({delimiter}|\r\n|\r|\n|\Z)')
+    table = RawTable("\ufeff" if text.startswith("\ufeff") else "", delimiter)
+    at, row = len(table.mark), list[str]()
+    while at < len(text) or row:
+        cell = pattern.match(text, at)
+        if cell is None:
+            where = f"{file}, row {len(table.rows) + 1}"
+            if re.compile(_QUOTED).match(text, at):
+                raise InputFileError("quote_broken", f"{where}: text follows a closing quote")
+            raise InputFileError("quote_open", f"{where}: a quote is opened and never closed")
+        row.append(cell[1])
+        at = cell.end()
+        if cell[2] != delimiter:
+            table.rows.append(row)
+            table.ends.append(cell[2])
+            row = []
+    return table
+
+
+# Whose row is whose -------------------------------------------------------------------------------
+
+Evidence = Sequence[tuple[str, str]]
+"""Columns and what would stand there, the strongest first; an empty text is no evidence."""
+NAMES = frozenset({"name", "name turned"})
+"""Columns that two people may share."""
+
+
+@dataclass(slots=True)
+class Matches:
+    """The row of each student, and why others have none. No row serves two students.
+
+    Attributes
+    ----------
+    by_name : students for whom nothing but their name speaks
+    """
+
+    rows: dict[str, int] = field(default_factory=dict)
+    missing: dict[str, str] = field(default_factory=dict)
+    by_name: list[str] = field(default_factory=list)
+
+    def notes_on(self, students: Iterable[str]) -> list[str]:
+        """What a person should check among these students."""
+        chosen = set(students)
+        doubtful = [student for student in self.by_name if student in chosen]
+        return [f"found by name alone, look whether they are these: {in_a_row(doubtful)}"] if doubtful else []
+
+
+def match_rows(
+    rows: Mapping[int, Mapping[str, str]], students: Mapping[str, Evidence], table: str
+) -> Matches:
+    """The row of each student in a table, without regard to case, spaces and ways to write an accent.
+
+    The strongest evidence that fits decides, unless stronger evidence speaks against that row: a
+    namesake with another address. Only columns that know anybody of these students can speak so.
+
+    Arguments: `rows` has cells by row and column, `table` is the table's name in words.
+    """
+    cells = {row: {column: _folded(text) for column, text in texts.items()} for row, texts in rows.items()}
+    index: dict[tuple[str, str], list[int]] = defaultdict(list)
+    for row, texts in cells.items():
+        for cell in texts.items():
+            index[cell].append(row)
+    keys = {
+        student: [(column, _folded(text)) for column, text in evidence if text.strip()]
+        for student, evidence in students.items()
+    }
+    speaking = {key[0] for evidence in keys.values() for key in evidence if key in index}
+    matches = Matches()
+    claims: dict[int, dict[str, str]] = defaultdict(dict)
+    for student, evidence in keys.items():
+        key = next((key for key in evidence if key in index), None)
+        if key is None:
+            known = ", ".join(f"{column} '{text}'" for column, text in students[student] if text)
+            known = known or "anything known of the student"
+            matches.missing[student] = f"nobody in {table} has {known}"
+            continue
+        row, *others = index[key]
+        contrary = [
+            column
+            for column, text in evidence[: evidence.index(key)]
+            if column in speaking - {key[0]} and cells[row].get(column) not in (None, "", text)
+        ]
+        if others:
+            numbers = ", ".join(str(each + 1) for each in index[key])
+            matches.missing[student] = f"rows {numbers} of {table} all fit"
+        elif contrary:
+            matches.missing[student] = f"row {row + 1} of {table} has the {key[0]}, but another {contrary[0]}"
+        else:
+            claims[row][student] = key[0]
+    for row, claiming in claims.items():
+        if len(claiming) > 1:
+            why = f"row {row + 1} of {table} fits {' and '.join(claiming)} alike"
+            matches.missing.update(dict.fromkeys(claiming, why))
+            continue
+        ((student, column),) = claiming.items()
+        matches.rows[student] = row
+        if column in NAMES:
+            matches.by_name.append(student)
+    return matches
+
+
+def _folded(text: str) -> str:
+    return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
+
+
+# A platform's own table, filled in ----------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class Form(ABC):
+    """A platform's own table of students, with a column in which grades are filled in.
+
+    Attributes
+    ----------
+    columns : places of columns by our names, ``grade`` among them; ``feedback`` takes comments
+    above : row of the table above the first student
+    possible : the maximum of all grades; None where each row states its own
+    """
+
+    table: RawTable
+    columns: Mapping[str, int]
+    above: int = 0
+    possible: float | None = None
+    notes: list[str] = field(default_factory=list)
+
+    name: ClassVar[str]
+    platform: ClassVar[str]
+    replaced: ClassVar[str] = ""
+    """What the platform does where grades that it holds already are changed."""
+
+    @staticmethod
+    @abstractmethod
+    def amount(text: str) -> float | None:
+        """A number that is not negative, as the platform writes it."""
+
+    @abstractmethod
+    def why_fixed(self, row: int) -> str:
+        """Why the grade of a row must not be changed; empty where it may."""
+
+    @abstractmethod
+    def identity(self, row: int) -> Mapping[str, str]:
+        """The cells that say who a row is; none for a row of nobody."""
+
+    @staticmethod
+    @abstractmethod
+    def evidence(student_id: str, person: Person) -> Evidence:
+        """What would stand in a student's row."""
+
+    def value(self, row: int, name: str) -> str:
+        """A cell's text; empty where the table has no such column."""
+        column = self.columns.get(name)
+        return "" if column is None else self.table.value(row, column).strip()
+
+    def maximum(self, row: int) -> float | None:
+        """The maximum grade of a row; None where the table does not state it."""
+        return self.possible or self.amount(self.value(row, "maximum"))
+
+    @property
+    def people(self) -> list[int]:
+        """The rows of students; platforms skip empty lines."""
+        rows = self.table.rows
+        return [row for row in range(self.above + 1, len(rows)) if rows[row] != [""]]
+
+    def match(self, grades: Sequence[Grade], options: Options) -> Matches:
+        """The rows of students, among the whole class: a row that fits two of them is given to neither."""
+        students = {**options.people, **{grade.student_id: grade.person for grade in grades}}
+        return match_rows(
+            {row: cells for row in self.people if (cells := self.identity(row))},
+            {student: self.evidence(student, person) for student, person in students.items()},
+            self.name,
+        )
+
+
+def fill_in(
+    form: Form, reopen: Callable[[bytes], Form], grades: Sequence[Grade], options: Options,
+    comments: Mapping[str, str],
+) -> Delivery:  # fmt: skip
+    """Fill in grades, and comments by student_id; only cells of those who have a grade change.
+
+    What was filled in is opened again with `reopen`, and must hold the grades that were meant.
+
+    Raises CallError where the form's maximum is not the rubric's and nobody asks for rescaling.
+    """
+    matches = form.match(grades, options)
+    held = {row: cell for row in form.people if (cell := form.value(row, "grade")) not in NO_GRADE}
+    texts, unplaced = _put_grades(form, matches, grades, options)
+    students = {student: row for student, row in matches.rows.items() if row in texts}
+    changed = 0
+    for student, text in comments.items() if "feedback" in form.columns else ():
+        if (row := students.get(student)) is not None:
+            changed += form.value(row, "feedback") not in {"", text}
+            form.table.put(row, form.columns["feedback"], text)
+    if changed:
+        form.notes.append(f"{changed} comment(s) that {form.platform} holds already are replaced")
+    content = form.table.text().encode("utf-8")
+    again = reopen(content)
+    if any(number(again.amount(again.value(row, "grade")) or 0.0) != text for row, text in texts.items()):
+        raise not_as_meant(form.name)
+    waiting = [grade.student_id for grade in grades if grade.score is None]
+    stays = [f"{one} ({held[matches.rows[one]]})" for one in waiting if matches.rows.get(one) in held]
+    notes = [*form.notes, *matches.notes_on(students)]
+    if stays:
+        notes.append(f"withheld, and a grade is there already, which stays: {in_a_row(stays)}")
+    return Delivery(content, unplaced=unplaced, notes=tuple(notes))
+
+
+def _put_grades(
+    form: Form, matches: Matches, grades: Sequence[Grade], options: Options
+) -> tuple[dict[int, str], dict[str, str]]:
+    """Put grades into their cells: the grades by row, and why students have none."""
+    texts, unplaced, replaced = dict[int, str](), dict[str, str](), 0
+    for grade in ready(grades):
+        row = matches.rows.get(grade.student_id)
+        if why := matches.missing[grade.student_id] if row is None else form.why_fixed(row):
+            unplaced[grade.student_id] = why
+        if row is None or why:
+            continue
+        texts[row] = number(grade.out_of(form.maximum(row), rescale=options.rescale))
+        before = form.value(row, "grade")
+        amount = form.amount(before)
+        if amount is None or number(amount) != texts[row]:
+            replaced += before not in NO_GRADE
+            form.table.put(row, form.columns["grade"], texts[row])
+    if replaced:
+        note = f"{replaced} grade(s) that {form.platform} holds already are changed{form.replaced}"
+        form.notes.append(note)
+    return texts, unplaced

@@ -1,0 +1,267 @@
+"""The door of all exports: what is refused, names of files, and the last check before one is written."""
+
+import csv
+import io
+import zipfile
+
+import pytest
+from pydantic import ValidationError
+
+from grader.documents import AlikeDocument
+from grader.files import OutputError
+from grader.lms import table
+from grader.lms.canvas import CanvasMarksDocument
+from grader.lms.export import KINDS, export, usual_name
+from grader.lms.grades import Options, Person
+from grader.lms.marks import PlatformCriterion
+from grader.lms.moodle_guide import MoodleFilled, MoodleGuide
+from grader.lms.scores import GradescopeTest, LtiDocument
+from grader.lms.table import RawTable
+from reference.errors import CallError
+from tests.unit.lms.classroom import a_class, marked, report, results
+
+NEEDED = {
+    ("moodle", "feedback"): {"people": {"s09": Person(participant=1)}},
+    ("moodle", "rubric"): {"cmid": 1, "context_id": 2},
+    ("moodle", "marks"): {"criteria": "c1,11", "assignment_id": 17},
+    ("canvas", "marks"): {"criteria": "c1,11"},
+}
+
+
+@pytest.mark.parametrize("key", KINDS)
+def test_where_nobody_has_a_grade_the_file_has_nobody_and_everybody_is_told(key, tmp_path):
+    options = dict(NEEDED.get(key, {}))
+    if "criteria" in options:
+        table = tmp_path / "criteria.csv"
+        table.write_text(f"criterion,id\n{options['criteria']}\n")
+        options["criteria"] = table
+    options = Options(to=key[0], what=key[1], **options)
+    path = tmp_path / usual_name(options)
+    waiting = marked("s01", 5.0, status="needs_review")
+    delivery = export(results(waiting, report("s02", None, status="missing")), path, options)
+    assert path.is_file()
+    if key[0] != "csv" and key[1] != "rubric":
+        assert delivery.written == ()
+        assert set(delivery.withheld) == {"s01", "s02"}
+        assert delivery.notes[0].startswith("nobody has a grade yet")
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [
+        (Options(to="csv"), "export-csv.csv"),
+        (Options(to="csv", what="grades"), "export-csv-grades.csv"),
+        (Options(to="moodle"), "export-moodle.csv"),
+        (Options(to="moodle", what="feedback"), "export-moodle-feedback.zip"),
+        (Options(to="canvas", what="marks"), "export-canvas-marks.json"),
+        (Options(to="gradescope"), "export-gradescope.zip"),
+        (Options(to="lti"), "export-lti.json"),
+    ],
+)
+def test_files_are_called_by_platform_and_thing(options, name):
+    assert usual_name(options) == name
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (Options(to="lti", item="x"), "--item has no meaning for lti grades"),
+        (Options(to="csv", position=1), "--position has no meaning for csv marks"),
+        (Options(to="canvas", identity="email"), "--identity has no meaning"),
+        (Options(to="canvas", what="marks", rescale=True), "--rescale has no meaning"),
+        (Options(to="gradescope", maximum=5.0), "--maximum has no meaning"),
+        (Options(to="moodle", cmid=5), "--cmid has no meaning"),
+        (Options(to="moodle", what="rubric", assignment_id=5), "--assignment-id has no meaning"),
+    ],
+)
+def test_an_option_without_meaning_is_refused_not_passed_over(options, message, tmp_path):
+    with pytest.raises(CallError, match=message):
+        export(results(marked("s01", 5.0)), tmp_path / "x", options)
+
+
+@pytest.mark.parametrize("option", [{"item": "Pump"}, {"identity": "email"}, {"maximum": 10.0}])
+def test_a_worksheet_says_itself_what_options_would(option, tmp_path):
+    form = tmp_path / "w.csv"
+    form.write_text("Identifier,Grade,Last modified (grade)\nParticipant 1,,-\n")
+    with pytest.raises(CallError, match="no meaning beside --worksheet"):
+        export(results(marked("s01", 5.0)), tmp_path / "x", Options(to="moodle", form=form, **option))
+
+
+def test_a_place_that_cannot_be_written_is_told(tmp_path):
+    (tmp_path / "file").write_text("")
+    for to, name in (("moodle", "x.csv"), ("gradescope", "x.zip"), ("gradescope", "folder")):
+        with pytest.raises(OutputError, match="cannot be written"):
+            export(results(marked("s01", 5.0)), tmp_path / "file" / name, Options(to=to))
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]
+
+
+def test_sheets_that_look_alike_are_told_before_their_grades_are_out(tmp_path):
+    pair = AlikeDocument(students=["s01", "s02"], positions=[None, None], why=["same_numbers"], measure=0.01)
+    two = results(marked("s01", 5.0), marked("s02", 5.0, status="needs_review"))
+    delivery = export(two.model_copy(update={"alike": [pair]}), tmp_path / "o", Options(to="lti"))
+    assert delivery.notes[-1].startswith("the sheets of s01 and s02 look alike")
+    one = results(marked("s01", 5.0, status="needs_review"))
+    delivery = export(one.model_copy(update={"alike": [pair]}), tmp_path / "o", Options(to="lti"))
+    assert not any("alike" in note for note in delivery.notes)
+
+
+def test_a_worksheet_filled_in_again_is_told_to_be_skipped_by_moodle(tmp_path):
+    form = tmp_path / "w.csv"
+    form.write_text("Identifier,Grade,Last modified (grade)\nParticipant 1,,-\n")
+    options = Options(to="moodle", form=form, people={"s01": Person(participant=1)})
+    one = results(marked("s01", 5.0))
+    assert not any("made before" in note for note in export(one, tmp_path / "o.csv", options).notes)
+    assert any("made before" in note for note in export(one, tmp_path / "o.csv", options).notes)
+
+
+def test_who_has_no_such_position_is_told(tmp_path):
+    two = results(marked("s01", 5.0, position=1), marked("s02", 5.0, position=2))
+    delivery = export(two, tmp_path / "o.csv", Options(to="moodle", position=2))
+    assert delivery.written == ("s02",)
+    assert delivery.withheld == {"s01": "has no position 2"}
+
+
+def test_two_students_with_a_row_between_them_have_none_even_if_one_is_withheld(tmp_path):
+    form = tmp_path / "w.csv"
+    form.write_text("Identifier,Full name,Grade,Last modified (grade)\nParticipant 1,Ion,,-\n")
+    people = {"s01": Person(name="Ion"), "s02": Person(name="Ion")}
+    both = results(marked("s01", 5.0), marked("s02", 5.0, status="needs_review"))
+    delivery = export(both, tmp_path / "o.csv", Options(to="moodle", form=form, people=people))
+    assert delivery.written == ()
+    assert "fits s01 and s02 alike" in delivery.unplaced["s01"]
+    assert set(delivery.withheld) == {"s02"}
+
+
+def test_export_writes_one_file_and_says_who_is_in_it(tmp_path):
+    delivery = export(a_class(), tmp_path / "moodle.csv", Options(to="moodle", item="Pump"))
+    assert delivery.written == ("s01",)
+    assert delivery.withheld == {"s02": "needs review", "s03": "nothing handed in", "s04": "unreadable"}
+    text = (tmp_path / "moodle.csv").read_text(encoding="utf-8")
+    header, first = csv.reader(io.StringIO(text, newline=""))
+    assert header == ["idnumber", "Pump", "Pump (feedback)"]
+    assert first[2] == "<ul><li>~ <b>Vector v_B</b>: It is too long.</li></ul>"
+
+
+# What is rendered is read back, and a difference stops it ------------------------------------------
+ONE = results(marked("s01", 5.0, 2.5))
+WORKSHEET = "Identifier,Grade,Last modified (grade)\nParticipant 1,,-\n"
+GRADEBOOK = (
+    "LastName,FirstName,ID,SIS User ID,SIS Login ID,Section,Pump (1)\n"
+    "    Points Possible,,,,,,10\nPopescu,Ion,1,s01,,1,\n"
+)
+
+
+def refused(tmp_path, options, name="out.csv"):
+    before = set(tmp_path.iterdir())
+    with pytest.raises(OutputError, match="does not read back as it was meant"):
+        export(ONE, tmp_path / name, options)
+    assert set(tmp_path.iterdir()) == before
+
+
+def form(tmp_path, text):
+    path = tmp_path / "form.csv"
+    path.write_text(text)
+    return path
+
+
+def test_a_table_that_reads_otherwise_is_not_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(table.csv, "reader", lambda *_, **__: [["something else"]])
+    refused(tmp_path, Options(to="csv"))
+
+
+def test_a_filled_in_file_that_reads_otherwise_is_not_written(tmp_path, monkeypatch):
+    whole = RawTable.text
+    monkeypatch.setattr(RawTable, "text", lambda self: whole(self).replace("7.5", "75"))
+    people = {"s01": Person(participant=1)}
+    refused(tmp_path, Options(to="moodle", form=form(tmp_path, WORKSHEET), people=people))
+    refused(tmp_path, Options(to="canvas", form=form(tmp_path, GRADEBOOK)))
+
+
+def test_a_document_that_reads_otherwise_is_not_written(tmp_path, monkeypatch):
+    text = '{"assignment": "press", "scores": []}'
+    monkeypatch.setattr(LtiDocument, "model_dump_json", lambda *_, **__: text)
+    refused(tmp_path, Options(to="lti"))
+
+
+@pytest.mark.parametrize("broken", ["read", "namelist"])
+def test_an_archive_that_reads_otherwise_is_not_written(tmp_path, monkeypatch, broken):
+    monkeypatch.setattr(zipfile.ZipFile, broken, lambda *_: [])
+    refused(tmp_path, Options(to="gradescope"), "out.zip")
+
+
+def test_maxima_that_differ_have_no_one_row_of_points(tmp_path):
+    two = results(report("s01", 5.0), report("s02", 5.0, max_score=20.0))
+    for to in ("canvas", "moodle", "lti", "gradescope"):
+        with pytest.raises(CallError, match=r"(?s)maxima differ.*10: s01\n  20: s02"):
+            export(two, tmp_path / "o.csv", Options(to=to))
+    with pytest.raises(CallError, match="maxima differ"):
+        export(two, tmp_path / "o.csv", Options(to="moodle", rescale=True))
+    with pytest.raises(CallError, match="--rescale"):
+        export(two, tmp_path / "o.csv", Options(to="canvas", maximum=10.0))
+    export(two, tmp_path / "o.csv", Options(to="canvas", maximum=10.0, rescale=True))
+    assert (tmp_path / "o.csv").read_text().splitlines()[3].endswith(",2.5")
+
+
+CRITERION = {"criterion": "c1", "id": "_1", "max_points": 5.0}
+CALL = {
+    "student_id": "s01",
+    "path": "/p",
+    "body": {
+        "submission": {"posted_grade": "5"},
+        "comment": {"text_comment": "x"},
+        "rubric_assessment": {"_1": {"points": 5.0, "comments": ""}},
+    },
+}
+BULK = {"posted_grade": "5", "text_comment": "x", "rubric_assessment": {}}
+TEST = {
+    "name": "x", "number": "1", "score": 6.0, "max_score": 5.0, "status": "passed", "output": "",
+    "visibility": "visible", "extra_data": {"criterion": "c1", "verdict": "full"},
+}  # fmt: skip
+FILLING = {"criterionid": 2, "score": 1, "remark": ""}
+GUIDED = {"shortname": "a", "description": "", "descriptionmarkers": "", "maxscore": 1}
+
+
+@pytest.mark.parametrize(
+    ("model", "document", "why"),
+    [
+        (GradescopeTest, TEST, "6 of 5 points"),
+        (MoodleFilled, {"criterionid": 1, "fillings": [FILLING]}, "as 2"),
+        (
+            MoodleGuide,
+            {
+                "guide_criteria": [{**GUIDED, "sortorder": 1}, {**GUIDED, "sortorder": 2}],
+                "guide_comments": [{"sortorder": 1, "description": "x"}],
+            },
+            "criterion a stands twice",
+        ),
+        (
+            CanvasMarksDocument,
+            {
+                "assignment": "pump", "criteria": [CRITERION], "calls": [CALL],
+                "bulk": {"path": "/b", "body": {"grade_data": {}}},
+            },
+            "different students",
+        ),
+        (
+            CanvasMarksDocument,
+            {
+                "assignment": "pump", "criteria": [{**CRITERION, "id": "_2"}], "calls": [CALL],
+                "bulk": {"path": "/b", "body": {"grade_data": {"1": BULK}}},
+            },
+            r"criteria \['_1'\] are filled, \['_2'\] are there",
+        ),
+        (
+            CanvasMarksDocument,
+            {
+                "assignment": "pump", "criteria": [CRITERION],
+                "calls": [{**CALL, "body": {**CALL["body"], "submission": {"posted_grade": "4"}}}],
+                "bulk": {"path": "/b", "body": {"grade_data": {"1": BULK}}},
+            },
+            "s01: the criteria give 5 together",
+        ),
+        (PlatformCriterion, {**CRITERION, "more": 1}, "more"),
+    ],
+)  # fmt: skip
+def test_documents_that_a_platform_would_misread_are_none(model, document, why):
+    with pytest.raises(ValidationError, match=why):
+        model.model_validate(document)
