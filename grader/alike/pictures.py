@@ -1,8 +1,8 @@
 """The ink of two sheets laid over each other: the very same drawing, scanned twice, nearly covers itself.
 
-Each sheet is kept as a small map of where its ink lies. What many sheets have in common (frame, title
-block, a printed sheet's lines) is left out, and how much independent drawings of this class resemble
-each other is told by the class itself.
+Each sheet is stored as a small map of where its ink lies. What belongs to the page (frame, title block,
+folds, a printed sheet's lines) is left out, and the class itself shows how much independent drawings
+resemble each other.
 """
 
 from collections.abc import Sequence
@@ -36,6 +36,7 @@ QUANTILES = 0.84, 0.95
 """The upper one leaves a copied pair out in a class of seven."""
 TAIL_DROP = float(np.log((1.0 - QUANTILES[0]) / (1.0 - QUANTILES[1])))
 LEAST_SPREAD = 0.015
+"""Of the inverse hyperbolic tangent of the correlation: a class of few pairs may show less by chance."""
 LEAST_ALIKE = 0.5
 """Mean correlation of the parts below which two sheets are never the same drawing."""
 
@@ -152,10 +153,11 @@ def _long_runs(inked: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
     A run may step aside by a cell, for the page lies askew, and have gaps, for pencil is faint.
     """
-    wide = _with_neighbours(inked).astype(np.int16)
-    sums = np.pad(wide.cumsum(axis=2, dtype=np.int16), ((0, 0), (0, 0), (1, 0)))
+    # A row has fewer than 256 cells: counts fit into bytes.
+    wide = _with_neighbours(inked).astype(np.uint8)
+    sums = np.pad(wide.cumsum(axis=2, dtype=np.uint8), ((0, 0), (0, 0), (1, 0)))
     begins = sums[..., RUN:] - sums[..., :-RUN] >= RUN_INKED * RUN
-    marks = np.pad(begins, ((0, 0), (0, 0), (RUN, RUN))).cumsum(axis=2, dtype=np.int16)
+    marks = np.pad(begins, ((0, 0), (0, 0), (RUN, RUN))).cumsum(axis=2, dtype=np.uint8)
     covered = marks[..., RUN:] - marks[..., :-RUN] > 0
     return _with_neighbours(covered[..., : inked.shape[2]])
 
