@@ -11,7 +11,7 @@ from grader.exports import write_summary
 from grader.feedback import About, Level, write_feedback, write_index
 from grader.files import make_folder, write_whole
 from grader.folder import submissions, told_name
-from grader.jobs import Job, alike_of_run, folders_of, inputs_of_run
+from grader.jobs import Job, folders_of, inputs_of_run, similar_of_run
 from grader.kept import digest_of, keep_looked, keep_maps, kept_looked
 from grader.measurements import names_of
 from grader.moved import earlier, moved, note_inputs, noted_inputs
@@ -104,7 +104,7 @@ def _graded(
         reports=reports,
         unmatched=unmatched,
         moved=moved(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
-        alike=alike_of_run(batch.assignment, jobs, reports, notes / "readings"),
+        alike=similar_of_run(batch.assignment, jobs, reports, notes / "readings"),
     )
     _write_results(batch, results, works)
     note_inputs(notes, inputs)

@@ -7,20 +7,19 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from grader.alike import CELLS, find_alike, ink_map
-from grader.alike.drawings import like_drawings
-from grader.alike.hands import log_chance
+from grader.similarity import CELLS, find_similar, ink_map
+from grader.similarity.drawings import compare_drawings, log_chance
 from grader.simulation import PERFECT
 from reference.assignment import built_in, load_assignment
-from tests.unit.alike import classes
-from tests.unit.alike.classes import any_drawing, changed, drawing, measured, scanned, scanned_class
+from tests.unit.similarity import classes
+from tests.unit.similarity.classes import any_drawing, changed, drawing, measured, scanned, scanned_class
 
 SECONDS = 1.0
 COPIES = 12
 
 
-def found(name, handed, maps=()):
-    return {frozenset(one.students): one for one in find_alike(load_assignment(name), handed, maps)}
+def found(name, submissions, maps=()):
+    return {frozenset(one.students): one for one in find_similar(load_assignment(name), submissions, maps)}
 
 
 # Independent hands --------------------------------------------------------------------------------
@@ -165,25 +164,25 @@ def sheet_picture(seed, shift_px=0, *, frame=True):
     return grey
 
 
-def laid_out(handed, variant, seed):
+def laid_out(submissions, variant, seed):
     """A drawing with its figures where a teacher wants them, to 0.3 mm."""
     rng = np.random.default_rng([seed, 31])
-    (sheet,) = handed.sheets
+    (sheet,) = submissions.sheets
     spots = {"mechanism": 110 - 190j, "velocity_plan": 250 - 110j, "acceleration_plan": 330 - 180j}
     placed = {}
     for figure, nodes in sheet.items():
         first = next(iter(drawing("pump", variant, seed, "careful").sheets[0][figure].values()))
         shift = spots[figure] - first + complex(*rng.normal(0.0, 0.3, 2))
         placed[figure] = {node: at + shift for node, at in nodes.items()}
-    return replace(handed, sheets=(placed,))
+    return replace(submissions, sheets=(placed,))
 
 
-def drawn_picture(handed, seed):
+def drawn_picture(submissions, seed):
     """A sheet with a drawing's nodes joined by lines, and a few letters elsewhere."""
     rng = np.random.default_rng([seed, 41])
     grey = np.full((297 * 2, 420 * 2), 255, np.uint8)
     share = np.linspace(0.0, 1.0, 400)
-    for nodes in handed.sheets[0].values():
+    for nodes in submissions.sheets[0].values():
         for tail, head in pairwise(nodes.values()):
             at = 2.0 * (tail + share * (head - tail))
             rows, columns = np.clip(-at.imag, 0, 592).astype(int), np.clip(at.real, 0, 838).astype(int)
@@ -194,10 +193,10 @@ def drawn_picture(handed, seed):
 
 
 def test_the_very_same_picture_is_found_though_it_lay_otherwise_and_nothing_was_read():
-    handed = [replace(drawing("pump", k, k), sheets=()) for k in range(12)]
+    submissions = [replace(drawing("pump", k, k), sheets=()) for k in range(12)]
     pictures = [sheet_picture(k) for k in range(11)] + [sheet_picture(4, shift_px=1)]
     maps = [[ink_map(grey, (420.0, 297.0))] for grey in pictures]
-    (one,) = found("pump", handed, maps).values()
+    (one,) = found("pump", submissions, maps).values()
     assert (set(one.students), one.why) == ({"s4", "s11"}, ["same_picture"])
 
 
@@ -213,8 +212,8 @@ def test_frame_desk_and_folds_that_a_few_sheets_share_make_nobody_alike():
             40,
         )
         grey[:, 415:418] = 30
-    handed = [replace(drawing("pump", k, k), sheets=()) for k in range(40)]
-    assert found("pump", handed, [[ink_map(grey, (420.0, 297.0))] for grey in pictures]) == {}
+    submissions = [replace(drawing("pump", k, k), sheets=()) for k in range(40)]
+    assert found("pump", submissions, [[ink_map(grey, (420.0, 297.0))] for grey in pictures]) == {}
 
 
 @pytest.mark.parametrize("read", [False, True])
@@ -234,8 +233,8 @@ def test_two_on_printed_sheets_in_a_class_on_plain_paper_are_not_alike_by_their_
     for grey in pictures[:2]:
         for k in range(60):
             grey[60 + 8 * k : 62 + 8 * k, 60 + 90 * (k % 8) : 110 + 90 * (k % 8)] = 0
-    handed = [replace(drawing("pump", k, k), sheets=(), printed=k < 2) for k in range(20)]
-    assert found("pump", handed, [[ink_map(grey, (420.0, 297.0))] for grey in pictures]) == {}
+    submissions = [replace(drawing("pump", k, k), sheets=(), printed=k < 2) for k in range(20)]
+    assert found("pump", submissions, [[ink_map(grey, (420.0, 297.0))] for grey in pictures]) == {}
 
 
 def test_a_map_tells_where_the_ink_lies():
@@ -261,9 +260,9 @@ def test_the_chance_of_a_cosine_is_that_of_a_random_direction():
 
 def test_chances_of_independent_hands_are_spread_as_chances_are():
     """A share p of the pairs of independent hands has a chance under p, or fewer."""
-    handed = scanned_class("pump", 100)
-    told = like_drawings(load_assignment("pump"), handed)
-    log = told.log_hands[np.triu_indices(len(handed), 1)]
+    submissions = scanned_class("pump", 100)
+    told = compare_drawings(load_assignment("pump"), submissions)
+    log = told.log_errors[np.triu_indices(len(submissions), 1)]
     for chance in (0.1, 0.01, 0.001):
         assert (log < np.log(chance)).mean() < 1.7 * chance
 
@@ -276,7 +275,7 @@ def test_three_hundred_students_are_compared_in_less_than_a_second():
     ]
     maps = [[np.zeros(CELLS, np.uint8)] for _ in entered]
     start = time.process_time()
-    find_alike(load_assignment("press"), entered, maps)
+    find_similar(load_assignment("press"), entered, maps)
     assert time.process_time() - start < SECONDS
 
 
@@ -289,7 +288,7 @@ def test_classes_of_any_size_are_compared(count):
 def test_any_assignment_and_any_reading_can_be_compared(name):
     assignment = load_assignment(name)
     rng = np.random.default_rng(3)
-    (variant, *_), handed = assignment.variants(), []
+    (variant, *_), submissions = assignment.variants(), []
     for k in range(12):
         one = any_drawing(assignment, variant, k)
         (figures,) = one.sheets
@@ -298,10 +297,10 @@ def test_any_assignment_and_any_reading_can_be_compared(name):
             for figure, nodes in figures.items()
             if rng.random() < 0.8
         }
-        handed.append(
+        submissions.append(
             replace(one, sheets=(kept,), numbers={"v_A": 5.0 * k, "a_A_deg": 1.0, "odd_value": 2.0})
         )
-    assert found(name, handed) == {}
+    assert found(name, submissions) == {}
 
 
 @pytest.mark.parametrize("printed", [False, True])

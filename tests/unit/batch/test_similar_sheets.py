@@ -9,7 +9,7 @@ from grader.cli.telling import tell_class
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
 from tests.inline import Inline
-from tests.unit.alike.classes import changed, drawing, measured
+from tests.unit.similarity.classes import changed, drawing, measured
 
 PRESS = load_assignment("press")
 RUBRIC = load_rubric("press")

@@ -13,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
-from grader.alike.handed import Handed
 from grader.records import FloatArray
-from reference.assignment import Assignment, Scales, Variant
+from grader.similarity.submission import USUAL, ComparedSubmission, scales_used
+from reference.assignment import Assignment, Variant
 from reference.construction import evaluate
 from reference.geometry import ComplexArray
-from reference.hand import SMALL, Skill, hand_errors
+from reference.hand import SMALL, hand_errors
 from reference.plan import exact_plan
 
-USUAL = Skill(angle_deg=0.3, place_mm=0.3, mark_mm=0.15)
 READ_OFF_MM = 0.15
 """Standard deviation of reading a ruler, beside the rounding of what is written down."""
 SCALE_OFF = 0.015
@@ -40,11 +39,11 @@ OWN_SHARE = 0.6
 LEAST_EQUAL = 5
 LEAST_TELLING = 3
 SKILLS = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0)
-"""Hands tried, as multiples of the usual one's errors."""
+"""Drafting errors tried, as multiples of the usual one's errors."""
 
 
 @dataclass(frozen=True, slots=True)
-class LikeNumbers:
+class NumberSimilarity:
     """Every two students' entered values; arrays (students, students).
 
     Attributes
@@ -82,17 +81,17 @@ class _Table:
     by_act: FloatArray
 
 
-def like_numbers(assignment: Assignment, handed: Sequence[Handed]) -> LikeNumbers:
+def compare_numbers(assignment: Assignment, submissions: Sequence[ComparedSubmission]) -> NumberSimilarity:
     """Compare the entered values of a class, each against the variant that was drawn."""
-    count = len(handed)
+    count = len(submissions)
     chance, equal, compared = np.zeros((count, count)), np.zeros((count, count)), np.zeros((count, count))
-    having = [k for k, one in enumerate(handed) if len(one.numbers) >= LEAST_EQUAL]
+    having = [k for k, one in enumerate(submissions) if len(one.numbers) >= LEAST_EQUAL]
     if len(having) < 2:
-        return LikeNumbers(chance, equal, compared, 0)
-    table = _table(assignment, [handed[k] for k in having])
+        return NumberSimilarity(chance, equal, compared, 0)
+    table = _table(assignment, [submissions[k] for k in having])
     single = _single(table)
     same, telling, alone, both = _counted(table, single)
-    people = np.array([handed[k].student_id for k in having])
+    people = np.array([submissions[k].student_id for k in having])
     strangers = people[:, None] != people[None, :]
     pairs = max(int(strangers.sum()) // 2, 1)
     choices = _choices(both, same)
@@ -108,7 +107,7 @@ def like_numbers(assignment: Assignment, handed: Sequence[Handed]) -> LikeNumber
         chance[a, b] = chance[b, a] = min(chance[a, b], known[key] + choices[i, j])
     where = np.ix_(having, having)
     equal[where], compared[where] = np.maximum(same, same.T), both
-    return LikeNumbers(chance, equal, compared, pairs)
+    return NumberSimilarity(chance, equal, compared, pairs)
 
 
 def _counted(table: _Table, single: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -120,11 +119,11 @@ def _counted(table: _Table, single: FloatArray) -> tuple[FloatArray, FloatArray,
     count = len(table.entered)
     same, telling, alone = (np.zeros((count, count)) for _ in range(3))
     for field, column in enumerate(table.entered.T):
-        alike = column[:, None] == column[None, :]
-        usable = alike & table.usable[:, field, None]
+        equal = column[:, None] == column[None, :]
+        usable = equal & table.usable[:, field, None]
         same += usable
         alone += np.where(usable, single[:, field, None], 0.0)
-        telling += alike & table.telling[:, field, None]
+        telling += equal & table.telling[:, field, None]
     known = np.isfinite(table.entered).astype(np.float64)
     return same, telling, alone, known @ known.T
 
@@ -137,13 +136,13 @@ def _choices(both: FloatArray, equal: FloatArray) -> FloatArray:
 # The table ----------------------------------------------------------------------------------------
 
 
-def _table(assignment: Assignment, handed: Sequence[Handed]) -> _Table:
-    known = {one.variant for one in handed}
-    variants = [one.fits[0] if one.fits and one.fits[0] in known else one.variant for one in handed]
-    exact, added = _exact(assignment, handed, variants)
+def _table(assignment: Assignment, submissions: Sequence[ComparedSubmission]) -> _Table:
+    known = {one.variant for one in submissions}
+    variants = [one.fits[0] if one.fits and one.fits[0] in known else one.variant for one in submissions]
+    exact, added = _exact(assignment, submissions, variants)
     names = list(exact)
-    lengths = np.array([[one.numbers.get(name, np.nan) for name in names] for one in handed])
-    turns = np.array([[one.numbers.get(f"{name}_deg", np.nan) for name in names] for one in handed])
+    lengths = np.array([[one.numbers.get(name, np.nan) for name in names] for one in submissions])
+    turns = np.array([[one.numbers.get(f"{name}_deg", np.nan) for name in names] for one in submissions])
     drawn = np.array([exact[name] for name in names]).T
     size = np.abs(drawn)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -156,7 +155,7 @@ def _table(assignment: Assignment, handed: Sequence[Handed]) -> _Table:
     off_mm = np.concatenate([lengths - size, np.radians(off) * size], axis=1)
     by_act = np.concatenate([acts.real, acts.imag], axis=1)
     spread = np.sqrt((by_act**2).sum(axis=2) + READ_OFF_MM**2 + grain**2 / 12.0)
-    excused = np.tile([[name in one.excused for name in names] for one in handed], 2)
+    excused = np.tile([[name in one.excused for name in names] for one in submissions], 2)
     entered = np.concatenate([lengths, turns], axis=1)
     with np.errstate(invalid="ignore"):
         usable = np.isfinite(entered) & (np.abs(off_mm) < GROSS * spread) & ~excused
@@ -168,20 +167,13 @@ def _table(assignment: Assignment, handed: Sequence[Handed]) -> _Table:
 
 
 def _exact(
-    assignment: Assignment, handed: Sequence[Handed], variants: list[Variant]
+    assignment: Assignment, submissions: Sequence[ComparedSubmission], variants: list[Variant]
 ) -> tuple[dict[str, ComplexArray], dict[str, ComplexArray]]:
     """Exact vectors (students,) in mm, and what usual errors of all acts add to them (students, acts)."""
-    rule = assignment.scales(variants)
-    scales = Scales(
-        *(
-            np.array(
-                [one.used.get(name, usual) for one, usual in zip(handed, getattr(rule, name), strict=True)]
-            )
-            for name in ("kL", "kv", "ka")
-        )
-    )
-    plan = exact_plan(assignment, variants, scales)
-    vectors = {name: np.broadcast_to(plan.drawn_mm(name), len(handed)) for name in plan.construction.vectors}
+    plan = exact_plan(assignment, variants, scales_used(assignment, submissions, variants))
+    vectors = {
+        name: np.broadcast_to(plan.drawn_mm(name), len(submissions)) for name in plan.construction.vectors
+    }
     moved: dict[str, list[ComplexArray]] = {name: [] for name in vectors}
     for step in plan.construction.steps:
         errors = hand_errors(step, USUAL)
@@ -191,7 +183,7 @@ def _exact(
         for name, vector in plan.construction.vectors.items():
             ends = np.atleast_2d(nodes[vector.head] - nodes[vector.tail])
             change = (ends[1:] - ends[:1]) / SMALL if len(ends) > 1 else np.zeros((len(errors), 1))
-            moved[name].append(np.asarray(np.broadcast_to(change, (len(errors), len(handed))).T))
+            moved[name].append(np.asarray(np.broadcast_to(change, (len(errors), len(submissions))).T))
     for plan_name in plan.construction.poles:
         of_plan = {vector.name for vector in plan.construction.vectors_of(plan_name)}
         for name, drawn in vectors.items():

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from grader.alike import Handed
+from grader.similarity import ComparedSubmission
 from grader.simulation import CAREFUL, SLOPPY, TYPICAL, Student
 from grader.simulation.hand import draw, task_of
 from reference.assignment import load_assignment
@@ -36,7 +36,7 @@ def any_drawing(assignment, variant, seed, hand="typical", mistakes=()):
     for figure in sheet.figures:
         place = complex(rng.normal(200.0, 25.0), -rng.normal(150.0, 20.0))
         figures[figure.name] = {node: place + at for node, at in figure.nodes.items()}
-    return Handed(f"s{seed}", variant, (figures,), {}, task.declared)
+    return ComparedSubmission(f"s{seed}", variant, (figures,), {}, task.declared)
 
 
 def scanned(drawn, seed, student_id=None, moved_mm=0.0, scale=1.0):
@@ -83,10 +83,10 @@ def measured(drawn, seed, step_mm=0.5, spread_mm=0.1, *, directions=True):
     return replace(drawn, sheets=(), numbers=numbers)
 
 
-def changed(handed, seed, count, student_id="copy"):
+def changed(submissions, seed, count, student_id="copy"):
     """A copy of measured values with some of them changed by a step or two."""
     rng = np.random.default_rng([seed, 3])
-    numbers = dict(handed.numbers)
+    numbers = dict(submissions.numbers)
     for name in rng.choice(sorted(numbers), count, replace=False):
         numbers[name] = round(numbers[name] + float(rng.choice([-1.0, -0.5, 0.5, 1.0])), 3)
-    return replace(handed, student_id=student_id, numbers=numbers)
+    return replace(submissions, student_id=student_id, numbers=numbers)
