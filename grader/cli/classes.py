@@ -9,12 +9,12 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from grader.class_sheet import Tell, class_csv, class_pages, numbered, table_pages
+from grader.authoring.variant_checks import broken_findings, broken_variants
+from grader.authoring.variant_table import Tell, class_csv, class_pages, numbered, table_pages
 from grader.cli.grading import check_language, progress
 from grader.cli.plans import check_crank
 from grader.files import write_whole
 from grader.i18n import tongue
-from grader.lint import broken_findings, broken_variants
 from grader.plan_document import plan_documents
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, MechanismError
@@ -85,7 +85,7 @@ def _sound(assignment: Assignment) -> list[Variant]:
 
 def _print_pages(assignment: Assignment, plan: Plan, pdf: Path, *, drawings: bool, lang: str) -> None:
     from grader.plan_pdf import pdf as as_pdf
-    from grader.plan_steps import wording_of
+    from grader.plan_steps.words import wording_of
 
     words = tongue(lang)
     pages = table_pages(assignment, plan, words)

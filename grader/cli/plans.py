@@ -84,7 +84,8 @@ def _draw(assignment: Assignment, plan: Plan, drawings: Drawings) -> None:
     if not drawings.files:
         return
     from grader.plan_pdf import pdf as as_pdf
-    from grader.plan_steps import html_page, pdf_pages, wording_of
+    from grader.plan_steps.pages import html_page, pdf_pages
+    from grader.plan_steps.words import wording_of
 
     speaker = tongue(drawings.lang)
     subject = Subject(assignment, plan, 0, wording_of(speaker))

@@ -8,12 +8,13 @@ from pathlib import Path
 import typer
 
 from grader.answer_sheet import make_calibration, make_sheets
+from grader.authoring.lint import lint
+from grader.authoring.round_scales import suggestions
 from grader.cli.grading import check_language, progress
 from grader.contact_sheet import Thumbnail, contact_sheet, thumbnail
 from grader.files import write_whole
 from grader.folder import submissions, told_name
 from grader.intake import page_of
-from grader.lint import lint, suggestions
 from grader.matching import SURE, draft_csv, suggest
 from grader.measurements import names_of
 from grader.ownership import PageSource

@@ -6,7 +6,8 @@ from grader.documents import MistakeDocument, ReportDocument, RivalDocument
 from grader.feedback.sentences import Level, one_mistake
 from grader.i18n import Tongue, tongue
 from grader.outcomes import Judgement, Mistake
-from grader.plan_steps import redo, wording_of
+from grader.plan_steps.redoing import redo
+from grader.plan_steps.words import wording_of
 from reference.assignment import Assignment, Variant
 from reference.drawing.subject import Subject
 from reference.plan import exact_plan

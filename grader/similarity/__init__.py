@@ -139,28 +139,28 @@ def _rare(log_chance: FloatArray, pairs: int) -> Iterator[tuple[int, int, float]
         yield int(i), int(j), exp(max(float(expected[i, j]), -600.0))
 
 
-def _add_drawings(pairs: dict[tuple[int, int], _Pair], found: DrawingSimilarity) -> None:
-    for i, j, measure in _rare(found.log_chance, found.pairs):
-        why: list[Sign] = ["hand_errors"] if found.log_errors[i, j] < NOTED else []
-        why += ["same_place"] if found.log_places[i, j] < NOTED else []
-        share = float(np.clip(found.cosine[i, j], 0.0, 1.0))
-        pairs.setdefault((i, j), _Pair()).add(why, measure, share, int(found.count[i, j]))
+def _add_drawings(pairs: dict[tuple[int, int], _Pair], drawings: DrawingSimilarity) -> None:
+    for i, j, measure in _rare(drawings.log_chance, drawings.pairs):
+        why: list[Sign] = ["hand_errors"] if drawings.log_errors[i, j] < NOTED else []
+        why += ["same_place"] if drawings.log_places[i, j] < NOTED else []
+        share = float(np.clip(drawings.cosine[i, j], 0.0, 1.0))
+        pairs.setdefault((i, j), _Pair()).add(why, measure, share, int(drawings.count[i, j]))
 
 
-def _add_numbers(pairs: dict[tuple[int, int], _Pair], found: NumberSimilarity) -> None:
-    for i, j, measure in _rare(found.log_chance, found.pairs):
-        compared = int(found.compared[i, j])
-        share = min(float(found.equal[i, j]) / max(compared, 1), 1.0)
+def _add_numbers(pairs: dict[tuple[int, int], _Pair], numbers: NumberSimilarity) -> None:
+    for i, j, measure in _rare(numbers.log_chance, numbers.pairs):
+        compared = int(numbers.compared[i, j])
+        share = min(float(numbers.equal[i, j]) / max(compared, 1), 1.0)
         pairs.setdefault((i, j), _Pair()).add(["same_numbers"], measure, share, compared)
 
 
 def _add_pictures(
-    pairs: dict[tuple[int, int], _Pair], found: PictureSimilarity, drawings: DrawingSimilarity
+    pairs: dict[tuple[int, int], _Pair], pictures: PictureSimilarity, drawings: DrawingSimilarity
 ) -> None:
     # Good drawings whose figures lie in the same places have the same ink: that is no rarer than the places.
-    log_chance = np.fmax(found.log_chance, drawings.log_layout)
-    for i, j, measure in _rare(log_chance, found.pairs):
-        share = float(np.clip(found.overlap[i, j], 0.0, 1.0))
+    log_chance = np.fmax(pictures.log_chance, drawings.log_layout)
+    for i, j, measure in _rare(log_chance, pictures.pairs):
+        share = float(np.clip(pictures.overlap[i, j], 0.0, 1.0))
         pairs.setdefault((i, j), _Pair()).add(["same_picture"], measure, share, 0)
 
 

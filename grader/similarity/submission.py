@@ -122,9 +122,9 @@ def drawn_of(
     return found
 
 
-def _fullest(one: ComparedSubmission, figure: str) -> int:
-    having = [k for k, sheet in enumerate(one.sheets) if figure in sheet]
-    return max(having, key=lambda k: len(one.sheets[k][figure]), default=-1)
+def _fullest(submission: ComparedSubmission, figure: str) -> int:
+    having = [k for k, sheet in enumerate(submission.sheets) if figure in sheet]
+    return max(having, key=lambda k: len(submission.sheets[k][figure]), default=-1)
 
 
 def fitting(

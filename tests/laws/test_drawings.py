@@ -7,7 +7,9 @@ from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 
 from grader.i18n import tongue
-from grader.plan_steps import explain, html_page, wording_of
+from grader.plan_steps.explanation import explain
+from grader.plan_steps.pages import html_page
+from grader.plan_steps.words import wording_of
 from reference.assignment import Assignment
 from reference.assignment_file import AssignmentFile
 from reference.authored import validate

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from grader.authoring.lint import lint
 from grader.bench import judging, judging_scans
 from grader.bench.judging import JudgingBench, judged, main
 from grader.bench.judging_assignments import ASSIGNMENTS, assignment_named
@@ -21,7 +22,6 @@ from grader.bench.judging_truth import verdicts_due
 from grader.bench.judging_values import computed, exact_rates
 from grader.bench.plain_text import as_text
 from grader.judging import judge, task_of
-from grader.lint import lint
 from grader.outcomes import Mistake as Named
 from grader.records import Reading
 from grader.simulation.hand import draw

@@ -5,7 +5,8 @@ import re
 import pytest
 
 from grader.i18n import LANGUAGES, tongue
-from grader.plan_steps import redo, wording_of
+from grader.plan_steps.redoing import redo
+from grader.plan_steps.words import wording_of
 from reference.assignment import load_assignment
 from reference.construction import ancestors
 from reference.drawing.subject import Subject

@@ -10,10 +10,10 @@ import pytest
 
 from grader.i18n import LANGUAGES, tongue
 from grader.plan_pdf import pdf
-from grader.plan_steps import explain, html_page, pdf_pages, wording_of
-from grader.plan_steps.pages import chapters
+from grader.plan_steps.explanation import explain
+from grader.plan_steps.pages import chapters, html_page, pdf_pages
 from grader.plan_steps.sentences import sentence
-from grader.plan_steps.words import speaker_of
+from grader.plan_steps.words import speaker_of, wording_of
 from reference.assignment import load_assignment
 from reference.canvas import Label, Ring
 from reference.draw import reference_drawing

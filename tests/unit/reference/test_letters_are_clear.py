@@ -13,7 +13,7 @@ import pytest
 from PIL import ImageFont
 
 from grader.i18n import tongue
-from grader.plan_steps import wording_of
+from grader.plan_steps.words import wording_of
 from reference.canvas import svg
 from reference.draw import reference_drawing
 from tests.drawn import CASES, planned

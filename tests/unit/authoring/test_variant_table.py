@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from grader.class_sheet import class_csv, class_pages, numbered, sections_of, table_pages
+from grader.authoring.variant_table import class_csv, class_pages, numbered, sections_of, table_pages
 from grader.i18n import tongue
 from grader.measurements import names_of
 from grader.plan_document import plan_document, plan_documents

@@ -1,23 +1,35 @@
-"""The class sheet on paper: tables over A3 pages, then a reference drawing of every variant.
+"""Table of all variants for the instructor's records: CSV columns, and A3 pages with reference drawings.
 
-Everything in millimetres from the page's top left corner, x right, y down.
+Names are those of measurement files: ``v_A`` drawn millimetres, ``v_A_value`` SI, ``v_A_deg``
+counter-clockwise from +x, ``omega_3_value`` counter-clockwise positive; besides them the scales (real
+units per millimetre on paper) and the points of the mechanism, ``x_A`` and ``y_A`` in metres.
+
+Pages are in millimetres from the top left corner, x right, y down.
 """
 
+import csv
+import io
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from grader.class_sheet.columns import Column, Section, identity, sections_of
+from grader.authoring.round_scales import is_zero
 from grader.i18n import Tongue
-from reference.assignment import Assignment
+from reference.assignment import Assignment, Variant
 from reference.canvas import A3_MM, Area, Label, Shape, Stroke
 from reference.draw import ENGLISH, reference_drawing
 from reference.drawing.subject import Wording
+from reference.geometry import FloatArray
 from reference.lettering import Text, pieces_of, scale_pieces, width_of
 from reference.plan import Plan
 
+UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}
+Title = Literal["Scales", "Mechanism", "Velocities", "Accelerations"]
+PLANS: dict[Title, str] = {"Velocities": "velocity_plan", "Accelerations": "acceleration_plan"}
+VALUE_UNITS = {"kv": "m/s", "ka": "m/s²"}
 MARGIN_MM = 15.0
 BOTTOM_MM = A3_MM[1] - MARGIN_MM
 ROW_MM = 5.6
@@ -35,6 +47,122 @@ GREY = "#5b6470"
 Page = tuple[Shape, ...]
 Tell = Callable[[int, int], None]
 """How many drawings are done, of how many."""
+
+
+# Columns ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One figure of every variant.
+
+    Attributes
+    ----------
+    key : its name in files
+    over, under : its heading on paper: whose it is, and in what unit
+    values : (N,), nan where a variant has none (the direction of a zero vector)
+    digits, kind : on paper, so many decimals (``f``) or significant digits (``g``)
+    """
+
+    key: str
+    over: str
+    under: str
+    values: FloatArray
+    digits: int
+    kind: Literal["f", "g"] = "f"
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Columns that belong together, in blocks that stay on one page."""
+
+    title: Title
+    blocks: tuple[tuple[Column, ...], ...]
+
+
+def sections_of(plan: Plan) -> tuple[Section, ...]:
+    """All columns of a plan's variants."""
+    count = len(plan.variants)
+    scales = [
+        Column(name, name, unit, np.broadcast_to(getattr(plan.scales, name), (count,)), 5, "g")
+        for name, unit in UNITS.items()
+    ]
+    rates = [
+        Column(
+            f"{name}_value",
+            name,
+            "rad/s" if name.startswith("omega") else "rad/s²",
+            _rate(plan, name),
+            5,
+            "g",
+        )
+        for name in plan.rates
+    ]
+    sections = [
+        Section("Scales", tuple((column,) for column in (*scales, *rates))),
+        Section("Mechanism", tuple(_point(joint, at, count) for joint, at in plan.motion.position.items())),
+    ]
+    for title, figure in PLANS.items():
+        if figure in plan.nodes_mm:
+            names = [vector.name for vector in plan.construction.vectors_of(figure)]
+            sections.append(Section(title, tuple(_vector(plan, name) for name in names)))
+    return tuple(sections)
+
+
+def _point(joint: str, at: np.ndarray, count: int) -> tuple[Column, ...]:
+    place = np.broadcast_to(at, (count,))
+    return (
+        Column(f"x_{joint}", joint, "x, m", place.real + 0.0, 5),
+        Column(f"y_{joint}", joint, "y, m", place.imag + 0.0, 5),
+    )
+
+
+def _rate(plan: Plan, name: str) -> FloatArray:
+    """An angular quantity, exactly zero where the vector that it comes from is."""
+    values = np.broadcast_to(plan.rates[name], (len(plan.variants),))
+    return np.where(is_zero(plan, plan.construction.rates[name].vector), 0.0, values) + 0.0
+
+
+def _vector(plan: Plan, name: str) -> tuple[Column, ...]:
+    drawn, value, zero = np.abs(plan.drawn_mm(name)), np.abs(plan.vectors_si[name]), is_zero(plan, name)
+    unit = VALUE_UNITS[plan.construction.vectors[name].scale]
+    return (
+        Column(name, name, "mm", np.where(zero, 0.0, drawn), 2),
+        Column(f"{name}_value", name, unit, np.where(zero, 0.0, value), 4, "g"),
+        Column(f"{name}_deg", name, "°", plan.direction_deg(name), 2),
+    )
+
+
+def identity(variants: Sequence[Variant]) -> list[tuple[str, list[int]]]:
+    """``n`` and ``position`` of each variant, as far as the assignment has them."""
+    columns = [(name, [getattr(variant, name) for variant in variants]) for name in ("n", "position")]
+    return [(name, numbers) for name, numbers in columns if numbers and numbers[0] is not None]
+
+
+def class_csv(plan: Plan, *, decimal_comma: bool = False) -> str:
+    """A row for each variant; semicolons and decimal commas where the spreadsheet's language has them.
+
+    Ten significant digits; a zero vector's direction is blank. UTF-8 without a mark, CRLF.
+    """
+    columns = [column for section in sections_of(plan) for block in section.blocks for column in block]
+    known = identity(plan.variants)
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\r\n", delimiter=";" if decimal_comma else ",")
+    writer.writerow([*(name for name, _ in known), *(column.key for column in columns)])
+    for row in range(len(plan.variants)):
+        figures = [_written(float(column.values[row]), decimal_comma) for column in columns]
+        writer.writerow([*(numbers[row] for _, numbers in known), *figures])
+    return buffer.getvalue()
+
+
+def _written(value: float, decimal_comma: bool) -> str:
+    if np.isnan(value):
+        return ""
+    text = f"{value:.10g}"
+    return text.replace(".", ",") if decimal_comma else text
+
+
+# Pages --------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,9 @@ import jsonschema
 import numpy as np
 import pytest
 
+from grader.authoring.findings import named
+from grader.authoring.lint import lint, lint_document
 from grader.documents import schema
-from grader.lint import lint, lint_document, named
 from grader.rubric import load_rubric
 from reference.assignment import Variant, built_in, library, load_assignment
 from reference.plan import exact_plan
@@ -201,7 +202,9 @@ def test_what_lint_finds_as_json_is_what_its_schema_says(name):
 
 def codes() -> set[str]:
     """Every code that the source gives to a finding."""
-    trees = (ast.parse(source.read_text(encoding="utf-8")) for source in (ROOT / "grader/lint").glob("*.py"))
+    trees = (
+        ast.parse(source.read_text(encoding="utf-8")) for source in (ROOT / "grader/authoring").glob("*.py")
+    )
     calls = (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call))
     made = (call for call in calls if isinstance(call.func, ast.Name) and call.func.id == "LintFinding")
     return {call.args[1].value for call in made if isinstance(call.args[1], ast.Constant)}

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from grader.lint.lengths import asked_vectors
-from grader.lint.ties import MOST_PAIRS, SAME_MM, _pairs, groups_of, ties_of
+from grader.authoring.round_scales import asked_vectors
+from grader.authoring.variant_checks import MOST_PAIRS, SAME_MM, _pairs, groups_of, ties_of
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
 from reference.plan import exact_plan
