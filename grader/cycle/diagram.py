@@ -283,7 +283,7 @@ def _number_ticks(axis: Any, words: Tongue) -> int:  # noqa: ANN401 - matplotlib
 def _write_marks(axes: Axes, marks: Sequence[Mark]) -> None:
     """The texts of the marks above a panel, each in the lowest row that has room for it."""
     left, right = axes.get_xlim()
-    figure = axes.get_figure(root=True)
+    figure = axes.figure
     figure.draw_without_rendering()
     rows: list[float] = []
     for mark in sorted((mark for mark in marks if mark.text), key=lambda mark: mark.at):
