@@ -13,7 +13,7 @@ from grader.feedback.pages import write_feedback
 from grader.feedback.sentences import Level
 from grader.files import make_folder, write_whole
 from grader.folder import submissions, told_name
-from grader.jobs import Job, alike_of_run, folders_of, inputs_of_run
+from grader.jobs import Job, folders_of, inputs_of_run, similar_of_run
 from grader.kept import digest_of, keep_looked, keep_maps, kept_looked
 from grader.lms.table import write_summary
 from grader.measurements import names_of
@@ -107,7 +107,7 @@ def _graded(
         reports=reports,
         unmatched=unmatched,
         moved=moved(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
-        alike=alike_of_run(batch.assignment, jobs, reports, notes / "readings"),
+        alike=similar_of_run(batch.assignment, jobs, reports, notes / "readings"),
     )
     _write_results(batch, results, works)
     note_inputs(notes, inputs)

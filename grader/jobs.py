@@ -5,12 +5,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.alike import find_alike, handed_in
 from grader.documents import AlikeDocument, ReportDocument
 from grader.kept import code_version, kept_maps
 from grader.moved import Inputs, inputs_of
 from grader.pipeline import Work
 from grader.rubric import RubricFile
+from grader.similarity import compared_submission, find_similar
 from grader.survey import Survey
 from reference.assignment import Assignment
 
@@ -66,14 +66,14 @@ def inputs_of_run(
     return inputs_of(authored, [job.work for job in jobs], [job.folder for job in jobs], content)
 
 
-def alike_of_run(
+def similar_of_run(
     assignment: Assignment, jobs: Sequence[Job], reports: Sequence[ReportDocument], readings: Path
 ) -> list[AlikeDocument]:
-    """The sheets that look alike, of those that were marked."""
+    """The similar sheets among those that were marked."""
     marked = [
-        (job, handed_in(report, job.work.variant, job.work.measured))
+        (job, compared_submission(report, job.work.variant, job.work.measured))
         for job, report in zip(jobs, reports, strict=True)
         if job.work.variant is not None and report.criteria
     ]
     maps = [kept_maps(readings, job.name) for job, _ in marked]
-    return find_alike(assignment, [one for _, one in marked], maps)
+    return find_similar(assignment, [one for _, one in marked], maps)

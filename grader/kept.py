@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.alike import CELLS, ink_map
 from grader.documents import ReadingDocument
 from grader.files import write_whole
 from grader.picture import Backdrop, restored, stored
 from grader.pipeline import Looked
 from grader.records import Figure, Identity, Problem, Reading, ReadNode, ReadVector, Swapped, Unread, Written
+from grader.similarity import CELLS, ink_map
 
 RECORDS: Mapping[str, type] = {
     one.__name__: one

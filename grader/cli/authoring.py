@@ -4,7 +4,7 @@ from pathlib import Path
 
 import typer
 
-from grader.authoring import new_assignment
+from grader.authoring.new import new_assignment
 from reference.assignment import load_assignment
 
 

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from grader.class_sheet.columns import class_csv
+from grader.authoring.variant_checks import broken_findings, broken_variants
+from grader.authoring.variant_table import class_csv
 from grader.cli.app import check_language
 from grader.cli.plans import check_crank
 from grader.cli.progress import progress
 from grader.files import write_whole
 from grader.i18n import tongue
-from grader.lint.broken import broken_findings, broken_variants
 from grader.plan_document import plan_documents
 from reference.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, MechanismError
 from reference.plan import Plan, exact_plan
 
 if TYPE_CHECKING:
-    from grader.class_sheet.pages import Tell
+    from grader.authoring.variant_table import Tell
 
 LONG = 20
 """So many drawings take seconds: their progress is shown."""
@@ -87,7 +87,7 @@ def _sound(assignment: Assignment) -> list[Variant]:
 
 
 def _print_pages(assignment: Assignment, plan: Plan, pdf: Path, *, drawings: bool, lang: str) -> None:
-    from grader.class_sheet.pages import class_pages, numbered, table_pages
+    from grader.authoring.variant_table import class_pages, numbered, table_pages
     from grader.plan_pdf import pdf as as_pdf
     from grader.plan_steps.words import wording_of
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import typer
 
-from grader.cycle import Asked, Extreme, Subject, cycle_csv, extremes, strokes_of
-from grader.cycle.page import Setting
+from grader.cycle.quantities import Selection, Subject, cycle_csv
+from grader.cycle.strokes import Extreme, extremes, strokes_of
 from grader.files import write_whole
-from grader.i18n import tongue
+from grader.i18n import Tongue, tongue
 from reference.assignment import Assignment, Variant, load_assignment
-from reference.canvas import svg as as_svg
 from reference.cycle import cycle
+from reference.errors import CallError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -43,35 +43,42 @@ def show_cycle(
     assignment = load_assignment(name)
     variant = assignment.variant(n, position)
     subject = Subject(cycle(assignment.mechanism([variant]), samples))
-    asked = subject.asked([one.strip() for text in of for one in text.split(",") if one.strip()])
+    selection = subject.select([part.strip() for text in of for part in text.split(",") if part.strip()])
+    drawn_in = {kind: file for kind, file in (("svg", svg), ("pdf", pdf)) if file is not None}
+    diagrams = _diagrams(assignment, variant, subject, selection, words, list(drawn_in))
     if csv is not None:
-        write_whole(csv, cycle_csv(subject, asked, decimal_comma=words.lang in DECIMAL_COMMA))
-    _draw(Setting(assignment, variant, words), subject, asked, (svg, pdf))
-    if csv is None and svg is None and pdf is None:
-        _print(assignment, variant, subject, asked)
-    for file in (csv, svg, pdf):
-        if file is not None:
-            typer.echo(f"{'Written to' if file == csv else 'Drawn in'} {file}")
+        write_whole(csv, cycle_csv(subject, selection, decimal_comma=words.lang in DECIMAL_COMMA))
+        typer.echo(f"Written to {csv}")
+    for file, diagram in zip(drawn_in.values(), diagrams, strict=True):
+        write_whole(file, diagram)
+        typer.echo(f"Drawn in {file}")
+    if csv is None and not drawn_in:
+        _print(assignment, variant, subject, selection)
 
 
-def _draw(setting: Setting, subject: Subject, asked: Asked, files: tuple[Path | None, Path | None]) -> None:
-    svg, pdf = files
-    if svg is None and pdf is None:
-        return
-    from grader.cycle.plot import cycle_diagram
+def _diagrams(
+    assignment: Assignment,
+    variant: Variant,
+    subject: Subject,
+    selection: Selection,
+    words: Tongue,
+    formats: list[str],
+) -> list[bytes]:
+    """The diagram as files of some formats; raises CallError where matplotlib is not installed."""
+    if not formats:
+        return []
+    try:
+        from grader.cycle.diagram import Setting, cycle_diagram
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "matplotlib":
+            raise
+        message = "a diagram of a cycle needs matplotlib: install it with pip install 'planmark[plots]'"
+        raise CallError("matplotlib_needed", message) from error
+    return cycle_diagram(subject, selection, Setting(assignment, variant, words), formats)
 
-    diagram = cycle_diagram(subject, asked, setting)
-    if svg is not None:
-        write_whole(svg, as_svg([diagram.shapes], diagram.page_mm))
-    if pdf is not None:
-        from grader.plan_pdf import pdf as as_pdf
 
-        title = f"{setting.assignment.file.title.in_language(setting.words.lang)}, {setting.variant}"
-        write_whole(pdf, as_pdf([diagram.shapes], title, diagram.page_mm))
-
-
-def _print(assignment: Assignment, variant: Variant, subject: Subject, asked: Asked) -> None:
-    """The range, strokes, and the extremes of what is asked for."""
+def _print(assignment: Assignment, variant: Variant, subject: Subject, selection: Selection) -> None:
+    """The range, strokes, and the extremes of the selected quantities."""
     from rich.console import Console
     from rich.table import Table
 
@@ -83,7 +90,7 @@ def _print(assignment: Assignment, variant: Variant, subject: Subject, asked: As
     where = "at deg" if subject.cycle.is_turned else "at mm"
     for heading in ("unit", "least", where, "largest", where, "here"):
         table.add_column(heading, justify="left" if heading == "unit" else "right")
-    for quantity in asked.quantities:
+    for quantity in selection.quantities:
         least, largest = extremes(subject, quantity)
         here = float(subject.values_at(quantity, np.array([subject.cycle.start]))[0])
         unit = quantity.unit.replace("²", "^2")
@@ -94,7 +101,7 @@ def _print(assignment: Assignment, variant: Variant, subject: Subject, asked: As
             continue
         cells = (*_told(subject, least, size), *_told(subject, largest, size), f"{here + 0.0:.6g}")
         table.add_row(quantity.name, unit, *cells)
-    for point in asked.points:
+    for point in selection.points:
         _path_rows(subject, point, table)
     console.print(table)
     console.print("every position: --csv FILE; as a diagram: --svg FILE, --pdf FILE", style="dim")

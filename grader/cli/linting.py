@@ -9,12 +9,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from grader.authoring.findings import named
+from grader.authoring.lint import Least, Lint, Row, lint, lint_document
+from grader.authoring.round_scales import WELL_READ_MM, Proposal, ratio_text
 from grader.files import write_whole
-from grader.lint.document import lint_document
-from grader.lint.findings import named
-from grader.lint.inspection import Least, Lint, Row, lint
-from grader.lint.lengths import WELL_READ_MM
-from grader.lint.scales import Proposal, ratio_text
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
 from reference.canvas import Label
@@ -155,28 +153,28 @@ def _span(values: FloatArray) -> str:
     return low if low == high else f"{low}..{high}"
 
 
-def _tell_findings(console: Console, found: Lint) -> None:
+def _tell_findings(console: Console, result: Lint) -> None:
     """A line each, which terminals break and programs can search."""
-    for finding in found.findings:
+    for finding in result.findings:
         word = f"[{COLOURS[finding.severity]}]{finding.severity:<8}[/]"
         console.print(f"{word} ", end="")
         console.print(str(finding), markup=False, highlight=False, soft_wrap=True)
 
 
-def _tell_end(found: Lint, svg: Path | None) -> None:
-    if found.worst is not None and found.plan is not None:
-        variant = found.plan.variants[found.worst.index]
-        typer.echo(f"hardest to draw: {variant}: {found.worst.why}")
+def _tell_end(result: Lint, svg: Path | None) -> None:
+    if result.worst is not None and result.plan is not None:
+        variant = result.plan.variants[result.worst.index]
+        typer.echo(f"hardest to draw: {variant}: {result.worst.why}")
         if svg is not None:
             typer.echo(f"drawn in {svg}")
     elif svg is not None:
         typer.echo("nothing drawn: no variant can be solved")
     counts = {
-        severity: sum(finding.severity == severity for finding in found.findings)
+        severity: sum(finding.severity == severity for finding in result.findings)
         for severity in ("fault", "warning", "hint")
     }
     told = ", ".join(
         f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items() if count
     )
-    many = "1 variant" if len(found.rows) == 1 else f"{len(found.rows)} variants"
-    typer.echo(f"{found.assignment.id}: {many}, {told or 'no findings'}")
+    many = "1 variant" if len(result.rows) == 1 else f"{len(result.rows)} variants"
+    typer.echo(f"{result.assignment.id}: {many}, {told or 'no findings'}")

@@ -9,14 +9,14 @@ import typer
 
 from grader.answer_sheet.calibration import make_calibration
 from grader.answer_sheet.sheets import make_sheets
+from grader.authoring.lint import lint
+from grader.authoring.round_scales import suggestions
 from grader.cli.app import check_language
 from grader.cli.progress import progress
 from grader.contact_sheet import Thumbnail, contact_sheet, thumbnail
 from grader.files import write_whole
 from grader.folder import submissions, told_name
 from grader.intake import page_of
-from grader.lint.inspection import lint
-from grader.lint.scales import suggestions
 from grader.matching import SURE, draft_csv, suggest
 from grader.measurements import names_of
 from grader.ownership import PageSource

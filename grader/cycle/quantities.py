@@ -1,10 +1,12 @@
-"""What may be asked of a cycle by name: vectors of the plans, rates of links, paths of points.
+"""Quantities of a cycle by name, and their table: vectors of the plans, rates of links, paths of points.
 
 ``v_B`` is a speed, ``v_B_x`` and ``v_B_y`` its components; likewise ``a_B``, ``v_BA``, ``a_BA_n``;
 ``omega_3``, ``epsilon_3`` counter-clockwise positive; ``D`` the path of point D.
 """
 
+import csv
 import difflib
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,9 +26,11 @@ from reference.plan import vectors_of
 Kind = Literal["velocity", "acceleration", "omega", "epsilon"]
 UNITS: dict[Kind, str] = {"velocity": "m/s", "acceleration": "m/s²", "omega": "rad/s", "epsilon": "rad/s²"}
 AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
+_LETTERS: dict[str, Kind] = {"v": "velocity", "a": "acceleration"}
 FINE = 361
+"""Samples of a cycle among which extremes and dead points are sought: one degree of a full turn."""
 MANY = 24
-"""Of so many known names an error tells no more."""
+"""An error message lists at most so many known names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +50,15 @@ class Quantity:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """What is to be told: quantities, and points whose paths are."""
+class Selection:
+    """What a table or a diagram shows: quantities, and points whose paths are drawn."""
 
     quantities: tuple[Quantity, ...]
     points: tuple[str, ...] = ()
 
 
 class Subject:
-    """A mechanism on its cycle, and all that may be asked of it."""
+    """A mechanism on its cycle, with every quantity of it by name."""
 
     def __init__(self, cycle: Cycle) -> None:
         self.cycle = cycle
@@ -80,19 +84,19 @@ class Subject:
             known[f"epsilon_{link}"] = Quantity(f"epsilon_{link}", "epsilon", f"epsilon_{link}")
         return known
 
-    def asked(self, names: list[str]) -> Asked:
+    def select(self, names: list[str]) -> Selection:
         """The quantities and points of some names; speeds and accelerations of all points for none.
 
         Raises CallError with the near names for one that is unknown.
         """
         if not names:
             every = [f"{letter}_{joint}" for letter in _LETTERS for joint in self.points]
-            return Asked(tuple(self._known[name] for name in every))
+            return Selection(tuple(self._known[name] for name in every))
         for name in names:
             if name not in self._known and name not in self.points:
                 raise CallError("unknown_quantity", self._unknown(name))
         chosen = dict.fromkeys(names)
-        return Asked(
+        return Selection(
             tuple(self._known[name] for name in chosen if name in self._known),
             tuple(name for name in chosen if name in self.points),
         )
@@ -104,8 +108,10 @@ class Subject:
         same = by_case.get(name.lower())
         near = [same] if same else difflib.get_close_matches(name, everything, n=2, cutoff=0.5)
         meant = f" (did you mean {' or '.join(near)}?)" if near else ""
-        told = ", ".join(everything[:MANY]) + (", ..." if len(everything) > MANY else "")
-        return f"nothing on this cycle is called '{name}'{meant}: known are {told}; _x or _y for a component"
+        listed = ", ".join(everything[:MANY]) + (", ..." if len(everything) > MANY else "")
+        return (
+            f"nothing on this cycle is called '{name}'{meant}: known are {listed}; _x or _y for a component"
+        )
 
     @cached_property
     def fine(self) -> tuple[FloatArray, Motion]:
@@ -176,4 +182,38 @@ def _largest(kind: Kind, motion: Motion) -> FloatArray:
     return np.asarray(np.max(parts, axis=0))
 
 
-_LETTERS: dict[str, Kind] = {"v": "velocity", "a": "acceleration"}
+def cycle_csv(subject: Subject, selection: Selection, *, decimal_comma: bool = False) -> str:
+    """The driven coordinate and the selected quantities at each sample; the reason where there is none.
+
+    Numbers with all their digits (they read back as the same doubles), blank where there is none; the
+    file begins as ``crank angle [deg],v_B [m/s],x_D [m]`` and ends with the column ``note``. With decimal
+    commas fields are separated by semicolons. UTF-8 without a mark, CRLF.
+    """
+    cycle = subject.cycle
+    first = (
+        ("crank angle [deg]", np.degrees(cycle.driven))
+        if cycle.is_turned
+        else ("displacement [m]", cycle.driven)
+    )
+    columns: list[tuple[str, FloatArray]] = [first]
+    for quantity in selection.quantities:
+        unit = quantity.unit.replace("s²", "s^2")
+        columns.append((f"{quantity.name} [{unit}]", subject.values(quantity)))
+    for point in selection.points:
+        place = np.broadcast_to(cycle.motion.position[point], cycle.driven.shape)
+        columns += [(f"x_{point} [m]", place.real), (f"y_{point} [m]", place.imag)]
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\r\n", delimiter=";" if decimal_comma else ",")
+    writer.writerow([*(heading for heading, _ in columns), "note"])
+    for row in range(cycle.driven.size):
+        numbers = [_written(float(values[row]), decimal_comma) for _, values in columns]
+        writer.writerow([*numbers, cycle.untold.get(row, "")])
+    return buffer.getvalue()
+
+
+def _written(value: float, decimal_comma: bool) -> str:
+    if not np.isfinite(value):
+        return ""
+    # Adding zero turns minus zero into zero.
+    text = repr(value + 0.0)
+    return text.replace(".", ",") if decimal_comma else text

@@ -10,13 +10,19 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from grader.i18n import N_, Tongue
-from grader.plan_steps import sentences, texts
+from grader.plan_steps import sentences
 from grader.plan_steps.explanation import computed
 from grader.plan_steps.words import Speaker, speaker_of
 from reference.drawing.subject import Subject
 from reference.elements import Along, Coriolis, Normal
 from reference.steps import Coincide, Divide, Given, Similar, Step, TwoLines
 
+LAY_OFF_UNTOLD = N_("From %(start)s lay off %(segment)s, %(direction)s; it ends in %(node)s.")
+SIMILAR_UNTOLD = N_(
+    "On %(base)s draw the triangle similar to %(model)s, its letters following in the same sense. "
+    "Its third corner is %(node)s."
+)
+DIVIDE_UNTOLD = N_("Take %(node)s on the line through %(p)s and %(q)s as the link's points divide it.")
 MOST_STEPS = 8
 """Of one figure that are told in full: what follows is told by its names."""
 THEN = N_("Then draw again what follows from it: %(nodes)s.")
@@ -89,15 +95,13 @@ def _untold(speaker: Speaker, step: Step) -> Iterator[Markup]:
             yield from _formula(speaker, step)
             direction = sentences.direction_told(speaker, step)
             yield speaker.say(
-                texts.LAY_OFF_UNTOLD, start=speaker.name(step.start), node=node,
+                LAY_OFF_UNTOLD, start=speaker.name(step.start), node=node,
                 segment=speaker.name(step.start, step.node), direction=direction,
             )  # fmt: skip
         case Similar(base=base, model=model):
-            yield speaker.say(
-                texts.SIMILAR_UNTOLD, base=speaker.name(*base), model=speaker.name(*model), node=node
-            )
+            yield speaker.say(SIMILAR_UNTOLD, base=speaker.name(*base), model=speaker.name(*model), node=node)
         case Divide(base=(p, q)):
-            yield speaker.say(texts.DIVIDE_UNTOLD, node=node, p=speaker.name(p), q=speaker.name(q))
+            yield speaker.say(DIVIDE_UNTOLD, node=node, p=speaker.name(p), q=speaker.name(q))
 
 
 def _formula(speaker: Speaker, step: Given) -> Iterator[Markup]:

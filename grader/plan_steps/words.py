@@ -6,11 +6,22 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from grader.i18n import N_, UNITS, Tongue
-from grader.plan_steps import texts
 from reference.drawing.subject import SCALE_UNITS, VECTOR_UNITS, Subject, Wording
 from reference.elements import Along, Direction, Fixed, View
 from reference.lettering import Piece, pieces_of, scale_pieces
 
+PERPENDICULAR = N_("perpendicular to %(link)s")
+PARALLEL = N_("parallel to %(link)s")
+TOWARDS = N_("parallel to %(link)s, from %(tail)s towards %(head)s")
+TURNED_LEFT = N_(
+    "perpendicular to %(link)s, a quarter turn counter-clockwise from the direction %(tail)s→%(head)s"
+)
+TURNED_RIGHT = N_("perpendicular to %(link)s, a quarter turn clockwise from the direction %(tail)s→%(head)s")
+GUIDE = N_("parallel to the guide of %(joint)s")
+ACROSS_GUIDE = N_("perpendicular to the guide of %(joint)s")
+SLOT = N_("parallel to the slot of %(joint)s")
+AT_ANGLE = N_("in the direction %(angle)s")
+ALONG_GUIDE = N_("along the guide of %(joint)s, in the direction %(angle)s")
 TITLES = {
     "mechanism": N_("Mechanism"),
     "velocity_plan": N_("Velocity plan"),
@@ -109,12 +120,12 @@ class Speaker:
     def line_direction(self, along: Direction) -> Markup:
         """Where a line runs, without a sense."""
         if isinstance(along, Along):
-            text = texts.PERPENDICULAR if along.quarters % 2 else texts.PARALLEL
+            text = PERPENDICULAR if along.quarters % 2 else PARALLEL
             return self.say(text, link=self.name(along.tail, along.head))
         kind, joint = _guided(along)
         if kind == "slot":
-            return self.say(texts.SLOT, joint=self.name(joint))
-        return self.say(texts.ACROSS_GUIDE if along.quarters % 2 else texts.GUIDE, joint=self.name(joint))
+            return self.say(SLOT, joint=self.name(joint))
+        return self.say(ACROSS_GUIDE if along.quarters % 2 else GUIDE, joint=self.name(joint))
 
     def vector_direction(self, along: Direction, sign: float) -> Markup:
         """Where a vector points: a negative length turns it about."""
@@ -122,12 +133,12 @@ class Speaker:
             angle = self.degrees(complex(along.at(self.view)) * (-1.0 if sign < 0.0 else 1.0))
             kind, joint = _guided(along)
             if kind == "guide":
-                return self.say(texts.ALONG_GUIDE, joint=self.name(joint), angle=angle)
-            return self.say(texts.AT_ANGLE, angle=angle)
+                return self.say(ALONG_GUIDE, joint=self.name(joint), angle=angle)
+            return self.say(AT_ANGLE, angle=angle)
         link = self.name(along.tail, along.head)
         turns = (along.quarters + (2 if sign < 0.0 else 0)) % 4
         ends = (along.head, along.tail) if turns == 2 else (along.tail, along.head)
-        text = {0: texts.TOWARDS, 1: texts.TURNED_LEFT, 2: texts.TOWARDS, 3: texts.TURNED_RIGHT}[turns]
+        text = {0: TOWARDS, 1: TURNED_LEFT, 2: TOWARDS, 3: TURNED_RIGHT}[turns]
         return self.say(text, link=link, tail=self.name(ends[0]), head=self.name(ends[1]))
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.authoring.rubric import rubric_for
+from grader.authoring.new import rubric_for
 from grader.judging import Submission, judge, task_of
 from grader.measurements import Names, reading_of
 from reference.assignment import Assignment

@@ -9,7 +9,7 @@ import tomllib
 from functools import cache
 from pathlib import Path
 
-from grader.authoring.rubric import rubric_for
+from grader.authoring.new import rubric_for
 from grader.rubric import RubricFile, rubric_of
 from reference.assignment import Assignment, load_assignment
 from reference.assignment_file import AssignmentFile

@@ -26,7 +26,7 @@ import cv2
 import numpy as np
 
 from grader.answer_sheet.sheets import make_sheets
-from grader.lint.inspection import lint
+from grader.authoring.lint import lint
 from grader.pipeline import Place, read, see
 from grader.roster import RosterRow
 from grader.rubric import load_rubric

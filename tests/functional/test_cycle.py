@@ -2,7 +2,11 @@
 
 import csv
 import io
+import os
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -107,19 +111,25 @@ def test_in_russian_fields_are_told_apart_by_semicolons(planmark, tmp_path):
 
 @pytest.mark.parametrize("lang", ["en", "ro", "ru"])
 @pytest.mark.parametrize(
-    "call", ["pump --n 7", "press --position 0 --of B,D", "shaper --n 3 --of v_E_x,a_E,omega_3,epsilon_3,D"]
+    ("call", "page"),
+    [
+        ("pump --n 7", "297x210"),
+        ("press --position 0 --of B,D", "297x210"),
+        ("shaper --n 3 --of v_E,a_E,omega_3,epsilon_3", "210x297"),
+        ("shaper --n 3 --of v_E_x,a_E,omega_3,epsilon_3,D", "420x297"),
+    ],
 )
-def test_the_diagram_is_drawn_within_its_page(planmark, tmp_path, call, lang):
+def test_the_diagram_is_drawn_on_a_page_of_its_size(planmark, tmp_path, call, page, lang):
     ran = planmark("cycle", *call.split(), "--svg", "c.svg", "--pdf", "c.pdf", "--lang", lang)
     assert ran.returncode == 0
     assert ran.stdout.splitlines() == ["Drawn in c.svg", "Drawn in c.pdf"]
     root = ET.parse(tmp_path / "c.svg").getroot()
-    wide, high = (float(root.get(side).removesuffix("mm")) for side in ("width", "height"))
-    lines = list(root.iter("{http://www.w3.org/2000/svg}polyline"))
-    assert len(lines) >= 3
-    for line in lines:
-        places = np.array([[float(n) for n in pair.split(",")] for pair in line.get("points").split()])
-        assert np.all((places >= 0.0) & (places <= [wide, high]))
+    size = [float(root.get(side).removesuffix("pt")) / 72 * 25.4 for side in ("width", "height")]
+    assert size == pytest.approx([float(edge) for edge in page.split("x")], abs=0.01)
+    texts = "".join(root.itertext())
+    assert {"en": "this variant", "ro": "această variantă", "ru": "этот вариант"}[
+        lang
+    ] in texts or "--of B" in call
     assert (tmp_path / "c.pdf").read_bytes().startswith(b"%PDF")
 
 
@@ -187,3 +197,21 @@ def test_a_kite_is_followed_over_two_turns_and_silent_where_it_is_flat(planmark,
     drawn = planmark("cycle", "kite.assignment.toml", "--position", 1, "--svg", "k.svg")
     assert drawn.returncode == 0
     assert "flat position (B): 360°" in (tmp_path / "k.svg").read_text(encoding="utf-8")
+
+
+def test_without_matplotlib_a_diagram_says_what_to_install_and_tables_are_written_all_the_same(tmp_path):
+    absent = "import sys; sys.modules['matplotlib'] = None; from grader.cli import main; main()"
+
+    def planmark(*options):
+        call = [sys.executable, "-c", absent, "cycle", "press", "--position", "1", "--csv", "c.csv", *options]
+        environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+        return subprocess.run(  # noqa: S603 - our own program
+            call, cwd=tmp_path, env=environment, capture_output=True, encoding="utf-8", check=False
+        )
+
+    ran = planmark("--svg", "c.svg")
+    assert ran.returncode == 2
+    assert "pip install 'planmark[plots]'" in " ".join(ran.stderr.split())
+    assert not list(tmp_path.iterdir())
+    assert planmark().returncode == 0
+    assert (tmp_path / "c.csv").exists()

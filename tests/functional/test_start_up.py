@@ -67,7 +67,7 @@ def folder(tmp_path):
         ("schema report", set()),
         ("cycle pump --n 7 --csv cycle.csv", set()),
         ("cycle pump --n 7", {"rich", "mpmath"}),
-        ("cycle pump --n 7 --svg cycle.svg", {"mpmath"}),
+        ("cycle pump --n 7 --svg cycle.svg", {"mpmath", "PIL"}),
     ],
 )
 def test_a_command_imports_no_heavy_library_that_it_does_not_use(folder, command, allowed):

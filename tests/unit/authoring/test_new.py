@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from grader.authoring import new_assignment, starts
-from grader.authoring.explained import KEYS, TABLES
-from grader.authoring.rubric import joints_of, rubric_for
-from grader.authoring.toml import commented, inline, quoted
+from grader.authoring.comments import KEYS, TABLES, commented, inline, quoted
+from grader.authoring.lint import lint
+from grader.authoring.new import joints_of, new_assignment, rubric_for, starts
 from grader.files import OutputError
-from grader.lint.inspection import lint
 from grader.rubric import CriterionTable, RubricFile, load_rubric, rubric_of
 from reference.assignment import built_in, load_assignment
 from reference.assignment_file import AssignmentFile

@@ -9,7 +9,6 @@ from grader import batch as batch_module
 from grader import jobs as jobs_module
 from grader import kept as kept_module
 from grader import survey as survey_module
-from grader.alike import CELLS
 from grader.batch import Batch, InterruptedRunError, grade
 from grader.kept import digest_of, keep_looked, keep_maps, kept_looked, kept_maps, packed, unpacked
 from grader.moved import told_standing
@@ -18,6 +17,7 @@ from grader.pipeline import Looked, Place, Seen, Work, documents_of
 from grader.plan_document import plan_document
 from grader.records import Figure, Page, Problem, Reading, ReadNode, ReadVector, Swapped, Unread
 from grader.rubric import load_rubric
+from grader.similarity import CELLS
 from reference.assignment import Variant, load_assignment
 from reference.plan import exact_plan
 from tests.inline import Inline

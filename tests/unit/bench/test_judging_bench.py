@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from grader.authoring.lint import lint
 from grader.judging import judge, task_of
-from grader.lint.inspection import lint
 from grader.outcomes import Mistake as Named
 from grader.records import Reading
 from reference.mistakes import Mistake, commit

@@ -4,18 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 
-from grader.cycle import Subject, extremes, strokes_of
-from grader.cycle.axes import Frame, Labelling, cut, decimals_of, dense, step_of, ticks
-from grader.cycle.flags import Across, flags_of
-from grader.cycle.marks import REASONS, Mark, marks_of
-from grader.cycle.page import NAME_MM, Setting
-from grader.cycle.plot import cycle_diagram
+from grader.cycle.diagram import REASONS, STYLE, Setting, cycle_figure, marks_of, mathtext
+from grader.cycle.quantities import Subject
+from grader.cycle.strokes import extremes, strokes_of
 from grader.i18n import tongue
 from reference.assignment import load_assignment
-from reference.canvas import Curve, Label
 from reference.cycle import cycle
 from reference.mechanism import FixedGuide, Yoke
 from reference.refusal import WHAT_IS_IN_LINE
@@ -28,6 +26,20 @@ def subject_of(name, n=None, position=None, samples=361):
     return Subject(cycle(assignment.mechanism([assignment.variant(n, position)]), samples))
 
 
+def figure_of(name, n, position, of, lang, speed=None):
+    """The diagram of a variant, and its subject; at a crank speed that gives about the largest value."""
+    assignment = load_assignment(name)
+    variant = assignment.variant(n, position)
+    mechanism = assignment.mechanism([variant])
+    if speed is not None:
+        factor = speed / (0.15 * mechanism.crank.omega[0])
+        mechanism = replace(mechanism, driver=replace(mechanism.driver, omega=factor * mechanism.crank.omega))
+    subject = Subject(cycle(mechanism))
+    with rc_context(STYLE):
+        setting = Setting(assignment, variant, tongue(lang))
+        return cycle_figure(subject, subject.select(of.split(",") if of else []), setting), subject
+
+
 @pytest.fixture(scope="module")
 def press():
     return subject_of("press", position=1)
@@ -35,28 +47,28 @@ def press():
 
 def test_every_name_of_the_plans_can_be_asked_for(press):
     names = [*press.construction.vectors, *press.construction.rates]
-    asked = press.asked(names)
-    assert [quantity.name for quantity in asked.quantities] == names
-    for quantity in asked.quantities:
+    selection = press.select(names)
+    assert [quantity.name for quantity in selection.quantities] == names
+    for quantity in selection.quantities:
         assert np.isfinite(press.values(quantity)).all(), quantity.name
 
 
 def test_components_make_up_the_length(press):
     for name in ("v_C", "a_BA_n", "a_D"):
         length, x, y = (
-            press.values(quantity) for quantity in press.asked([name, f"{name}_x", f"{name}_y"]).quantities
+            press.values(quantity) for quantity in press.select([name, f"{name}_x", f"{name}_y"]).quantities
         )
         assert np.hypot(x, y) == pytest.approx(length, rel=ROUNDING, abs=ROUNDING)
 
 
 def test_normal_and_tangential_parts_make_up_the_relative_acceleration(press):
-    parts = press.asked(["a_BA_n_x", "a_BA_t_x", "a_B_x", "a_A_x"]).quantities
+    parts = press.select(["a_BA_n_x", "a_BA_t_x", "a_B_x", "a_A_x"]).quantities
     normal, tangential, of_b, of_a = (press.values(quantity) for quantity in parts)
     assert normal + tangential == pytest.approx(of_b - of_a, abs=1e-10)
 
 
 def test_what_is_asked_twice_is_told_once(press):
-    assert len(press.asked(["v_B", "v_B"]).quantities) == 1
+    assert len(press.select(["v_B", "v_B"]).quantities) == 1
 
 
 def test_dead_points_are_where_the_output_stands_still(press):
@@ -103,14 +115,14 @@ def test_a_scotch_yoke_goes_and_returns_alike():
 def test_extremes_do_not_hang_on_the_samples():
     """They are found between the samples, from few as from many."""
     coarse, fine = (subject_of("shaper", n=3, samples=samples) for samples in (37, 1441))
-    for quantity in fine.asked(["v_E", "a_E", "omega_3", "epsilon_3"]).quantities:
+    for quantity in fine.select(["v_E", "a_E", "omega_3", "epsilon_3"]).quantities:
         largest = [extremes(subject, quantity)[1] for subject in (coarse, fine)]
         assert largest[0].value == pytest.approx(largest[1].value, rel=1e-7), quantity.name
 
 
 def test_a_quantity_without_bound_is_told_at_the_ends_where_it_grows():
     subject = subject_of("pump", n=7)
-    speed, crank, component = subject.asked(["v_B", "v_A", "omega_3"]).quantities
+    speed, crank, component = subject.select(["v_B", "v_A", "omega_3"]).quantities
     stops = tuple(stop.at for stop in subject.cycle.following.stops)
     assert extremes(subject, speed)[1].value == np.inf
     assert extremes(subject, speed)[1].at == stops
@@ -126,73 +138,6 @@ def test_every_reason_of_a_flat_position_is_translated():
         assert all(tongue(lang).gettext(reason) != reason for reason in REASONS)
 
 
-@given(span=st.floats(1e-6, 1e9), most=st.floats(2.0, 20.0))
-def test_ticks_are_round_and_no_more_than_wanted(span, most):
-    step = step_of(span, most)
-    assert span / step <= most * (1 + 1e-9)
-    assert span / step > most / 2.51
-    digits = step / 10.0 ** np.floor(np.log10(step) + 1e-12)
-    assert min(abs(digits - part) for part in (1.0, 2.0, 2.5, 5.0, 10.0)) < 1e-9
-
-
-def test_ticks_reach_from_end_to_end():
-    assert ticks(-0.3, 0.3, 0.1) == pytest.approx([-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3])
-    assert [decimals_of(step) for step in (100.0, 1.0, 0.5, 0.25, 0.02)] == [0, 0, 1, 2, 2]
-
-
-FRAME = Frame((0.0, 0.0, 100.0, 50.0), (0.0, 10.0), (-1.0, 1.0))
-
-
-def test_a_curve_is_cut_exactly_at_its_frame():
-    x = np.linspace(0.0, 10.0, 11)
-    first, second = cut(FRAME, x, np.where(x < 5.5, 0.5 * x, 5.0 - 0.5 * x))
-    assert np.array(first) == pytest.approx(np.array([(0.0, 25.0), (10.0, 12.5), (20.0, 0.0)]))
-    # From 2.5 at x = 5 (above the frame) to 2 at 6 and on: down through 1 at x = 8, to 0 at x = 10.
-    assert np.array(second) == pytest.approx(np.array([(80.0, 0.0), (90.0, 12.5), (100.0, 25.0)]))
-
-
-def test_samples_without_a_value_are_bridged():
-    x = np.linspace(0.0, 10.0, 5)
-    (piece,) = cut(FRAME, x, np.array([0.1, 0.2, np.nan, 0.4, 0.5]))
-    assert [round(place[0]) for place in piece] == [0, 25, 75, 100]
-
-
-@given(seed=st.integers(0, 1000), curves=st.integers(1, 4))
-def test_names_of_curves_stand_in_the_frame_and_not_on_each_other(seed, curves):
-    lots = np.random.default_rng(seed)
-    x = np.linspace(0.0, 10.0, 200)
-    pieces = [
-        list(cut(FRAME, x, lots.uniform(0.2, 0.9) * np.sin(lots.uniform(0.3, 1.5) * x + lots.uniform(0, 6))))
-        for _ in range(curves)
-    ]
-    labelling = Labelling(FRAME.box, [dense(one) for one in pieces], np.zeros((0, 2)), [])
-    boxes = [labelling.beside(k, Label((0.0, 0.0), f"v{k}", 3.8)).bounds for k in range(curves)]
-    for k, (left, top, right, bottom) in enumerate(boxes):
-        assert left >= 0.0
-        assert top >= 0.0
-        assert right <= 100.0
-        assert bottom <= 50.0
-        for other in boxes[:k]:
-            assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top
-    if curves == 1:
-        own = dense(pieces[0])
-        left, top, right, bottom = boxes[0]
-        under = (own[:, 0] > left) & (own[:, 0] < right) & (own[:, 1] > top) & (own[:, 1] < bottom)
-        assert not under.any()
-
-
-@given(places=st.lists(st.integers(0, 360), min_size=1, max_size=8, unique=True))
-def test_texts_of_marks_never_overlap(places):
-    marks = [Mark(float(at), f"dead point (B): {at}°", "#000000", 0.2, ()) for at in places]
-    flags = flags_of(marks, Across((20.0, 280.0), (0.0, 360.0)))
-    assert len(flags) == len(marks)
-    for k, flag in enumerate(flags):
-        assert flag.start >= 5.0
-        assert flag.end <= 289.0
-        for other in flags[:k]:
-            assert flag.row != other.row or flag.end < other.start or other.end < flag.start
-
-
 def test_dead_points_at_one_place_are_marked_once(press):
     texts = [mark.text for mark in marks_of(press, tongue("en"))]
     assert texts.count("dead point (link 2, D): 180°") == 1
@@ -206,48 +151,79 @@ def test_dead_points_at_one_place_are_marked_once(press):
         ("pump", 7, None, ""),
         ("pump", 30, None, "v_B,v_D_x,omega_2,omega_3,epsilon_3"),
         ("pump-collinear", 3, None, ""),
-        ("press", None, 1, ""),
         ("press", None, 0, "B,C,D"),
         ("engine", 24, None, "v_B_x,v_D,a_B_x,a_D_y,omega_2,epsilon_2,D"),
         ("shaper", 3, None, "v_E,v_D,a_E_x,a_E,D"),
     ],
 )
-def test_names_in_a_diagram_keep_clear_of_curves_and_of_each_other(name, n, position, of, lang):
-    assignment = load_assignment(name)
-    subject = subject_of(name, n, position)
-    setting = Setting(assignment, assignment.variant(n, position), tongue(lang))
-    diagram = cycle_diagram(subject, subject.asked(of.split(",") if of else []), setting)
-    curves = dense(
-        [shape.points for shape in diagram.shapes if isinstance(shape, Curve) and shape.width == 0.5]
-    )
-    names = [shape.bounds for shape in diagram.shapes if isinstance(shape, Label) and shape.size == NAME_MM]
-    texts = [shape.bounds for shape in diagram.shapes if isinstance(shape, Label)]
-    assert names
-    for left, top, right, bottom in names:
-        under = (
-            (curves[:, 0] > left) & (curves[:, 0] < right) & (curves[:, 1] > top) & (curves[:, 1] < bottom)
-        )
-        assert not under.any()
-    for k, (left, top, right, bottom) in enumerate(texts):
-        assert min(left, top) >= 0.0
-        assert right <= diagram.page_mm[0]
-        assert bottom <= diagram.page_mm[1]
-        for other in texts[:k]:
-            assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top
+def test_texts_of_a_diagram_stay_on_the_page_and_off_each_other(name, n, position, of, lang):
+    figure, _ = figure_of(name, n, position, of, lang)
+    figure.draw_without_rendering()
+    width, height = figure.bbox.size
+    texts = list(figure.texts)
+    for axes in figure.axes:
+        names = axes.get_legend().get_texts() if axes.get_legend() else []
+        texts += [*axes.texts, *names, axes.xaxis.label, axes.yaxis.label]
+    # A text's own box, without the line of a mark.
+    boxes = [Text.get_window_extent(text) for text in texts if text.get_text()]
+    assert len(boxes) > 5
+    for k, box in enumerate(boxes):
+        assert min(box.x0, box.y0) >= 0.0
+        assert box.x1 <= width
+        assert box.y1 <= height
+        assert not any(box.overlaps(other) for other in boxes[:k]), texts[k]
 
 
-def test_of_very_many_samples_some_are_drawn():
-    assignment = load_assignment("engine")
-    subject = subject_of("engine", n=1, samples=20_001)
-    setting = Setting(assignment, assignment.variant(1), tongue("en"))
-    diagram = cycle_diagram(subject, subject.asked(["v_B_x"]), setting)
-    (curve,) = (shape for shape in diagram.shapes if isinstance(shape, Curve) and shape.width == 0.5)
-    assert 1000 < len(curve.points) <= 1600
+def test_a_panel_shows_each_quantity_by_name_with_its_unit_and_the_value_of_the_variant():
+    figure, subject = figure_of("engine", 1, None, "v_B_x,v_B", "ru")
+    (panel,) = figure.findobj(Axes)
+    assert panel.get_ylabel() == "Скорости,\nм/с"
+    assert [text.get_text() for text in panel.get_legend().get_texts()] == ["${v}_{B}^{x}$", "${v}_{B}$"]
+    curves = [line for line in panel.get_lines() if len(line.get_xdata()) > 1000]
+    rings = [line.get_ydata()[0] for line in panel.get_lines() if line.get_marker() == "o"]
+    for quantity, curve, ring in zip(subject.select(["v_B_x", "v_B"]).quantities, curves, rings, strict=True):
+        driven = np.radians(curve.get_xdata())
+        assert curve.get_ydata() == pytest.approx(subject.values_at(quantity, driven), abs=1e-9)
+        assert ring == pytest.approx(subject.values_at(quantity, np.array([subject.cycle.start]))[0])
+
+
+def test_a_panel_shows_the_part_of_an_unbounded_quantity_between_the_ends():
+    figure, subject = figure_of("pump", 7, None, "v_D", "en")
+    (panel,) = figure.findobj(Axes)
+    hump = np.nanmax(subject.values(subject.select(["v_D"]).quantities[0])[100:220])
+    assert hump < panel.get_ylim()[1] < 20 * hump
+    ends = [stop.at for stop in subject.cycle.following.stops]
+    assert panel.get_xlim()[0] < np.degrees(min(ends)) < np.degrees(max(ends)) < panel.get_xlim()[1]
+
+
+def test_paths_are_true_to_their_scale():
+    figure, _ = figure_of("press", None, 0, "D", "en")
+    (paths,) = figure.findobj(Axes)
+    assert paths.get_title(loc="left") == "Paths of points, 1 : 15"
+    figure.draw_without_rendering()
+    width_mm = paths.get_window_extent().width / figure.dpi * 25.4
+    assert np.ptp(paths.get_xlim()) / width_mm == pytest.approx(15.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("largest", "label"), [(2.5e6, "$10^{6}$ m/s"), (0.025, "$10^{-3}$ m/s"), (25, "m/s")]
+)
+def test_a_power_of_ten_stands_with_the_unit_where_numbers_would_be_long(largest, label):
+    figure, _ = figure_of("engine", 1, None, "v_B_x", "en", speed=largest)
+    (panel,) = figure.findobj(Axes)
+    assert panel.get_ylabel() == f"Velocities,\n{label}"
+    assert all(len(tick.get_text()) <= 6 for tick in panel.get_yticklabels())
+
+
+def test_any_name_can_stand_in_a_diagram():
+    figure = Figure()
+    figure.text(0.1, 0.1, mathtext("a$b\\c{d}_Ж%_#&^~ e"))
+    figure.draw_without_rendering()
 
 
 def test_what_is_smaller_than_its_own_error_is_zero(press):
     """The horizontal slider's velocity has no upright part, and at the dead points none at all."""
-    upright, along = (press.values(quantity) for quantity in press.asked(["v_D_y", "v_D_x"]).quantities)
+    upright, along = (press.values(quantity) for quantity in press.select(["v_D_y", "v_D_x"]).quantities)
     assert not upright.any()
     assert along[[0, 180, 360]].tolist() == [0.0, 0.0, 0.0]
     assert np.count_nonzero(along) == 358

@@ -3,8 +3,7 @@ import pytest
 import simplejpeg
 
 from grader.contact_sheet import contact_sheet, thumbnail
-from grader.likeness import likeness
-from grader.matching import draft_csv, suggest
+from grader.matching import draft_csv, figure_similarity, suggest
 from grader.ownership import PageSource
 from grader.records import Identity
 from grader.roster import parse_roster
@@ -87,7 +86,7 @@ def test_a_drawing_of_one_students_variant_suggests_that_student(n):
 def test_likeness_tells_neighbours_apart_by_two_degrees():
     variants = PUMP.variants()
     for n in (2, 15, 29):
-        assert variants[int(np.argmax(likeness(drawn(n), PUMP, variants)))].n == n
+        assert variants[int(np.argmax(figure_similarity(drawn(n), PUMP, variants)))].n == n
 
 
 @pytest.mark.parametrize("strokes", [None, np.zeros((0, 2, 2)), drawn(15), drawn(10)[-40:]])

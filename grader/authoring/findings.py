@@ -1,0 +1,107 @@
+"""Findings of lint: severity, place in a file, message, and the variants concerned."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.assignment import Assignment, Variant
+
+Severity = Literal["fault", "warning", "hint"]
+"""fault: some student cannot be set or marked; warning: something a teacher should change or accept;
+hint: good to know."""
+SEVERITIES: tuple[Severity, ...] = ("fault", "warning", "hint")
+File = Literal["assignment", "mechanism", "rubric"]
+BoolArray = NDArray[np.bool_]
+NAMED = 6
+"""Ranges of numbers that are named before the rest is only counted."""
+
+
+@dataclass(frozen=True, slots=True)
+class LintFinding:
+    """One finding: how grave, a stable code, where (a path such as ``$.criterion[3]``), what, for whom.
+
+    `variants` is empty where the finding concerns the files as such; `names_them` where the message
+    tells them in its own way.
+    """
+
+    severity: Severity
+    code: str
+    file: File
+    path: str
+    message: str
+    variants: tuple[Variant, ...] = ()
+    names_them: bool = False
+
+    def __str__(self) -> str:
+        told = f" ({named(self.variants)})" if self.variants and not self.names_them else ""
+        return f"{self.file} {self.path}: {self.message}{told}"
+
+
+def chosen(variants: Sequence[Variant], which: BoolArray) -> tuple[Variant, ...]:
+    """The variants where `which` (N,) is true."""
+    return tuple(variant for variant, is_so in zip(variants, which, strict=True) if is_so)
+
+
+def named(variants: Iterable[Variant]) -> str:
+    """Variants as people say them: ``n = 3..7, 12``; with positions ``n = 3, 4, position = 0``."""
+    alike: dict[tuple[int, ...], list[int]] = {}
+    for n, group in groupby(variants, key=lambda variant: variant.n):
+        positions = tuple(variant.position for variant in group if variant.position is not None)
+        alike.setdefault(positions, []).extend([] if n is None else [n])
+    parts = [
+        ", ".join(
+            f"{name} = {_ranges(numbers)}"
+            for name, numbers in (("n", known), ("position", positions))
+            if numbers
+        )
+        for positions, known in alike.items()
+    ]
+    more = len(parts) - NAMED
+    return "; ".join(parts[:NAMED]) + (" and more" if more > 0 else "") or "the only variant"
+
+
+def _ranges(numbers: Sequence[int]) -> str:
+    """Whole numbers in rising order, runs of three and more drawn together."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    told: list[str] = []
+    for run in runs:
+        told.extend([f"{run[0]}..{run[-1]}"] if len(run) > 2 else map(str, run))
+    if len(told) <= NAMED + 2:
+        return ", ".join(told)
+    counted = sum(len(run) for run in runs[NAMED:])
+    return ", ".join(told[:NAMED]) + f" and {counted} more"
+
+
+# Places in files ----------------------------------------------------------------------------------
+
+
+def mechanism_place(assignment: Assignment, key: str = "") -> tuple[File, str]:
+    """The file and path of a key of the mechanism, which may stand within the assignment's file."""
+    if isinstance(assignment.file.mechanism, str):
+        return "mechanism", f"${key}"
+    return "assignment", f"$.mechanism{key}"
+
+
+def group_place(assignment: Assignment, joint: str | None) -> tuple[File, str]:
+    """The file and path of the group that adds a joint; the driven link's, or the whole mechanism's."""
+    tables = assignment.mechanism_file.group
+    for index, table in enumerate(tables):
+        if joint is not None and joint == getattr(table, "node", None):
+            return mechanism_place(assignment, f".group[{index}]")
+    return mechanism_place(assignment)
+
+
+def group_of_image(assignment: Assignment, node: str) -> tuple[File, str]:
+    """The place of the group whose joint has this image in a plan: ``b'`` is made by the group of B."""
+    joint = node.removesuffix("'")
+    known = {table.node.lower(): table.node for table in assignment.mechanism_file.group}
+    return group_place(assignment, known.get(joint))

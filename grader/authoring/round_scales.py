@@ -1,0 +1,494 @@
+"""Sizes of drawings at the proposed scales, and round scales: the largest that fit every variant.
+
+Short vectors, room on the answer sheet and on a plain A3 sheet, and scales as a drawing teacher writes
+them.
+"""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grader.answer_sheet.fit import MARGIN_MM, template_for
+from grader.authoring.findings import NAMED, BoolArray, LintFinding, chosen
+from grader.layout import FRAME_MM, TEMPLATES, Template
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box
+from grader.rubric import RubricFile
+from reference.assignment import Assignment, Scales, Variant
+from reference.geometry import FloatArray
+from reference.plan import ZERO_SHARE, Plan
+
+WELL_READ_MM = 8.0
+"""Shorter vectors are read from scans with less certainty."""
+Extents = Mapping[str, tuple[FloatArray, FloatArray]]
+"""Width and height of each figure, millimetres, (N,) each."""
+IntArray = NDArray[np.intp]
+LENGTH_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+"""Of 1 : 10^k. ISO 5455 has 1, 2, 5; GOST 2.302 and SR EN practice add 2.5."""
+RATE_STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 10.0)
+"""Of 10^k (m/s)/mm and (m/s^2)/mm: factors by which a ruler's millimetres are easily multiplied."""
+LEAST_LINK_MM = 20.0
+"""The plans' directions are read off the sketch: a shorter link tells them less well than a hand draws."""
+SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
+_SLACK = 1e-9
+
+
+# Lengths of vectors -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class AskedVectors:
+    """Drawn lengths of the vectors that a rubric asks for.
+
+    Attributes
+    ----------
+    criteria : index of each vector's criterion
+    names : of the vectors, V of them
+    length_mm : (V, N)
+    is_zero : (V, N), of true length zero (a dead point): no scale makes it longer
+    least_mm : (V,), shorter ones are not judged on their direction
+    """
+
+    criteria: tuple[int, ...]
+    names: tuple[str, ...]
+    length_mm: FloatArray
+    is_zero: BoolArray
+    least_mm: FloatArray
+
+    def short(self, limit_mm: FloatArray | float) -> BoolArray:
+        """(V, N): drawn shorter than a limit, though not zero."""
+        return np.asarray((self.length_mm < limit_mm) & ~self.is_zero)
+
+
+def asked_vectors(rubric: RubricFile, plan: Plan) -> AskedVectors:
+    """The vectors asked for that the mechanism has."""
+    known = [
+        (index, criterion.vector, rubric.tolerance_of(criterion).least_mm)
+        for index, criterion in enumerate(rubric.criterion)
+        if criterion.vector is not None and criterion.vector in plan.vectors_si
+    ]
+    names = tuple(name for _, name, _ in known)
+    return AskedVectors(
+        tuple(index for index, _, _ in known),
+        names,
+        *_lengths(plan, names),
+        np.array([one[2] for one in known]),
+    )
+
+
+def is_zero(plan: Plan, vector: str) -> BoolArray:
+    """(N,) whether a vector's true length is zero but for rounding, against the size of its plan."""
+    figure = plan.construction.figure_of(plan.construction.vectors[vector].head)
+    return np.asarray(np.abs(plan.drawn_mm(vector)) <= ZERO_SHARE * plan.size_mm(figure))
+
+
+def _lengths(plan: Plan, names: tuple[str, ...]) -> tuple[FloatArray, BoolArray]:
+    count = len(plan.variants)
+    lengths, zeros = np.empty((len(names), count)), np.zeros((len(names), count), dtype=np.bool_)
+    for row, name in enumerate(names):
+        lengths[row] = np.abs(plan.drawn_mm(name))
+        zeros[row] = is_zero(plan, name)
+    return lengths, zeros
+
+
+def length_findings(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Iterator[LintFinding]:
+    """Short vectors one by one where they are asked for, together where they are not."""
+    for row, name in enumerate(asked.names):
+        path = f"$.criterion[{asked.criteria[row]}]"
+        least = float(asked.least_mm[row])
+        short = asked.short(least)[row]
+        if np.any(short):
+            told = f"{name} is shorter than {least:g} mm at the proposed scales, down to"
+            shortest = float(np.min(asked.length_mm[row][short]))
+            yield LintFinding(
+                "warning", "short_vector", "rubric", path,
+                f"{told} {shortest:.2g} mm", chosen(plan.variants, short),
+            )  # fmt: skip
+        zero = asked.is_zero[row]
+        if np.any(zero):
+            told = f"{name} is zero: it has a length to be judged, and no direction"
+            yield LintFinding("hint", "zero_vector", "rubric", path, told, chosen(plan.variants, zero))
+    few = asked.short(WELL_READ_MM)
+    if np.any(few):
+        told = (
+            f"{int(few.sum())} of {int((~asked.is_zero).sum())} asked vectors are shorter than"
+            f" {WELL_READ_MM:g} mm at the proposed scales: on scans they are read with less certainty"
+        )
+        meant = chosen(plan.variants, np.any(few, axis=0))
+        yield LintFinding("hint", "hard_to_read", "assignment", "$.scales", told, meant)
+    yield from _unasked(rubric, plan, asked)
+
+
+def _unasked(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Iterator[LintFinding]:
+    names = tuple(name for name in plan.vectors_si if name not in asked.names)
+    lengths, zeros = _lengths(plan, names)
+    short = (lengths < rubric.tolerance.least_mm) & ~zeros
+    told = [
+        f"{name} (down to {np.min(lengths[row][short[row]]):.2g} mm)"
+        for row, name in enumerate(names)
+        if np.any(short[row])
+    ]
+    if told:
+        least = f"{rubric.tolerance.least_mm:g} mm"
+        message = f"shorter than {least}, though not asked for: {', '.join(told)}"
+        meant = chosen(plan.variants, np.any(short, axis=0))
+        yield LintFinding("hint", "short_unasked", "assignment", "$.scales", message, meant)
+
+
+# Room on the sheets -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class PageRoom:
+    """How a page's figures fit at the proposed scales; 1 is just enough, arrays of shape (N,).
+
+    Attributes
+    ----------
+    zones : by figure, how many times as large it could be drawn in its zone of the answer sheet
+    frame : how many times as large all of them could be drawn side by side in a plain A3 sheet's frame
+    """
+
+    zones: Mapping[str, FloatArray]
+    frame: FloatArray
+
+
+def extents_of(plan: Plan) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """How wide and high each figure of every variant is drawn."""
+    count = len(plan.variants)
+    found = {}
+    for figure, nodes in plan.nodes_mm.items():
+        places = np.stack([np.broadcast_to(place, (count,)) for place in nodes.values()])
+        found[figure] = (np.ptp(places.real, axis=0), np.ptp(places.imag, axis=0))
+    return found
+
+
+def pages_of(assignment: Assignment, plan: Plan) -> list[tuple[int, tuple[str, ...]]]:
+    """The assignment's pages with their index, and those of their figures that the plan has."""
+    pages = [
+        (index, tuple(figure for figure in page.figures if figure in plan.nodes_mm))
+        for index, page in enumerate(assignment.file.page)
+    ]
+    return [(index, figures) for index, figures in pages if figures]
+
+
+def room_of(figures: Sequence[str], extents: Extents) -> PageRoom:
+    """How the figures of one page fit, in the division of the answer sheet that is printed for them."""
+    largest = {
+        figure: (float(extents[figure][0].max()), float(extents[figure][1].max())) for figure in figures
+    }
+    template = template_for(largest).template
+    zones = {figure: growth(template.zones[figure], *extents[figure]) for figure in figures}
+    return PageRoom(zones, _frame_growth([extents[figure] for figure in figures]))
+
+
+def growth(box: Box, wide: FloatArray, high: FloatArray) -> FloatArray:
+    """By what factor figures could be enlarged to fill a box, margins for letters kept; (N,)."""
+    _, _, box_wide, box_high = box
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.minimum((box_wide - 2 * MARGIN_MM) / wide, (box_high - 2 * MARGIN_MM) / high))
+
+
+def _frame_growth(sizes: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """The same for all figures of a page in the frame: in a row, in a column, or one beside two."""
+    wide, high = FRAME_MM[2], FRAME_MM[3]
+    options = [_in_line(sizes, wide, high)]
+    options.append(_in_line([size[::-1] for size in sizes], high, wide))
+    if len(sizes) == 3:
+        for alone in range(3):
+            pair = [size for index, size in enumerate(sizes) if index != alone]
+            options.append(_beside_pair(sizes[alone], pair, wide, high))
+            turned = [size[::-1] for size in pair]
+            options.append(_beside_pair(sizes[alone][::-1], turned, high, wide))
+    return np.asarray(np.max(options, axis=0))
+
+
+def _in_line(sizes: Sequence[tuple[FloatArray, FloatArray]], along: float, across: float) -> FloatArray:
+    free = along - 2 * MARGIN_MM * len(sizes)
+    lengths, widths = sum(size[0] for size in sizes), np.max([size[1] for size in sizes], axis=0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.minimum(free / lengths, (across - 2 * MARGIN_MM) / widths))
+
+
+def _beside_pair(
+    alone: tuple[FloatArray, FloatArray], pair: Sequence[tuple[FloatArray, FloatArray]],
+    along: float, across: float,
+) -> FloatArray:  # fmt: skip
+    """One figure, and beside it two that share the sheet's other dimension."""
+    longer = np.max([size[0] for size in pair], axis=0)
+    total = pair[0][1] + pair[1][1]
+    with np.errstate(divide="ignore"):
+        return np.asarray(
+            np.min(
+                [
+                    (along - 4 * MARGIN_MM) / (alone[0] + longer),
+                    (across - 2 * MARGIN_MM) / alone[1],
+                    (across - 4 * MARGIN_MM) / total,
+                ],
+                axis=0,
+            )
+        )
+
+
+def room_findings(assignment: Assignment, plan: Plan, rooms: Mapping[int, PageRoom]) -> Iterator[LintFinding]:
+    """Figures too large for their zone, and pages whose figures do not fit a plain A3 sheet either."""
+    for index, room in rooms.items():
+        path = f"$.page[{index}]"
+        for figure, factor in room.zones.items():
+            tight = factor < 1.0
+            if np.any(tight):
+                told = f"the {figure.replace('_', ' ')} does not fit its zone on the A3 answer sheet"
+                yield LintFinding(
+                    "warning", "does_not_fit", "assignment", path,
+                    f"{told}: it would at {np.min(factor):.2f} of the proposed size",
+                    chosen(plan.variants, tight),
+                )  # fmt: skip
+        tight = room.frame < 1.0
+        if np.any(tight):
+            told = "the page's figures do not fit side by side into the frame of a plain A3 sheet"
+            yield LintFinding(
+                "warning", "does_not_fit_a3", "assignment", path,
+                f"{told}: they would at {np.min(room.frame):.2f} of the proposed size",
+                chosen(plan.variants, tight),
+            )  # fmt: skip
+    shown = {figure for page in assignment.file.page for figure in page.figures}
+    for figure in plan.nodes_mm:
+        if figure not in shown:
+            told = f"no page has the {figure.replace('_', ' ')}, which the rubric needs"
+            yield LintFinding("warning", "no_page", "assignment", "$.page", told)
+
+
+# Round scales -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """Scales and what they give, over all variants.
+
+    Attributes
+    ----------
+    name : ``proposed`` (by the assignment), ``round`` (one for all), ``round_each`` (each its own)
+    room : the least enlargement that any figure's zone has left; below 1 it does not fit
+    shortest_mm : the shortest asked vector that is not zero, with its name; None where none is asked
+    under_8_mm, asked : how many asked vectors are shorter than 8 mm, of how many
+    link_mm : the shortest link of the sketch
+    short : (N,) how many asked vectors of each variant are shorter than 8 mm
+    still_short : names of the vectors that are, the most frequent first
+    """
+
+    name: str
+    scales: Scales
+    room: float
+    shortest_mm: float | None
+    shortest: str
+    under_8_mm: int
+    asked: int
+    link_mm: float
+    short: IntArray
+    still_short: tuple[str, ...]
+
+
+def round_up(values: FloatArray, steps: Sequence[float]) -> FloatArray:
+    """The least of the steps times a power of ten that is not below each value (positive, any shape)."""
+    decade = 10.0 ** np.floor(np.log10(values) + _SLACK)
+    ladder = decade[..., None] * np.asarray(steps)
+    reached = ladder >= values[..., None] * (1.0 - _SLACK)
+    return np.asarray(np.take_along_axis(ladder, np.argmax(reached, axis=-1)[..., None], axis=-1)[..., 0])
+
+
+def proposals(
+    assignment: Assignment, plan: Plan, extents: Extents, asked: AskedVectors, rooms: Mapping[int, PageRoom]
+) -> list[Proposal]:
+    """The assignment's own scales, round ones for all, and round ones for each variant."""
+    own_room = min(
+        (float(np.min(one)) for room in rooms.values() for one in room.zones.values()), default=np.inf
+    )
+    pages = [figures for _, figures in pages_of(assignment, plan)]
+    links = _shortest_link_m(plan)
+    templates = [_best_template(figures, plan, extents, links) for figures in pages]
+    proposed = [_judged("proposed", plan.scales, plan, asked, own_room)]
+    for name in ("round", "round_each"):
+        scales = _round_scales(templates, plan, extents, together=name == "round")
+        proposed.append(_judged(name, scales, plan, asked, _room(templates, _redrawn(extents, plan, scales))))
+    return proposed
+
+
+def _shortest_link_m(plan: Plan) -> FloatArray:
+    """The shortest distance (m) that a direction of the plans is taken from, (N,)."""
+    at = plan.motion.position
+    links = {vector.link for vector in plan.construction.vectors.values() if vector.link}
+    count = len(plan.variants)
+    known = [np.abs(at[head] - at[tail]) for tail, head in links if {tail, head} <= at.keys()]
+    # A slider lies on the point under it: that is no link.
+    lengths = [length for length in known if np.all(length > ZERO_SHARE * np.max(known))]
+    return (
+        np.min([np.broadcast_to(length, (count,)) for length in lengths], axis=0)
+        if lengths
+        else np.ones(count)
+    )
+
+
+def _needed(template: Template, plan: Plan, extents: Extents) -> dict[str, FloatArray]:
+    """The finest scale at which each figure of a template fits its zone, (N,)."""
+    needed = {}
+    for figure, box in template.zones.items():
+        factor = growth(box, *extents[figure])
+        # A figure that is a single point fits at any scale.
+        scale = getattr(plan.scales, SCALE_OF[figure])
+        needed[figure] = np.where(np.isfinite(factor), scale / factor, scale)
+    return needed
+
+
+def _best_template(figures: Sequence[str], plan: Plan, extents: Extents, links_m: FloatArray) -> Template:
+    """The division at which plans are largest, and the sketch not too small to take directions from."""
+
+    def worth(template: Template) -> tuple[float, ...]:
+        scales = {
+            figure: float(round_up(np.asarray(np.max(values)), steps_of(SCALE_OF[figure])))
+            for figure, values in _needed(template, plan, extents).items()
+        }
+        sketch = scales.pop(MECHANISM, None)
+        link_mm = LEAST_LINK_MM if sketch is None else float(np.min(links_m)) / sketch
+        plans = -sum(np.log(scale) for scale in scales.values())
+        return (min(link_mm, LEAST_LINK_MM), float(plans), link_mm)
+
+    return max((one for one in TEMPLATES if one.figures == set(figures)), key=worth)
+
+
+def steps_of(scale: str) -> tuple[float, ...]:
+    """The round steps of kL, kv or ka."""
+    return LENGTH_STEPS if scale == "kL" else RATE_STEPS
+
+
+def _round_scales(templates: Sequence[Template], plan: Plan, extents: Extents, *, together: bool) -> Scales:
+    """Round scales that fit every page; a scale that no page needs stays as it is."""
+    scales = {name: np.asarray(getattr(plan.scales, name)) for name in SCALE_OF.values()}
+    finest: dict[str, FloatArray] = {}
+    for template in templates:
+        for figure, values in _needed(template, plan, extents).items():
+            name = SCALE_OF[figure]
+            finest[name] = np.maximum(finest[name], values) if name in finest else values
+    for name, values in finest.items():
+        common = np.full_like(values, np.max(values)) if together else values
+        scales[name] = round_up(common, steps_of(name))
+    return Scales(scales["kL"], scales["kv"], scales["ka"])
+
+
+def _redrawn(extents: Extents, plan: Plan, scales: Scales) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """The figures' sizes at other scales."""
+    found = {}
+    for figure, (wide, high) in extents.items():
+        name = SCALE_OF[figure]
+        factor = getattr(plan.scales, name) / getattr(scales, name)
+        found[figure] = (wide * factor, high * factor)
+    return found
+
+
+def _room(templates: Sequence[Template], extents: Extents) -> float:
+    rooms = [
+        float(np.min(growth(box, *extents[figure])))
+        for template in templates
+        for figure, box in template.zones.items()
+    ]
+    return min(rooms, default=np.inf)
+
+
+def _judged(name: str, scales: Scales, plan: Plan, asked: AskedVectors, room: float) -> Proposal:
+    lengths = np.array(asked.length_mm)
+    for row, vector in enumerate(asked.names):
+        own = plan.construction.vectors[vector].scale
+        lengths[row] *= getattr(plan.scales, own) / getattr(scales, own)
+    real = np.where(asked.is_zero, np.inf, lengths)
+    place = np.unravel_index(int(np.argmin(real)), real.shape) if real.size else None
+    known = place is not None and np.isfinite(real[place])
+    short = real < WELL_READ_MM
+    often = sorted(zip(asked.names, short.sum(axis=1).tolist(), strict=True), key=lambda one: -one[1])
+    return Proposal(
+        name=name,
+        scales=scales,
+        room=room,
+        shortest_mm=float(real[place]) if place is not None and known else None,
+        shortest=asked.names[place[0]] if place is not None and known else "",
+        under_8_mm=int(np.sum(short)),
+        asked=int(real.size - asked.is_zero.sum()),
+        link_mm=float(np.min(_shortest_link_m(plan) / scales.kL)),
+        short=np.asarray(short.sum(axis=0), dtype=np.intp).reshape(len(plan.variants)),
+        still_short=tuple(name for name, count in often if count),
+    )
+
+
+def scale_findings(assignment: Assignment, plan: Plan, proposed: Sequence[Proposal]) -> Iterator[LintFinding]:
+    """Round scales where the proposed ones are none, and whether normals can be built by the triangle."""
+    drawn = {figure for _, figures in pages_of(assignment, plan) for figure in figures}
+    names = [name for figure, name in SCALE_OF.items() if figure in drawn]
+    own, round_, each = proposed
+    values = {name: np.asarray(getattr(plan.scales, name)) for name in names}
+    is_round = all(np.allclose(round_up(one, steps_of(name)), one, rtol=1e-6) for name, one in values.items())
+    if own.room < 1.0 or not is_round:
+        why = "do not fit" if own.room < 1.0 else "are not round"
+        message = (
+            f"the proposed scales {why}; round ones that fit every variant: {written(round_.scales, names)};"
+            f" then {round_.under_8_mm} of {round_.asked} asked vectors are under {WELL_READ_MM:g} mm"
+            f" instead of {own.under_8_mm}; with round scales of each variant's own {each.under_8_mm}"
+        )
+        yield LintFinding("hint", "round_scales", "assignment", "$.scales", message)
+    yield from _short_findings(plan, own, each)
+    if "acceleration_plan" in plan.nodes_mm and any("_n" in name for name in plan.vectors_si):
+        ratio = plan.scales.kL * plan.scales.ka / plan.scales.kv**2
+        if not np.allclose(ratio, 1.0, rtol=1e-6):
+            message = (
+                "kL ka is not kv^2: normal components cannot be built by the right triangle (altitude) method"
+            )
+            yield LintFinding("hint", "no_altitude_method", "assignment", "$.scales", message)
+
+
+def _short_findings(plan: Plan, own: Proposal, each: Proposal) -> Iterator[LintFinding]:
+    """Whether scales of each variant's own make every asked vector long enough, and what no scale does."""
+    if own.under_8_mm == 0:
+        return
+    if each.under_8_mm == 0:
+        told = f"with round scales of each variant's own no asked vector is under {WELL_READ_MM:g} mm"
+        yield LintFinding("hint", "scales_of_its_own", "assignment", "$.scales", told)
+        return
+    left = each.short > 0
+    names = ", ".join(each.still_short[:NAMED]) + (" and more" if len(each.still_short) > NAMED else "")
+    told = (
+        f"even at the largest round scales that fit the sheet, {each.under_8_mm} of {each.asked} asked"
+        f" vectors stay under {WELL_READ_MM:g} mm ({names}): no scale makes them easy to read; a page for"
+        " each plan, or a criterion that is optional, would help"
+    )
+    yield LintFinding(
+        "hint", "short_at_any_scale", "assignment", "$.scales", told, chosen(plan.variants, left)
+    )
+
+
+def suggestions(proposed: Sequence[Proposal], plan: Plan, figures: Collection[str]) -> dict[Variant, str]:
+    """The round scales of each variant's own, where they leave fewer asked vectors under 8 mm; as text."""
+    own, _, each = proposed
+    names = [name for figure, name in SCALE_OF.items() if figure in figures]
+    texts = {}
+    for index, variant in enumerate(plan.variants):
+        if each.short[index] < own.short[index] or own.room < 1.0:
+            scales = Scales(*(getattr(each.scales, name)[index : index + 1] for name in ("kL", "kv", "ka")))
+            texts[variant] = (
+                f"{written(scales, names)}: {each.short[index]} instead of {own.short[index]} asked vectors"
+                f" under {WELL_READ_MM:g} mm"
+            )
+    return texts
+
+
+def written(scales: Scales, names: Sequence[str]) -> str:
+    """Scales that are the same for all variants, as people write them."""
+    units = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
+    texts = []
+    for name in names:
+        value = float(np.ravel(getattr(scales, name))[0])
+        text = f"{value:g} {units[name]}"
+        texts.append(f"kL = {ratio_text(value)} ({text})" if name == "kL" else f"{name} = {text}")
+    return ", ".join(texts)
+
+
+def ratio_text(scale_m_per_mm: float) -> str:
+    """A scale of lengths as a ratio: 1:5, 1:2.5, 10:1."""
+    ratio = 1000.0 * scale_m_per_mm
+    return f"1:{ratio:.4g}" if ratio >= 1.0 - _SLACK else f"{1.0 / ratio:.4g}:1"

@@ -1,0 +1,307 @@
+"""Checks of single variants and of pairs: unsolvable ones, badly conditioned plans, equal drawings."""
+
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grader.authoring.findings import (
+    BoolArray,
+    LintFinding,
+    chosen,
+    group_of_image,
+    group_place,
+    mechanism_place,
+    named,
+)
+from grader.authoring.round_scales import AskedVectors
+from grader.rubric import RubricFile
+from reference.assignment import Assignment, Variant
+from reference.geometry import FloatArray
+from reference.motion import move_where_possible
+from reference.plan import Plan, conditioning
+from reference.refusal import reason
+
+_GAP = re.compile(r"\bby ([0-9.]+(?:e[-+]?[0-9]+)?) m\b")
+_ABOUT_ARRAYS = re.compile(r" \(1 of \d+ variant\(s\), the first at index \d+\)")
+"""What a message says of how many variants of how many: here it is always one."""
+_GROUP = re.compile(r"the group of (\w+)")
+LEAST_TRANSMISSION = 0.25
+"""|sin| of a transmission angle of about 15 degrees: below it, plans are hard to draw."""
+LEAST_CROSSING_DEG = 20.0
+"""Construction lines that meet at less are hard to intersect by hand: an error across one of them
+moves the node by three times as much."""
+LARGEST_ERROR = 1e-9
+"""Relative error of a computed plan that is told: far below a pencil's, far above a rounding's."""
+SAME_MM = 0.5
+"""Drawings whose nodes all lie within this of each other cannot be told apart: a hand's tolerance."""
+NAMED_GROUPS = 3
+MOST_PAIRS = 100_000
+"""No more are looked for: where all variants are alike, there are as many as their number squared."""
+
+Pairs = tuple[np.ndarray, np.ndarray]
+
+
+# Variants whose mechanism cannot be solved --------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """A variant that cannot be solved, and why."""
+
+    variant: Variant
+    code: str
+    message: str
+
+
+def broken_variants(assignment: Assignment, variants: list[Variant]) -> list[Broken]:
+    """The variants that do not assemble or are singular: all at once, the reason of each by itself."""
+    mechanism = assignment.mechanism(variants)
+    lost = ~np.isfinite(move_where_possible(mechanism).predicted_error)
+    found = []
+    for index in np.flatnonzero(lost):
+        error = reason(mechanism, np.arange(len(variants)) == index)
+        found.append(Broken(variants[index], error.code, _ABOUT_ARRAYS.sub("", error.message)))
+    return found
+
+
+def broken_findings(assignment: Assignment, broken: Sequence[Broken]) -> Iterator[LintFinding]:
+    """A fault for each group and reason, with all its variants and the range of the gaps."""
+    alike: dict[tuple[str, str], list[Broken]] = defaultdict(list)
+    for one in broken:
+        alike[one.code, _GAP.sub("by {}", one.message)].append(one)
+    for (code, _), ones in alike.items():
+        group = _GROUP.search(ones[0].message)
+        file, path = group_place(assignment, group.group(1) if group else None)
+        variants = tuple(one.variant for one in ones)
+        yield LintFinding("fault", code, file, path, _together([one.message for one in ones]), variants)
+
+
+def _together(messages: Sequence[str]) -> str:
+    """Messages that differ only in the gap as one, with the gap's range."""
+    gaps = [float(found.group(1)) for message in messages if (found := _GAP.search(message))]
+    if not gaps or max(gaps) == min(gaps):
+        return messages[0]
+    return _GAP.sub(f"by {min(gaps):.3g} to {max(gaps):.3g} m", messages[0], count=1)
+
+
+# Conditioning: transmission angles, crossing angles, predicted error ------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """Arrays of shape (N,) by joint or node; `error` is the predicted relative error of the plan."""
+
+    transmission: Mapping[str, FloatArray]
+    crossing_deg: Mapping[str, FloatArray]
+    error: FloatArray
+
+
+def conditions_of(plan: Plan) -> Conditions:
+    """The figures of every variant of a plan."""
+    count = len(plan.variants)
+    found: dict[str, dict[str, FloatArray]] = {"transmission": {}, "crossing": {}}
+    error = np.zeros(count)
+    for name, values in conditioning(plan).items():
+        kind, _, node = name.partition(" ")
+        whole = np.broadcast_to(values, (count,))
+        if kind in found:
+            found[kind][node] = whole
+        elif kind == "predicted_error":
+            error = whole
+    return Conditions(found["transmission"], found["crossing"], error)
+
+
+def condition_findings(assignment: Assignment, plan: Plan, conditions: Conditions) -> Iterator[LintFinding]:
+    """Groups near a singular position, lines that meet at a small angle, results that lose digits."""
+    for node, sine in conditions.transmission.items():
+        weak = sine < LEAST_TRANSMISSION
+        if np.any(weak):
+            told = f"near a singular position: the sine of the transmission angle at {node} falls to"
+            yield LintFinding(
+                "warning", "transmission", *group_place(assignment, node),
+                f"{told} {np.min(sine):.2g}", chosen(plan.variants, weak),
+            )  # fmt: skip
+    for nodes, angle in _alike(conditions.crossing_deg).items():
+        flat = angle < LEAST_CROSSING_DEG
+        if np.any(flat):
+            least = float(np.min(angle))
+            moved = (
+                f"; a line {1:g} mm off moves the node by {1.0 / np.sin(np.radians(max(least, 1e-3))):.2g} mm"
+            )
+            yield LintFinding(
+                "warning", "crossing", *group_of_image(assignment, nodes[0]),
+                f"the construction lines of {' and '.join(nodes)} meet at only {least:.1f} degrees{moved}",
+                chosen(plan.variants, flat),
+            )  # fmt: skip
+    sines = [np.ones(len(plan.variants)), *plan.motion.transmission.values()]
+    again = plan.motion.recomputed & (np.min(sines, axis=0) < LEAST_TRANSMISSION)
+    if np.any(again):
+        told = "would lose a digit or two in double precision, and was computed with more"
+        yield LintFinding(
+            "hint", "recomputed", *mechanism_place(assignment), told, chosen(plan.variants, again)
+        )
+    lost = conditions.error > LARGEST_ERROR
+    if np.any(lost):
+        told = f"the computed plan may be off by {np.max(conditions.error):.1g} of its size"
+        yield LintFinding(
+            "warning", "predicted_error", *mechanism_place(assignment), told, chosen(plan.variants, lost)
+        )
+
+
+def _alike(angles: Mapping[str, FloatArray]) -> dict[tuple[str, ...], FloatArray]:
+    """Nodes whose lines meet at the same angles in every variant (b and b') told as one."""
+    found: list[tuple[list[str], FloatArray]] = []
+    for node, angle in angles.items():
+        same = next((names for names, other in found if np.allclose(angle, other, rtol=0, atol=1e-6)), None)
+        if same is None:
+            found.append(([node], angle))
+        else:
+            same.append(node)
+    return {tuple(names): angle for names, angle in found}
+
+
+# Pairs of variants with the same drawing ----------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Ties:
+    """Pairs of variants, indices into the plan's.
+
+    Attributes
+    ----------
+    same : every node of every figure lies in the same place
+    passing : every asked vector of one would get full marks for the other
+    """
+
+    same: Pairs
+    passing: Pairs
+
+
+def ties_of(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Ties:
+    """Which variants have the same drawing, and which could be copied from each other."""
+    nodes = np.stack(
+        [
+            np.broadcast_to(place, (len(plan.variants),))
+            for figure in plan.nodes_mm.values()
+            for place in figure.values()
+        ]
+    )
+
+    def is_same(i: np.ndarray, j: np.ndarray) -> BoolArray:
+        return np.asarray(np.max(np.abs(nodes[:, i] - nodes[:, j]), axis=0) <= SAME_MM)
+
+    spread = np.vstack([nodes.real, nodes.imag])
+    same = _pairs(spread, np.full(len(spread), SAME_MM), is_same)
+    return Ties(same, _passing(rubric, plan, asked))
+
+
+def _passing(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Pairs:
+    """Pairs in which either's asked vectors are all within the rubric's tolerance of the other's."""
+    if not asked.names:
+        return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
+    vectors = np.stack([plan.drawn_mm(name) for name in asked.names])
+    length, turn = _tolerances(rubric, asked)
+
+    def is_passing(i: np.ndarray, j: np.ndarray) -> BoolArray:
+        off = np.abs(asked.length_mm[:, i] - asked.length_mm[:, j])
+        crossed = vectors[:, i] * np.conj(vectors[:, j])
+        turned = np.abs(np.angle(crossed))
+        near = (off <= np.minimum(length[:, i], length[:, j])) & (
+            turned <= np.minimum(turn[:, i], turn[:, j])
+        )
+        return np.asarray(near.all(axis=0))
+
+    reach = np.max(length + asked.length_mm * np.minimum(turn, 2.0), axis=1)
+    spread = np.vstack([vectors.real, vectors.imag])
+    return _pairs(spread, np.concatenate([reach, reach]), is_passing)
+
+
+def _tolerances(rubric: RubricFile, asked: AskedVectors) -> tuple[FloatArray, FloatArray]:
+    """(V, N) of length in mm and of direction in radians; pi where a direction is not judged."""
+    tables = [rubric.tolerance_of(rubric.criterion[index]) for index in asked.criteria]
+    column = {
+        key: np.array([getattr(table, key) for table in tables])[:, None]
+        for key in ("length_mm", "length_relative", "direction_deg", "across_mm", "least_mm")
+    }
+    length = np.maximum(column["length_mm"], column["length_relative"] * asked.length_mm)
+    with np.errstate(divide="ignore"):
+        turn = np.maximum(
+            np.radians(column["direction_deg"]), np.arctan(column["across_mm"] / asked.length_mm)
+        )
+    judged = np.array([rubric.criterion[index].direction for index in asked.criteria])[:, None]
+    free = (asked.length_mm < column["least_mm"]) | ~judged
+    return np.asarray(length), np.where(free, np.pi, turn)
+
+
+def _pairs(
+    coordinates: FloatArray, reach: FloatArray, judge: Callable[[np.ndarray, np.ndarray], BoolArray]
+) -> Pairs:
+    """Pairs i < j that a judge accepts, of those within reach in the coordinate that tells most apart.
+
+    Arguments: `coordinates` (C, N) and `reach` (C,), such that pairs further apart than that in any
+    coordinate are never accepted.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        apart = np.nan_to_num(np.ptp(coordinates, axis=1) / reach, posinf=0.0)
+    best = int(np.argmax(apart))
+    key, limit = coordinates[best], reach[best]
+    order = np.argsort(key, kind="stable")
+    found: list[Pairs] = []
+    total = 0
+    for step in range(1, len(order)):
+        near = np.flatnonzero(key[order[step:]] - key[order[:-step]] <= limit)
+        if not len(near):
+            break
+        i, j = order[near], order[near + step]
+        accepted = judge(i, j)
+        found.append((np.minimum(i, j)[accepted], np.maximum(i, j)[accepted]))
+        total += int(accepted.sum())
+        if total >= MOST_PAIRS:
+            break
+    first = np.concatenate([pair[0] for pair in found]) if found else np.empty(0, dtype=np.intp)
+    second = np.concatenate([pair[1] for pair in found]) if found else np.empty(0, dtype=np.intp)
+    return first, second
+
+
+def groups_of(pairs: Pairs, count: int) -> list[list[int]]:
+    """Variants that hang together by pairs, each group in rising order."""
+    from scipy.sparse import coo_array  # noqa: PLC0415 - of all commands lint alone needs it
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415 - as above
+
+    graph = coo_array((np.ones(len(pairs[0]), dtype=np.int8), pairs), shape=(count, count))
+    _, group = connected_components(graph, directed=False)
+    tied = np.unique(np.concatenate(pairs))
+    found: dict[int, list[int]] = {}
+    for one in tied.tolist():
+        found.setdefault(int(group[one]), []).append(one)
+    return list(found.values())
+
+
+def tie_findings(plan: Plan, ties: Ties) -> Iterator[LintFinding]:
+    """Groups with the same drawing; and how many further pairs could be copied unseen."""
+    variants = plan.variants
+    groups = groups_of(ties.same, len(variants))
+    if groups:
+        meant = np.zeros(len(variants), dtype=np.bool_)
+        meant[[one for group in groups for one in group]] = True
+        told = "; ".join(named([variants[one] for one in group]) for group in groups[:NAMED_GROUPS])
+        more = f" and {len(groups) - NAMED_GROUPS} more groups" if len(groups) > NAMED_GROUPS else ""
+        message = f"the same drawing within {SAME_MM:g} mm: {told}{more}"
+        yield LintFinding(
+            "warning", "ties", "assignment", "$.variant", message, chosen(variants, meant), names_them=True
+        )
+    count = len(variants)
+    further = np.setdiff1d(ties.passing[0] * count + ties.passing[1], ties.same[0] * count + ties.same[1])
+    if len(further):
+        i, j = divmod(int(further[0]), count)
+        least = "at least " if len(ties.passing[0]) >= MOST_PAIRS else ""
+        message = (
+            f"{least}{len(further)} pair(s) of variants differ by less than the rubric's tolerance: a copied"
+            f" drawing would get full marks, such as that of {variants[i]} for {variants[j]}"
+        )
+        meant = np.zeros(count, dtype=np.bool_)
+        meant[np.concatenate(divmod(further, count))] = True
+        yield LintFinding("hint", "near_ties", "assignment", "$.variant", message, chosen(variants, meant))

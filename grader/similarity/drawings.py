@@ -1,0 +1,464 @@
+"""Similarity of drawings: drafting errors and places on the sheet weighed together.
+
+Each node is held against the one that a perfect hand would have made of the student's *own* earlier
+nodes, so that an error counts where it was made and nowhere after. What an act may miss by, from the
+construction's derivative with a usual hand's errors, makes the misses of all acts comparable: for hands
+that do not know of each other they are independent and of one spread. A mistake is no error of a hand:
+acts that miss by much more than the student's others are left out.
+
+Two lists of d such errors make an angle. Without a common origin all directions in d dimensions are
+equally likely, whatever the two hands' quality, and the cosine's distribution is known exactly.
+
+How near two placements come to each other by chance is told by the class itself: where a teacher or a
+printed sheet says where the pole belongs, everybody's figures lie alike and that says nothing.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betainc, gammaincc
+
+from grader.records import MECHANISM, FloatArray, IntArray
+from grader.similarity.submission import USUAL, ComparedSubmission, Drawn, drawn_of, fitting, scales_used
+from reference.assignment import Assignment, Variant
+from reference.construction import Construction
+from reference.derivation import construction_of
+from reference.elements import View
+from reference.geometry import ComplexArray
+from reference.hand import SMALL, hand_errors
+from reference.plan import exact_plan
+from reference.steps import Coincide, Pivot, Pole, Step
+
+USUAL_SHARE = 0.45
+LARGEST_SHARE = 0.7
+"""Drafting errors that count as independent, as a share of all; a large class shows its own."""
+RARE = -9.0
+"""Log of the chance below which two placements make it worth to hold each against the other's variant."""
+SCALES = ("kL", "kv", "ka")
+GROSS = 4.0
+"""A miss so many times as large as the student's usual one is a mistake or a misreading."""
+TAIL = 2.5
+"""Larger misses count as this: one bad slip does not make two drawings alike."""
+LEAST_SPREAD = 0.1
+LEAST_CLASS = 10
+"""So many of one variant tell what they have in common (a copier's scale, a table's rounding)."""
+NEAR_MM = 0.5
+"""Nearer than this is not told apart."""
+RINGS_MM = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+"""Radii within which the class's own placements are counted."""
+LAYOUT_MM, LAYOUT_SHARE = 4.0, 0.05
+"""A class follows a layout where this share of its pairs has all figures in the same places, so nearly."""
+LEAST_PAIRS = 10
+TRUSTED = 3000.0
+"""So many times the class's pairs the rarest placement may be: rarer ones no class can vouch for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A student's drawing (by index) held against a variant."""
+
+    owner: int
+    variant: Variant
+
+
+@dataclass(frozen=True, slots=True)
+class DrawingSimilarity:
+    """Every two students' drawings; arrays (students, students).
+
+    Attributes
+    ----------
+    log_chance : natural logarithm of the chance that independent hands come so near; 0 where not compared
+    log_errors, log_places : what errors of the hand and places on the sheet give alone
+    log_layout : as `log_places`, nan where places were not read unless the class follows a layout
+    cosine, count : agreement of the errors, and how many there are
+    pairs : of different students
+    fits : the variant of the class that a drawing fits though it is not the own, and how far off it is, mm
+    """
+
+    log_chance: FloatArray
+    log_errors: FloatArray
+    log_places: FloatArray
+    log_layout: FloatArray
+    cosine: FloatArray
+    count: FloatArray
+    pairs: int
+    fits: list[tuple[Variant, float] | None]
+
+
+def compare_drawings(assignment: Assignment, submissions: Sequence[ComparedSubmission]) -> DrawingSimilarity:
+    """Compare the drawings of a class."""
+    construction = construction_of(
+        assignment.mechanism(assignment.variants()[:1]),
+        plate_by_similarity=assignment.file.plate_images == "similarity",
+    )
+    figures = (MECHANISM, *construction.poles)
+    drawn = drawn_of(submissions, {one: [step.node for step in construction.figures[one]] for one in figures})
+    fits = fitting(assignment, submissions, drawn)
+    variants = list(dict.fromkeys(one.variant for one in submissions))
+    printed = np.array([one.printed for one in submissions])
+    layout, known = place_chance(
+        drawn, printed, np.array([variants.index(one.variant) for one in submissions])
+    )
+    places = np.where(known, layout, 0.0)
+    rows = _rows(submissions, fits, places)
+    together = _together(rows, submissions)
+    cosines, counts, log_agreement = _agreement(
+        drafting_errors(assignment, submissions, drawn, rows), together
+    )
+    log_errors, cosine, count = _by_student(
+        rows,
+        len(submissions),
+        np.asarray(np.where(together, log_agreement, 0.0), np.float64),
+        (cosines, counts),
+    )
+    compared = _by_student(rows, len(submissions), np.where(together, -1.0, 0.0), ())[0] < 0.0
+    people = np.array([one.student_id for one in submissions])
+    return DrawingSimilarity(
+        log_chance=np.where(compared, _both(log_errors, places), 0.0),
+        log_errors=log_errors,
+        log_places=np.where(compared, places, 0.0),
+        log_layout=layout,
+        cosine=cosine,
+        count=count,
+        pairs=int((people[:, None] != people[None, :]).sum()) // 2,
+        fits=fits,
+    )
+
+
+def _rows(
+    submissions: Sequence[ComparedSubmission],
+    fits: Sequence[tuple[Variant, float] | None],
+    places: FloatArray,
+) -> list[Row]:
+    """Each drawing against its own variant, against those that it fits, and that of whose places it has."""
+    rows = dict.fromkeys(Row(k, one.variant) for k, one in enumerate(submissions))
+    rows |= dict.fromkeys(Row(k, found[0]) for k, found in enumerate(fits) if found is not None)
+    known = {one.variant for one in submissions}
+    rows |= dict.fromkeys(
+        Row(k, one.fits[0])
+        for k, one in enumerate(submissions)
+        if one.fits is not None and one.fits[0] in known
+    )
+    if len(submissions) > 1:
+        rows |= dict.fromkeys(Row(int(j), submissions[i].variant) for i, j in np.argwhere(places < RARE))
+    return list(rows)
+
+
+def _together(rows: Sequence[Row], submissions: Sequence[ComparedSubmission]) -> NDArray[np.bool_]:
+    """(rows, rows) which rows are compared: of one variant, and of two people."""
+    variants = {one: k for k, one in enumerate(dict.fromkeys(row.variant for row in rows))}
+    people = {one: k for k, one in enumerate(dict.fromkeys(one.student_id for one in submissions))}
+    variant = np.array([variants[row.variant] for row in rows])
+    person = np.array([people[submissions[row.owner].student_id] for row in rows])
+    return np.asarray((variant[:, None] == variant[None, :]) & (person[:, None] != person[None, :]))
+
+
+def _by_student(
+    rows: Sequence[Row], students: int, log_chance: FloatArray, others: Sequence[FloatArray]
+) -> list[FloatArray]:
+    """For every two students the rows that agree best, and what else is known of those."""
+    owner = np.array([row.owner for row in rows])
+    pair = owner[:, None] * students + owner[None, :]
+    order = np.argsort(-log_chance, axis=None, kind="stable")
+    found = []
+    for values in (log_chance, *others):
+        best = np.zeros(students * students)
+        # The last one written is the least chance.
+        best[pair.ravel()[order]] = values.ravel()[order]
+        found.append(best.reshape(students, students))
+    return found
+
+
+def _both(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Fisher's rule: log of the chance that two independent pieces of evidence are so rare together."""
+    both = gammaincc(2.0, -(first + second))
+    with np.errstate(divide="ignore"):
+        return np.where(second < 0.0, np.maximum(np.log(both), -690.0), first)
+
+
+# Drafting errors ----------------------------------------------------------------------------------
+
+
+def drafting_errors(
+    assignment: Assignment,
+    submissions: Sequence[ComparedSubmission],
+    drawn: Mapping[str, Drawn],
+    rows: Sequence[Row],
+) -> FloatArray:
+    """Errors of drawings held against variants, (rows, acts), in units of the student's usual error.
+
+    nan where not known.
+    """
+    owner = np.array([row.owner for row in rows], np.int64)
+    variants = [row.variant for row in rows]
+    chosen = [submissions[row.owner] for row in rows]
+    placed = {figure: one.at[owner] for figure, one in drawn.items()}
+    misses, by_scale = _misses(assignment, chosen, variants, placed)
+    errors = _normed(misses - _scale(misses, by_scale) * by_scale)
+    return _centred(_without(errors, by_scale), variants)
+
+
+def _misses(
+    assignment: Assignment,
+    chosen: Sequence[ComparedSubmission],
+    variants: list[Variant],
+    drawn: Mapping[str, ComplexArray],
+) -> tuple[FloatArray, FloatArray]:
+    """What each node is off from the student's own earlier ones, in usual errors; both (rows, 2 nodes).
+
+    The second array is what it would be off if everything came out larger by its own size, as printers
+    and copiers do it.
+    """
+    plan = exact_plan(assignment, variants, scales_used(assignment, chosen, variants))
+    own = _own_nodes(plan.construction, plan.nodes_mm, drawn)
+    nodes: dict[str, ComplexArray] = {}
+    known = plan.drawing.parameters
+    view = View(nodes, known)
+    copied = View(nodes, {**known, **{name: np.asarray(known[name] / (1.0 + SMALL)) for name in SCALES}})
+    found, by_scale = [], []
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for step in plan.construction.steps:
+            expected = np.broadcast_to(step.place(view), (len(chosen),))
+            placed = own[step.node]
+            if not isinstance(step, Coincide | Pivot | Pole):
+                reach = _reach(step, view, expected)
+                found.append(_whitened(placed - expected, reach))
+                by_scale.append(_whitened((step.place(copied) - expected) / SMALL, reach))
+            nodes[step.node] = np.where(np.isfinite(placed), placed, expected)
+    return _finite(np.concatenate(found, axis=1)), _finite(np.concatenate(by_scale, axis=1))
+
+
+def _finite(values: FloatArray) -> FloatArray:
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _own_nodes(
+    construction: Construction,
+    exact: Mapping[str, Mapping[str, ComplexArray]],
+    drawn: Mapping[str, ComplexArray],
+) -> dict[str, ComplexArray]:
+    """The students' nodes in the assignment's frame, nan where not read: plans about their pole."""
+    own: dict[str, ComplexArray] = {}
+    turn = np.ones(len(drawn[MECHANISM]), np.complex128)
+    for figure, at in drawn.items():
+        names = [step.node for step in construction.figures[figure]]
+        if figure == MECHANISM:
+            proper = np.array([np.broadcast_to(exact[figure][name], len(at)) for name in names]).T
+            placed, turn = _laid_over(at, proper)
+        else:
+            pole = names.index(construction.poles[figure])
+            placed = (at - at[:, pole : pole + 1]) * turn[:, None].conj()
+        own |= dict(zip(names, placed.T, strict=True))
+    return own
+
+
+def _laid_over(drawn: ComplexArray, proper: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Sketches turned and shifted onto the right ones, and their turn (1 where not known)."""
+    known = np.isfinite(drawn) & np.isfinite(proper)
+    count = np.maximum(known.sum(axis=1, keepdims=True), 1)
+    here = np.where(known, drawn, 0.0)
+    there = np.where(known, proper, 0.0)
+    middle, centre = here.sum(axis=1, keepdims=True) / count, there.sum(axis=1, keepdims=True) / count
+    here, there = np.where(known, here - middle, 0.0), np.where(known, there - centre, 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        fit = (here * there.conj()).sum(axis=1) / (np.abs(there) ** 2).sum(axis=1)
+        turn = fit / np.abs(fit)
+    turn = np.where((known.sum(axis=1) > 1) & np.isfinite(turn), turn, 1.0)
+    return (drawn - middle) * turn[:, None].conj() + centre, turn
+
+
+def _reach(step: Step, view: View, expected: ComplexArray) -> FloatArray:
+    """(rows, 2, 2) covariance of a node under a usual hand's errors in the acts that make it, mm^2."""
+    errors = hand_errors(step, USUAL)
+    placed = np.asarray(step.place(View(view.nodes, view.parameters, errors)))
+    moved = (np.broadcast_to(placed, (len(next(iter(errors.values()))), len(expected))) - expected) / SMALL
+    by = np.nan_to_num(np.stack([moved.real, moved.imag], axis=-1))
+    return np.asarray(np.einsum("ari,arj->rij", by, by) + USUAL.mark_mm**2 * np.eye(2))
+
+
+def _whitened(off: ComplexArray, covariance: FloatArray) -> FloatArray:
+    """(rows, 2) an offset in units of its spread."""
+    root = np.linalg.cholesky(covariance)
+    return np.linalg.solve(root, np.stack([off.real, off.imag], axis=-1)[..., None])[..., 0]
+
+
+def _normed(misses: FloatArray) -> FloatArray:
+    """Misses in units of the student's usual one; mistakes out, bad slips cut to size."""
+    with np.errstate(invalid="ignore"):
+        usual = _middle(np.abs(misses)) / 0.6745
+        scaled = misses / np.maximum(usual, LEAST_SPREAD)
+        scaled[np.abs(scaled) > GROSS] = np.nan
+        return np.clip(scaled, -TAIL, TAIL)
+
+
+def _scale(misses: FloatArray, by_scale: FloatArray) -> FloatArray:
+    """(rows, 1) the common enlargement, the median of what each length tells, by its weight."""
+    weight = np.where(np.isfinite(misses) & np.isfinite(by_scale), np.abs(by_scale), 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        told = np.where(weight > 0.0, misses / by_scale, 0.0)
+    order = np.argsort(told, axis=1)
+    reached = np.cumsum(np.take_along_axis(weight, order, axis=1), axis=1)
+    middle = (reached >= reached[:, -1:] / 2.0).argmax(axis=1)[:, None]
+    return np.take_along_axis(np.take_along_axis(told, order, axis=1), middle, axis=1)
+
+
+def _without(errors: FloatArray, by_scale: FloatArray) -> FloatArray:
+    """Errors less what a common enlargement explains of them."""
+    known = np.isfinite(errors) & np.isfinite(by_scale)
+    along = np.where(known, by_scale, 0.0)
+    size = np.maximum((along**2).sum(axis=1, keepdims=True), 1e-12)
+    share = (np.where(known, errors, 0.0) * along).sum(axis=1, keepdims=True) / size
+    return np.asarray(errors - share * along)
+
+
+def _middle(values: FloatArray) -> FloatArray:
+    """Medians of rows, of what is known; nan-free (0 for empty rows)."""
+    known = np.isfinite(values)
+    ordered = np.sort(np.where(known, values, np.inf), axis=1)
+    count = known.sum(axis=1)
+    middle = (
+        ordered[np.arange(len(values)), np.maximum(count - 1, 0) // 2] if values.shape[1] else count * 0.0
+    )
+    return np.where(count > 0, middle, 0.0)[:, None]
+
+
+def _centred(errors: FloatArray, variants: Sequence[Variant]) -> FloatArray:
+    """Errors less what all of a variant have in common, where they are many enough to tell."""
+    errors = errors.copy()
+    for variant in set(variants):
+        same = np.array([one == variant for one in variants])
+        if same.sum() >= LEAST_CLASS:
+            common = _middle(errors[same].T)
+            errors[same] -= common.T
+    return errors
+
+
+def _agreement(errors: FloatArray, together: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """How the errors of every two rows agree: cosines, how many errors both have, log of the chance.
+
+    Arguments: `together` (rows, rows) are the pairs that are compared.
+
+    What pushes every hand the same way (a protractor, a bent scan, the reading of a node) gives all
+    cosines one mean, by which they are reduced: two vectors with a part in common have the cosine
+    rho + (1 - rho) cos, where cos is that of their own parts.
+    """
+    known = np.isfinite(errors)
+    values, mask = np.where(known, errors, 0.0), known.astype(np.float64)
+    size = (values**2) @ mask.T
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cosine = np.clip(np.nan_to_num((values @ values.T) / np.sqrt(size * size.T)), -1.0, 1.0)
+    count = mask @ mask.T
+    pairs = np.triu(together, 1)
+    common = max(float(np.median(cosine[pairs])), 0.0) if pairs.sum() >= LEAST_PAIRS else 0.0
+    own = np.clip((cosine - common) / max(1.0 - common, 0.1), -1.0, 1.0)
+    return cosine, count, log_chance(own, _share(own[pairs], count[pairs]) * count)
+
+
+def _share(cosines: FloatArray, counts: FloatArray) -> float:
+    """The share of the errors that is independent, from how widely the cosines of this class spread."""
+    if len(cosines) < LEAST_CLASS * (LEAST_CLASS - 1) // 2:
+        return USUAL_SHARE
+    low, high = np.percentile(cosines, [15.87, 84.13])
+    return float(np.clip(4.0 / max((high - low) ** 2 * float(counts.mean()), 1e-9), 0.1, LARGEST_SHARE))
+
+
+def log_chance(cosine: FloatArray, dimensions: FloatArray) -> FloatArray:
+    """Log of P(cos >= c) for a random direction in d dimensions, 0 below two dimensions.
+
+    The half of a regularised incomplete beta function, I_{1 - c^2}((d - 1) / 2, 1 / 2) / 2.
+    """
+    half = np.maximum(dimensions - 1.0, 1e-9) / 2.0
+    tail = 0.5 * betainc(half, 0.5, np.clip(1.0 - cosine**2, 0.0, 1.0))
+    chance = np.where(cosine >= 0.0, tail, 1.0 - tail)
+    return np.where(dimensions >= 2.0, np.log(np.maximum(chance, 1e-300)), 0.0)
+
+
+# Places on the sheet ------------------------------------------------------------------------------
+
+
+def place_chance(
+    drawn: Mapping[str, Drawn], printed: NDArray[np.bool_], variant: IntArray
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Log of the chance that two placements come so near, for every two students, and where they are known.
+
+    Where they are not, it is nan, but 0 in a class that follows a layout: the same places are usual there.
+
+    Arguments: which students drew on a `printed` sheet, whose crosses say for each variant where poles
+    are best put: there the sketch alone is placed freely. `variant` is each student's, as a number.
+
+    What one figure is shifted by, from one student's sheet to another's, is held against the shift of
+    the next: it does not matter how the sheets lay in the scanner.
+    """
+    shifts = {figure: _shift(one.at) for figure, one in drawn.items()}
+    count = len(next(iter(drawn.values())).at)
+    apart, freedom = np.zeros((count, count)), np.zeros((count, count), np.int64)
+    for first, second in combinations(drawn, 2):
+        together = drawn[first].sheet == drawn[second].sheet
+        between = np.abs(shifts[first] - shifts[second])
+        free = np.ones(len(printed), bool) if MECHANISM in {first, second} else ~printed
+        known = np.isfinite(between) & together[:, None] & together[None, :] & free[:, None] & free[None, :]
+        apart = np.maximum(apart, np.where(known, between, 0.0))
+        freedom += 2 * known
+    # Of three figures' distances two are free, beside prescribed poles one.
+    most = np.where(printed[:, None] | printed[None, :], 2, 2 * (len(drawn) - 1))
+    freedom = np.minimum(freedom, most)
+    apart = np.maximum(apart, NEAR_MM)
+    same = variant[:, None] == variant[None, :]
+    # Those of one variant may have more in common than all.
+    chance = _chance(apart, freedom)
+    chance = np.where(same, np.maximum(chance, _chance(apart, freedom, same)), chance)
+    known = (freedom > 0) & ~np.eye(count, dtype=bool)
+    follows = known.any() and (apart[known] < LAYOUT_MM).mean() > LAYOUT_SHARE
+    return np.where(known, chance, 0.0 if follows else np.nan), known
+
+
+def _shift(at: ComplexArray) -> ComplexArray:
+    """(students, students) by how much a figure is shifted, the median over the nodes that both have."""
+    between = at[None, :, :] - at[:, None, :]
+    known = np.isfinite(between)
+    last = np.maximum(known.sum(axis=2) - 1, 0)[..., None] // 2
+    x, y = (
+        np.take_along_axis(np.sort(np.where(known, part, np.inf), axis=2), last, axis=2)[..., 0]
+        for part in (between.real, between.imag)
+    )
+    shift = np.full(x.shape, complex(np.nan, np.nan))
+    some = np.isfinite(x) & np.isfinite(y)
+    shift[some] = x[some] + 1j * y[some]
+    return shift
+
+
+def _chance(apart: FloatArray, freedom: IntArray, among: NDArray[np.bool_] | None = None) -> FloatArray:
+    """Log chances, by the densest ring about each placement that the class (or some pairs of it) shows.
+
+    Too few pairs show nothing: 0 for the whole class, no objection (-inf) for some pairs of it.
+    """
+    chance = np.zeros(apart.shape) if among is None else np.full(apart.shape, -np.inf)
+    for dimensions in (2, 4):
+        of_these = (freedom == dimensions) & ~np.eye(len(apart), dtype=bool)
+        of_these &= True if among is None else among
+        if of_these.sum() < 2 * LEAST_PAIRS:
+            continue
+        pairs = np.maximum(_without_both(of_these), 1.0)
+        found = np.full(apart.shape, -np.inf)
+        for ring in RINGS_MM:
+            others = _without_both(of_these & (apart <= ring))
+            if ring == RINGS_MM[-1]:
+                others = np.maximum(others, 1.0)
+            nearer = dimensions * np.log(np.minimum(apart / ring, 1.0))
+            with np.errstate(divide="ignore"):
+                found = np.maximum(found, np.log(others / pairs) + nearer)
+        least = -np.log(TRUSTED * pairs) if among is None else -np.inf
+        chance = np.where(of_these, np.clip(found, least, 0.0), chance)
+    return chance
+
+
+def _without_both(near: NDArray[np.bool_]) -> FloatArray:
+    """(students, students) how many pairs there are among all others than these two.
+
+    The pair itself is no evidence on how others place their figures, nor is a third copy of its sheet.
+    """
+    each = near.sum(axis=1)
+    return np.asarray(np.maximum(near.sum() / 2.0 - each[:, None] - each[None, :] + near, 0.0))

@@ -1,0 +1,250 @@
+"""Entered values that are the same: how likely that is for two who measured their own drawings.
+
+Lengths and directions spread about the exact ones by the construction's derivative with a usual hand's
+errors, all vectors of a drawing together: one line drawn aslant shifts many values, and that is one
+coincidence, not many. A student whose values are all but exact is no evidence: everybody who works
+exactly has the same ones. What is far off is a mistake, which two may make alike, and is left out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from grader.records import FloatArray
+from grader.similarity.drawings import LEAST_CLASS
+from grader.similarity.submission import USUAL, ComparedSubmission, scales_used
+from reference.assignment import Assignment, Variant
+from reference.construction import evaluate
+from reference.geometry import ComplexArray
+from reference.hand import SMALL, hand_errors
+from reference.plan import exact_plan
+
+READ_OFF_MM = 0.15
+"""Standard deviation of reading a ruler, beside the rounding of what is written down."""
+SCALE_OFF = 0.015
+"""Of each plan as a whole: rounded scales and speeds, the same for all its vectors."""
+GRAINS = (1.0, 0.5, 0.1)
+"""Steps of rulers and protractors, mm and degrees. Finer ones are calculated, not measured: no finer
+coincidence counts."""
+NEARLY_ALL = 0.75
+LEAST_MM = 8.0
+"""Directions of shorter vectors are not compared."""
+GROSS = 4.0
+ROUNDED_MM = 0.05
+"""As good as exact, beside the step of the values."""
+OWN_SHARE = 0.6
+"""Of a student's values that must be near the exact ones: others are of another drawing."""
+LEAST_EQUAL = 5
+LEAST_TELLING = 3
+SKILLS = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0)
+"""Drafting errors tried, as multiples of the usual one's errors."""
+
+
+@dataclass(frozen=True, slots=True)
+class NumberSimilarity:
+    """Every two students' entered values; arrays (students, students).
+
+    Attributes
+    ----------
+    log_chance : natural logarithm of the chance that independent values are equal in so many places
+    equal, compared : values that are the same, and that both have
+    pairs : of students with values
+    """
+
+    log_chance: FloatArray
+    equal: FloatArray
+    compared: FloatArray
+    pairs: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """Entered values beside what is expected of each student; nan where there is none.
+
+    Attributes
+    ----------
+    entered : (students, fields) mm and degrees
+    usable : (students, fields) what is near enough to the exact value to be a hand's error
+    telling : (students, fields) what of it is further off than rounding alone would bring it
+    off_mm : (students, fields) from the exact values, directions as the vector's end across it; less what
+        all of one variant are off
+    grain_mm : (students, fields) step of the values
+    by_act : (students, fields, acts) what a usual error of each act adds, mm
+    """
+
+    entered: FloatArray
+    usable: NDArray[np.bool_]
+    telling: NDArray[np.bool_]
+    off_mm: FloatArray
+    grain_mm: FloatArray
+    by_act: FloatArray
+
+
+def compare_numbers(assignment: Assignment, submissions: Sequence[ComparedSubmission]) -> NumberSimilarity:
+    """Compare the entered values of a class, each against the variant that was drawn."""
+    count = len(submissions)
+    chance, equal, compared = np.zeros((count, count)), np.zeros((count, count)), np.zeros((count, count))
+    having = [k for k, one in enumerate(submissions) if len(one.numbers) >= LEAST_EQUAL]
+    if len(having) < 2:
+        return NumberSimilarity(chance, equal, compared, 0)
+    table = _table(assignment, [submissions[k] for k in having])
+    single = _single(table)
+    same, telling, alone, both = _counted(table, single)
+    people = np.array([submissions[k].student_id for k in having])
+    strangers = people[:, None] != people[None, :]
+    pairs = max(int(strangers.sum()) // 2, 1)
+    choices = _choices(both, same)
+    likely = (same >= LEAST_EQUAL) & (telling >= LEAST_TELLING) & (alone + choices <= -np.log(pairs))
+    known: dict[tuple[int, bytes], float] = {}
+    for i, j in np.argwhere(likely & strangers):
+        chosen = (table.entered[i] == table.entered[j]) & table.usable[i]
+        key = int(i), chosen.tobytes()
+        if key not in known:
+            known[key] = _chance(table, int(i), chosen)
+        # Whoever copied, the values came from one of both drawings.
+        a, b = having[i], having[j]
+        chance[a, b] = chance[b, a] = min(chance[a, b], known[key] + choices[i, j])
+    where = np.ix_(having, having)
+    equal[where], compared[where] = np.maximum(same, same.T), both
+    return NumberSimilarity(chance, equal, compared, pairs)
+
+
+def _counted(table: _Table, single: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """What every two students have in common, arrays (students, students).
+
+    Usable values of the first that the second has, too; telling ones of them; the log of their chances,
+    each taken by itself; and all values that both have.
+    """
+    count = len(table.entered)
+    same, telling, alone = (np.zeros((count, count)) for _ in range(3))
+    for field, column in enumerate(table.entered.T):
+        equal = column[:, None] == column[None, :]
+        usable = equal & table.usable[:, field, None]
+        same += usable
+        alone += np.where(usable, single[:, field, None], 0.0)
+        telling += equal & table.telling[:, field, None]
+    known = np.isfinite(table.entered).astype(np.float64)
+    return same, telling, alone, known @ known.T
+
+
+def _choices(both: FloatArray, equal: FloatArray) -> FloatArray:
+    """Log of the number of ways in which so many of the values can be the equal ones."""
+    return np.asarray(gammaln(both + 1.0) - gammaln(equal + 1.0) - gammaln(both - equal + 1.0))
+
+
+# The table ----------------------------------------------------------------------------------------
+
+
+def _table(assignment: Assignment, submissions: Sequence[ComparedSubmission]) -> _Table:
+    known = {one.variant for one in submissions}
+    variants = [one.fits[0] if one.fits and one.fits[0] in known else one.variant for one in submissions]
+    exact, added = _exact(assignment, submissions, variants)
+    names = list(exact)
+    lengths = np.array([[one.numbers.get(name, np.nan) for name in names] for one in submissions])
+    turns = np.array([[one.numbers.get(f"{name}_deg", np.nan) for name in names] for one in submissions])
+    drawn = np.array([exact[name] for name in names]).T
+    size = np.abs(drawn)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        along = drawn / size
+        off = (turns - np.degrees(np.angle(drawn)) + 180.0) % 360.0 - 180.0
+        acts = np.moveaxis(np.array([added[name] for name in names]), 0, 1) * along.conj()[..., None]
+    turns = np.where(size >= LEAST_MM, turns, np.nan)
+    known_mm, known_deg = _grain(lengths), _grain(turns)
+    grain = np.concatenate([known_mm * np.ones_like(size), np.radians(known_deg) * size], axis=1)
+    off_mm = np.concatenate([lengths - size, np.radians(off) * size], axis=1)
+    by_act = np.concatenate([acts.real, acts.imag], axis=1)
+    spread = np.sqrt((by_act**2).sum(axis=2) + READ_OFF_MM**2 + grain**2 / 12.0)
+    excused = np.tile([[name in one.excused for name in names] for one in submissions], 2)
+    entered = np.concatenate([lengths, turns], axis=1)
+    with np.errstate(invalid="ignore"):
+        usable = np.isfinite(entered) & (np.abs(off_mm) < GROSS * spread) & ~excused
+        usable &= usable.sum(axis=1, keepdims=True) >= OWN_SHARE * np.isfinite(entered).sum(
+            axis=1, keepdims=True
+        )
+        off_mm = off_mm - _common(np.where(usable, off_mm, np.nan), variants)
+        telling = usable & (np.abs(off_mm) > 0.5 * grain + ROUNDED_MM)
+    return _Table(entered, usable, telling, off_mm, grain, by_act)
+
+
+def _exact(
+    assignment: Assignment, submissions: Sequence[ComparedSubmission], variants: list[Variant]
+) -> tuple[dict[str, ComplexArray], dict[str, ComplexArray]]:
+    """Exact vectors (students,) in mm, and what usual errors of all acts add to them (students, acts)."""
+    plan = exact_plan(assignment, variants, scales_used(assignment, submissions, variants))
+    vectors = {
+        name: np.broadcast_to(plan.drawn_mm(name), len(submissions)) for name in plan.construction.vectors
+    }
+    moved: dict[str, list[ComplexArray]] = {name: [] for name in vectors}
+    for step in plan.construction.steps:
+        errors = hand_errors(step, USUAL)
+        if not errors:
+            continue
+        nodes = evaluate(plan.construction, plan.drawing.parameters, errors=errors)
+        for name, vector in plan.construction.vectors.items():
+            ends = np.atleast_2d(nodes[vector.head] - nodes[vector.tail])
+            change = (ends[1:] - ends[:1]) / SMALL if len(ends) > 1 else np.zeros((len(errors), 1))
+            moved[name].append(np.asarray(np.broadcast_to(change, (len(errors), len(submissions))).T))
+    for plan_name in plan.construction.poles:
+        of_plan = {vector.name for vector in plan.construction.vectors_of(plan_name)}
+        for name, drawn in vectors.items():
+            moved[name].append((SCALE_OFF * drawn * (name in of_plan))[:, None])
+    return vectors, {name: np.nan_to_num(np.concatenate(parts, axis=1)) for name, parts in moved.items()}
+
+
+def _common(off_mm: FloatArray, variants: Sequence[Variant]) -> FloatArray:
+    """(students, fields) the mean of what those of the same variant are off, where they are many enough.
+
+    A protractor or a rounded table that all have makes all values wrong alike. Not the median: of values
+    in whole millimetres it is one of them.
+    """
+    common = np.zeros_like(off_mm)
+    for variant in set(variants):
+        same = np.array([one == variant for one in variants])
+        known = np.isfinite(off_mm[same])
+        count = known.sum(axis=0)
+        mean = np.where(known, off_mm[same], 0.0).sum(axis=0) / np.maximum(count, 1)
+        common[same] = np.where(count >= LEAST_CLASS, mean, 0.0)
+    return common
+
+
+def _grain(values: FloatArray) -> FloatArray:
+    """(students, 1) the coarsest step of which nearly all the values are multiples, the finest for none."""
+    count = np.isfinite(values).sum(axis=1, keepdims=True)
+    found = np.full((len(values), 1), GRAINS[-1])
+    for grain in sorted(GRAINS[:-1]):
+        with np.errstate(invalid="ignore"):
+            whole = (np.abs(values / grain - np.round(values / grain)) < 1e-6).sum(axis=1, keepdims=True)
+        found = np.where(whole >= NEARLY_ALL * count, grain, found)
+    return found
+
+
+# Chances ------------------------------------------------------------------------------------------
+
+
+def _single(table: _Table) -> FloatArray:
+    """Log chance of each value by itself: an upper bound of the evidence, roughly, and quick."""
+    spread = np.sqrt((table.by_act**2).sum(axis=2) + READ_OFF_MM**2 + table.grain_mm**2 / 12.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log = np.log(table.grain_mm / spread / np.sqrt(2.0 * np.pi)) - 0.5 * (table.off_mm / spread) ** 2
+    return np.asarray(np.nan_to_num(np.minimum(log, 0.0)))
+
+
+def _chance(table: _Table, student: int, chosen: np.ndarray) -> float:
+    """Log of the chance that an independent student comes to these values of one who drew the same variant.
+
+    The density of all the values together times their steps; of the hands, better or worse than usual,
+    the one that makes it likeliest.
+    """
+    acts, off = table.by_act[student][chosen], table.off_mm[student][chosen]
+    grain = table.grain_mm[student][chosen]
+    best = -np.inf
+    for skill in SKILLS:
+        noise = (skill * READ_OFF_MM) ** 2 + grain**2 / 12.0
+        root = np.linalg.cholesky(skill**2 * acts @ acts.T + np.diag(noise))
+        moved = np.linalg.solve(root, off)
+        spread = np.log(2.0 * np.pi) * len(off) / 2.0 + np.log(np.diag(root)).sum()
+        best = max(best, float(-0.5 * moved @ moved - spread))
+    return min(best + float(np.log(grain).sum()), 0.0)

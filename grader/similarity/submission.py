@@ -1,0 +1,180 @@
+"""What the comparison of students uses of their submissions: nodes, entered values, scales."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from grader.documents import ReportDocument
+from grader.measurements import Measurements
+from grader.records import FloatArray
+from reference.assignment import Assignment, Scales, Variant
+from reference.geometry import ComplexArray
+from reference.hand import Skill
+from reference.plan import exact_plan
+
+Nodes = Mapping[str, Mapping[str, complex]]
+"""By figure and name, x - i y in sheet millimetres."""
+UNKNOWN = complex(np.nan, np.nan)
+FITS_MM = 2.0
+"""Root mean square distance from the exact figures up to which a drawing may be of that variant,"""
+FITS_BETTER = 0.5
+"""and how many times nearer than to those of the own one it must be."""
+LEAST_NODES = 6
+USUAL = Skill(angle_deg=0.3, place_mm=0.3, mark_mm=0.15)
+"""Drafting errors of a usual student, and of reading the marks."""
+
+
+@dataclass(frozen=True, slots=True)
+class ComparedSubmission:
+    """One student's submission for one position.
+
+    Attributes
+    ----------
+    sheets : the nodes read on each sheet
+    numbers : entered lengths (mm), ``NAME_deg`` directions and ``NAME_value`` SI values
+    used : scales used for marking, real units per millimetre; empty where marking came to none
+    fits : the variant that diagnosis says was drawn instead, with its confidence, or None
+    printed : whether it is drawn on printed answer sheets, that say where poles are best put
+    excused : nodes and vectors at which a mistake was named: what is off there is no hand's error
+    """
+
+    student_id: str
+    variant: Variant
+    sheets: tuple[Nodes, ...] = ()
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    used: Mapping[str, float] = field(default_factory=dict)
+    fits: tuple[Variant, float] | None = None
+    excused: frozenset[str] = frozenset()
+    printed: bool = False
+
+    @property
+    def key(self) -> tuple[str, int | None]:
+        """Student and position."""
+        return self.student_id, self.variant.position
+
+
+def compared_submission(
+    report: ReportDocument, variant: Variant, measured: Measurements | None
+) -> ComparedSubmission:
+    """A submission that was marked."""
+    return ComparedSubmission(
+        student_id=report.student_id,
+        variant=variant,
+        sheets=tuple(
+            {
+                figure: {name: complex(node.x_mm, -node.y_mm) for name, node in read.nodes.items()}
+                for figure, read in sheet.figures.items()
+            }
+            for sheet in report.reading.sheets
+            if sheet.figures
+        ),
+        numbers={} if measured is None else measured.numbers,
+        used={name: one.used for name, one in report.scales.items() if one.used},
+        fits=_fits(variant, report),
+        excused=frozenset(mistake.at for mistake in report.mistakes),
+        printed=any(one.sheet is not None and one.sheet.method == "markers" for one in report.reading.sheets),
+    )
+
+
+def _fits(variant: Variant, report: ReportDocument) -> tuple[Variant, float] | None:
+    """The other variant that diagnosis names."""
+    for mistake in report.mistakes:
+        if mistake.code == "other_variant":
+            told = dict(part.split(" = ", 1) for part in mistake.detail.split(", ") if " = " in part)
+            n, position = told.get("n"), told.get("position")
+            drawn = Variant(
+                n=variant.n if n is None else int(n),
+                position=variant.position if position is None else int(position),
+            )
+            return (drawn, mistake.confidence) if drawn != variant else None
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """The nodes of one figure in all submissions.
+
+    Attributes
+    ----------
+    names : (nodes,)
+    at : (students, nodes) x - i y in sheet millimetres, nan where not read
+    sheet : (students,) index of the sheet that it was taken from, -1 where it was on none
+    """
+
+    names: tuple[str, ...]
+    at: ComplexArray
+    sheet: np.ndarray
+
+
+def drawn_of(
+    submissions: Sequence[ComparedSubmission], nodes: Mapping[str, Sequence[str]]
+) -> dict[str, Drawn]:
+    """Each figure's nodes, of the sheet that shows most of them; a student may hand in two sketches."""
+    found = {}
+    for figure, names in nodes.items():
+        chosen = [_fullest(one, figure) for one in submissions]
+        at = [
+            [UNKNOWN if k < 0 else one.sheets[k][figure].get(name, UNKNOWN) for name in names]
+            for one, k in zip(submissions, chosen, strict=True)
+        ]
+        found[figure] = Drawn(tuple(names), np.array(at).reshape(len(submissions), -1), np.array(chosen))
+    return found
+
+
+def _fullest(submission: ComparedSubmission, figure: str) -> int:
+    having = [k for k, sheet in enumerate(submission.sheets) if figure in sheet]
+    return max(having, key=lambda k: len(submission.sheets[k][figure]), default=-1)
+
+
+def fitting(
+    assignment: Assignment, submissions: Sequence[ComparedSubmission], drawn: Mapping[str, Drawn]
+) -> list[tuple[Variant, float] | None]:
+    """For each student another variant of the class whose exact figures the drawing fits, and how far off."""
+    variants = list(dict.fromkeys(one.variant for one in submissions))
+    plan = exact_plan(assignment, variants)
+    square, count = np.zeros((len(submissions), len(variants))), np.zeros((len(submissions), 1))
+    for figure, one in drawn.items():
+        exact = np.array(
+            [np.broadcast_to(plan.nodes_mm[figure][name], len(variants)) for name in one.names]
+        ).T
+        known = np.isfinite(one.at)
+        square += _misfit(np.where(known, one.at, 0.0), known, exact)
+        count += known.sum(axis=1, keepdims=True)
+    off = np.sqrt(square / np.maximum(count, 1.0))
+    own = off[np.arange(len(submissions)), [variants.index(one.variant) for one in submissions]]
+    best = off.argmin(axis=1)
+    least = off[np.arange(len(submissions)), best]
+    fits = (count[:, 0] >= LEAST_NODES) & (least < FITS_MM) & (least < FITS_BETTER * own)
+    return [(variants[k], float(mm)) if good else None for k, mm, good in zip(best, least, fits, strict=True)]
+
+
+def _misfit(at: ComplexArray, known: np.ndarray, exact: ComplexArray) -> FloatArray:
+    """(students, variants) sums of squares, mm^2, of figures shifted, turned and scaled onto exact ones."""
+    weight = known.astype(np.float64)
+    count = np.maximum(weight.sum(axis=1), 1.0)
+    sum_at, sum_exact = at.sum(axis=1), weight @ exact.T
+    spread = (np.abs(at) ** 2).sum(axis=1) - np.abs(sum_at) ** 2 / count
+    sizes = weight @ (np.abs(exact) ** 2).T - np.abs(sum_exact) ** 2 / count[:, None]
+    joint = at @ exact.conj().T - sum_at[:, None] * sum_exact.conj() / count[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        explained = np.nan_to_num(np.abs(joint) ** 2 / sizes)
+    return np.asarray(np.maximum(spread[:, None] - explained, 0.0))
+
+
+def scales_used(
+    assignment: Assignment, submissions: Sequence[ComparedSubmission], variants: list[Variant]
+) -> Scales:
+    """The scales that each submission was marked with, (submissions,); the proposed ones where unknown."""
+    proposed = assignment.scales(variants)
+    return Scales(
+        *(
+            np.array(
+                [
+                    entry.used.get(name, usual)
+                    for entry, usual in zip(submissions, getattr(proposed, name), strict=True)
+                ]
+            )
+            for name in ("kL", "kv", "ka")
+        )
+    )
