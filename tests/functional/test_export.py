@@ -15,7 +15,7 @@ from grader.cli import app
 from grader.cli.schemas import schema
 
 ROOT = Path(__file__).parents[2]
-RESULTS = ROOT / "tests" / "unit" / "older" / "2026-11-22-0304" / "results.json"
+RESULTS = Path(__file__).parent / "results.json"
 DOCUMENT = (ROOT / "docs" / "exports.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"(?m)^    planmark (export .*)$", DOCUMENT)
 SCHEMAS = {
