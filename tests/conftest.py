@@ -18,6 +18,22 @@ settings.register_profile(
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.get("CI") else "dev"))
 
 
+SLOW = (
+    "bench", "docs/test_readme", "functional", "fuzz", "laws", "samples", "synthetic", "unit/bench",
+    "unit/ink", "unit/intake/test_hostile", "unit/letters", "unit/older", "unit/reading",
+    "unit/reference/test_exact_plan", "unit/sheet", "unit/similarity", "unit/test_calibration", "unit/workers",
+)  # fmt: skip
+"""Where tests run the whole program, read scans, or try many cases; the others are the quick set."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark slow tests by where they stand; `-m "not slow"` runs the quick set in under a minute."""
+    tests = Path(__file__).parent
+    for item in items:
+        if item.path.relative_to(tests).as_posix().startswith(SLOW):
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """The folder of material kept beside the project; tests that need it are skipped without."""

@@ -346,7 +346,7 @@ def test_numbers_and_positions_together_are_bounded(assignment):
         ("crank_mm = 60", "crank_mm = 1979-05-27", "$.scales.crank_mm"),
         ("crank_mm = 60", "crank_mm = " + "[" * 50 + "]" * 50, "$.scales.crank_mm"),
         ("crank_mm = 60", "crank_mm = " + "[" * 5000, "$"),
-        ("crank_mm = 60", "crank_mm" + ".a" * 20_000 + " = 1", "$.scales.crank_mm"),
+        ("crank_mm = 60", "crank_mm" + ".a" * 20_000 + " = 1", "$"),
         ("crank_mm = 60", 'crank_mm = "' + "9" * 180 + '**16"', "$.scales"),
         ("crank_mm = 60", 'crank_mm = "n\\u0000"', "$.scales.crank_mm"),
         ("crank_mm = 60", "crank_mm = 60\0", "$"),
