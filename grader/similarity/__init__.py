@@ -157,7 +157,7 @@ def _add_numbers(pairs: dict[tuple[int, int], _Pair], numbers: NumberSimilarity)
 def _add_pictures(
     pairs: dict[tuple[int, int], _Pair], pictures: PictureSimilarity, drawings: DrawingSimilarity
 ) -> None:
-    # Good drawings whose figures lie in the same places have the same ink: that is no rarer than the places.
+    # Good drawings whose figures follow one layout have the same ink: that is no rarer than their places.
     log_chance = np.fmax(pictures.log_chance, drawings.log_layout)
     for i, j, measure in _rare(log_chance, pictures.pairs):
         share = float(np.clip(pictures.overlap[i, j], 0.0, 1.0))
@@ -283,10 +283,10 @@ def _agreement(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> FloatArra
     parts /= np.maximum(size, FAINT)[..., None]
     total, count = np.zeros((2, len(maps), len(maps)))
     for part, its_size in zip(parts, size, strict=True):
-        having = its_size > FAINT
-        total += part @ part.T
-        count += having[:, None] | having[None, :]
-    return np.asarray(np.clip(total / np.maximum(count, LEAST_PARTS), 0.0, 1.0))
+        having = (its_size[:, None] > FAINT) | (its_size[None, :] > FAINT)
+        total += having * (part @ part.T)
+        count += having
+    return np.asarray(total / np.maximum(count, LEAST_PARTS))
 
 
 def _of_the_page(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -93,6 +93,16 @@ def test_nodes_that_are_read_with_the_same_errors_make_nobody_alike():
     assert found("pump", made) == {}
 
 
+def test_dust_in_the_same_places_makes_nobody_alike():
+    """Sheets that show next to nothing: specks that two of them share, each too faint for a part to count."""
+    maps = [[ink_map(sheet_picture(k), (420.0, 297.0))] for k in range(20)]
+    for (sheet,) in maps[:2]:
+        sheet[20:] = 0
+        sheet[25:110:12, 10:160:12] = 50
+    submissions = [replace(drawing("pump", k, k), sheets=()) for k in range(20)]
+    assert found("pump", submissions, maps) == {}
+
+
 def test_values_that_all_of_a_variant_have_wrong_alike_make_nobody_alike():
     """One table of rounded lengths, one wrong protractor: all values of all students are off by the same."""
     made = []
