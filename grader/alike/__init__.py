@@ -93,7 +93,7 @@ def _add_numbers(pairs: dict[tuple[int, int], _Pair], found: LikeNumbers) -> Non
 
 
 def _add_pictures(pairs: dict[tuple[int, int], _Pair], found: LikePictures, drawings: LikeDrawings) -> None:
-    # Good drawings whose figures lie in the same places have the same ink: that is no rarer than the places.
+    # Good drawings whose figures follow one layout have the same ink: that is no rarer than their places.
     log_chance = np.fmax(found.log_chance, drawings.log_layout)
     for i, j, measure in _rare(log_chance, found.pairs):
         share = float(np.clip(found.overlap[i, j], 0.0, 1.0))

@@ -27,7 +27,7 @@ class LikeDrawings:
     ----------
     log_chance : natural logarithm of the chance that independent hands come so near; 0 where not compared
     log_hands, log_places : what errors of the hand and places on the sheet give alone
-    log_layout : as `log_places`, nan where places were not read unless the class follows a layout
+    log_layout : as `log_places`, of those who follow a layout; nan for others
     cosine, count : agreement of the errors, and how many there are
     pairs : of different students
     fits : the variant of the class that a drawing fits though it is not the own, and how far off it is, mm
@@ -54,8 +54,7 @@ def like_drawings(assignment: Assignment, handed: Sequence[Handed]) -> LikeDrawi
     fits = fitting(assignment, handed, drawn)
     variants = list(dict.fromkeys(one.variant for one in handed))
     printed = np.array([one.printed for one in handed])
-    layout, known = place_chance(drawn, printed, np.array([variants.index(one.variant) for one in handed]))
-    places = np.where(known, layout, 0.0)
+    places, layout = place_chance(drawn, printed, np.array([variants.index(one.variant) for one in handed]))
     rows = _rows(handed, fits, places)
     hands = hands_of(assignment, handed, drawn, rows)
     together = _together(rows, handed)

@@ -127,10 +127,10 @@ def _agreement(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> FloatArra
     parts /= np.maximum(size, FAINT)[..., None]
     total, count = np.zeros((2, len(maps), len(maps)))
     for part, its_size in zip(parts, size, strict=True):
-        having = its_size > FAINT
-        total += part @ part.T
-        count += having[:, None] | having[None, :]
-    return np.asarray(np.clip(total / np.maximum(count, LEAST_PARTS), 0.0, 1.0))
+        having = (its_size[:, None] > FAINT) | (its_size[None, :] > FAINT)
+        total += having * (part @ part.T)
+        count += having
+    return np.asarray(total / np.maximum(count, LEAST_PARTS))
 
 
 def _of_the_page(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> NDArray[np.bool_]:

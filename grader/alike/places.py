@@ -18,8 +18,10 @@ NEAR_MM = 0.5
 """Nearer than this is not told apart."""
 RINGS_MM = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Radii within which the class's own placements are counted."""
-LAYOUT_MM, LAYOUT_SHARE = 4.0, 0.05
-"""A class follows a layout where this share of its pairs has all figures in the same places, so nearly."""
+LAYOUT_MM, LAYOUT_SHARE = 16.0, 0.15
+"""A class follows a layout where this share of its pairs has all figures so near. Figures of different
+variants on the same poles have it (0.28), free ones do not (0.003), nor does one copy among ten pairs.
+"""
 LEAST_PAIRS = 10
 TRUSTED = 3000.0
 """So many times the class's pairs the rarest placement may be: rarer ones no class can vouch for."""
@@ -27,10 +29,12 @@ TRUSTED = 3000.0
 
 def place_chance(
     drawn: Mapping[str, Drawn], printed: NDArray[np.bool_], variant: IntArray
-) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Log of the chance that two placements come so near, for every two students, and where they are known.
+) -> tuple[FloatArray, FloatArray]:
+    """Log of the chance that two placements come so near, and of what a layout explains.
 
-    Where they are not, it is nan, but 0 in a class that follows a layout: the same places are usual there.
+    Two arrays (students, students). The first is 0 where places are not known. The second is nan for pairs
+    of whom few lie in the same places; where the class follows a layout, or those of one variant do,
+    it is the first, 0 where places are not known.
 
     Arguments: which students drew on a `printed` sheet, whose crosses say for each variant where poles
     are best put: there the sketch alone is placed freely. `variant` is each student's, as a number.
@@ -57,8 +61,12 @@ def place_chance(
     chance = _chance(apart, freedom)
     chance = np.where(same, np.maximum(chance, _chance(apart, freedom, same)), chance)
     known = (freedom > 0) & ~np.eye(count, dtype=bool)
-    follows = known.any() and (apart[known] < LAYOUT_MM).mean() > LAYOUT_SHARE
-    return np.where(known, chance, 0.0 if follows else np.nan), known
+    layout = np.full(apart.shape, np.nan)
+    for among in (np.ones_like(same), same):
+        distances = apart[known & among]
+        if len(distances) >= 2 * LEAST_PAIRS and (distances < LAYOUT_MM).mean() > LAYOUT_SHARE:
+            layout[among] = chance[among]
+    return chance, layout
 
 
 def _shift(at: ComplexArray) -> ComplexArray:

@@ -253,6 +253,16 @@ def test_the_ink_of_two_of_one_variant_is_no_evidence_where_all_follow_one_layou
     assert found("pump", [first, *made[1:]], maps) == {}
 
 
+def test_dust_in_the_same_places_makes_nobody_alike():
+    """Sheets that show next to nothing: specks that two of them share, each too faint for a part to count."""
+    maps = [[ink_map(sheet_picture(k), (420.0, 297.0))] for k in range(20)]
+    for (sheet,) in maps[:2]:
+        sheet[20:] = 0
+        sheet[25:110:12, 10:160:12] = 50
+    handed = [replace(drawing("pump", k, k), sheets=()) for k in range(20)]
+    assert found("pump", handed, maps) == {}
+
+
 def test_two_on_printed_sheets_in_a_class_on_plain_paper_are_not_alike_by_their_print():
     pictures = [sheet_picture(k) for k in range(20)]
     for grey in pictures[:2]:
