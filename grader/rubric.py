@@ -4,6 +4,7 @@ Everything that judges a student stands here as data: the tolerances on paper an
 are widened for, the bands of partial points, what happens with what was not handed in.
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -74,6 +75,19 @@ class ToleranceTable(Authored):
     def farthest(self) -> float:
         """How many times the tolerance still gives points."""
         return self.all_bands[-1][0] if self.all_bands else 1.0
+
+    def length_at(self, expected_mm: float) -> float:
+        """The tolerance of a length, millimetres: the larger of the absolute and the relative one."""
+        return max(self.length_mm, self.length_relative * expected_mm)
+
+    def direction_at(self, expected_mm: float) -> float | None:
+        """The tolerance of a direction, degrees: the larger of the fixed one and that of the end across.
+
+        None where the vector is too short to judge its direction.
+        """
+        if expected_mm < self.least_mm or expected_mm == 0.0:
+            return None
+        return max(self.direction_deg, math.degrees(math.atan(self.across_mm / expected_mm)))
 
 
 class HandTable(Authored):
@@ -188,9 +202,16 @@ class RubricFile(Authored):
         """Whether anything asked for needs the acceleration plan."""
         return any(c.name.startswith(("a_", "epsilon_")) or c.scale == "ka" for c in self.criterion)
 
-    def tolerance_of(self, criterion: CriterionTable) -> ToleranceTable:
-        """The criterion's own tolerance, else the rubric's."""
-        return criterion.tolerance or self.tolerance
+    def tolerance_of(self, asked: CriterionTable | str) -> ToleranceTable:
+        """The tolerance of a criterion, or of the vector, angular quantity, scale or link of that name.
+
+        It is the criterion's own, else the rubric's. Where several criteria ask for the same name, the
+        first one with a tolerance of its own counts for it.
+        """
+        if not isinstance(asked, str):
+            return asked.tolerance or self.tolerance
+        own = (one.tolerance for one in self.criterion if one.tolerance is not None and one.name == asked)
+        return next(own, self.tolerance)
 
     def follows_through(self, criterion: CriterionTable) -> bool:
         """Whether full marks are given for what follows rightly from an earlier wrong value."""

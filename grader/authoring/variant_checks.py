@@ -222,18 +222,11 @@ def _passing(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Pairs:
 def _tolerances(rubric: RubricFile, asked: AskedVectors) -> tuple[FloatArray, FloatArray]:
     """(V, N) of length in mm and of direction in radians; pi where a direction is not judged."""
     tables = [rubric.tolerance_of(rubric.criterion[index]) for index in asked.criteria]
-    column = {
-        key: np.array([getattr(table, key) for table in tables])[:, None]
-        for key in ("length_mm", "length_relative", "direction_deg", "across_mm", "least_mm")
-    }
-    length = np.maximum(column["length_mm"], column["length_relative"] * asked.length_mm)
-    with np.errstate(divide="ignore"):
-        turn = np.maximum(
-            np.radians(column["direction_deg"]), np.arctan(column["across_mm"] / asked.length_mm)
-        )
+    rows = list(zip(tables, asked.length_mm.tolist(), strict=True))
+    length = np.array([[table.length_at(mm) for mm in lengths] for table, lengths in rows])
+    turn = np.array([[table.direction_at(mm) or 180.0 for mm in lengths] for table, lengths in rows])
     judged = np.array([rubric.criterion[index].direction for index in asked.criteria])[:, None]
-    free = (asked.length_mm < column["least_mm"]) | ~judged
-    return np.asarray(length), np.where(free, np.pi, turn)
+    return length.reshape(asked.length_mm.shape), np.where(judged, np.radians(turn), np.pi)
 
 
 def _pairs(

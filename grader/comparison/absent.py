@@ -15,7 +15,7 @@ def absent(ledger: Ledger, criterion: CriterionTable, expected: Quantity) -> Out
     if criterion.link is not None and not ledger.evidence.has_sketch:
         # Links are drawn, not measured: without a sketch that was read nothing is asked of them.
         return verdicts.unjudged(criterion, "not_judged", (reason,), expected=expected)
-    least, length = ledger.task.tolerance(criterion).least_mm, expected.length_mm
+    least, length = ledger.task.rubric.tolerance_of(criterion).least_mm, expected.length_mm
     if length is not None and length < least:
         short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
         return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)

@@ -95,7 +95,7 @@ def _judged(ledger: Ledger, criterion: CriterionTable) -> Outcome:
     sources = (ledger.evidence.drawn.get(criterion.name), ledger.evidence.measured.get(criterion.name))
     outcomes = [segment(ledger, criterion, drawn) for drawn in sources if drawn is not None]
     if len(outcomes) == 2:
-        return verdicts.both(outcomes[0], outcomes[1], ledger.task.tolerance(criterion).length_mm)
+        return verdicts.both(outcomes[0], outcomes[1], ledger.task.rubric.tolerance_of(criterion).length_mm)
     return outcomes[0] if outcomes else value_alone(ledger, criterion)
 
 
@@ -110,5 +110,5 @@ def _scale(ledger: Ledger, criterion: CriterionTable) -> Outcome:
         return verdicts.unjudged(criterion, "not_judged", scale.reasons, expected=expected)
     ledger.remember(name, scale.mark)
     measured = Quantity(value=scale.used.declared, unit=unit)
-    allowed = Tolerance(value=ledger.task.tolerance(criterion).scale_relative * right)
+    allowed = Tolerance(value=ledger.task.rubric.tolerance_of(criterion).scale_relative * right)
     return verdicts.outcome(criterion, scale.mark, measured, expected, allowed)

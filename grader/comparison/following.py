@@ -185,7 +185,7 @@ class Following:
             return True
         rubric = self.task.rubric
         right = min(abs(segment.drawn(one)) for one in (self.used, self.followed))
-        least = min(rubric.tolerance.least_mm, right / 2.0)
+        least = min(rubric.tolerance_of(segment.name).least_mm, right / 2.0)
         return abs(expected) < max(least, rubric.least_followed_share * right)
 
     def turned_plan(self, segment: Segment) -> Iterator[Expectation]:
@@ -197,7 +197,7 @@ class Following:
             return
         off = math.remainder(own.direction_rad - cmath.phase(task.real[crank]), math.tau)
         quarters = round(off / (math.pi / 2.0))
-        tolerance = task.rubric.tolerance
+        tolerance = task.rubric.tolerance_of(crank)
         slack = math.radians(tolerance.direction_deg * tolerance.farthest)
         if quarters and abs(off - quarters * math.pi / 2.0) <= slack:
             head = task.construction.vectors[crank].head

@@ -7,7 +7,6 @@ from typing import Protocol
 from grader.comparison.evidence import Evidence
 from grader.comparison.following import NO_SPREAD, Expectation, Following, scaled
 from grader.comparison.limits import FULL, NONE, Mark, the_better
-from grader.comparison.marking import length_tolerance
 from grader.comparison.scales import Scale, followed_scales, used_scales
 from grader.comparison.sketches import Sketch
 from grader.comparison.task import Segment, Task
@@ -177,7 +176,7 @@ class Ledger:
         if task.construction.figure_of(node) == MECHANISM:
             exact *= self.used["kL"] / self.followed["kL"]
         off = own - exact
-        if abs(off) <= length_tolerance(task.rubric.tolerance, abs(exact)):
+        if abs(off) <= task.tolerance_at(node).length_at(abs(exact)):
             return False
         reach = scaled(spread(task.traced(self.used).nodes[node].moved, off), task.rubric.hand.sigmas)
         return abs(off) > reach.along

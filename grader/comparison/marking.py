@@ -13,22 +13,10 @@ REVERSED_WITHIN_DEG = 20.0
 """A direction this near the opposite one is told as reversed, not as turned by so much."""
 
 
-def length_tolerance(tolerance: ToleranceTable, expected_mm: float) -> float:
-    """Millimetres: the larger of the absolute and the relative tolerance."""
-    return max(tolerance.length_mm, tolerance.length_relative * expected_mm)
-
-
-def direction_tolerance(tolerance: ToleranceTable, expected_mm: float) -> float | None:
-    """Degrees: the larger of the fixed one and that of the end across; None where too short to judge."""
-    if expected_mm < tolerance.least_mm or expected_mm == 0.0:
-        return None
-    return max(tolerance.direction_deg, math.degrees(math.atan(tolerance.across_mm / expected_mm)))
-
-
 def tolerances(tolerance: ToleranceTable, expected_mm: float, *, with_direction: bool) -> Tolerance:
     """Both tolerances as the rubric states them."""
-    turn = direction_tolerance(tolerance, expected_mm) if with_direction else None
-    return Tolerance(length_tolerance(tolerance, expected_mm), turn)
+    turn = tolerance.direction_at(expected_mm) if with_direction else None
+    return Tolerance(tolerance.length_at(expected_mm), turn)
 
 
 def widened(plain: Tolerance, expected_mm: float, reach: Spread, at_most: float = math.inf) -> Tolerance:

@@ -8,7 +8,7 @@ from grader.comparison.absent import absent
 from grader.comparison.evidence import Evidence
 from grader.comparison.ledger import Ledger
 from grader.comparison.limits import the_better
-from grader.comparison.marking import length_tolerance, mark_value, tolerances, widened
+from grader.comparison.marking import mark_value, tolerances, widened
 from grader.comparison.task import Segment, Task, unit_of
 from grader.comparison.values import common_factor
 from grader.outcomes import Outcome, Quantity, Reason, Tolerance
@@ -24,12 +24,12 @@ def rate(ledger: Ledger, criterion: CriterionTable) -> Outcome:
     right = task.rates[name]
     if name not in ledger.evidence.values:
         return absent(ledger, criterion, Quantity(value=right, unit=unit))
-    value, table = ledger.evidence.values[name], task.tolerance(criterion)
+    value, table = ledger.evidence.values[name], task.rubric.tolerance_of(criterion)
     turned = task.construction.rates[name]
     segment = task.segments[turned.vector]
     scale = ledger.used[segment.scale]
     per_mm = scale / task.lengths_m[name]
-    plain = length_tolerance(table, abs(right) / per_mm) * per_mm
+    plain = table.length_at(abs(right) / per_mm) * per_mm
     allowed = Tolerance(value=plain)
     mark, followed = mark_value(value, right, plain, plain, table, unit), False
     if not mark.is_full:
@@ -44,7 +44,7 @@ def rate(ledger: Ledger, criterion: CriterionTable) -> Outcome:
     if own is not None:
         # Values that are all off by one factor give an angular one off by it, too.
         own = own if factor is None else min(own, own * factor, key=lambda one: abs(one - value))
-        limit = length_tolerance(table, abs(own) / per_mm) * per_mm
+        limit = table.length_at(abs(own) / per_mm) * per_mm
         candidate = ledger.allowed(
             frozenset({segment.head}), mark_value(value, own, limit, limit, table, unit)
         )
@@ -58,7 +58,7 @@ def rate(ledger: Ledger, criterion: CriterionTable) -> Outcome:
 def _widened(ledger: Ledger, criterion: CriterionTable, segment: Segment, per_mm: float) -> Tolerance:
     """The tolerance with what a careful hand may miss of the vector that turns the link."""
     exact = segment.drawn(ledger.used)
-    plain = tolerances(ledger.task.tolerance(criterion), abs(exact), with_direction=False)
+    plain = tolerances(ledger.task.rubric.tolerance_of(criterion), abs(exact), with_direction=False)
     reach = ledger.following.whole_reach(segment, exact)
     wider = widened(plain, abs(exact), reach, ledger.task.rubric.hand.at_most)
     return Tolerance(value=(wider.length_mm or 0.0) * per_mm, widened=wider.widened)
@@ -89,7 +89,7 @@ def from_rate(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -
     is not known, the sense is the right one's.
     """
     own = evidence.vector(rate.vector)
-    if own is None or own.length_mm < task.rubric.tolerance.least_mm:
+    if own is None or own.length_mm < task.rubric.tolerance_of(rate.vector).least_mm:
         return None
     return _sense(task, evidence, rate) * own.length_mm * scale / own_length(task, evidence, rate)
 

@@ -13,7 +13,6 @@ from functools import lru_cache
 
 from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.limits import FULL, NONE, Limit, Mark, mark
-from grader.comparison.marking import length_tolerance
 from grader.comparison.task import SCALE_NAMES, Task, unit_of
 from grader.outcomes import Reason, UsedScale
 from grader.quantities import EXAMPLES, ByRule, ParsedScale, Refused, parse_scale
@@ -152,7 +151,7 @@ def _fitting(task: Task, evidence: Evidence, name: str, scale: float) -> int:
     vectors = [v for v in task.construction.vectors.values() if v.scale == name]
     known = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != f"{name[1]}_{task.pin}"]
     return sum(
-        _fits(drawn, abs(task.real[vector]) / scale, task.rubric.tolerance)
+        _fits(drawn, abs(task.real[vector]) / scale, task.rubric.tolerance_of(vector))
         for vector, drawn in known
         if drawn is not None
     )
@@ -162,7 +161,7 @@ def _links_at(task: Task, evidence: Evidence, scale: float) -> int:
     """How many links beside the yardstick have the right length at a scale of lengths."""
     yardstick = None if task.yardstick is None else {task.yardstick.tail, task.yardstick.head}
     return sum(
-        _fits(evidence.drawn[name], abs(task.segments[name].real) / scale, task.rubric.tolerance)
+        _fits(evidence.drawn[name], abs(task.segments[name].real) / scale, task.rubric.tolerance_of(name))
         for name, ends in task.construction.links.items()
         if name in evidence.drawn and set(ends) != yardstick
     )
@@ -170,7 +169,7 @@ def _links_at(task: Task, evidence: Evidence, scale: float) -> int:
 
 def _fits(drawn: DrawnVector, expected_mm: float, tolerance: ToleranceTable) -> bool:
     is_telling = expected_mm > tolerance.length_mm and drawn.length_mm > tolerance.length_mm
-    return is_telling and abs(drawn.length_mm - expected_mm) <= length_tolerance(tolerance, expected_mm)
+    return is_telling and abs(drawn.length_mm - expected_mm) <= tolerance.length_at(expected_mm)
 
 
 # Declared scales ----------------------------------------------------------------------------------
@@ -181,7 +180,7 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
 
     Another scale than the rule's cannot be judged where nothing was drawn: it may be the own choice.
     """
-    tolerance = task.rubric.tolerance
+    tolerance = task.rubric.tolerance_of(name)
     is_rule = abs(scale.used - rule) <= tolerance.scale_relative * rule
     witness = _witness(task, evidence, name)
     if witness is None:
@@ -198,7 +197,7 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
         what="scale",
         off=abs(real / scale.used - drawn_mm),
         tolerance=_allowed_mm(task, evidence, name, drawn_mm),
-        plain=length_tolerance(tolerance, drawn_mm),
+        plain=tolerance.length_at(drawn_mm),
         se=se_mm,
         table=tolerance,
         reason=Reason("scale_off", told),
@@ -238,14 +237,14 @@ def _is_witnessed(task: Task, evidence: Evidence, name: str, scale: float) -> bo
         return False
     expected_mm = witness[0] / scale
     off = abs(expected_mm - witness[1])
-    plain = length_tolerance(task.rubric.tolerance, expected_mm)
+    plain = task.rubric.tolerance_of(name).length_at(expected_mm)
     return off <= plain or off <= _allowed_mm(task, evidence, name, expected_mm)
 
 
 def _allowed_mm(task: Task, evidence: Evidence, name: str, expected_mm: float) -> float:
     """How far what a scale is told by may be off, with what a careful hand makes of it."""
-    table, hand = task.rubric.tolerance, task.rubric.hand
-    plain, ends = length_tolerance(table, expected_mm), _ends(task, name)
+    table, hand = task.rubric.tolerance_of(name), task.rubric.hand
+    plain, ends = table.length_at(expected_mm), _ends(task, name)
     if ends is None:
         return plain
     drawn = task.traced(task.rule_scales)

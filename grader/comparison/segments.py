@@ -49,7 +49,7 @@ class _against:  # noqa: N801 - used as a function
     """Marks a drawn vector against an expectation, as the rubric and the sheet's cells have it."""
 
     def __init__(self, ledger: Ledger, criterion: CriterionTable, drawn: DrawnVector) -> None:
-        self.table, self.drawn = ledger.task.tolerance(criterion), drawn
+        self.table, self.drawn = ledger.task.rubric.tolerance_of(criterion), drawn
         self.least, self.at_most = ledger.task.rubric.least_confidence, ledger.task.rubric.hand.at_most
         self.with_direction = criterion.direction and drawn.direction_rad is not None
         is_read = drawn is ledger.evidence.drawn.get(criterion.name)
@@ -83,7 +83,7 @@ def _is_boundless(reach: Spread, size_mm: float) -> bool:
 def _allowed(criterion: CriterionTable, ledger: Ledger, found: Found, *, with_direction: bool) -> Tolerance:
     """What full marks allow, for the report."""
     size = abs(found.expected)
-    plain = tolerances(ledger.task.tolerance(criterion), size, with_direction=with_direction)
+    plain = tolerances(ledger.task.rubric.tolerance_of(criterion), size, with_direction=with_direction)
     if found.reach is NO_SPREAD:
         return plain
     return widened(plain, size, found.reach, ledger.task.rubric.hand.at_most)

@@ -135,13 +135,15 @@ def _fitting(
     task: Task, plans: _Plans, known: Mapping[str, DrawnVector]
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
     """How many of the vectors lie within twice their tolerance, by variant."""
-    rows = [row for row, name in enumerate(plans.construction.vectors) if name in known]
-    drawn = [known[name] for name in plans.construction.vectors if name in known]
-    meant, table = plans.vectors[rows], task.rubric.tolerance
-    size, length = np.abs(meant), np.array([[one.length_mm] for one in drawn])
-    allowed = 2.0 * np.maximum(table.length_mm, table.length_relative * size)
-    along = np.array([[np.nan if one.direction_rad is None else one.direction_rad] for one in drawn])
-    turned = np.abs(np.angle(meant * np.exp(-1j * along)))
-    within = np.maximum(math.radians(table.direction_deg), table.across_mm / np.maximum(size, 1e-9))
-    fits = (np.abs(size - length) <= allowed) & ~(turned > 2.0 * within)
-    return np.asarray(fits.sum(axis=0))
+    count = np.zeros(plans.vectors.shape[1], np.int64)
+    for row, name in enumerate(plans.construction.vectors):
+        if name in known:
+            drawn, table = known[name], task.rubric.tolerance_of(name)
+            size = np.abs(plans.vectors[row])
+            fits = np.abs(size - drawn.length_mm) <= 2.0 * np.array([table.length_at(mm) for mm in size])
+            if drawn.direction_rad is not None:
+                turned = np.abs(np.angle(plans.vectors[row] * np.exp(-1j * drawn.direction_rad)))
+                across = table.across_mm / np.maximum(size, 1e-9)
+                fits &= ~(turned > 2.0 * np.maximum(math.radians(table.direction_deg), across))
+            count += fits
+    return count

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from grader.rubric import CriterionTable, RubricFile, ToleranceTable
+from grader.rubric import RubricFile, ToleranceTable
 from reference.assignment import Assignment, Variant
 from reference.construction import Construction, evaluate
 from reference.elements import Parameters
@@ -99,9 +99,15 @@ class Task:
         init=False, repr=False, compare=False, default_factory=dict
     )
 
-    def tolerance(self, criterion: CriterionTable) -> ToleranceTable:
-        """The tolerance of a criterion."""
-        return self.rubric.tolerance_of(criterion)
+    def tolerance_at(self, node: str) -> ToleranceTable:
+        """The tolerance of the place of a node: that of the vector or link asked for that ends there.
+
+        The vector from the pole comes first; where nothing asked for ends there, it is the rubric's.
+        """
+        asked = {criterion.name for criterion in self.rubric.criterion}
+        ends = [one for one in self.segments.values() if one.head == node and one.name in asked]
+        ends.sort(key=lambda one: one.tail not in self.construction.poles.values())
+        return self.rubric.tolerance_of(ends[0].name) if ends else self.rubric.tolerance
 
     @property
     def skill(self) -> Skill:

@@ -8,7 +8,7 @@ from grader.comparison.evidence import DrawnVector
 from grader.comparison.following import NO_SPREAD
 from grader.comparison.ledger import Against, Found, Ledger
 from grader.comparison.limits import Mark, the_better
-from grader.comparison.marking import length_tolerance, mark_value, tolerances, widened
+from grader.comparison.marking import mark_value, tolerances, widened
 from grader.comparison.task import unit_of
 from grader.outcomes import Outcome, Quantity, Reason, Tolerance
 from grader.rubric import CriterionTable
@@ -30,13 +30,13 @@ def mark_of_value(
     A wrong value costs only the value: what the rubric's nearest band takes. A wrong factor in all
     values of a scale costs once.
     """
-    one, table = ledger.task.segments[criterion.name], ledger.task.tolerance(criterion)
+    one, table = ledger.task.segments[criterion.name], ledger.task.rubric.tolerance_of(criterion)
     scale = ledger.used[one.scale]
     rights = [abs(one.real), abs(found.expected) * scale, drawn.length_mm * scale]
     factor = common_factor(ledger, one.scale)
     if factor is not None and _is_charged(ledger, one.scale):
         rights += [right * factor for right in rights]
-    limits = [length_tolerance(table, right / scale) * scale for right in rights]
+    limits = [table.length_at(right / scale) * scale for right in rights]
     marks = [
         mark_value(value, right, limit, limit, table, unit_of(one.name))
         for right, limit in zip(rights, limits, strict=True)
@@ -65,13 +65,13 @@ def _common_factor(ledger: Ledger, scale: str) -> float | None:
             continue
         drawn = evidence.vector(name)
         length = abs(task.drawn(name, ledger.used)) if drawn is None else drawn.length_mm
-        if length > task.rubric.tolerance.least_mm:
+        if length > task.rubric.tolerance_of(name).least_mm:
             found.append(abs(evidence.values[name]) / (length * ledger.used[scale]))
     if len(found) < SO_MANY:
         return None
     factor = statistics.median(found)
     alike = [one for one in found if abs(one - factor) <= ALIKE * factor]
-    is_off = abs(factor - 1.0) > 2.0 * task.rubric.tolerance.scale_relative
+    is_off = abs(factor - 1.0) > 2.0 * task.rubric.tolerance_of(scale).scale_relative
     return factor if is_off and len(alike) >= max(SO_MANY, len(found) - 1) else None
 
 
@@ -93,7 +93,7 @@ def value_alone(ledger: Ledger, criterion: CriterionTable) -> Outcome:
     value, unit = abs(values[one.name]), unit_of(one.name)
 
     def allowed(expected: complex, reach: Spread) -> Tolerance:
-        plain = tolerances(ledger.task.tolerance(criterion), abs(expected), with_direction=False)
+        plain = tolerances(ledger.task.rubric.tolerance_of(criterion), abs(expected), with_direction=False)
         if reach is NO_SPREAD:
             return Tolerance(value=(plain.length_mm or 0.0) * scale)
         wider = widened(plain, abs(expected), reach, ledger.task.rubric.hand.at_most)
@@ -101,8 +101,8 @@ def value_alone(ledger: Ledger, criterion: CriterionTable) -> Outcome:
 
     def against(expected: complex, reach: Spread = NO_SPREAD, se: Spread = NO_SPREAD) -> Mark:
         del se
-        limit, table = allowed(expected, reach).value or 0.0, ledger.task.tolerance(criterion)
-        plain = length_tolerance(table, abs(expected)) * scale
+        limit, table = allowed(expected, reach).value or 0.0, ledger.task.rubric.tolerance_of(criterion)
+        plain = table.length_at(abs(expected)) * scale
         return mark_value(value, abs(expected) * scale, limit, plain, table, unit)
 
     follows = ledger.task.rubric.follows_through(criterion)

@@ -2,7 +2,6 @@
 
 from grader.comparison.evidence import DrawnVector
 from grader.comparison.limits import FULL, NONE, Mark, open_between
-from grader.comparison.marking import length_tolerance
 from grader.outcomes import Reason
 from grader.rubric import ToleranceTable
 
@@ -25,7 +24,7 @@ def held_against_written(
     if written is None or written[1] < least:
         return mark
     length_mm = written[0]
-    allowed = length_tolerance(tolerance, length_mm) + tolerance.certain_errors * drawn.se_mm
+    allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
     if abs(drawn.length_mm - length_mm) <= allowed:
         return mark
     told: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from grader.comparison import compare
-from grader.comparison.marking import direction_tolerance, length_tolerance
 from reference.mistakes import Drawing, affected, single_mistakes
 from samples.simulation import PERFECT, TYPICAL
 from tests.hands import SOURCES, drawn_by, drawn_nodes, handed_in, task_for
@@ -54,7 +53,7 @@ def is_hidden(task, nodes, wrong):
     for vector in task.construction.vectors.values():
         if vector.head in wrong:
             exact, own = (abs(places[vector.head] - places[vector.tail]) for places in (right, nodes))
-            if abs(own - exact) > length_tolerance(task.rubric.tolerance, exact):
+            if abs(own - exact) > task.rubric.tolerance.length_at(exact):
                 return False
     return True
 
@@ -89,8 +88,8 @@ def is_clear(task, mistake):
         exact, own = (places[vector.head] - places[vector.tail] for places in (right, wrong))
         if vector.head != mistake.at or abs(exact) < table.least_mm or abs(own) < table.least_mm:
             continue
-        turn = direction_tolerance(table, abs(exact)) or 0.0
-        if abs(abs(own) - abs(exact)) > CLEAR * length_tolerance(table, abs(exact)):
+        turn = table.direction_at(abs(exact)) or 0.0
+        if abs(abs(own) - abs(exact)) > CLEAR * table.length_at(abs(exact)):
             return True
         if abs(np.degrees(np.angle(own / exact))) > CLEAR * turn:
             return True

@@ -6,7 +6,6 @@ from dataclasses import replace
 import pytest
 
 from grader.comparison import Submission, task_of
-from grader.comparison.marking import direction_tolerance, length_tolerance
 from grader.judging import judge
 from grader.rubric import HandTable, rubric_of
 from reference.assignment import built_in, load_assignment
@@ -48,12 +47,12 @@ def perturbations(task, share):
     for criterion in task.rubric.criterion:
         if criterion.vector is None:
             continue
-        tolerance = task.tolerance(criterion)
+        tolerance = task.rubric.tolerance_of(criterion)
         drawn = next(
             f.vectors[criterion.vector] for f in reading.figures.values() if criterion.vector in f.vectors
         )
-        step = share * length_tolerance(tolerance, drawn.length_mm)
-        turn = direction_tolerance(tolerance, drawn.length_mm)
+        step = share * tolerance.length_at(drawn.length_mm)
+        turn = tolerance.direction_at(drawn.length_mm)
         for sign in (1.0, -1.0):
             if drawn.length_mm + sign * step >= 0.0:
                 yield (

@@ -38,6 +38,8 @@ def lost(comparison):
 
 
 BARE = without_hand(PUMP)
+UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
+DECLARED = {name: f"{value!r} {UNITS[name]}" for name, value in rule_scales(PUMP).items()}
 
 
 # The original data --------------------------------------------------------------------------------
@@ -628,6 +630,51 @@ def test_a_criterion_may_have_its_own_tolerance():
     comparison = compare(task, Submission(measured=changed(reading, "a_BA_t", length_mm=length + 4.0)))
     assert outcome_of(comparison, "a_BA_t").verdict == "full"
     assert isinstance(task.rubric.criterion[0], CriterionTable)
+
+
+OWN_TOLERANCES = [
+    (Mistake("wrong_link", "b", 1, other=("C", "D")),),
+    (Mistake("normal_missing", "n_BA"), Mistake("sense_reversed", "a")),
+    (Mistake("scale_wrong", "kv", factor=1.3),),
+    (Mistake("figure_rotated", "velocity_plan", quarters=1),),
+    (),
+]
+
+
+@pytest.mark.parametrize("mistakes", OWN_TOLERANCES)
+@pytest.mark.parametrize("source", ["sheet", "directions"])
+def test_nothing_asks_for_the_rubrics_tolerance_where_every_criterion_has_its_own(mistakes, source):
+    usual = PUMP.rubric.tolerance
+    unlike = ToleranceTable(length_mm=25.0, direction_deg=40.0, least_mm=30.0, scale_relative=0.6)
+    asked = {one.name: one for one in PUMP.rubric.criterion}
+    template = PUMP.rubric.criterion[0].model_dump() | {"vector": None, "link": None, "scale": None}
+    names = {
+        "vector": PUMP.construction.vectors,
+        "link": PUMP.construction.links,
+        "scale": ("kL", "kv", "ka"),
+    }
+    unasked = [
+        CriterionTable.model_validate({**template, "id": f"also_{name}", kind: name, "optional": True})
+        for kind, each in names.items()
+        for name in each
+        if name not in asked
+    ]
+    same = with_rubric(PUMP, criterion=[*PUMP.rubric.criterion, *unasked])
+    each = [one.model_copy(update={"tolerance": usual}) for one in same.rubric.criterion]
+    own = with_rubric(same, criterion=each, tolerance=unlike)
+    if source == "sheet":
+        handed_in = Submission(readings=(sheet(PUMP, mistakes=mistakes),), declared=DECLARED)
+    else:
+        handed_in = Submission(measured=measured(PUMP, mistakes=mistakes), declared=DECLARED)
+    assert compare(own, handed_in).outcomes == compare(same, handed_in).outcomes
+
+
+def test_a_scale_with_a_tolerance_of_its_own_is_held_against_the_drawing_by_it():
+    drawn = measured(PUMP, scales={**rule_scales(PUMP), "kv": rule_scales(PUMP)["kv"] / 1.05})
+    handed_in = Submission(measured=drawn, declared=DECLARED)
+    assert outcome_of(compare(BARE, handed_in), "kv").verdict != "full"
+    wide = PUMP.rubric.tolerance.model_copy(update={"length_relative": 0.08})
+    assert outcome_of(compare(with_criterion(BARE, "kv", tolerance=wide), handed_in), "kv").verdict == "full"
 
 
 # Readings that lack something ---------------------------------------------------------------------
