@@ -5,9 +5,10 @@ from dataclasses import replace
 
 from grader.comparison import Comparison, Sketch, Submission, Task, compare, task_of
 from grader.diagnosis import LEAST_CONFIDENCE, diagnose
-from grader.outcomes import Judgement, Mistake, Outcome
+from grader.outcomes import Judgement, NamedMistake, Outcome
 from grader.scoring import score
 from grader.witness import case_of
+from reference.mistakes import Mistake
 
 __all__ = ["Submission", "Task", "judge", "task_of"]
 
@@ -28,10 +29,10 @@ def judge(task: Task, submission: Submission) -> Judgement:
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
 
 
-def _swaps_seen(task: Task, submission: Submission, known: Sequence[Mistake]) -> list[Mistake]:
+def _swaps_seen(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:
     """Letters seen at each other's node on a sheet: lines tell nothing of them, so diagnosis cannot."""
     vectors = task.construction.vectors
-    told = {(one.detail["first"], one.detail["second"]) for one in known if one.code == "labels_swapped"}
+    told = {one.mistake.other for one in known if one.code == "labels_swapped"}
     found = []
     for swap in (swap for reading in submission.readings for swap in reading.swapped):
         pair = swap.first, swap.second
@@ -43,12 +44,12 @@ def _swaps_seen(task: Task, submission: Submission, known: Sequence[Mistake]) ->
             for one in task.rubric.criterion
             if one.name in vectors and {vectors[one.name].tail, vectors[one.name].head} & set(pair)
         )
-        detail = {"first": swap.first, "second": swap.second}
-        found.append(Mistake("labels_swapped", swap.first, explains, swap.confidence, detail))
+        mistake = Mistake("labels_swapped", swap.first, other=pair)
+        found.append(NamedMistake(mistake, explains, swap.confidence))
     return found
 
 
-def _not_drawn(task: Task, comparison: Comparison) -> list[Mistake]:
+def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
     """Vectors that are asked for, long enough, and not on the sheet although both their ends were read.
 
     What was not measured says nothing: nobody need measure everything.
@@ -62,7 +63,8 @@ def _not_drawn(task: Task, comparison: Comparison) -> list[Mistake]:
             continue
         is_left_out = {vector.tail, vector.head} <= known
         if is_left_out and (one.expected.length_mm or 0.0) >= LEAST_LEFT_OUT_MM:
-            found.append(Mistake("vector_missing", one.name, (one.criterion,), LEFT_OUT))
+            mistake = Mistake("vector_missing", one.name)
+            found.append(NamedMistake(mistake, (one.criterion,), LEFT_OUT))
     return found
 
 
@@ -72,7 +74,7 @@ LEFT_OUT = 0.9
 """How sure it is: of 368 vectors drawn between two ends read for certain, none was overlooked."""
 
 
-def _with_mistake(outcome: Outcome, mistakes: Sequence[Mistake]) -> Outcome:
+def _with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
     """The outcome with the mistake that explains its loss."""
     if outcome.verdict not in {"none", "partial"}:
         return outcome

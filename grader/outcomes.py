@@ -1,6 +1,6 @@
 """What judging a submission leaves behind: structured, without a word in any language.
 
-`comparison` makes an `Outcome` per rubric criterion, `diagnosis` a `Mistake` per explanation,
+`comparison` makes an `Outcome` per rubric criterion, `diagnosis` a `NamedMistake` per explanation,
 `scoring` the points; `feedback` turns the `Reason`s into sentences in the student's language.
 
 Codes of reasons, with their parameters (numbers in mm, degrees or SI; names as in the assignment):
@@ -40,6 +40,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from grader.documents import Verdict
+from reference.mistakes import Mistake
 
 Param = float | str
 
@@ -112,23 +113,60 @@ class Outcome:
     reasons: tuple[Reason, ...]
     possible: tuple[Verdict, Verdict]
     mistake: str | None = None
-    cause: "Mistake | None" = None
+    cause: "NamedMistake | None" = None
     shares: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Mistake:
-    """An explanation of what is off: code of the contract, where, which criteria it explains.
+class NamedMistake:
+    """A mistake that is named to a student, because it explains what is off.
 
-    `rivals` explain it nearly as well: what was handed in (lengths alone, say) does not tell them apart.
+    Attributes
+    ----------
+    mistake : what was done instead of the right thing
+    explains : the criteria that lost by it
+    confidence : the probability that it was made
+    line : where a line was drawn wrongly: ``from`` a node, the ``link`` that gives its direction, and
+        ``line = guide`` where it follows a guide
+    rivals : mistakes that explain it nearly as well: what was handed in (lengths alone, say) does not tell
+        them apart
     """
 
-    code: str
-    at: str
+    mistake: Mistake
     explains: tuple[str, ...]
     confidence: float
-    detail: Mapping[str, Param] = field(default_factory=dict)
-    rivals: "tuple[Mistake, ...]" = ()
+    line: Mapping[str, str] = field(default_factory=dict)
+    rivals: "tuple[NamedMistake, ...]" = ()
+
+    @property
+    def code(self) -> str:
+        """The code of the contract."""
+        return self.mistake.code
+
+    @property
+    def at(self) -> str:
+        """The node, vector, scale or figure that it was made at."""
+        return self.mistake.at
+
+    @property
+    def detail(self) -> dict[str, Param]:
+        """What is known of it beside code and place, by the names that reports and sentences use."""
+        return {**_detail(self.mistake), **self.line}
+
+
+def _detail(mistake: Mistake) -> dict[str, Param]:
+    match mistake:
+        case Mistake(code="scale_wrong" | "rpm_not_converted" | "arithmetic", factor=factor):
+            return {} if factor == 1.0 else {"factor": factor}
+        case Mistake(code="labels_swapped", other=(first, second)):
+            return {"first": first, "second": second}
+        case Mistake(code="other_variant", n=n, position=position):
+            return {key: value for key, value in (("n", n), ("position", position)) if value is not None}
+        case Mistake(code="figure_rotated", quarters=quarters) if quarters:
+            return {"degrees": 90.0 * quarters}
+        case Mistake(other=other) if other:
+            return {"other": "".join(other)}
+    return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +212,7 @@ class Judgement:
     """Everything that marking one submission found."""
 
     outcomes: tuple[Outcome, ...]
-    mistakes: tuple[Mistake, ...]
+    mistakes: tuple[NamedMistake, ...]
     scales: Mapping[str, UsedScale]
     score: Score
 

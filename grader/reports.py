@@ -16,7 +16,7 @@ from grader.documents import (
     Status,
     ToleranceDocument,
 )
-from grader.outcomes import Judgement, Mistake, Outcome, Quantity
+from grader.outcomes import Judgement, NamedMistake, Outcome, Quantity
 from grader.records import Problem
 from grader.rubric import RubricFile
 from reference.assignment import Assignment, Variant
@@ -140,7 +140,7 @@ def _quantity(one: Quantity) -> QuantityDocument:
     )
 
 
-def _mistake(one: Mistake) -> MistakeDocument:
+def _mistake(one: NamedMistake) -> MistakeDocument:
     return MistakeDocument(
         code=one.code,
         at=one.at,
@@ -154,7 +154,7 @@ def _mistake(one: Mistake) -> MistakeDocument:
     )
 
 
-def _detail(one: Mistake) -> str:
+def _detail(one: NamedMistake) -> str:
     return ", ".join(
         f"{key} = {value:.6g}" if isinstance(value, float) else f"{key} = {value}"
         for key, value in one.detail.items()

@@ -10,7 +10,7 @@ from typing import Literal
 
 from grader.comparison import Submission, Task
 from grader.judging import judge
-from grader.outcomes import Judgement, Mistake, Outcome, Quantity, Reason, Tolerance
+from grader.outcomes import Judgement, NamedMistake, Outcome, Quantity, Reason, Tolerance
 
 Level = Literal["symbol", "hint", "full"]
 LEVELS: tuple[Level, ...] = ("symbol", "hint", "full")
@@ -52,7 +52,7 @@ def told(judgement: Judgement, level: Level) -> tuple[Checked, ...]:
     return tuple(_checked(one, level) for one in judgement.outcomes if _is_handed_in(one))
 
 
-def likely_mistakes(judgement: Judgement, level: Level) -> tuple[Mistake, ...]:
+def likely_mistakes(judgement: Judgement, level: Level) -> tuple[NamedMistake, ...]:
     """The mistakes that explain what is off, at level `full`."""
     return judgement.mistakes if level == "full" else ()
 

@@ -10,7 +10,7 @@ from grader.feedback.sentences import mistake_feedback, reason_sentence
 from grader.i18n import Tongue, tongue
 from grader.judging import Submission, judge, task_of
 from grader.measurements import Measurements, names_of, read_measurements
-from grader.outcomes import Mistake, Quantity
+from grader.outcomes import NamedMistake, Quantity
 from grader.rubric import RubricFile, rubric_of
 from grader.selfcheck import LEVELS, Checked, Level, is_all_right, likely_mistakes, told
 from reference.assignment import Assignment, Variant, load_assignment
@@ -134,7 +134,7 @@ def _tell(
 
 
 def _tell_mistakes(
-    console: Console, mistakes: tuple[Mistake, ...], lang: str, assignment: Assignment
+    console: Console, mistakes: tuple[NamedMistake, ...], lang: str, assignment: Assignment
 ) -> None:
     for mistake in mistakes:
         sentences = mistake_feedback(mistake, lang, "full", assignment.file.names)

@@ -17,10 +17,9 @@ import numpy as np
 
 from grader.diagnosis.case import Case
 from grader.diagnosis.telling import SCALES, told
-from grader.outcomes import Mistake
+from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
-from reference import mistakes as operators
-from reference.mistakes import Drawing
+from reference.mistakes import Drawing, Mistake, commit
 from reference.parameters import parameters_of
 from reference.replay import RARITY, Account, Root, Work, replay
 
@@ -54,7 +53,7 @@ class Diagnosis:
     wrong : the nodes at which it is wrong, or the mechanism; none where it is the right one
     """
 
-    mistakes: tuple[Mistake, ...] = ()
+    mistakes: tuple[NamedMistake, ...] = ()
     drawn: Drawing | None = None
     wrong: frozenset[str] = frozenset()
 
@@ -78,13 +77,13 @@ def diagnose(case: Case) -> Diagnosis:
     return Diagnosis(mistakes, _with(certain, case.drawing), frozenset(wrong))
 
 
-def _with(mistakes: Sequence[operators.Mistake], drawing: Drawing) -> Drawing:
+def _with(mistakes: Sequence[Mistake], drawing: Drawing) -> Drawing:
     """A drawing with mistakes in it, at its own scales."""
     for one in mistakes:
         if one.code == "other_variant":
             drawing = Drawing(drawing.construction, {**drawing.parameters, **one.parameters})
         else:
-            drawing = operators.commit(one, drawing)
+            drawing = commit(one, drawing)
     return drawing
 
 
@@ -144,7 +143,7 @@ def _other_scales(case: Case) -> Iterator[Root]:
         name: float(case.drawing.parameters[name]) / followed for name, followed in case.followed.items()
     }
     made = tuple(
-        operators.Mistake("scale_wrong", name, factor=factor)
+        Mistake("scale_wrong", name, factor=factor)
         for name, factor in factors.items()
         if abs(math.log(factor)) > LEAST_WRONG
     )
@@ -165,7 +164,7 @@ def _of_the_whole(case: Case) -> Iterator[Root]:
     """A plan turned as a whole; another variant's data."""
     for plan in case.drawing.construction.poles:
         for quarters in (1, 2, 3):
-            turned = operators.Mistake("figure_rotated", plan, quarters=quarters)
+            turned = Mistake("figure_rotated", plan, quarters=quarters)
             yield Root((turned,), turned={plan: 1j**quarters}, cost=RARITY["figure_rotated"])
     yield from _other_variants(case)
 
@@ -183,13 +182,13 @@ def _other_variants(case: Case) -> Iterator[Root]:
     for index, variant in enumerate(variants):
         if variant != case.variant and table:
             parameters = {name: np.asarray(value[index]) for name, value in table.items()}
-            other = operators.Mistake(
+            other = Mistake(
                 "other_variant", "mechanism", n=variant.n, position=variant.position, parameters=parameters
             )
             yield Root((other,), parameters, cost=RARITY["other_variant"])
 
 
-def _swaps(drawing: Drawing, account: Account) -> Iterator[operators.Mistake]:
+def _swaps(drawing: Drawing, account: Account) -> Iterator[Mistake]:
     """Two images of a plan with each other's letters, both of which are off by the likeliest account."""
     construction = drawing.construction
     off = {*account.unexplained, *(mistake.at for mistake in account.made)}
@@ -199,7 +198,7 @@ def _swaps(drawing: Drawing, account: Account) -> Iterator[operators.Mistake]:
         )
         for pair in combinations(images, 2):
             if off >= set(pair):
-                yield operators.Mistake("labels_swapped", pair[0], other=pair)
+                yield Mistake("labels_swapped", pair[0], other=pair)
 
 
 def _renamed(work: Work, pair: tuple[str, ...]) -> Work:

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from grader.diagnosis.case import Case
-from grader.outcomes import Mistake
-from reference import mistakes as operators
+from grader.outcomes import NamedMistake
 from reference.construction import Construction
 from reference.elements import Along, Line
+from reference.mistakes import RPM_FACTOR, Mistake, affected
 from reference.replay import Account
 from reference.steps import Step, TwoLines
 
@@ -27,7 +28,7 @@ SCALES = frozenset({"kL", "kv", "ka"})
 Key = tuple[str, str]
 
 
-def told(accounts: Sequence[Account], case: Case, least: float) -> tuple[Mistake, ...]:
+def told(accounts: Sequence[Account], case: Case, least: float) -> tuple[NamedMistake, ...]:
     """The mistakes of the likeliest account that are sure enough, in the order of construction."""
     if not accounts:
         return ()
@@ -49,11 +50,11 @@ def told(accounts: Sequence[Account], case: Case, least: float) -> tuple[Mistake
     return tuple(found)
 
 
-def _key(mistake: operators.Mistake) -> Key:
+def _key(mistake: Mistake) -> Key:
     return mistake.code, mistake.at
 
 
-def _is_slight(mistake: operators.Mistake, account: Account) -> bool:
+def _is_slight(mistake: Mistake, account: Account) -> bool:
     """Whether the step that it was made at is not far off: nothing that a hand could not do."""
     if mistake.code in OF_THE_WHOLE:
         return False
@@ -80,7 +81,7 @@ class _Shares:
         """Of another mistake without the first."""
         return sum(weight for made, weight in self._accounts if other in made and key not in made)
 
-    def rivals(self, key: Key, best: set[Key]) -> list[operators.Mistake]:
+    def rivals(self, key: Key, best: set[Key]) -> list[Mistake]:
         """The mistakes that stand in a mistake's place elsewhere, the likeliest first."""
         others = {name: one for made, _ in self._accounts if key not in made for name, one in made.items()}
         likely = [name for name in others if name not in best and self.instead(key, name) >= LEAST_RIVAL]
@@ -88,21 +89,21 @@ class _Shares:
         return [others[name] for name in likely[:MOST_RIVALS]]
 
 
-def _in_order(made: Sequence[operators.Mistake], construction: Construction) -> list[operators.Mistake]:
+def _in_order(made: Sequence[Mistake], construction: Construction) -> list[Mistake]:
     """Mistakes of the whole first, then step by step."""
     order = [step.node for step in construction.steps]
     return sorted(made, key=lambda one: order.index(one.at) if one.at in order else -1)
 
 
-def _explained(account: Account, case: Case) -> dict[operators.Mistake, list[str]]:
+def _explained(account: Account, case: Case) -> dict[Mistake, list[str]]:
     """Which of the criteria lost each mistake explains: the nearest one before it in the construction."""
     construction = case.drawing.construction
     made = _in_order(account.made, construction)
-    explains: dict[operators.Mistake, list[str]] = {
+    explains: dict[Mistake, list[str]] = {
         mistake: [name for scale, name in case.scale_criteria.items() if _is_about(mistake, scale)]
         for mistake in made
     }
-    reach = {mistake: operators.affected(mistake, construction) for mistake in made}
+    reach = {mistake: affected(mistake, construction) for mistake in made}
     for name, criterion in case.lost.items():
         vector = construction.vectors[name]
         if vector.head in account.unexplained:
@@ -116,7 +117,7 @@ def _explained(account: Account, case: Case) -> dict[operators.Mistake, list[str
     return explains
 
 
-def _touches(mistake: operators.Mistake, scale: str, ends: set[str], reach: frozenset[str]) -> bool:
+def _touches(mistake: Mistake, scale: str, ends: set[str], reach: frozenset[str]) -> bool:
     if mistake.at in SCALES:
         return mistake.at in {scale, "kL"}
     if mistake.code == "labels_swapped":
@@ -124,7 +125,7 @@ def _touches(mistake: operators.Mistake, scale: str, ends: set[str], reach: froz
     return bool(ends & reach)
 
 
-def _is_about(mistake: operators.Mistake, scale: str) -> bool:
+def _is_about(mistake: Mistake, scale: str) -> bool:
     return mistake.at == scale or mistake.code == "other_variant"
 
 
@@ -132,37 +133,23 @@ def _is_about(mistake: operators.Mistake, scale: str) -> bool:
 
 
 def _record(
-    operator: operators.Mistake,
+    mistake: Mistake,
     case: Case,
     explains: tuple[str, ...],
     confidence: float,
-    rivals: tuple[Mistake, ...] = (),
-) -> Mistake:
-    detail: dict[str, float | str] = {}
-    code = operator.code
-    match operator:
-        case operators.Mistake(code="scale_wrong", at=scale):
-            detail["factor"] = operator.factor
-            code = _code_of_scale(scale, operator.factor)
-        case operators.Mistake(code="arithmetic", factor=factor):
-            detail["factor"] = factor
-        case operators.Mistake(code="labels_swapped", other=(first, second)):
-            detail |= {"first": first, "second": second}
-        case operators.Mistake(code="other_variant"):
-            detail |= {key: n for key in ("n", "position") if (n := getattr(operator, key)) is not None}
-        case operators.Mistake(code="figure_rotated", quarters=quarters):
-            detail["degrees"] = 90.0 * quarters
-        case operators.Mistake(other=other) if other:
-            detail["other"] = "".join(other)
-    if code in LINE_MISTAKES:
-        detail |= _line_told(case.drawing.construction.step(operator.at), operator.slot)
-    return Mistake(code, operator.at, explains, min(confidence, 1.0), detail, rivals)
+    rivals: tuple[NamedMistake, ...] = (),
+) -> NamedMistake:
+    if mistake.code == "scale_wrong":
+        mistake = replace(mistake, code=_code_of_scale(mistake.at, mistake.factor))
+    is_line = mistake.code in LINE_MISTAKES
+    line = _line_of(case.drawing.construction.step(mistake.at), mistake.slot) if is_line else {}
+    return NamedMistake(mistake, explains, min(confidence, 1.0), line, rivals)
 
 
 LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
 
 
-def _line_told(step: Step, slot: int) -> dict[str, str]:
+def _line_of(step: Step, slot: int) -> dict[str, str]:
     """Which line of a step it is: where it starts, the link that gives its direction, if a guide does."""
     line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None
     if not isinstance(line, Line):
@@ -178,5 +165,5 @@ def _line_told(step: Step, slot: int) -> dict[str, str]:
 
 def _code_of_scale(name: str, factor: float) -> str:
     powers = {"kv": 1, "ka": 2}
-    rpm = operators.RPM_FACTOR ** powers.get(name, 0)
+    rpm = RPM_FACTOR ** powers.get(name, 0)
     return "rpm_not_converted" if name in powers and abs(factor / rpm - 1.0) <= RPM_WITHIN else "scale_wrong"

@@ -12,7 +12,7 @@ from typing import Literal
 from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, words_of
 from grader.feedback.reasons import told_reason
 from grader.i18n import N_, Tongue, tongue
-from grader.outcomes import Mistake, Outcome, Param, Reason
+from grader.outcomes import NamedMistake, Outcome, Param, Reason
 
 Level = Literal["symbol", "hint", "full"]
 
@@ -163,7 +163,7 @@ OR = N_("or:")
 
 
 def mistake_feedback(
-    mistake: Mistake, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
+    mistake: NamedMistake, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
 ) -> str:
     """What was done, most likely, and what to redo; empty at level `symbol` and for an unknown code.
 
@@ -180,7 +180,9 @@ def mistake_feedback(
     return " ".join((told, speaker.gettext(RIVALS), *(f"{speaker.gettext(OR)} {one}" for one in others)))
 
 
-def one_mistake(mistake: Mistake, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES) -> str:
+def one_mistake(
+    mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
+) -> str:
     """What was done and what to redo, whatever its rivals."""
     words = words_of(mistake.code, mistake.at, line_of(mistake))
     where = {"at": place(mistake.at, speaker, names)}
@@ -189,7 +191,7 @@ def one_mistake(mistake: Mistake, speaker: Tongue, level: Level, names: Mapping[
     return f"{speaker.gettext(what) % known} {speaker.gettext(words.redo) % where}"
 
 
-def _known(mistake: Mistake, speaker: Tongue, level: Level, names: Mapping[str, str]) -> dict[str, str]:
+def _known(mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str]) -> dict[str, str]:
     """What is known of a mistake, in words; numbers only where they may be told."""
     told = {
         key: speaker.trimmed(value, 3) if isinstance(value, float) else names.get(str(value), str(value))
@@ -209,7 +211,7 @@ _IMAGE, ACCELERATED = re.compile("[a-z][0-9]?'?"), "'"
 """How the images of joints are named in the plans, and those in the acceleration plan."""
 
 
-def line_of(mistake: Mistake) -> str:
+def line_of(mistake: NamedMistake) -> str:
     """Which kind of line it was made in, as `words_of` takes it; empty where the code says enough."""
     return str(mistake.detail.get("line", ""))
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from grader.documents import MistakeDocument, ReportDocument, RivalDocument
 from grader.feedback.sentences import Level, one_mistake
 from grader.i18n import Tongue, tongue
-from grader.outcomes import Judgement, Mistake
+from grader.outcomes import Judgement, NamedMistake
 from grader.plan_steps.redoing import redo
 from grader.plan_steps.words import wording_of
 from reference.assignment import Assignment, Variant
@@ -44,7 +44,7 @@ def with_mistakes_told(
 
 
 def _rivals(
-    document: MistakeDocument, mistake: Mistake, speaker: Tongue, level: Level, names: Mapping[str, str]
+    document: MistakeDocument, mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str]
 ) -> list[RivalDocument]:
     return [
         rival.model_copy(update={"feedback": one_mistake(one, speaker, level, names)})
@@ -59,7 +59,7 @@ def _subject(judgement: Judgement, assignment: Assignment, variant: Variant, spe
     return Subject(assignment, plan, 0, wording_of(speaker))
 
 
-def _redo(subject: Subject, mistake: Mistake, speaker: Tongue, level: Level) -> list[str]:
+def _redo(subject: Subject, mistake: NamedMistake, speaker: Tongue, level: Level) -> list[str]:
     """The steps from the mistake on; none where there is no single step that it was made at."""
     vectors = subject.plan.construction.vectors
     node = vectors[mistake.at].head if mistake.at in vectors else mistake.at

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from grader.outcomes import Mistake as Named
+from grader.outcomes import NamedMistake as Named
 from reference.construction import Construction
 from reference.mistakes import Mistake
 from tests.bench.judging_redrawn import Asked, is_same, meant, vectors_of

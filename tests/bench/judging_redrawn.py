@@ -1,11 +1,11 @@
 """A drawing with any mistakes in it, by a perfect hand: what a mistake looks like, and what looks like it."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.outcomes import Mistake as Named
+from grader.outcomes import NamedMistake as Named
 from reference.assignment import Assignment, Variant
 from reference.construction import evaluate
 from reference.mistakes import RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
@@ -68,38 +68,32 @@ class Asked:
 
 
 def meant(asked: Asked, named: Named) -> Iterator[Mistake]:
-    """What a mistake named in a report may mean: every operator that fits what is told."""
-    told, code, at = named.detail, named.code, named.at
-    construction = asked.right.construction
-    match code:
-        case "labels_swapped":
-            yield Mistake(code, at, other=(str(told.get("first", "")), str(told.get("second", ""))))
+    """What a mistake named in a report may mean: itself, in whichever line of its step it was made.
+
+    A factor is told from either side.
+    """
+    mistake = named.mistake
+    match mistake.code:
+        case "vector_missing" | "labels_swapped" | "figure_rotated":
+            yield mistake
         case "other_variant":
-            yield from _other_variant(asked, named)
-        case "figure_rotated":
-            yield Mistake(code, at, quarters=round(float(told.get("degrees", 0.0)) / 90.0) % 4)
-        case "vector_missing" | "rpm_not_converted":
-            yield Mistake(code, at, factor=RPM_FACTOR)
-        case "scale_wrong" | "arithmetic":
-            factor = float(told.get("factor", 0.5 if code == "arithmetic" else 1.0))
-            yield from (Mistake(code, at, factor=one) for one in (factor, 1.0 / factor if factor else 0.0))
+            yield from _other_variant(asked, mistake)
+        case "scale_wrong" | "rpm_not_converted" | "arithmetic":
+            yield from (replace(mistake, factor=one) for one in (mistake.factor, 1.0 / mistake.factor))
         case _:
-            other = told.get("other")
-            for figure in construction.figures:
+            for figure in asked.right.construction.figures:
                 for one in single_mistakes(asked.right, figure):
-                    fits = other is None or not one.other or "".join(one.other) == other
-                    if one.code == code and one.at == at and fits:
+                    if (one.code, one.at, one.other) == (mistake.code, mistake.at, mistake.other):
                         yield one
 
 
-def _other_variant(asked: Asked, named: Named) -> Iterator[Mistake]:
-    n, position = (named.detail.get(name) for name in ("n", "position"))
-    other = Variant(None if n is None else int(n), None if position is None else int(position))
+def _other_variant(asked: Asked, named: Mistake) -> Iterator[Mistake]:
+    other = Variant(named.n, named.position)
     if other == asked.variant or other not in asked.assignment.variants():
         return
     scales = asked.assignment.scales([other])
     parameters = parameters_of(asked.assignment.mechanism([other]), scales.kL, scales.kv, scales.ka)
-    yield Mistake("other_variant", "n", n=other.n, position=other.position, parameters=scalars(parameters))
+    yield replace(named, parameters=scalars(parameters))
 
 
 def is_same(made: Mistake, named: Named) -> bool:
@@ -108,13 +102,11 @@ def is_same(made: Mistake, named: Named) -> bool:
         return False
     match made.code:
         case "labels_swapped":
-            return set(made.other) == {named.detail.get("first"), named.detail.get("second")}
+            return set(made.other) == set(named.mistake.other)
         case "other_variant":
-            told = named.detail.get("n"), named.detail.get("position")
-            return told == (made.n, made.position)
+            return (named.mistake.n, named.mistake.position) == (made.n, made.position)
         case "rpm_not_converted":
             return True
         case "figure_rotated":
-            degrees = float(named.detail.get("degrees", 0.0))
-            return made.at == named.at and round(degrees / 90.0) % 4 == made.quarters % 4
+            return made.at == named.at and named.mistake.quarters % 4 == made.quarters % 4
     return made.at == named.at

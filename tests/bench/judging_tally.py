@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from grader.judging import Submission
-from grader.outcomes import Judgement, Mistake
+from grader.outcomes import Judgement, NamedMistake
 from reference import mistakes as operators
 from tests.bench.judging_naming import Made, first_of, is_named, mistakes_due
 from tests.bench.judging_rules import Due, Seen
@@ -60,12 +60,12 @@ class Result:
     source: Source
     criteria: tuple[Marked, ...]
     made: tuple[operators.Mistake, ...]
-    mistakes: tuple[Mistake, ...]
+    mistakes: tuple[NamedMistake, ...]
     first: operators.Mistake | None
     named: bool
     surest: bool
     among_rivals: bool
-    not_made: tuple[Mistake, ...]
+    not_made: tuple[NamedMistake, ...]
     unpunished: bool
 
     @property
@@ -100,7 +100,7 @@ def told(mistake: operators.Mistake) -> str:
     return " ".join([mistake.code, mistake.at, *(f"{name}={value}" for name, value in differ)])
 
 
-def _named(mistake: Mistake) -> str:
+def _named(mistake: NamedMistake) -> str:
     detail = " ".join(f"{name}={value}" for name, value in mistake.detail.items())
     rivals = f" or {len(mistake.rivals)} rivals" if mistake.rivals else ""
     return f"{mistake.code} {mistake.at} {detail} {mistake.confidence:.2f}{rivals}"
@@ -119,7 +119,7 @@ def result_of(work: Work, source: Source, handed_in: Submission, judgement: Judg
         made.append(Made(operators.Mistake("arithmetic", told.slip, factor=told.factor), math.inf))
     first = first_of(made)
 
-    def names(mistake: Mistake, one: operators.Mistake) -> bool:
+    def names(mistake: NamedMistake, one: operators.Mistake) -> bool:
         if told.slip is not None:
             return mistake.code == one.code and one.at in {mistake.at, *mistake.explains}
         return is_named(work, source, seen, one, mistake)

@@ -23,7 +23,7 @@ def mistakes(task, *swapped: Swapped):
 def test_letters_seen_at_each_others_node_are_a_mistake_of_all_vectors_that_end_there(task):
     (found,) = mistakes(task, Swapped(VELOCITY_PLAN, "b", "c", SEEN))
     assert (found.code, found.at, found.confidence) == ("labels_swapped", "b", SEEN)
-    assert (found.detail["first"], found.detail["second"]) == ("b", "c")
+    assert found.mistake.other == ("b", "c")
     named = {one.name for one in task.rubric.criterion if one.id in found.explains}
     assert {"v_B", "v_C"} <= named
     assert not named & {"v_A", "v_D", "a_B"}

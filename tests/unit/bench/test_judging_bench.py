@@ -8,7 +8,7 @@ import pytest
 
 from grader.authoring.lint import lint
 from grader.judging import judge, task_of
-from grader.outcomes import Mistake as Named
+from grader.outcomes import NamedMistake as Named
 from grader.records import Reading
 from reference.mistakes import Mistake, commit
 from samples.simulation.hand import draw
@@ -178,7 +178,7 @@ def test_a_wrong_assembly_is_charged_on_the_sketch_or_else_where_the_plan_first_
 
 
 def test_of_another_students_data_the_crank_is_charged_or_else_the_first_vector_and_the_rest_follows():
-    named = Named("other_variant", "mechanism", (), 1.0, {"position": 3})
+    named = Named(Mistake("other_variant", "mechanism", position=3), (), 1.0)
     work = drawn("press", next(meant_of("press", named, position=1)), position=1)
     found, made, _ = due(work)
     assert group(found, "wrong") == {"O1A"}
@@ -244,18 +244,18 @@ def test_two_mistakes_that_draw_the_same_count_as_each_other():
     right = work.task.right
     both = [vectors_of(right, [one]) for one in (turned, Mistake("sense_reversed", "a"))]
     assert all(abs(both[0][name] - both[1][name]) < ROUNDING_MM for name in both[0])
-    assert is_named(work, "nodes", seen, turned, Named("sense_reversed", "a", (), 0.9))
-    assert not is_named(work, "nodes", seen, turned, Named("sense_reversed", "a'", (), 0.9))
-    assert is_named(work, "nodes", seen, turned, Named(turned.code, turned.at, (), 0.9, {"degrees": 180.0}))
+    assert is_named(work, "nodes", seen, turned, Named(Mistake("sense_reversed", "a"), (), 0.9))
+    assert not is_named(work, "nodes", seen, turned, Named(Mistake("sense_reversed", "a'"), (), 0.9))
+    assert is_named(work, "nodes", seen, turned, Named(turned, (), 0.9))
 
 
 def test_a_mistake_that_differs_only_in_direction_is_as_good_in_lengths_alone():
     made = Mistake("image_mirrored", "c")
     work = drawn("engine", Mistake("sense_reversed", "a"), n=3)
     seen = Seen.of(submission(work, "lengths"), {})
-    named = Named("figure_rotated", "velocity_plan", (), 0.9, {"degrees": 90.0})
+    named = Named(Mistake("figure_rotated", "velocity_plan", quarters=1), (), 0.9)
     assert is_named(work, "lengths", seen, work.task.mistakes[0], named)
-    assert not is_named(work, "lengths", seen, made, Named("sense_reversed", "b", (), 0.9))
+    assert not is_named(work, "lengths", seen, made, Named(Mistake("sense_reversed", "b"), (), 0.9))
 
 
 # How it is counted ----------------------------------------------------------------------------------

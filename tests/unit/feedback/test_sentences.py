@@ -8,8 +8,8 @@ from grader import outcomes
 from grader.feedback.mistakes import MISTAKES
 from grader.feedback.sentences import FULL, HINTS, criterion_feedback, mistake_feedback, reason_sentence
 from grader.i18n import LANGUAGES, tongue
-from grader.outcomes import Mistake, Outcome, Quantity, Reason, Tolerance
-from reference.mistakes import CODES
+from grader.outcomes import NamedMistake, Outcome, Quantity, Reason, Tolerance
+from reference.mistakes import CODES, Mistake
 
 TOO_LONG = Reason("too_long", {"measured_mm": 49.5, "expected_mm": 47.2, "off_mm": 2.3, "tolerance_mm": 1.0})
 VALUE = Reason(
@@ -67,7 +67,7 @@ def test_hints_say_no_number(lang, code):
 
 def test_the_symbol_level_says_nothing():
     assert criterion_feedback(outcome("none", TOO_LONG), "en", "symbol") == ""
-    assert mistake_feedback(Mistake("arithmetic", "v_B", (), 0.9), "en", "symbol") == ""
+    assert mistake_feedback(NamedMistake(Mistake("arithmetic", "v_B"), (), 0.9), "en", "symbol") == ""
 
 
 def test_a_wrong_value_is_told_with_what_is_right_only_in_full():
@@ -156,14 +156,14 @@ def test_a_limit_of_direction_is_told_in_degrees():
 @pytest.mark.parametrize("lang", LANGUAGES)
 @pytest.mark.parametrize("code", sorted(MISTAKES))
 def test_every_mistake_says_what_was_done_and_what_to_redo(lang, code):
-    told = mistake_feedback(Mistake(code, "velocity_plan", (), 0.9), lang)
+    told = mistake_feedback(NamedMistake(Mistake(code, "velocity_plan"), (), 0.9), lang)
     assert len(told) > 40
     assert "%(" not in told
     assert "velocity_plan" not in told
 
 
 def test_names_are_those_that_the_students_know():
-    told = mistake_feedback(Mistake("scale_wrong", "kv", (), 0.9), "ru", names={"kv": "μv"})
+    told = mistake_feedback(NamedMistake(Mistake("scale_wrong", "kv"), (), 0.9), "ru", names={"kv": "μv"})
     assert "μv" in told
     assert "kv" not in told
 
