@@ -13,8 +13,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray
+from reference.canvas import A3_MM
 
-PAGE_MM = (420.0, 297.0)
+PAGE_MM = A3_MM
 FRAME_MM: Box = (20.0, 10.0, 390.0, 277.0)
 """ISO 5457: 20 mm at the left for filing, 10 mm elsewhere."""
 DRAWING_MM: Box = (23.0, 51.0, 384.0, 212.0)

@@ -3,14 +3,14 @@
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-import cv2
 import numpy as np
 
+from grader.layout import PAGE_MM
+from grader.pixels import MM_PER_INCH, inverted, mapped, through_corners
 from grader.records import FloatArray
-from grader.sheet.fitting import Side, affine_of, affine_params, apply, inverted
+from grader.sheet.fitting import Side, affine_of, affine_params
 from grader.sheet.longlines import RIDGE, STEP, LongLine
-from grader.sheet.models import FRAMES, PAGE_MM, PAPER, Model
-from grader.sheet.upright import drawn_ends, title_block_mm
+from grader.sheet.models import FRAMES, PAPER, Model, drawn_ends, title_block_mm
 
 _LINES_EACH_WAY = 12
 _APART = 0.4
@@ -124,7 +124,7 @@ def _in_each_turn(
         params = None if map_px is None else affine_params(map_px)
         if map_px is None or params is None or not np.all(np.isfinite(params)):
             continue
-        bend = np.abs(apply(affine_of(params), model.corners()) - apply(map_px, model.corners())).max()
+        bend = np.abs(mapped(affine_of(params), model.corners()) - mapped(map_px, model.corners())).max()
         perspective = bool(bend / np.exp(params[:2].mean()) > _SCAN_BEND_MM)
         penalty = _camera_misfit(map_px, shape) if perspective else _scan_misfit(params, resolution)
         if penalty < _HOPELESS:
@@ -136,9 +136,7 @@ def _in_each_turn(
 
 def _quad_map(model: Model, corners: FloatArray) -> FloatArray | None:
     """Homography from a model's corners to pixels; None for corners that span no area."""
-    matrix = cv2.getPerspectiveTransform(
-        model.corners().astype(np.float32), corners.astype(np.float32)
-    ).astype(np.float64)
+    matrix = through_corners(model.corners(), corners)
     good = bool(np.all(np.isfinite(matrix))) and abs(np.linalg.det(matrix)) > _FLAT
     return matrix if good else None
 
@@ -160,7 +158,7 @@ def _scan_misfit(params: FloatArray, resolution: Resolution | None) -> float:
     penalty = 0.5 * unequal**2
     if resolution is not None:
         se, most = (_DPI_SE, 3.0) if resolution.stated else (_WINDOW_SE, 1.5)
-        wrong = (params[:2] - np.log(np.array(resolution.dpi) / 25.4)) / se
+        wrong = (params[:2] - np.log(np.array(resolution.dpi) / MM_PER_INCH)) / se
         penalty += min(most, 0.25 * float(wrong @ wrong))
     return float(penalty)
 
@@ -211,7 +209,7 @@ def on_sides(
     if not lines:
         return []
     px = np.stack([line.ends for line in lines])
-    mm = apply(inverse, px.reshape(-1, 2)).reshape(-1, 2, 2)
+    mm = mapped(inverse, px)
     brighter = _brighter_mm(inverse, lines, px)
     drawn = np.array([line.kind == RIDGE for line in lines])
     x0, y0, x1, y1 = model.box
@@ -233,4 +231,4 @@ def _brighter_mm(inverse: FloatArray, lines: list[LongLine], px: FloatArray) -> 
     """(n, 2) the way on the sheet from each line to its bright side; 0 for drawn lines."""
     middle = px.mean(axis=1)
     step = np.array([[0.0, 5.0 * line.bright] if line.across else [5.0 * line.bright, 0.0] for line in lines])
-    return apply(inverse, middle + step) - apply(inverse, middle)
+    return mapped(inverse, middle + step) - mapped(inverse, middle)
