@@ -132,7 +132,7 @@ class Door:
     """
 
     page: Callable[[InputFile, int], Page | None]
-    count: Callable[[InputFile], int]
+    count: Callable[[InputFile], int] = lambda _: 1
     code: str = "image_damaged"
     noun: str = "image"
 
