@@ -22,6 +22,7 @@ _PAPER_LONG_SIDE_PX = 640
 _CLOSE_PX = 17
 """Closing window there (11 mm): wider than any stroke, letter or filled arrowhead."""
 _ACROSS_STEP_PX = (0.5, 2.0)
+"""Finer steps than half a pixel say nothing new; coarser ones than two miss a stroke."""
 _ACROSS_STEPS = 16
 """Samples to one side of a cut, where that is neither finer nor coarser than the steps allow."""
 _REMAP_ROWS = 32000
@@ -350,8 +351,8 @@ class Lines:
     scale: FloatArray
     weight: FloatArray
 
-    def moved(self, ends: FloatArray) -> FloatArray:
-        """Segments (k, 2, 2) moved across onto the lines, which were fitted in their own coordinates."""
+    def shifted(self, ends: FloatArray) -> FloatArray:
+        """Segments (k, 2, 2) shifted across onto the lines, which were fitted in their own coordinates."""
         length, u = lengths_and_directions(ends)
         shift = np.stack([self.a, self.a + self.b * length], axis=1)
         return np.asarray(ends + shift[:, :, None] * np.column_stack([-u[:, 1], u[:, 0]])[:, None, :])

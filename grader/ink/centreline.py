@@ -253,7 +253,7 @@ def _fit(flat: Flat, strokes: Fitted, count: int, unit: float, middles: Callable
     across, turn = _standard_errors(cuts.along, lines, unit)
     width = np.where(seen.lone.sum(axis=1) >= _LEAST_LONE, _mean_of(cuts.width, seen.lone), strokes.width)
     return Fitted(
-        lines.moved(strokes.ends),
+        lines.shifted(strokes.ends),
         width,
         lines.scale,
         np.where(known.sum(axis=1) >= _LEAST_CUTS, support, 0.0),

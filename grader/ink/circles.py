@@ -11,30 +11,46 @@ from grader.pixels import BoolArray, Flat, Float32Array, at_full_size, lengths_a
 from grader.records import FloatArray, GreyImage, Strokes
 
 _RADIUS_MM = (0.6, 3.4)
+"""Of joints and poles as people draw them."""
 _CELL_PX = 2
+"""Side of a cell in which normals are counted."""
 _EVERY = 2
 """Every second border pixel votes."""
 _VOTES = 0.3
 """Share of a full circle of the least radius whose normals must meet."""
 _MOST = 250
 _ANGLES = 48
+"""Rays around a centre."""
 _ROUNDS = 3
 _RADIAL_MM = np.arange(0.3, 4.0, 0.1)
+"""Distances from a centre at which ink is looked for."""
 _ROUND_MM = 0.11
+"""Rms distance of a hand-drawn ring from a circle, at most."""
 _DRAWN = 0.75
 """Share of the circle that is inked and round, but for where strokes cross it."""
 _DRAWN_ALONE = 0.5
+"""The same with the places counted where strokes cross it."""
 _THICK = 0.7
+"""Share of the places across the ring that are inked where a stroke runs along the ray."""
 _POINTS_TO_MM = 0.35
+"""Of the radius: a line that leads to a circle passes its centre so near."""
 _LEADS_TO_MM = 1.5
+"""It ends at most so far from the ring."""
 _LEAST_LINK_MM = 4.0
+"""Shorter strokes belong to letters."""
 _HOLLOW = 0.55
+"""Share of a smaller circle that may be inked, and that circle's size: a ring is hollow, a dot is not."""
 _HOLLOW_AT = 0.55
 _EDGE_BYTES = 12.0
+"""Rise of the contrast across a border of ink, at least."""
 _CHORD = 0.65
+"""Of the radius: a piece of the ring lies at least so far from the centre,"""
 _TANGENT_MM = 0.35
+"""and at most so far outside of the ring;"""
 _CHORD_MM = 6.0
+"""it is shorter than this"""
 _CHORD_PAST_MM = 2.2
+"""and ends no farther from the ring."""
 
 
 def find_circles(flat: Flat, seeds: Seeds, components: Components, field: Field) -> FloatArray:

@@ -12,16 +12,23 @@ from grader.pixels import BoolArray, at_full_size, lengths_and_directions
 from grader.records import FloatArray
 
 _MARK_MM = 8.0
+"""Larger pieces of ink are no single letter."""
 _LONG_SEED_MM = 4.5
 """Ink without a straight border of this length holds letters, compass arcs and the like."""
 _LEAST_STROKE_MM = 1.2
+"""Shorter pieces are dots and dust."""
 _THIN = 0.5
 """Spread across a stroke in pens: 0.29 for an even one."""
 _LONG = 2.5
+"""A stroke is so many times as long as wide."""
 _LONE_MM = 6.0
+"""A straight piece this long is a stroke, whatever stands beside it."""
 _NEIGHBOUR_MM = 5.0
+"""Letters of one word are closer to each other than this."""
 _NEIGHBOURS = 2
+"""A single letter beside a short stroke names it; two are a text of which it is part."""
 _DUST_MM = 0.4
+"""Smaller pieces are dust."""
 
 
 @dataclass(frozen=True, slots=True)

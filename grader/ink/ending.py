@@ -12,32 +12,48 @@ from grader.pixels import BoolArray, Flat, cut_across, lengths_and_directions
 from grader.records import FloatArray
 
 _BEYOND_MM = 9.0
+"""How far beyond a fitted end a stroke may go on: over a joint's circle and a gap."""
 _INSIDE_MM = 2.0
+"""Where following starts: fitted ends may lie outside of the ink."""
 _STEP_MM = 0.15
+"""Half of a pen's width: no gap is stepped over."""
 _GAP_MM = 0.9
+"""Paper over this length ends a stroke; dashes are joined before."""
 _CROSSING_MM = 1.6
 """Ink whose borders are not the stroke's is passed over this far: another stroke, a letter, a joint."""
 _OFF_MM = 0.11
+"""Ink is the stroke's own where its middle or a border is this near to where it should be."""
 _REACH_MM = 0.8
+"""Beyond its width, how far to either side the ink is looked at."""
 _INKED = 0.45
 """Of the stroke's own darkness."""
 _BAND_MM = 40.0
+"""A stroke is followed through another's ink over at most this length."""
 _BAND_STEP_MM = 0.3
+"""About a pen's width."""
 _BAND_GAP, _BAND_PAPER = 5, 0.5
+"""Steps over which paper is averaged, and its share from which the ink has ended."""
 _BAND_OFF_MM = 0.1
+"""Beyond its width, how near another stroke runs whose ink hides this one."""
 _LEAST_BAND_MM = 2.5
 """Ink of two strokes over less than this is a crossing."""
 _LEAST_LED_MM = 8.0
+"""The direction of a shorter stroke is not known well enough to follow it."""
 _PROBES = np.array([-0.4, 0.0, 0.4])
 """Of a stroke's width: places across it at which ink is looked for."""
 _OWN, _OTHER, _PAPER = 2, 1, 0
 _ACROSS = np.linspace(-0.6, 0.6, 5)
+"""Of a stroke's width: places across it, a little beyond both borders."""
 _LIGHT = 0.6
 """Of the stroke's dark level; a pencil's grain varies less over a millimetre."""
 _DARK_QUANTILE = 0.75
+"""Of the levels along a stroke: its dark part's, if that is a quarter of it."""
 _SMOOTH_MM = 1.05
+"""Running median: a crossing stroke is narrower than half of this."""
 _LEAST_LIGHT_MM = 1.5
+"""Shorter light ends are a pen lifted slowly."""
 _LEAST_PART_MM = 2.0
+"""Shorter light parts are not kept as strokes."""
 
 
 def find_ends(flat: Flat, fitted: Fitted, px_per_mm: float) -> tuple[FloatArray, BoolArray]:

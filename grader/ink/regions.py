@@ -12,17 +12,27 @@ from grader.pixels import BoolArray, at_full_size, inverted, mapped
 from grader.records import Box, FloatArray, Page, Sheet
 
 _FRAME_MM = 1.5
+"""Inside of the frame's middle line: its pen and the registration's error."""
 _BLOCK_MM = (215.0, 80.0)
+"""Width and height of the corner in which a title block may lie."""
 _SQUARE = 0.05
+"""Of its length: how far askew a ruled line may be."""
 _PIECE_MM = 3.0
+"""Shorter pieces of borders are letters'."""
 _RULED_MM = 6.0
+"""Shorter joined lines are no part of a table."""
 _OFF_MM = 0.5
+"""Both borders of a ruled line are joined."""
 _BROKEN_MM = 16.0
 """Letters that touch a ruled line break its border this far."""
 _MEET_MM = 4.0
+"""The block's lines are ruled to their corner no nearer than this."""
 _REACH_MM = 18.0
+"""The block's lines reach the frame, or end this far from it."""
 _EDGE_MM = 2.5
+"""Lines nearer to the sheet's right and lower edge are the paper's shadow."""
 _LEAST_LINES = 4
+"""Top, left and at least two rows."""
 _SAMPLES = 64
 """Places along each side of a box: 4096 tell a median to a few per cent."""
 

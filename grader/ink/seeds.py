@@ -16,16 +16,25 @@ from grader.records import FloatArray, GreyImage
 PX_PER_MM = 6.0
 """Resolution at which ink is looked for; strokes of 0.3 mm are two pixels wide."""
 _WHOLE = 0.08
+"""Relative difference up to which a whole fraction of the resolution is near enough."""
 _FAINT = 20
 """Of 255: fainter than a construction line drawn with a hard pencil is paper."""
 _PEAK_WINDOW_PX = 7
+"""Wider than a stroke with its blur, narrower than the distance of two strokes."""
 _DARK = 0.62
+"""Of the darkest strokes' contrast: construction lines are lighter."""
 _DARK_QUANTILE = 0.85
+"""Of the ink's contrast: that of the darkest strokes."""
 _POLYGON_PX = 1.0
+"""Distance of a border from the straight runs that replace it."""
 _LEAST_PX = 5.0
+"""0.8 mm: shorter runs have no direction."""
 _SOFTEN_PX = 0.7
+"""Less than a stroke's width: grain fades and gaps stay open."""
 _WIDEST_PX = 12
+"""2 mm: a wider band is a blot."""
 _PEN_PX = 2.0
+"""A pen of 0.35 mm, where a sheet has no long stroke to tell."""
 _BUNDLE = 1.6
 """An ink band this many pens wide is more than one stroke."""
 _STRIP_MM, _STRIPS, _EVERY = 10.0, 5, 3

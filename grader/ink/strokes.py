@@ -18,33 +18,49 @@ from grader.records import FloatArray, Strokes, Unread
 _OFF_MM = 0.25
 """Pieces this near to one line are of it; strokes further apart are told apart."""
 _GAP_MM = 2.3
+"""Gaps within a stroke's border: where another crosses it, and in pencil."""
 _FITTED_OFF_MM = 0.16
+"""The same for fitted strokes, whose lines are known better."""
 _FITTED_GAP_MM = 3.5
 """Gaps of dashed lines, and of lines that stop at a joint's circle and go on behind it."""
 _LEAST_DASHED_MM = 7.0
+"""A shorter row of dashes beside letters is a text."""
 _LEAST_MM = 1.0
+"""Shorter strokes have no direction."""
 _MOST_STROKES = 6000
 """On a sheet: drawings of a class have up to 530 before fitting, real ones on A3 covered with ink 2,100,
 and 5,300 where the lines of 1 mm squared paper are all taken for strokes."""
 _RUNS_OF_STROKE = 8
 """Straight runs of border per stroke: 2 to 7 were counted on scans of drawings, squared paper and text."""
 _LEAST_SUPPORT = 0.3
+"""Share of the cuts that must agree with a stroke's line."""
 _SAME_MM = 0.2
+"""A stroke this near to a longer one all along is the same ink."""
 _SHORT_MM = 6.0
+"""Joints, arrowheads and letters leave over no longer pieces."""
 _LONG_MM = 8.0
+"""The pen's width is taken from strokes of this length and more."""
 _COVERED = 0.85
+"""Of a short stroke's length: so much inside of others is no stroke of its own."""
 _SE_END_MM = 0.8
 _SE_MERGED_MM = 2.5
 """Ends err by this much, measured on simulated students: lines run on along their neighbours."""
 _ALIKE_DEG = 11.0
+"""Short hatching strokes are drawn by free hand,"""
 _LONG_ALIKE_DEG = 5.0
+"""long ones along a set square."""
 _APART_MM = (0.5, 6.0)
+"""Nearer strokes are one drawn twice, farther ones no hatching."""
 _LEAST_ALIKE = 4
+"""A family of short strokes has more."""
 _LEAST_LONG_ALIKE = 6
 """A slider, its guide and a link along it make five level lines."""
 _LONGEST_MM = 60.0
+"""Across the largest plate."""
 _RATIO = 2.5
+"""Of the longer to the shorter of two neighbours in hatching."""
 _WEIGHT_RATIO = 1.35
+"""Of the width times darkness of two neighbours: one pen, one pressure."""
 
 
 def find_strokes(flat: Flat, seeds: Seeds, components: Components, field: Field) -> Strokes | Unread:

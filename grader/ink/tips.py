@@ -21,6 +21,7 @@ STEP_MM = 0.15
 HALF = 15
 """Pixels of a band to either side of its stroke."""
 BEYOND_MM = 3.0
+"""Of a band past its stroke's ends: an arrowhead is shorter."""
 GAP = 20
 """Empty columns between bands."""
 CELL = 2
@@ -32,10 +33,14 @@ APART = 48
 FULL_INK = 1.3
 """Contrast that counts as 1, of the stroke's mean."""
 LEAST_DARK, MOST_INK = 0.08, 1.5
+"""Contrast below which a stroke counts as so dark, and the most that ink counts."""
 LEAST_MM = 2.0
+"""No vector is drawn shorter."""
 LEAST_SURE = 0.15
 ASIDE_MM = 0.5
+"""A tip lies in its own cell or the next."""
 KINDS = 4
+"""Heads and tails, ahead and back."""
 
 
 def find_tips(flat: Flat, strokes: Strokes, mm_to_px: FloatArray) -> Tips:

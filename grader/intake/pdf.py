@@ -22,6 +22,7 @@ from grader.records import FloatArray, GreyImage, Page
 from reference.errors import InputFileError
 
 RENDER_DPI = 300.0
+"""As drawings are scanned."""
 _POINTS_PER_INCH = 72.0
 _INHERITED = ("/Resources", "/MediaBox", "/CropBox", "/Rotate")
 _END, _END_WITHIN = (b"%%EOF", b"startxref"), 1 << 16
@@ -38,6 +39,7 @@ _SQUARE = 1e-3
 _PAINTS = frozenset(("S", "s", "f", "F", "f*", "B", "B*", "b", "b*", "sh", "BI", "INLINE IMAGE"))
 _SHOWS_TEXT = frozenset(("Tj", "TJ", "'", '"'))
 _INVISIBLE_TEXT = 3
+"""Text mode of what optical character recognition lays over a scan."""
 
 Matrix = tuple[float, float, float, float, float, float]
 _UNIT: Matrix = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)

@@ -11,11 +11,14 @@ from grader.pixels import MM_PER_INCH
 from grader.records import GreyImage
 
 _ORIENTATION_TAG = 274
+"""EXIF 2.3 and TIFF 6.0."""
 _INCH, _CENTIMETRE = 2, 3
+"""TIFF's units of the resolution."""
 _TURN_CCW = {1: 0, 2: 0, 3: 180, 4: 180, 5: 90, 6: 270, 7: 270, 8: 90}
 """EXIF/TIFF orientation to the counter-clockwise turn that a viewer applies, after undoing the mirror."""
 _MIRRORED = frozenset({2, 4, 5, 7})
 _PLAUSIBLE_DPI = (30.0, 4800.0)
+"""Below and above, a file states a number that is no resolution."""
 
 Dpi = tuple[float, float]
 

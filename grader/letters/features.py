@@ -15,12 +15,17 @@ from grader.records import FloatArray, GreyImage
 SIDE_PX = 28
 """Side of the picture that is looked at; the sign's longer side fills all but the margin."""
 _MARGIN_PX = 3
+"""Around the sign: its border's gradient lies inside the picture."""
 _ORIENTATIONS = 8
+"""Directions that borders are sorted by."""
 _CELLS = 6
+"""Cells along a side for the directions of borders,"""
 _ZONES = 7
+"""and for the ink."""
 _LOBE = 0.6
 """A border counts for a direction as far as its part along it exceeds this share of its strength."""
 _LEAST_PX = 1.0
+"""No side of a crop counts as shorter."""
 _AT_ONCE = 32
 """Pictures whose numbers fit into the processor's cache together."""
 

@@ -25,6 +25,7 @@ _FAINT = 20
 _SHARE = 0.2
 """Of the usual darkness of the sheet's ink: fainter is squared paper, or the back showing through."""
 _PEAK_MM = 0.9
+"""Window of the darkest ink close by: three strokes wide."""
 _GROWN_MM = 0.16
 """Strokes are taken out with so much more than their width: the hand's wobble and the blur."""
 _LONG_MM = 6.0

@@ -37,6 +37,7 @@ _WORTH = 12.0
 _FREEDOMS = (4, 6, 8)
 """Parameters of a similarity, of an affine map and of a perspective."""
 _LEAST_POINTS = 4
+"""One whole marker."""
 _TOLERANCE = 1e-15
 """Relative change at which a fit is finished: what follows must not depend on where it stopped."""
 

@@ -13,21 +13,32 @@ from grader.sheet.longlines import RIDGE, STEP, LongLine
 from grader.sheet.models import FRAMES, PAPER, Model, drawn_ends, title_block_mm
 
 _LINES_EACH_WAY = 12
+"""Of the longest lines in each direction: a title block adds a few to the eight of paper and frame."""
 _APART = 0.4
+"""Of the image's width or height: opposite sides of a sheet are farther apart than this."""
 _LEAST_LENGTH = 0.4
 """Sides are at least this share of the image's width or height."""
 _SCAN_BEND_MM = 1.2
 """A quadrilateral whose corners lie nearer than this to a scanner's map is a scan."""
 _MATCH_MM = 2.0
+"""A line lies on a side of a model if both its ends are nearer than this."""
 _TILT_MM = 2.0
+"""A side ruled by hand is askew by less from end to end."""
 _UNEQUAL_SE = 0.004
+"""Relative difference of a scanner's scales along its two axes."""
 _DPI_SE = 0.005
+"""Of a stated resolution, with room for copies at a slightly other scale."""
 _WINDOW_SE = 0.02
+"""Of a resolution that was only guessed by the size of the image."""
 _HOPELESS = 12.0
+"""A reading with a larger penalty is no longer followed."""
 _FLAT = 1e-9
+"""Least determinant of a map that can be inverted."""
 _CAMERA_SE = 0.015
+"""How far off a camera's view may be, by the lines' errors: right angle in radians, ratio of the axes."""
 _LOOKED_AT = 80
 _BLOCK_MM = 200.0
+"""Length of a title block's ruled lines that counts as much as one side that agrees."""
 _BLOCK_WORTH = 3.0
 """The title block's ruled lines count as much as three sides that agree."""
 _FOCAL = np.geomspace(0.55, 3.0, 12)

@@ -315,7 +315,7 @@ def _settled_step(flat: Flat, line: LongLine, full_per_small: float) -> LongLine
     if known.sum() < _LEAST_CUTS:
         return line
     fit = robust_lines(along[None], offset[None], known[None].astype(np.float64), 0.1)
-    return replace(line, ends=fit.moved(line.ends[None])[0])
+    return replace(line, ends=fit.shifted(line.ends[None])[0])
 
 
 def _settled_strokes(flat: Flat, lines: list[LongLine], full_per_small: float) -> list[LongLine]:
@@ -327,10 +327,10 @@ def _settled_strokes(flat: Flat, lines: list[LongLine], full_per_small: float) -
     cuts = cut_across(flat, ends, _CUTS, reach, np.full(len(lines), 0.6 * reach))
     usual = np.nanmedian(np.where(np.isfinite(cuts.width), cuts.width, 2.0 * reach), axis=1)
     good = np.isfinite(cuts.width) & (cuts.width < 1.8 * usual[:, None])
-    moved = robust_lines(cuts.along, cuts.offset, good.astype(np.float64), 0.05).moved(ends)
+    shifted = robust_lines(cuts.along, cuts.offset, good.astype(np.float64), 0.05).shifted(ends)
     return [
         replace(
-            line, ends=moved[k], inked=float(good[k].mean()), width=float(usual[k]),
+            line, ends=shifted[k], inked=float(good[k].mean()), width=float(usual[k]),
             dark=float(np.median(cuts.dark[k][good[k]])),
         )
         if good[k].sum() >= _LEAST_CUTS

@@ -46,13 +46,17 @@ _DETECTION_PX = 1600
 _CLOSER_PX = 3200
 """Second look, for photos in which the sheet is a small part."""
 _LEAST_MARKERS = 2
+"""One marker settles a map too badly far from it."""
 _LEAST_APART_MM = 100.0
+"""Markers closer together do not settle the far end of the sheet."""
 _OFF_MM = 3.0
 """A marker farther off than this from where the others put it is a foreign one; no lens bends as much."""
 _LEAST_PX_PER_MM = 2.0
+"""A stroke of 0.3 mm is less than a pixel wide below this."""
 _MAX_RMS_MM = 1.5
 """A wide lens bends the sheet as much; what no lens explains is in `scale_se`."""
 _MAX_SE_MM = 0.6
+"""A map less sure than this at the edge of the drawing area cannot be measured by."""
 _MAX_UNEVEN = 2.5
 """Largest over smallest scale on the sheet; a photo any more slanted cannot be measured."""
 _PRINTER_SE, _SCANNER_SE = 0.002, 0.002
@@ -61,10 +65,13 @@ _PRINTER_SE, _SCANNER_SE = 0.002, 0.002
 Markers are printed by the same printer, so that what it does to lengths shows in them only against the
 stated resolution, and there together with what the scanner does."""
 _USUAL_LENGTH_MM = 60.0
+"""Of a vector: what the map leaves unexplained is an error of lengths over this distance."""
 _FLAT_MM = 0.12
 """Misfit from which paper that is not flat is told; printers and flatbeds stay under 0.1."""
 _SCALE_TOLD = 0.004
+"""Printers and scanners together stay below this."""
 _SCALE_NEAR = 0.1
+"""Up to here a printed page may pass for the right size."""
 _SCALE_FAR = 1.6
 """Between A3 and A4 lies a factor of 1.41; what is farther off is a wrong resolution."""
 

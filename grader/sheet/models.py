@@ -20,12 +20,15 @@ _SQUARE_MM = 2.5
 _LEAST_MM = 12.0
 """Shorter lines are letters or a drawing's."""
 _LEAST_LEVEL = 2
+"""A block has at least its top line and one row."""
 _OTHERS = 0.8
 """Share of another corner's ruled lines that is taken off: squared paper has as many in each."""
 _A4_MM = (297.0, 210.0)
+"""ISO 216."""
 _A4_WITHIN_MM = 6.0
 """A scanner's window is as much larger or smaller than the paper."""
 _SCANNERS_DPI = (100.0, 150.0, 200.0, 240.0, 300.0, 400.0, 600.0)
+"""Resolutions that scanners for A4 offer."""
 UNSET_DPI = 100.0
 """Below this a stated resolution is what programs write that do not know."""
 HALVES_ADVICE = (

@@ -24,30 +24,45 @@ from grader.sheet.models import (
 )
 
 _LEAST_PX_PER_MM = 3.0
+"""Along the long side: below this a pencil's stroke is less than a pixel wide."""
 _USUAL_DPI = (100.0, 150.0, 200.0, 240.0, 250.0, 300.0, 400.0, 500.0, 600.0, 800.0, 1200.0)
+"""Resolutions that scanners and copiers for A3 offer."""
 _UNSET_DPI = (72.0, 96.0)
 """What programs write when they do not know; no evidence either way."""
 _A3_SLACK_MM = (40.0, 22.0)
 """A scanner's window may be this much larger than the sheet; paper that is cut off is not A3."""
 _A3_SHORT_MM = 5.0
+"""A scanner may cut so much off the sheet's edges."""
 _WINDOW_SE = 0.004
+"""Relative error of a scale by a usual resolution that fits A3."""
 _BAD_FIT = 4.0
+"""Chi squared for each degree of freedom from which the evidence is said to disagree."""
 _NO_FIT_MM = 1.5
+"""Sides that disagree by more are not those of one A3 sheet."""
 _VAGUE_SE = 0.02
+"""A scale less sure than this is no better than a guess."""
 _MOST_SIDES = 3
+"""Sides by which a frame is known,"""
 _SOME_SIDES = 2
+"""and those of the paper that must be seen beside it."""
 _ALL_SIDES = 4
 _COPY_SE = 0.012
 """Copiers enlarge or reduce by a per cent or two unless told not to."""
 _SAMPLED, _WHITE = 7, 255
+"""Pixels between those that are looked at, and the value of white ones."""
 _FAR_OFF_MM = 1.5
+"""A side farther off after the fit was taken for the wrong line."""
 _EDGE_WITHIN_MM = 6.0
+"""Without a frame the sheet's place is known no better before its edges are looked for."""
 _ASSUMED_PAPER_SE = 0.004
+"""Paper that looks like A3 may be a trimmed sheet or another format of nearly its ratio."""
 _SCALE_DOUBTS = frozenset({"paper_assumed", "registration_disagrees"})
 _SAME = 1e-6
+"""Scores of readings that the drawing does not tell apart differ by rounding only."""
 _AS_LIKELY = 2.0
 """Scores of readings that differ by less: either may be the right one."""
 _ANOTHER_SCALE = 0.012
+"""Relative difference of two scales that is worth a warning."""
 
 
 def register_plain(page: Page) -> Sheet | Unread:
