@@ -14,19 +14,24 @@ from grader.answer_sheet.calibration import calibration_segments
 from grader.documents import CalibrationDocument, CalibrationPoint, CalibrationSegments
 from grader.ink import find_ink
 from grader.intake import page_of
+from grader.pixels import MM_PER_INCH, lengths_and_directions
 from grader.records import FloatArray, Page, Unread
 from grader.sheet import marker_middles, rectify, straighten
+from grader.sheet.models import UNSET_DPI
 
-_MM_PER_INCH = 25.4
 _LEAST_MARKERS = 4
+"""Two scales and a skew, with markers left over to tell their errors."""
 _SCALE_TOLD, _UNEQUAL_TOLD, _SKEW_TOLD_DEG = 0.003, 0.001, 0.05
+"""Relative scale error, difference of the axes and skew that are worth a remedy."""
 _OFF_TOLD_MM = 0.12
+"""Markers on a flat page stay below this."""
 _LENGTH_TOLD_MM = 0.15
 _PHOTO_MM = 0.4
 """Markers farther off a linear map than this are a camera's view, not a scanner's."""
 _NEAR_MM, _NEAR_RAD = 1.5, 0.03
+"""How far beside its segment, and how much turned, a stroke was read that is the segment's."""
 _SHIFT_MM = 4.0
-_UNSET_DPI = 100.0
+"""Ends of strokes are known less well than their lines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,14 +66,14 @@ def calibrate(path: Path, number: int = 1) -> CalibrationDocument | Unread:
         return ink
     strokes = ink.strokes.ends
     known = calibration_segments()
-    found = _matched(known, strokes)
-    segments = _segments(known, found)
+    reads = _matched(known, strokes)
+    segments = _segments(known, reads)
     scales = _scales(linear, page) if scanned else {}
     points = [
         *(_point("marker", at, off) for at, off in zip(mm, linear.off_mm, strict=True) if scanned),
         *(
             _point("segment", at.mean(axis=0), _aside(at, read))
-            for at, read in zip(known, found, strict=True)
+            for at, read in zip(known, reads, strict=True)
             if read is not None
         ),
     ]
@@ -95,8 +100,8 @@ def _linear(mm: FloatArray, px: FloatArray) -> _Linear:
 
 def _scales(linear: _Linear, page: Page) -> dict[str, float | None]:
     """Scales along the sheet's x and y, relative to the stated resolution where there is one."""
-    stated = page.dpi if page.dpi is not None and min(page.dpi) >= _UNSET_DPI else None
-    per_px = _MM_PER_INCH / np.array(stated) if stated is not None else np.ones(2)
+    stated = page.dpi if page.dpi is not None and min(page.dpi) >= UNSET_DPI else None
+    per_px = MM_PER_INCH / np.array(stated) if stated is not None else np.ones(2)
     along = per_px[:, None] * linear.matrix
     size = np.hypot(*along)
     se = [float(np.sqrt(linear.cov[k, k]) / np.hypot(*linear.matrix[:, k])) for k in (0, 1)]
@@ -113,18 +118,18 @@ def _scales(linear: _Linear, page: Page) -> dict[str, float | None]:
 
 def _matched(known: FloatArray, strokes: FloatArray) -> list[FloatArray | None]:
     """For each known segment the stroke that it was read as, ends in the same order, or None."""
-    found: list[FloatArray | None] = []
+    both = np.concatenate([strokes, strokes[:, ::-1]])
+    if len(both) == 0:
+        return [None] * len(known)
+    reads: list[FloatArray | None] = []
     for segment in known:
-        best, least = None, _SHIFT_MM
-        for ends in (strokes, strokes[:, ::-1]):
-            gap = np.hypot(*np.moveaxis(ends - segment, -1, 0)).max(axis=1) if len(ends) else np.zeros(0)
-            if len(gap) and gap.min() < least:
-                least, best = float(gap.min()), ends[int(gap.argmin())]
-        found.append(best if best is not None and _alike(segment, best) else None)
-    return found
+        gap = np.hypot(*np.moveaxis(both - segment, -1, 0)).max(axis=1)
+        nearest = both[int(gap.argmin())]
+        reads.append(nearest if gap.min() < _SHIFT_MM and _lies_along(segment, nearest) else None)
+    return reads
 
 
-def _alike(segment: FloatArray, read: FloatArray) -> bool:
+def _lies_along(segment: FloatArray, read: FloatArray) -> bool:
     """Whether a stroke lies along a segment, not across its end."""
     along = segment[1] - segment[0]
     drawn = read[1] - read[0]
@@ -135,14 +140,14 @@ def _alike(segment: FloatArray, read: FloatArray) -> bool:
 
 def _aside(segment: FloatArray, read: FloatArray) -> FloatArray:
     """How far a stroke's middle lies beside its segment; where a stroke ends is known less well."""
-    along = segment[1] - segment[0]
-    normal = np.array([-along[1], along[0]]) / np.hypot(*along)
+    _, (u,) = lengths_and_directions(segment[None])
+    normal = np.array([-u[1], u[0]])
     return np.asarray(((read - segment).mean(axis=0) @ normal) * normal)
 
 
-def _segments(known: FloatArray, found: list[FloatArray | None]) -> CalibrationSegments:
+def _segments(known: FloatArray, reads: list[FloatArray | None]) -> CalibrationSegments:
     """Errors of the segments that were read."""
-    pairs = [(at, read) for at, read in zip(known, found, strict=True) if read is not None]
+    pairs = [(at, read) for at, read in zip(known, reads, strict=True) if read is not None]
     if not pairs:
         return CalibrationSegments(printed=len(known), read=0)
     true = np.array([at[1] - at[0] for at, _ in pairs])
@@ -171,41 +176,47 @@ def _point(kind: str, at: FloatArray, off: FloatArray) -> CalibrationPoint:
     )
 
 
-def _advice(found: CalibrationDocument) -> list[str]:
+def _advice(document: CalibrationDocument) -> list[str]:
     """What to do, in words; a single sentence where all is well."""
-    told: list[str] = []
-    if found.camera:
-        told.append("a photo: scale and skew are the camera's; scan the page to measure printer and scanner")
-    scale = None if found.scale_x is None or found.scale_y is None else (found.scale_x + found.scale_y) / 2.0
+    advice: list[str] = []
+    if document.camera:
+        advice.append(
+            "a photo: scale and skew are the camera's; scan the page to measure printer and scanner"
+        )
+    scale = (
+        None
+        if document.scale_x is None or document.scale_y is None
+        else (document.scale_x + document.scale_y) / 2.0
+    )
     if scale is not None and abs(scale - 1.0) > _SCALE_TOLD:
-        told.append(
+        advice.append(
             f"lengths come out at {100.0 * scale:.2f} % of their size: print at 100 % without fitting to the"
             " page, and scan without scaling; printed sheets stay right, plain ones are as much off"
         )
-    elif scale is None and not found.camera:
-        told.append("the file states no resolution: only the ratio of the scales is known")
-    if found.unequal is not None and abs(found.unequal) > _UNEQUAL_TOLD:
-        told.append(
-            f"lengths along the sheet come out {100.0 * found.unequal:+.2f} % against those across it: use"
+    elif scale is None and not document.camera:
+        advice.append("the file states no resolution: only the ratio of the scales is known")
+    if document.unequal is not None and abs(document.unequal) > _UNEQUAL_TOLD:
+        advice.append(
+            f"lengths along the sheet come out {100.0 * document.unequal:+.2f} % against those across it: use"
             " printed sheets, whose markers undo it, or rule the frame with care"
         )
-    if found.skew_deg is not None and abs(found.skew_deg) > _SKEW_TOLD_DEG:
-        told.append(f"right angles come out {found.skew_deg:+.2f} degrees off: the paper is fed askew")
-    if found.residual_mm > _OFF_TOLD_MM:
-        told.append("markers are off any even map: the page was not flat, or its feed is uneven")
-    seen = found.segments
-    if seen.read < 0.9 * seen.printed:
-        few = f"only {seen.read} of {seen.printed} segments are read"
-        told.append(f"{few}: scan sharper and darker, at 300 dpi")
-    elif seen.length_rms_mm is not None and seen.length_rms_mm > _LENGTH_TOLD_MM:
-        told.append("lengths of the segments scatter: scan at 300 dpi, grey, not black and white")
-    return told or ["printer and scanner are fit for grading"]
+    if document.skew_deg is not None and abs(document.skew_deg) > _SKEW_TOLD_DEG:
+        advice.append(f"right angles come out {document.skew_deg:+.2f} degrees off: the paper is fed askew")
+    if document.residual_mm > _OFF_TOLD_MM:
+        advice.append("markers are off any even map: the page was not flat, or its feed is uneven")
+    segments = document.segments
+    if segments.read < 0.9 * segments.printed:
+        few = f"only {segments.read} of {segments.printed} segments are read"
+        advice.append(f"{few}: scan sharper and darker, at 300 dpi")
+    elif segments.length_rms_mm is not None and segments.length_rms_mm > _LENGTH_TOLD_MM:
+        advice.append("lengths of the segments scatter: scan at 300 dpi, grey, not black and white")
+    return advice or ["printer and scanner are fit for grading"]
 
 
-def residual_map(found: CalibrationDocument, magnified: float = 200.0) -> str:
+def residual_map(document: CalibrationDocument, magnified: float = 200.0) -> str:
     """An SVG of the page in mm: where points are off, and which way, `magnified` times."""
     marks = []
-    for point in found.points:
+    for point in document.points:
         (x, y), (dx, dy) = point.at_mm, point.off_mm
         colour, size = ("#1d5fa8", 1.5) if point.kind == "marker" else ("#5b6470", 0.7)
         marks.append(

@@ -13,8 +13,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray
+from reference.canvas import A3_MM
 
-PAGE_MM = (420.0, 297.0)
+PAGE_MM = A3_MM
 FRAME_MM: Box = (20.0, 10.0, 390.0, 277.0)
 """ISO 5457: 20 mm at the left for filing, 10 mm elsewhere."""
 DRAWING_MM: Box = (23.0, 51.0, 384.0, 212.0)
@@ -31,6 +32,7 @@ SCALE_BOXES: dict[str, Box] = {
     name: (306.0, 13.0 + 9.5 * row, 53.0, 8.0) for row, name in enumerate(("kL", "kv", "ka"))
 }
 _ZONE_GAP_MM = 4.0
+"""Ink of one zone does not reach the next."""
 _FIELD_COLUMNS = ((39.0, 103.0), (159.0, 113.0), (289.0, 103.0))
 """Left edge and width of the three stretches between the foot's markers."""
 _FIELD_TOP_MM, _FIELD_HEIGHT_MM = 265.7, 20.2
@@ -101,19 +103,19 @@ def _divisions() -> list[dict[str, Box]]:
     """Every division there is. Its place in this list is printed on paper: append, never reorder."""
     m, v, a = MECHANISM, VELOCITY_PLAN, ACCELERATION_PLAN
     columns, rows = True, False
-    found = [_zones((figure,), DRAWING_MM, (1.0,), columns) for figure in (m, v, a)]
+    divisions = [_zones((figure,), DRAWING_MM, (1.0,), columns) for figure in (m, v, a)]
     for plan in (v, a):
         shares = ((share, 1.0 - share) for share in (0.28, 0.4, 0.5, 0.6, 0.72))
-        found.extend(_zones((m, plan), DRAWING_MM, share, columns) for share in shares)
-        found.append(_zones((m, plan), DRAWING_MM, (0.5, 0.5), rows))
-    found.extend(_zones((v, a), DRAWING_MM, (share, 1.0 - share), columns) for share in (0.4, 0.5))
-    found.append(_zones((m, v, a), DRAWING_MM, (1 / 3, 1 / 3, 1 / 3), columns))
-    found.append(_zones((m, v, a), DRAWING_MM, (0.4, 0.25, 0.35), columns))
+        divisions.extend(_zones((m, plan), DRAWING_MM, share, columns) for share in shares)
+        divisions.append(_zones((m, plan), DRAWING_MM, (0.5, 0.5), rows))
+    divisions.extend(_zones((v, a), DRAWING_MM, (share, 1.0 - share), columns) for share in (0.4, 0.5))
+    divisions.append(_zones((m, v, a), DRAWING_MM, (1 / 3, 1 / 3, 1 / 3), columns))
+    divisions.append(_zones((m, v, a), DRAWING_MM, (0.4, 0.25, 0.35), columns))
     for share in (0.35, 0.45, 0.55):
         left, right = _cut(DRAWING_MM, (share, 1.0 - share), across=True)
-        found.extend(_zones((m, v), left, (top, 1.0 - top), rows) | {a: right} for top in (0.4, 0.55))
-        found.append({m: left} | _zones((v, a), right, (0.45, 0.55), rows))
-    return found
+        divisions.extend(_zones((m, v), left, (top, 1.0 - top), rows) | {a: right} for top in (0.4, 0.55))
+        divisions.append({m: left} | _zones((v, a), right, (0.45, 0.55), rows))
+    return divisions
 
 
 TEMPLATES = tuple(Template(number, zones) for number, zones in enumerate(_divisions()))
@@ -174,18 +176,18 @@ def combs_of(fields: Mapping[str, Box]) -> dict[str, tuple[Box, ...]]:
     return {name: comb_cells(box) for name, box in fields.items() if name not in SCALE_BOXES}
 
 
-class _Told(BaseModel):
+class _Document(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class MarkerPlace(_Told):
+class MarkerPlace(_Document):
     """A printed marker: its id and its corners from the top left, clockwise."""
 
     id: int
     corners_mm: list[tuple[float, float]]
 
 
-class PageLayout(_Told):
+class PageLayout(_Document):
     """Where everything is on the pages of one kind. `zones` holds the figures' boxes and `fields`.
 
     `cells` holds, for each box of `fields` that a measured length is written in (millimetres), its
@@ -198,7 +200,7 @@ class PageLayout(_Told):
     cells: dict[str, tuple[Box, ...]] = {}
 
 
-class Layout(_Told):
+class Layout(_Document):
     """`layout.json`: millimetres from the upright sheet's top left corner, x right, y down."""
 
     schema_version: Literal[1] = 1
@@ -208,7 +210,7 @@ class Layout(_Told):
 
 
 def marker_places(template: Template) -> list[MarkerPlace]:
-    """The markers of a template as `layout.json` tells them."""
+    """The markers of a template as they stand in `layout.json`."""
     return [
         MarkerPlace(id=number, corners_mm=[(float(x), float(y)) for x, y in corners])
         for number, corners in zip(template.marker_ids, MARKER_CORNERS, strict=True)

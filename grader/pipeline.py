@@ -19,8 +19,7 @@ from grader.feedback.telling import with_mistakes_told
 from grader.ink import find_ink
 from grader.intake import changed, is_blank, load, page_of
 from grader.judging import Submission, Task, judge, task_of
-from grader.letters import find_letters, written_scales
-from grader.letters.lengths import written_lengths
+from grader.letters import find_letters, written_lengths, written_scales
 from grader.measurements import Measurements
 from grader.outcomes import Judgement
 from grader.picture import Backdrop, backdrop, overlay

@@ -1,7 +1,7 @@
-"""Pixels with their light levelled, and strokes measured across at full resolution.
+"""Homographies, pictures with their light levelled, and strokes measured across at full resolution.
 
-Shared by the stages that look at pixels (`sheet`, `ink`). Pixel coordinates are (x right, y down),
-the centre of the stored image's top left pixel is (0, 0).
+Shared by the stages that look at pixels (`sheet`, `ink`, `letters`). Pixel coordinates are (x right,
+y down), the centre of the stored image's top left pixel is (0, 0). A homography is a (3, 3) array.
 """
 
 from collections.abc import Iterator
@@ -11,16 +11,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.records import FloatArray, GreyImage
+from grader.records import Box, FloatArray, GreyImage
 
 Float32Array = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
 
+MM_PER_INCH = 25.4
 _PAPER_LONG_SIDE_PX = 640
 """Resolution of the paper's brightness: about 1.5 px/mm on A3."""
 _CLOSE_PX = 17
 """Closing window there (11 mm): wider than any stroke, letter or filled arrowhead."""
 _ACROSS_STEP_PX = (0.5, 2.0)
+"""Finer steps than half a pixel say nothing new; coarser ones than two miss a stroke."""
 _ACROSS_STEPS = 16
 """Samples to one side of a cut, where that is neither finer nor coarser than the steps allow."""
 _REMAP_ROWS = 32000
@@ -30,6 +32,79 @@ _PART = 1 << 21
 _TUKEY_ROUNDS = 6
 _TUKEY = 4.685
 """Tukey's constant: 95 % efficient for normal errors."""
+
+
+def mapped(homography: FloatArray, points: FloatArray) -> FloatArray:
+    """(..., 2) points through a homography."""
+    if points.size == 0:
+        return np.zeros(points.shape)
+    flat = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 1, 2)
+    return np.asarray(cv2.perspectiveTransform(flat, homography), dtype=np.float64).reshape(points.shape)
+
+
+def inverted(homography: FloatArray) -> FloatArray:
+    """The inverse homography. Raises numpy.linalg.LinAlgError where there is none."""
+    return np.asarray(np.linalg.inv(homography), dtype=np.float64)
+
+
+def through_corners(corners: FloatArray, onto: FloatArray) -> FloatArray:
+    """The homography that maps four corners (4, 2) onto four others; not finite where they span no area."""
+    matrix = cv2.getPerspectiveTransform(corners.astype(np.float32), onto.astype(np.float32))
+    return np.asarray(matrix, dtype=np.float64)
+
+
+def local_axes(homography: FloatArray, at: FloatArray, step: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """Where steps along x and along y lead from points (n, 2): two (n, 2), per unit of the step."""
+    origin = mapped(homography, at)
+    right, down = (mapped(homography, at + step * axis) - origin for axis in np.eye(2))
+    return right / step, down / step
+
+
+def at_full_size(points: FloatArray, scale: float | FloatArray) -> FloatArray:
+    """Points of a picture reduced by `scale` (along x and y, or both), in pixels of the full one."""
+    return (points + 0.5) / scale - 0.5
+
+
+def cut_out(
+    grey: GreyImage, mm_to_px: FloatArray, box: Box, px_per_mm: float, outside: int | None = None
+) -> GreyImage:
+    """A box of the sheet resampled upright; empty where no part of it is in the picture.
+
+    The centre of the result's pixel q lies (q + 0.5) / px_per_mm mm from the box's left or upper side.
+    Beyond the picture it has the value `outside`, or without one that of the picture's nearest pixel.
+    """
+    x, y, wide, high = box
+    size = round(wide * px_per_mm), round(high * px_per_mm)
+    step = 1.0 / px_per_mm
+    to_px = mm_to_px @ np.array([[step, 0.0, x + step / 2.0], [0.0, step, y + step / 2.0], [0.0, 0.0, 1.0]])
+    corners = mapped(to_px, np.array([(0.0, 0.0), (size[0], 0.0), (0.0, size[1]), size]))
+    if np.any(corners.max(axis=0) < 0.0) or np.any(corners.min(axis=0) > np.array(grey.shape[::-1]) - 1.0):
+        return np.zeros((0, 0), dtype=np.uint8)
+    border = cv2.BORDER_REPLICATE if outside is None else cv2.BORDER_CONSTANT
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    cut = cv2.warpPerspective(
+        grey, to_px, size, flags=flags, borderMode=border, borderValue=(outside or 0,) * 4
+    )
+    return np.asarray(cut, dtype=np.uint8)
+
+
+def reached(spans: FloatArray, start: FloatArray, gap: float) -> BoolArray:
+    """Which stretches of a line, (n, 2) low and high, are reached from another (2,) over gaps no wider."""
+    low, high = float(start[0]), float(start[1])
+    taken = np.zeros(len(spans), dtype=bool)
+    while True:
+        more = ~taken & (spans[:, 0] <= high + gap) & (spans[:, 1] >= low - gap)
+        if not more.any():
+            return taken
+        taken |= more
+        low, high = min(low, float(spans[more, 0].min())), max(high, float(spans[more, 1].max()))
+
+
+def lengths_and_directions(ends: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """((...) lengths, (..., 2) unit vectors from first to second end) of segments (..., 2, 2)."""
+    span = ends[..., 1, :] - ends[..., 0, :]
+    length = np.maximum(np.hypot(span[..., 0], span[..., 1]), 1e-9)
+    return length, span / length[..., None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +129,17 @@ class Flat:
         """
         middle = x.shape[1] // 2
         level = self._paper_at(x[:, middle], y[:, middle])
-        share = _sampled(self.grey, x, y) / np.maximum(level, np.float32(1.0))[:, None]
+        share = sampled(self.grey, x, y) / np.maximum(level, np.float32(1.0))[:, None]
         return np.clip(np.float32(1.0) - share, np.float32(0.0), np.float32(1.0))
 
     def brightness(self, x: FloatArray, y: FloatArray) -> Float32Array:
         """Pixels as stored, 0..255, at points (r, m) given in pixels."""
-        return _sampled(self.grey, x, y)
+        return sampled(self.grey, x, y)
 
     def _paper_at(self, x: FloatArray, y: FloatArray) -> Float32Array:
         """(r,) brightness of the paper at points given in pixels."""
         reduced = (x + 0.5) / self.step[0] - 0.5, (y + 0.5) / self.step[1] - 0.5
-        return _sampled(self.paper, reduced[0][:, None], reduced[1][:, None])[:, 0]
+        return sampled(self.paper, reduced[0][:, None], reduced[1][:, None])[:, 0]
 
     def reduced(self, scale: float) -> GreyImage:
         """Contrast of the whole page at `scale` times its resolution, 0 = paper .. 255 = black."""
@@ -213,7 +288,7 @@ def _contrast_across(
     return flat.contrast(x.reshape(k * n, m), y.reshape(k * n, m)).reshape(k, n, m)
 
 
-def _sampled(image: GreyImage, x: FloatArray | Float32Array, y: FloatArray | Float32Array) -> Float32Array:
+def sampled(image: GreyImage, x: FloatArray | Float32Array, y: FloatArray | Float32Array) -> Float32Array:
     """Bilinear values of an image at (r, m) points, in blocks that a remap can take."""
     x, y = np.ascontiguousarray(x, dtype=np.float32), np.ascontiguousarray(y, dtype=np.float32)
     result = np.empty(x.shape, dtype=np.float32)
@@ -275,6 +350,12 @@ class Lines:
     b: FloatArray
     scale: FloatArray
     weight: FloatArray
+
+    def shifted(self, ends: FloatArray) -> FloatArray:
+        """Segments (k, 2, 2) shifted across onto the lines, which were fitted in their own coordinates."""
+        length, u = lengths_and_directions(ends)
+        shift = np.stack([self.a, self.a + self.b * length], axis=1)
+        return np.asarray(ends + shift[:, :, None] * np.column_stack([-u[:, 1], u[:, 0]])[:, None, :])
 
 
 def robust_lines(t: FloatArray, y: FloatArray, weight: FloatArray, noise_floor: float) -> Lines:

@@ -27,8 +27,8 @@ def code_of(identity: Identity) -> str:
 
 def identity_of(code: str) -> Identity | None:
     """The identity in a code's text, None for anything that is no code of a printed page."""
-    found = _CODE.fullmatch(code) if len(code) <= MAX_LENGTH else None
-    if found is None or set(found["student"]) == {"."}:
+    match = _CODE.fullmatch(code) if len(code) <= MAX_LENGTH else None
+    if match is None or set(match["student"]) == {"."}:
         return None
-    n, position = (int(found[name]) if found[name] else None for name in ("n", "position"))
-    return Identity(found["assignment"], found["student"], n, position, found["kind"])
+    n, position = (int(match[name]) if match[name] else None for name in ("n", "position"))
+    return Identity(match["assignment"], match["student"], n, position, match["kind"])

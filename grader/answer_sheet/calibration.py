@@ -5,7 +5,6 @@ import numpy as np
 from grader.answer_sheet.drawing import Drawing
 from grader.answer_sheet.page import draw_ruler
 from grader.answer_sheet.sheets import Sheets
-from grader.answer_sheet.words import REGULAR, fitted
 from grader.i18n import N_, tongue
 from grader.layout import CALIBRATION, Layout, PageLayout, marker_places
 from grader.records import FloatArray
@@ -25,19 +24,19 @@ def calibration_segments() -> FloatArray:
     A star has twelve diameters of 60 mm, 15 degrees apart, with its middle left free; a ladder has
     horizontal or vertical segments of 5 to 80 mm.
     """
-    found: list[tuple[complex, complex]] = []
+    segments: list[tuple[complex, complex]] = []
     for centre in (85.0 + 100.0j, 215.0 + 100.0j, 345.0 + 100.0j):
         for angle in _ANGLES_DEG:
             along = np.exp(-1j * np.radians(angle))
-            found.append((centre + 12.0 * along, centre + 40.0 * along))
-            found.append((centre - 12.0 * along, centre - 40.0 * along))
+            segments.append((centre + 12.0 * along, centre + 40.0 * along))
+            segments.append((centre - 12.0 * along, centre - 40.0 * along))
     for row, length in enumerate(_LENGTHS_MM):
         y = 165.0 + 18.0 * row
-        found.extend((x + 1j * y, x + length + 1j * y) for x in (40.0, 140.0, 240.0))
+        segments.extend((x + 1j * y, x + length + 1j * y) for x in (40.0, 140.0, 240.0))
     for column, length in enumerate(_LENGTHS_MM):
         x = 335.0 + 14.0 * column
-        found.append((x + 160.0j, x + 1j * (160.0 + length)))
-    return np.array([[(end.real, end.imag) for end in ends] for ends in found])
+        segments.append((x + 160.0j, x + 1j * (160.0 + length)))
+    return np.array([[(end.real, end.imag) for end in ends] for ends in segments])
 
 
 def make_calibration(lang: str = "en") -> Sheets:
@@ -46,9 +45,7 @@ def make_calibration(lang: str = "en") -> Sheets:
     drawing = Drawing.begin(words.gettext(N_("Calibration page")))
     drawing.frame()
     drawing.markers(CALIBRATION)
-    size, lines = fitted([words.gettext(_ADVICE)], REGULAR, (9.0, 8.0, 7.0), (103.0, 36.0))
-    for row, line in enumerate(lines):
-        drawing.text((39.0, 16.0 + row * 1.3 * size * 25.4 / 72.0), line, size)
+    drawing.paragraphs((39.0, 16.0, 103.0, 36.0), [words.gettext(_ADVICE)], (9.0, 8.0, 7.0), pitch=1.3)
     for (x0, y0), (x1, y1) in calibration_segments().tolist():
         drawing.line((x0, y0, x1, y1), _PEN_MM)
     draw_ruler(drawing, words)

@@ -8,7 +8,7 @@ from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 
 from grader import aruco
-from grader.answer_sheet.words import REGULAR, embed_fonts, width_mm
+from grader.answer_sheet.words import REGULAR, embed_fonts, fitted, width_mm
 from grader.layout import FRAME_MM, MARKER_CORNERS, MARKER_MM, PAGE_MM, Template
 from grader.records import Box
 from reference.lettering import Piece
@@ -79,6 +79,26 @@ class Drawing:
         self.canvas.setFillGray(grey)
         self.canvas.setFont(font, size_pt)
         self.canvas.drawString(at[0] * mm, _up(at[1]), text)
+
+    def paragraphs(
+        self,
+        box: Box,
+        texts: list[str],
+        sizes_pt: tuple[float, ...],
+        font: str = REGULAR,
+        *,
+        lines_down: int = 0,
+        pitch: float = 1.2,
+    ) -> None:
+        """Wrapped texts at the largest size that fits a box.
+
+        The first base line is `lines_down` lines below the box's upper side; lines are `pitch` times
+        their size apart.
+        """
+        x, y, wide, high = box
+        size, lines = fitted(texts, font, sizes_pt, (wide, high))
+        for row, line in enumerate(lines):
+            self.text((x, y + (row + lines_down) * pitch * size / mm), line, size, font)
 
     def pieces(
         self, at: tuple[float, float], pieces: Iterable[Piece], size_pt: float, font: str = REGULAR

@@ -80,17 +80,16 @@ def poles_mm(
     least in one variant: the student will choose another scale.
     """
     plans = [figure for figure in template.zones if figure != MECHANISM]
-    found = {}
+    poles = {}
     for figure, places in places_mm(assignment, plans, variants).items():
         x, y, wide, high = template.zones[figure]
         low = places.real.min(axis=0) + 1j * places.imag.min(axis=0)
         top = places.real.max(axis=0) + 1j * places.imag.max(axis=0)
-        if np.all((top - low).real <= wide - 2 * MARGIN_MM) and np.all(
-            (top - low).imag <= high - 2 * MARGIN_MM
-        ):
+        room = complex(wide - 2 * MARGIN_MM, high - 2 * MARGIN_MM)
+        if np.all((top - low).real <= room.real) and np.all((top - low).imag <= room.imag):
             pole = complex(x + wide / 2.0, -y - high / 2.0) - (low + top) / 2.0
-            found[figure] = [(float(one.real), float(-one.imag)) for one in pole]
-    return found
+            poles[figure] = [(float(at.real), float(-at.imag)) for at in pole]
+    return poles
 
 
 def best_template(assignment: Assignment, figures: Sequence[str]) -> Fit:

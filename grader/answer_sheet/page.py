@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import segno
+from reportlab.lib.units import mm
 
 from grader.answer_sheet.drawing import GREY, Drawing, runs
 from grader.answer_sheet.words import (
@@ -51,13 +52,17 @@ _MEASURED = N_(
 )
 _MEASURED_AT_MM = (39.0, 265.2)
 _TICK_MM = 5.0
+"""Long enough to be seen, too short to be taken for a stroke."""
 _POLE_MM = (2.0, 4.5)
 """Ends of the arms of the cross for a pole: open in the middle, where lines are to begin."""
 _FAINT, _FAINT_PEN_MM = 0.9, 0.25
 """Lighter than any pencil: people see it, and no stroke is found in it on a scan."""
 _CELL_GREY = 0.6
+"""Light enough that the digits' ink stands out."""
 _RULER_MM = (24.0, 291.0, 100.0)
-_PT = 25.4 / 72.0
+"""Left end, height and length of the line that must measure 100 mm."""
+_PT = 1.0 / mm
+"""Millimetres in a point."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,11 +133,8 @@ def _code(drawing: Drawing, identity: Identity) -> None:
 def _student(drawing: Drawing, assignment: Assignment, text: PageText, tongue: Tongue) -> None:
     x, y, wide, _ = _STUDENT_MM
     identity = text.identity
-    size, lines = fitted(
-        [assignment.file.title.in_language(tongue.lang)], BOLD, (10.0, 9.0, 8.0), (wide, 9.0)
-    )
-    for row, line in enumerate(lines):
-        drawing.text((x, y + 3.5 + row * 1.2 * size * _PT), line, size, BOLD)
+    title = [assignment.file.title.in_language(tongue.lang)]
+    drawing.paragraphs((x, y + 3.5, wide, 9.0), title, (10.0, 9.0, 8.0), BOLD)
     variant = [
         f"{label} = {value}"
         for label, value in (("n", identity.n), (tongue.gettext(N_("position")), identity.position))
@@ -141,30 +143,22 @@ def _student(drawing: Drawing, assignment: Assignment, text: PageText, tongue: T
     sheet = tongue.gettext(N_("sheet {number} of {count}")).format(number=text.sheet, count=text.sheets)
     name = wrap(text.name, BOLD, 12.0, wide)[:1] or [""]
     drawing.text((x, y + 13.5), name[0], 12.0, BOLD)
-    size, lines = fitted(
-        [",  ".join([identity.student_id, *variant])], REGULAR, (10.0, 8.0, 6.5), (wide, 4.6)
-    )
-    for row, line in enumerate(lines):
-        drawing.text((x, y + 18.8 + row * 1.2 * size * _PT), line, size)
+    whose = [",  ".join([identity.student_id, *variant])]
+    drawing.paragraphs((x, y + 18.8, wide, 4.6), whose, (10.0, 8.0, 6.5))
     drawing.text((x, y + 23.6), f"{tongue.gettext(KINDS[identity.kind])}, {sheet}", 9.0)
 
 
 def _task(drawing: Drawing, assignment: Assignment, identity: Identity, tongue: Tongue) -> None:
     """The task in words at the largest size that leaves room for the data below it."""
     x, y, wide, high = _TASK_MM
+    task = assignment.file.task.in_language(tongue.lang)
     data = _given(assignment, Variant(identity.n, identity.position), tongue)
     for size in (8.5, 8.0, 7.5, 7.0, 6.5, 6.0):
         step = 1.3 * size * _PT
         rows = _flow(data, size, wide)
-        if (
-            len(wrap(assignment.file.task.in_language(tongue.lang), REGULAR, size, wide)) * step
-            + len(rows) * step
-            <= high
-        ):
+        if len(wrap(task, REGULAR, size, wide)) * step + len(rows) * step <= high:
             break
-    _, lines = fitted(
-        [assignment.file.task.in_language(tongue.lang)], REGULAR, (size,), (wide, high - len(rows) * step)
-    )
+    _, lines = fitted([task], REGULAR, (size,), (wide, high - len(rows) * step))
     base = y + size * _PT
     for line in lines:
         drawing.text((x, base), line, size)
@@ -183,13 +177,13 @@ _SPACE_MM = 3.0
 def _given(assignment: Assignment, variant: Variant, tongue: Tongue) -> list[tuple[Piece, ...]]:
     """The given data, each as label = value unit."""
     values = assignment.values([variant])
-    found = []
+    data = []
     for datum in assignment.file.given:
-        told = number(float(np.ravel(datum.value(values))[0]), tongue.lang)
+        value = number(float(np.ravel(datum.value(values))[0]), tongue.lang)
         unit = tongue.unit(datum.unit)
         gap = "" if unit in {"", "°"} else "\N{NO-BREAK SPACE}"
-        found.append((*pieces_of(datum.label), Piece(f" = {told}{gap}{unit}")))
-    return found
+        data.append((*pieces_of(datum.label), Piece(f" = {value}{gap}{unit}")))
+    return data
 
 
 def _flow(data: list[tuple[Piece, ...]], size_pt: float, wide_mm: float) -> list[list[tuple[Piece, ...]]]:
@@ -208,11 +202,9 @@ def _flow(data: list[tuple[Piece, ...]], size_pt: float, wide_mm: float) -> list
 
 def _advice(drawing: Drawing, tongue: Tongue) -> None:
     """What makes a drawing easy to read, and what the registration of the scan needs."""
-    for texts, (x, y, wide, high) in ((_ADVICE, _ADVICE_MM), ((_CLEAR,), _CLEAR_MM)):
-        told = [tongue.gettext(text) for text in texts]
-        size, lines = fitted(told, REGULAR, (7.5, 7.0, 6.5, 6.0, 5.5), (wide, high))
-        for row, line in enumerate(lines):
-            drawing.text((x, y + (row + 1) * 1.2 * size * _PT), line, size)
+    for texts, box in ((_ADVICE, _ADVICE_MM), ((_CLEAR,), _CLEAR_MM)):
+        words = [tongue.gettext(text) for text in texts]
+        drawing.paragraphs(box, words, (7.5, 7.0, 6.5, 6.0, 5.5), lines_down=1)
 
 
 def _zone(drawing: Drawing, zone: Box, title: str) -> None:
@@ -273,5 +265,5 @@ def draw_ruler(drawing: Drawing, tongue: Tongue) -> None:
     drawing.line((x, y, x + long, y), 0.2, GREY)
     for end in (x, x + long):
         drawing.line((end, y - 1.2, end, y + 1.2), 0.2, GREY)
-    told = tongue.gettext(N_("This line must measure 100 mm: print at 100 %, without fitting to the page."))
-    drawing.text((x + long + 3.0, y + 0.8), told, 6.5, REGULAR, GREY)
+    words = tongue.gettext(N_("This line must measure 100 mm: print at 100 %, without fitting to the page."))
+    drawing.text((x + long + 3.0, y + 0.8), words, 6.5, REGULAR, GREY)

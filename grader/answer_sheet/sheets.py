@@ -86,8 +86,8 @@ def _unprintable(rows: Sequence[RosterRow], roster: str) -> Iterator[Problem]:
     for row in rows:
         letters = unprintable(row.name)
         if letters:
-            told = f"line {row.line}: the font has no {letters}; {row.student_id}'s name has boxes instead"
-            yield Problem("sheet_letters", told, roster)
+            message = f"line {row.line}: the font has no {letters}; {row.student_id}'s name has boxes instead"
+            yield Problem("sheet_letters", message, roster)
 
 
 def page_layouts(assignment: Assignment, asked: Collection[str] | None = None) -> Layout:
@@ -120,8 +120,8 @@ def _plans(
         names = [vector.name for figure in figures for vector in construction.vectors_of(figure)]
         boxes = _boxes(names, asked)
         if names and not boxes and (asked is None or set(names) & set(asked)):
-            told = f"page {table.kind}: {len(names)} lengths are too many for boxes; none are printed"
-            problems.append(Problem("sheet_boxes", told, str(assignment.path)))
+            message = f"page {table.kind}: {len(names)} lengths are too many for boxes; none are printed"
+            problems.append(Problem("sheet_boxes", message, str(assignment.path)))
         problems.extend(_too_small(assignment, table, fit))
         scales = {_SCALE_OF[figure]: SCALE_BOXES[_SCALE_OF[figure]] for figure in figures}
         plans.append(_PagePlan(table, PageForm(fit.template, scales | boxes, dict(construction.poles))))
@@ -161,11 +161,11 @@ def _too_small(assignment: Assignment, table: PageTable, fit: Fit) -> list[Probl
             continue
         wide, high = fit.need_mm[figure]
         _, _, zone_wide, zone_high = fit.template.zones[figure]
-        told = (
+        message = (
             f"page {table.kind}: {figure} needs up to {wide:.0f} x {high:.0f} mm at the assignment's scales,"
             f" its zone has {zone_wide:.0f} x {zone_high:.0f} mm; it fits at {100 * share:.0f} % of that size"
         )
-        problems.append(Problem("sheet_zone_small", told, str(assignment.path)))
+        problems.append(Problem("sheet_zone_small", message, str(assignment.path)))
     return problems
 
 

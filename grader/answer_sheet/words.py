@@ -88,5 +88,5 @@ def fitted(
         room = int(high / (1.25 * size / mm))
         if len(lines) <= room:
             return size, lines
-    kept = lines[: max(room, 1)]
-    return size, [*kept[:-1], f"{kept[-1].rstrip('.,;')} …"] if kept else []
+    cut = lines[: max(room, 1)]
+    return size, [*cut[:-1], f"{cut[-1].rstrip('.,;')} …"] if cut else []

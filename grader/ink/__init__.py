@@ -10,20 +10,19 @@ import numpy as np
 
 from grader.ink.circles import arcs, find_circles, led_to
 from grader.ink.components import find_components, mark_boxes
-from grader.ink.hatching import boxes_around, hatching
-from grader.ink.inkmap import ink_map
 from grader.ink.regions import brightness, field_of
-from grader.ink.seeds import find_seeds, working_scale
-from grader.ink.squares import without_squares
-from grader.ink.strokes import find_strokes, take
+from grader.ink.seeds import find_seeds, without_squares, working_scale
+from grader.ink.strokes import boxes_around, find_strokes, hatching, take
 from grader.ink.tips import find_tips
-from grader.pixels import flatten
-from grader.records import Box, Ink, Page, Sheet, Unread
+from grader.pixels import cut_out, flatten
+from grader.records import Box, GreyImage, Ink, InkMap, Page, Sheet, Unread
 
 __all__ = ["find_ink"]
 
 _DARK = 64.0
 """Of 255, a quarter of white: paper in photos is brighter than 130, a negative's darker than 20."""
+_MAP_PX_PER_MM = 6.0
+"""Resolution of the ink map: a stroke of 0.3 mm is two pixels wide."""
 
 
 def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> Ink | Unread:
@@ -56,4 +55,12 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     marks = np.concatenate([mark_boxes(components, field), boxes_around(strokes, hatched)])
     strokes = take(strokes, ~hatched)
     tips = find_tips(flat, strokes, sheet.mm_to_px)
-    return Ink(strokes, circles, marks, ink_map(contrast, scale, sheet), tips=tips)
+    return Ink(strokes, circles, marks, _ink_map(contrast, scale, sheet), tips=tips)
+
+
+def _ink_map(contrast: GreyImage, scale: float, sheet: Sheet) -> InkMap:
+    """Contrast of the whole sheet, upright, from the page reduced by `scale`."""
+    reduced = np.array([[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5], [0.0, 0.0, 1.0]])
+    # The centre of the map's pixel q is at q / 6 mm.
+    box = (-0.5 / _MAP_PX_PER_MM, -0.5 / _MAP_PX_PER_MM, *sheet.page_mm)
+    return InkMap(cut_out(contrast, reduced @ sheet.mm_to_px, box, _MAP_PX_PER_MM, outside=0), _MAP_PX_PER_MM)

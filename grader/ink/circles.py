@@ -5,36 +5,52 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.ink.components import Components
-from grader.ink.regions import Field, to_mm
+from grader.ink.regions import Field
 from grader.ink.seeds import PX_PER_MM, Seeds
-from grader.pixels import BoolArray, Flat, Float32Array
+from grader.pixels import BoolArray, Flat, Float32Array, at_full_size, lengths_and_directions
 from grader.records import FloatArray, GreyImage, Strokes
 
 _RADIUS_MM = (0.6, 3.4)
+"""Of joints and poles as people draw them."""
 _CELL_PX = 2
+"""Side of a cell in which normals are counted."""
 _EVERY = 2
 """Every second border pixel votes."""
 _VOTES = 0.3
 """Share of a full circle of the least radius whose normals must meet."""
 _MOST = 250
 _ANGLES = 48
+"""Rays around a centre."""
 _ROUNDS = 3
 _RADIAL_MM = np.arange(0.3, 4.0, 0.1)
+"""Distances from a centre at which ink is looked for."""
 _ROUND_MM = 0.11
+"""Rms distance of a hand-drawn ring from a circle, at most."""
 _DRAWN = 0.75
 """Share of the circle that is inked and round, but for where strokes cross it."""
 _DRAWN_ALONE = 0.5
+"""The same with the places counted where strokes cross it."""
 _THICK = 0.7
+"""Share of the places across the ring that are inked where a stroke runs along the ray."""
 _POINTS_TO_MM = 0.35
+"""Of the radius: a line that leads to a circle passes its centre so near."""
 _LEADS_TO_MM = 1.5
+"""It ends at most so far from the ring."""
 _LEAST_LINK_MM = 4.0
+"""Shorter strokes belong to letters."""
 _HOLLOW = 0.55
+"""Share of a smaller circle that may be inked, and that circle's size: a ring is hollow, a dot is not."""
 _HOLLOW_AT = 0.55
 _EDGE_BYTES = 12.0
+"""Rise of the contrast across a border of ink, at least."""
 _CHORD = 0.65
+"""Of the radius: a piece of the ring lies at least so far from the centre,"""
 _TANGENT_MM = 0.35
+"""and at most so far outside of the ring;"""
 _CHORD_MM = 6.0
+"""it is shorter than this"""
 _CHORD_PAST_MM = 2.2
+"""and ends no farther from the ring."""
 
 
 def find_circles(flat: Flat, seeds: Seeds, components: Components, field: Field) -> FloatArray:
@@ -43,45 +59,43 @@ def find_circles(flat: Flat, seeds: Seeds, components: Components, field: Field)
     Rings that are part of a letter are left out.
     """
     unit = field.sheet.px_per_mm
-    guesses = (_meeting_points(seeds, field.mask(seeds.mask.shape)) + 0.5) / field.scale - 0.5
+    guesses = at_full_size(_meeting_points(seeds, field.mask(seeds.mask.shape)), field.scale)
     if len(guesses) == 0:
         return np.zeros((0, 3))
     rings = _distinct(_refined(flat, guesses, unit))
     rings = rings[~_in_letter(rings, components, field.scale)]
-    return np.column_stack([to_mm(field.sheet, rings[:, :2]), rings[:, 2] / unit])
+    return np.column_stack([field.to_mm(rings[:, :2]), rings[:, 2] / unit])
 
 
 def led_to(circles: FloatArray, strokes: Strokes) -> BoolArray:
     """Which circles a stroke of 4 mm or more leads to or through: joints and poles, not letters."""
-    span = strokes.ends[:, 1] - strokes.ends[:, 0]
-    length = np.hypot(span[:, 0], span[:, 1])
-    rows = np.flatnonzero(length >= _LEAST_LINK_MM)
+    length, u = lengths_and_directions(strokes.ends)
+    links = length >= _LEAST_LINK_MM
     result = np.zeros(len(circles), dtype=bool)
     for index, (x, y, radius) in enumerate(circles):
-        relative = np.array([x, y]) - strokes.ends[rows, 0]
-        u = span[rows] / length[rows, None]
-        along = (relative * u).sum(axis=1)
-        off = np.abs(relative[:, 0] * u[:, 1] - relative[:, 1] * u[:, 0])
+        along, off = _beside(strokes, u, (x, y))
         reach = radius + _LEADS_TO_MM
-        on = (along > -reach) & (along < length[rows] + reach)
-        result[index] = bool((on & (off < _POINTS_TO_MM * radius + 0.2)).any())
+        on = (along > -reach) & (along < length + reach) & (off < _POINTS_TO_MM * radius + 0.2)
+        result[index] = bool((on & links).any())
     return result
 
 
 def arcs(strokes: Strokes, circles: FloatArray) -> BoolArray:
     """Which strokes are short chords or tangents of a circle, pieces of its ring."""
     result = np.zeros(len(strokes), dtype=bool)
-    span = strokes.ends[:, 1] - strokes.ends[:, 0]
-    length = np.maximum(np.hypot(span[:, 0], span[:, 1]), 1e-9)
-    u = span / length[:, None]
+    length, u = lengths_and_directions(strokes.ends)
     for x, y, radius in circles:
-        relative = np.array([x, y]) - strokes.ends[:, 0]
-        foot = (relative * u).sum(axis=1)
-        off = np.abs(relative[:, 0] * u[:, 1] - relative[:, 1] * u[:, 0])
+        foot, off = _beside(strokes, u, (x, y))
         tangent = (off > _CHORD * radius) & (off < radius + _TANGENT_MM) & (foot > 0) & (foot < length)
         away = np.hypot(strokes.ends[..., 0] - x, strokes.ends[..., 1] - y).max(axis=1)
         result |= tangent & (length < _CHORD_MM) & (away < radius + _CHORD_PAST_MM)
     return result
+
+
+def _beside(strokes: Strokes, u: FloatArray, at: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """How far along each stroke a point lies, and how far beside it; `u` are the strokes' directions."""
+    relative = np.array(at) - strokes.ends[:, 0]
+    return (relative * u).sum(axis=1), np.abs(relative[:, 0] * u[:, 1] - relative[:, 1] * u[:, 0])
 
 
 def _meeting_points(seeds: Seeds, where: BoolArray) -> FloatArray:

@@ -6,22 +6,29 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.ink.regions import Field, to_mm
+from grader.ink.regions import Field
 from grader.ink.seeds import PX_PER_MM, Seeds
-from grader.pixels import BoolArray
+from grader.pixels import BoolArray, at_full_size, lengths_and_directions
 from grader.records import FloatArray
 
 _MARK_MM = 8.0
+"""Larger pieces of ink are no single letter."""
 _LONG_SEED_MM = 4.5
 """Ink without a straight border of this length holds letters, compass arcs and the like."""
 _LEAST_STROKE_MM = 1.2
+"""Shorter pieces are dots and dust."""
 _THIN = 0.5
 """Spread across a stroke in pens: 0.29 for an even one."""
 _LONG = 2.5
+"""A stroke is so many times as long as wide."""
 _LONE_MM = 6.0
+"""A straight piece this long is a stroke, whatever stands beside it."""
 _NEIGHBOUR_MM = 5.0
+"""Letters of one word are closer to each other than this."""
 _NEIGHBOURS = 2
+"""A single letter beside a short stroke names it; two are a text of which it is part."""
 _DUST_MM = 0.4
+"""Smaller pieces are dust."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +56,7 @@ def find_components(seeds: Seeds) -> Components:
     of_seed = labels[seeds.border[:, 0], seeds.border[:, 1]].astype(np.intp) - 1
     size = np.hypot(box[:, 2], box[:, 3]) / PX_PER_MM
     longest = np.zeros(len(box))
-    length = np.hypot(*(seeds.ends[:, 1] - seeds.ends[:, 0]).T) / PX_PER_MM
+    length = lengths_and_directions(seeds.ends)[0] / PX_PER_MM
     np.maximum.at(longest, of_seed, length)
     major, minor = _spread(labels.astype(np.int32, copy=False), len(box))
     straight = (minor <= _THIN * seeds.pen_px) & (major >= _LONG * minor)
@@ -97,7 +104,8 @@ def mark_boxes(components: Components, field: Field) -> FloatArray:
     left, top, wide, high = components.box_px[components.mark | components.dash].T
     steps = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
     corners = np.stack([np.column_stack([left + dx * wide, top + dy * high]) for dx, dy in steps], axis=1)
-    mm = to_mm(field.sheet, corners / field.scale - 0.5)
+    # A box's edge lies between pixels.
+    mm = field.to_mm(at_full_size(corners - 0.5, field.scale))
     low, far = mm.min(axis=1), mm.max(axis=1)
     inside = field.holds((low + far) / 2.0) & ((far - low).max(axis=1) > _DUST_MM)
     return np.column_stack([low[inside], (far - low)[inside]])

@@ -1,40 +1,64 @@
-"""Where strokes begin and end: followed outward through their own ink."""
+"""Where strokes begin and end: followed outward through their own ink, and parted where it turns light."""
+
+from itertools import pairwise
 
 import numpy as np
 import scipy.ndimage
 from numpy.typing import NDArray
 
 from grader.ink.centreline import Fitted
-from grader.ink.pairs import near_pairs
-from grader.pixels import BoolArray, Flat, cut_across
+from grader.ink.joining import near_pairs
+from grader.pixels import BoolArray, Flat, cut_across, lengths_and_directions
 from grader.records import FloatArray
 
 _BEYOND_MM = 9.0
+"""How far beyond a fitted end a stroke may go on: over a joint's circle and a gap."""
 _INSIDE_MM = 2.0
+"""Where following starts: fitted ends may lie outside of the ink."""
 _STEP_MM = 0.15
+"""Half of a pen's width: no gap is stepped over."""
 _GAP_MM = 0.9
+"""Paper over this length ends a stroke; dashes are joined before."""
 _CROSSING_MM = 1.6
 """Ink whose borders are not the stroke's is passed over this far: another stroke, a letter, a joint."""
 _OFF_MM = 0.11
+"""Ink is the stroke's own where its middle or a border is this near to where it should be."""
 _REACH_MM = 0.8
+"""Beyond its width, how far to either side the ink is looked at."""
 _INKED = 0.45
 """Of the stroke's own darkness."""
 _BAND_MM = 40.0
+"""A stroke is followed through another's ink over at most this length."""
 _BAND_STEP_MM = 0.3
+"""About a pen's width."""
 _BAND_GAP, _BAND_PAPER = 5, 0.5
+"""Steps over which paper is averaged, and its share from which the ink has ended."""
 _BAND_OFF_MM = 0.1
+"""Beyond its width, how near another stroke runs whose ink hides this one."""
 _LEAST_BAND_MM = 2.5
 """Ink of two strokes over less than this is a crossing."""
 _LEAST_LED_MM = 8.0
+"""The direction of a shorter stroke is not known well enough to follow it."""
 _PROBES = np.array([-0.4, 0.0, 0.4])
+"""Of a stroke's width: places across it at which ink is looked for."""
 _OWN, _OTHER, _PAPER = 2, 1, 0
+_ACROSS = np.linspace(-0.6, 0.6, 5)
+"""Of a stroke's width: places across it, a little beyond both borders."""
+_LIGHT = 0.6
+"""Of the stroke's dark level; a pencil's grain varies less over a millimetre."""
+_DARK_QUANTILE = 0.75
+"""Of the levels along a stroke: its dark part's, if that is a quarter of it."""
+_SMOOTH_MM = 1.05
+"""Running median: a crossing stroke is narrower than half of this."""
+_LEAST_LIGHT_MM = 1.5
+"""Shorter light ends are a pen lifted slowly."""
+_LEAST_PART_MM = 2.0
+"""Shorter light parts are not kept as strokes."""
 
 
 def find_ends(flat: Flat, fitted: Fitted, px_per_mm: float) -> tuple[FloatArray, BoolArray]:
     """((k, 2, 2) ends where each stroke's own ink stops, (k, 2) whether other ink goes on there)."""
-    span = fitted.ends[:, 1] - fitted.ends[:, 0]
-    length = np.maximum(fitted.length, 1e-9)
-    u = span / length[:, None]
+    length, u = lengths_and_directions(fitted.ends)
     ends = fitted.ends.copy()
     merged = np.zeros((len(fitted), 2), dtype=bool)
     inside = np.minimum(_INSIDE_MM * px_per_mm, 0.5 * length)
@@ -97,12 +121,11 @@ def through_bands(
     Such strokes mostly meet at the node that both lead to: they end where the ink along them does.
     """
     result = ends.copy()
-    span = ends[:, 1] - ends[:, 0]
-    length = np.maximum(np.hypot(span[:, 0], span[:, 1]), 1e-9)
+    length, along = lengths_and_directions(ends)
     count = round(_BAND_MM / _BAND_STEP_MM)
     steps = np.asarray((np.arange(count) + 1.0) * _BAND_STEP_MM * px_per_mm, dtype=np.float64)
     for side, sign in ((0, -1.0), (1, 1.0)):
-        u = sign * span / length[:, None]
+        u = sign * along
         rows = np.flatnonzero(merged[:, side] & (length > _LEAST_LED_MM * px_per_mm))
         rows = rows[_beside_another(fitted, ends[rows, side], u[rows], rows, px_per_mm)]
         if len(rows) == 0:
@@ -121,8 +144,7 @@ def _beside_another(
     fitted: Fitted, tips: FloatArray, outward: FloatArray, rows: NDArray[np.intp], px_per_mm: float
 ) -> BoolArray:
     """(m,) whether another stroke runs past each tip, near it both before and behind."""
-    span = fitted.ends[:, 1] - fitted.ends[:, 0]
-    u = span / np.maximum(fitted.length, 1e-9)[:, None]
+    length, u = lengths_and_directions(fitted.ends)
     limit = fitted.width + _BAND_OFF_MM * px_per_mm
     reach = _LEAST_BAND_MM * px_per_mm + float(limit.max(initial=0.0))
     first, second = near_pairs(np.stack([tips, tips], axis=1), fitted.ends, reach)
@@ -132,7 +154,7 @@ def _beside_another(
         relative = at[first] - fitted.ends[second, 0]
         along = (relative * u[second]).sum(axis=1)
         off = np.abs(relative[:, 0] * u[second, 1] - relative[:, 1] * u[second, 0])
-        beside &= (off < limit[second]) & (along > 0) & (along < fitted.length[second])
+        beside &= (off < limit[second]) & (along > 0) & (along < length[second])
     result = np.zeros(len(rows), dtype=bool)
     result[first[beside]] = True
     return result
@@ -156,3 +178,60 @@ def _inked_on(
     y = middle[..., 1, None] + (way[:, 0, None] * across)[:, None, :]
     level = flat.contrast(x.reshape(-1, len(_PROBES)), y.reshape(-1, len(_PROBES))).max(axis=1)
     return np.asarray(level.reshape(len(start), len(steps)) > _INKED * strokes.darkness[:, None])
+
+
+# Dark and light parts -----------------------------------------------------------------------------
+
+
+def split_by_darkness(flat: Flat, fitted: Fitted, px_per_mm: float) -> tuple[FloatArray, NDArray[np.intp]]:
+    """((m, 2, 2) ends in pixels, (m,) row of the stroke that each part is of).
+
+    A vector drawn over its construction line has dark and light parts. Light runs at either end of a
+    stroke are cut off it; those of 2 mm and more stay as strokes.
+    """
+    parts: list[FloatArray] = []
+    owners: list[int] = []
+    for row, levels in enumerate(_profiles(flat, fitted, px_per_mm)):
+        for low, high in _runs(levels):
+            share = np.array([low, high]) / len(levels)
+            span = fitted.ends[row, 1] - fitted.ends[row, 0]
+            parts.append(fitted.ends[row, 0] + share[:, None] * span)
+            owners.append(row)
+    return np.array(parts).reshape(-1, 2, 2), np.array(owners, dtype=np.intp)
+
+
+def _profiles(flat: Flat, fitted: Fitted, px_per_mm: float) -> list[FloatArray]:
+    """Mean contrast over a little more than the pen's width, every 0.15 mm, smoothed by a running median."""
+    count = np.maximum(4, np.rint(fitted.length / (_STEP_MM * px_per_mm))).astype(np.intp)
+    if len(count) == 0:
+        return []
+    row = np.repeat(np.arange(len(count)), count)
+    first = np.concatenate([[0], np.cumsum(count)])
+    share = (np.arange(first[-1]) - first[row] + 0.5) / count[row]
+    length, u = lengths_and_directions(fitted.ends)
+    middle = fitted.ends[row, 0] + (share * length[row])[:, None] * u[row]
+    across = _ACROSS[None, :] * fitted.width[row, None]
+    level = flat.contrast(
+        middle[:, 0, None] - u[row, 1, None] * across, middle[:, 1, None] + u[row, 0, None] * across
+    ).mean(axis=1)
+    smooth = scipy.ndimage.median_filter(level, round(_SMOOTH_MM / _STEP_MM) | 1, mode="nearest")
+    return [smooth[low:high].astype(np.float64) for low, high in pairwise(first)]
+
+
+def _runs(level: FloatArray) -> list[tuple[int, int]]:
+    """Index ranges of the dark part and of the light parts worth keeping at its two ends."""
+    n = len(level)
+    usual = float(np.partition(level, int(_DARK_QUANTILE * (n - 1)))[int(_DARK_QUANTILE * (n - 1))])
+    dark = level >= _LIGHT * usual
+    least = round(_LEAST_LIGHT_MM / _STEP_MM)
+    first, last = int(np.argmax(dark)), n - int(np.argmax(dark[::-1]))
+    first = first if first >= least else 0
+    last = last if n - last >= least else n
+    keep = round(_LEAST_PART_MM / _STEP_MM)
+    inked = level > 0.3 * usual
+    runs = [(first, last)]
+    if first >= keep and inked[:first].mean() > 0.5:
+        runs.append((0, first))
+    if n - last >= keep and inked[last:].mean() > 0.5:
+        runs.append((last, n))
+    return runs

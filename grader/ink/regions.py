@@ -1,28 +1,38 @@
 """What is not drawing: the frame, what lies outside it, and the title block."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from grader.ink.joining import join
 from grader.ink.seeds import Seeds
-from grader.pixels import BoolArray
+from grader.pixels import BoolArray, at_full_size, inverted, mapped
 from grader.records import Box, FloatArray, Page, Sheet
 
 _FRAME_MM = 1.5
+"""Inside of the frame's middle line: its pen and the registration's error."""
 _BLOCK_MM = (215.0, 80.0)
+"""Width and height of the corner in which a title block may lie."""
 _SQUARE = 0.05
+"""Of its length: how far askew a ruled line may be."""
 _PIECE_MM = 3.0
+"""Shorter pieces of borders are letters'."""
 _RULED_MM = 6.0
+"""Shorter joined lines are no part of a table."""
 _OFF_MM = 0.5
+"""Both borders of a ruled line are joined."""
 _BROKEN_MM = 16.0
 """Letters that touch a ruled line break its border this far."""
 _MEET_MM = 4.0
+"""The block's lines are ruled to their corner no nearer than this."""
 _REACH_MM = 18.0
+"""The block's lines reach the frame, or end this far from it."""
 _EDGE_MM = 2.5
+"""Lines nearer to the sheet's right and lower edge are the paper's shadow."""
 _LEAST_LINES = 4
+"""Top, left and at least two rows."""
 _SAMPLES = 64
 """Places along each side of a box: 4096 tell a median to a few per cent."""
 
@@ -44,6 +54,10 @@ class Field:
     block: Box | None
     scale: float
 
+    def to_mm(self, points: FloatArray) -> FloatArray:
+        """(..., 2) full pixels to sheet millimetres."""
+        return mapped(inverted(self.sheet.mm_to_px), points)
+
     def holds(self, points: FloatArray) -> BoolArray:
         """Which points, (n, 2) mm, are in the field."""
         inside = np.zeros(len(points), dtype=bool)
@@ -63,7 +77,7 @@ class Field:
     def _outline(self, box: Box) -> np.ndarray:
         x, y, w, h = box
         corners = np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]])
-        return np.rint((to_px(self.sheet, corners) + 0.5) * self.scale - 0.5).astype(np.int32)
+        return np.rint((mapped(self.sheet.mm_to_px, corners) + 0.5) * self.scale - 0.5).astype(np.int32)
 
 
 def brightness(page: Page, sheet: Sheet, boxes: Sequence[Box] | None) -> float:
@@ -72,7 +86,7 @@ def brightness(page: Page, sheet: Sheet, boxes: Sequence[Box] | None) -> float:
     across, down = (share.ravel() for share in np.meshgrid(shares, shares))
     mm = [np.column_stack([x + w * across, y + h * down]) for x, y, w, h in boxes or (_inner(sheet),)]
     last = np.array(page.grey.shape[::-1]) - 1
-    column, row = np.clip(np.rint(to_px(sheet, np.concatenate(mm))), 0, last).astype(np.intp).T
+    column, row = np.clip(np.rint(mapped(sheet.mm_to_px, np.concatenate(mm))), 0, last).astype(np.intp).T
     return float(np.median(page.grey[row, column]))
 
 
@@ -84,8 +98,10 @@ def _inner(sheet: Sheet) -> Box:
 
 def field_of(seeds: Seeds, sheet: Sheet, scale: float, boxes: Sequence[Box] | None) -> Field:
     """The frame's inside, or the boxes asked for, without the title block."""
-    block = None if sheet.zones else title_block(to_mm(sheet, (seeds.ends + 0.5) / scale - 0.5), sheet)
-    return Field(sheet, (_inner(sheet),) if boxes is None else tuple(boxes), block, scale)
+    field = Field(sheet, (_inner(sheet),) if boxes is None else tuple(boxes), None, scale)
+    if sheet.zones:
+        return field
+    return replace(field, block=title_block(field.to_mm(at_full_size(seeds.ends, scale)), sheet))
 
 
 def title_block(ends: FloatArray, sheet: Sheet) -> Box | None:
@@ -132,19 +148,3 @@ def _in_box(points: FloatArray, box: Box) -> BoolArray:
     return np.asarray(
         (points[:, 0] >= x) & (points[:, 0] <= x + w) & (points[:, 1] >= y) & (points[:, 1] <= y + h)
     )
-
-
-def to_mm(sheet: Sheet, points: FloatArray) -> FloatArray:
-    """(..., 2) full pixels to sheet millimetres."""
-    return _mapped(np.asarray(np.linalg.inv(sheet.mm_to_px), dtype=np.float64), points)
-
-
-def to_px(sheet: Sheet, points: FloatArray) -> FloatArray:
-    """(..., 2) sheet millimetres to full pixels."""
-    return _mapped(sheet.mm_to_px, points)
-
-
-def _mapped(homography: FloatArray, points: FloatArray) -> FloatArray:
-    flat = points.reshape(-1, 2)
-    mapped = np.column_stack([flat, np.ones(len(flat))]) @ homography.T
-    return np.asarray((mapped[:, :2] / mapped[:, 2:]).reshape(points.shape))

@@ -10,24 +10,45 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.pixels import parts
+from grader.pixels import Float32Array, lengths_and_directions, parts
 from grader.records import FloatArray, GreyImage
 
 PX_PER_MM = 6.0
 """Resolution at which ink is looked for; strokes of 0.3 mm are two pixels wide."""
 _WHOLE = 0.08
+"""Relative difference up to which a whole fraction of the resolution is near enough."""
 _FAINT = 20
 """Of 255: fainter than a construction line drawn with a hard pencil is paper."""
 _PEAK_WINDOW_PX = 7
+"""Wider than a stroke with its blur, narrower than the distance of two strokes."""
 _DARK = 0.62
+"""Of the darkest strokes' contrast: construction lines are lighter."""
 _DARK_QUANTILE = 0.85
+"""Of the ink's contrast: that of the darkest strokes."""
 _POLYGON_PX = 1.0
+"""Distance of a border from the straight runs that replace it."""
 _LEAST_PX = 5.0
+"""0.8 mm: shorter runs have no direction."""
 _SOFTEN_PX = 0.7
+"""Less than a stroke's width: grain fades and gaps stay open."""
 _WIDEST_PX = 12
+"""2 mm: a wider band is a blot."""
 _PEN_PX = 2.0
+"""A pen of 0.35 mm, where a sheet has no long stroke to tell."""
 _BUNDLE = 1.6
 """An ink band this many pens wide is more than one stroke."""
+_STRIP_MM, _STRIPS, _EVERY = 10.0, 5, 3
+"""Strips narrow enough that a skewed line stays within its own width over most of one."""
+_LEAST_PEAK = 6.0
+"""Of 255: fainter squares do not disturb."""
+_LEAST_LINES = 12
+"""A table has fewer lines; 10 mm of a strip have as many squares."""
+_REGULAR, _ALIKE = 0.6, 0.2
+"""Share of the distances that are whole numbers of squares, to within this share of one."""
+_DARKER = 1.35
+"""Drawn lines are so much darker than printed squares."""
+_DARKEST = 0.9
+"""Quantile of a strip's lines: every fifth or tenth is printed darker."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,8 +160,7 @@ def _border_runs(mask: GreyImage) -> FloatArray:
 def _band_width(mask: GreyImage, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
     """((n, 2) unit normals into the ink, (n,) median width of the ink band there, px)."""
     share = np.linspace(0.1, 0.9, 9)
-    direction = edges[:, 1] - edges[:, 0]
-    direction /= np.hypot(*direction.T)[:, None]
+    direction = lengths_and_directions(edges)[1]
     normal = np.column_stack([direction[:, 1], -direction[:, 0]])
     points = edges[:, None, 0] + share[None, :, None] * (edges[:, None, 1] - edges[:, None, 0])
     depth = np.arange(1.0, _WIDEST_PX + 1.0)
@@ -163,3 +183,59 @@ def _usual(width: FloatArray, weight: FloatArray) -> float:
     order = np.argsort(width)
     cumulated = np.cumsum(weight[order])
     return float(width[order][np.searchsorted(cumulated, 0.35 * cumulated[-1])])
+
+
+# Graph paper --------------------------------------------------------------------------------------
+
+
+def squares_darkness(contrast: GreyImage) -> float:
+    """Darkness of printed squares, 0..255 of contrast, 0 where there are none.
+
+    Arguments
+    ---------
+    contrast : 0 = paper .. 255 = black, at about 6 px/mm
+
+    Lines that fill most of a strip, at equal distances, in most strips of both directions. Slanted
+    strokes never fill a strip, and a table's lines are too few.
+    """
+    return min(_of_strips(contrast), _of_strips(np.ascontiguousarray(contrast.T)))
+
+
+def without_squares(contrast: GreyImage) -> GreyImage:
+    """Contrast with all that is no darker than printed squares left out; as given where there are none."""
+    dark = squares_darkness(contrast)
+    if dark == 0.0:
+        return contrast
+    _, drawn = cv2.threshold(contrast, _DARKER * dark, 0, cv2.THRESH_TOZERO)
+    return np.asarray(drawn, dtype=np.uint8)
+
+
+def _of_strips(contrast: GreyImage) -> float:
+    """Darkness of lines at equal distances in most strips across the picture, else 0."""
+    high = contrast.shape[0]
+    deep = round(_STRIP_MM * PX_PER_MM)
+    strips = []
+    for top in np.linspace(0.08 * high, 0.92 * high - deep, _STRIPS).astype(int):
+        strip = contrast[top : top + deep : _EVERY]
+        strips.append(_regular_peaks(np.median(strip, axis=0).astype(np.float32)))
+    squared = [dark for dark in strips if dark > 0.0]
+    return float(np.median(squared)) if 2 * len(squared) > len(strips) else 0.0
+
+
+def _regular_peaks(profile: Float32Array) -> float:
+    """Darkness of the peaks of a profile where they are many and at equal distances, else 0."""
+    above = profile - _floor(profile)
+    inner = above[1:-1]
+    at = 1 + np.flatnonzero((inner >= _LEAST_PEAK) & (inner >= above[:-2]) & (inner > above[2:]))
+    if len(at) < _LEAST_LINES:
+        return 0.0
+    gaps = np.diff(at).astype(np.float64)
+    usual = np.median(gaps)
+    off = np.abs(gaps / usual - np.maximum(np.rint(gaps / usual), 1.0))
+    return float(np.quantile(profile[at], _DARKEST)) if np.mean(off < _ALIKE) > _REGULAR else 0.0
+
+
+def _floor(profile: Float32Array) -> FloatArray:
+    wide = round(2.0 * PX_PER_MM) | 1
+    row = profile[None, :]
+    return np.asarray(cv2.erode(row, np.ones((1, wide), np.uint8))[0], dtype=np.float64)

@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from grader.pixels import Flat
+from grader.pixels import Flat, lengths_and_directions, mapped
 from grader.records import NO_TIPS, FloatArray, IntArray, Strokes, Tips
 
 STEP_MM = 0.15
@@ -21,6 +21,7 @@ STEP_MM = 0.15
 HALF = 15
 """Pixels of a band to either side of its stroke."""
 BEYOND_MM = 3.0
+"""Of a band past its stroke's ends: an arrowhead is shorter."""
 GAP = 20
 """Empty columns between bands."""
 CELL = 2
@@ -32,16 +33,19 @@ APART = 48
 FULL_INK = 1.3
 """Contrast that counts as 1, of the stroke's mean."""
 LEAST_DARK, MOST_INK = 0.08, 1.5
+"""Contrast below which a stroke counts as so dark, and the most that ink counts."""
 LEAST_MM = 2.0
+"""No vector is drawn shorter."""
 LEAST_SURE = 0.15
 ASIDE_MM = 0.5
+"""A tip lies in its own cell or the next."""
 KINDS = 4
+"""Heads and tails, ahead and back."""
 
 
 def find_tips(flat: Flat, strokes: Strokes, mm_to_px: FloatArray) -> Tips:
     """Heads and tails of vectors along strokes of at least 2 mm."""
-    span = strokes.ends[:, 1] - strokes.ends[:, 0]
-    rows = np.flatnonzero(np.hypot(span[:, 0], span[:, 1]) >= LEAST_MM)
+    rows = np.flatnonzero(lengths_and_directions(strokes.ends)[0] >= LEAST_MM)
     if not len(rows):
         return NO_TIPS
     strip = strip_of(flat, strokes.ends[rows], strokes.darkness[rows], mm_to_px)
@@ -66,21 +70,16 @@ class Strip:
 
 def strip_of(flat: Flat, ends: FloatArray, darkness: FloatArray, mm_to_px: FloatArray) -> Strip:
     """The strokes `ends` (k, 2, 2) mm straightened, 3 mm beyond their ends."""
-    span = ends[:, 1] - ends[:, 0]
-    length = np.hypot(span[:, 0], span[:, 1])
+    length, unit = lengths_and_directions(ends)
     count = np.ceil((length + 2.0 * BEYOND_MM) / STEP_MM / CELL).astype(np.int64) * CELL
     band = np.repeat(np.arange(len(ends)), count + GAP)
     first = np.concatenate([[0], np.cumsum(count + GAP)[:-1]])
     along = (np.arange(len(band)) - first[band]) * STEP_MM - BEYOND_MM
-    unit = span / length[:, None]
     aside = np.arange(-HALF, HALF + 1) * STEP_MM
     x = (ends[band, 0, 0] + along * unit[band, 0])[:, None] + aside * unit[band, 1, None]
     y = (ends[band, 0, 1] + along * unit[band, 1])[:, None] - aside * unit[band, 0, None]
-    h = mm_to_px
-    depth = h[2, 0] * x + h[2, 1] * y + h[2, 2]
-    contrast = flat.contrast(
-        (h[0, 0] * x + h[0, 1] * y + h[0, 2]) / depth, (h[1, 0] * x + h[1, 1] * y + h[1, 2]) / depth
-    )
+    px = mapped(mm_to_px, np.stack([x, y], axis=-1))
+    contrast = flat.contrast(px[..., 0], px[..., 1])
     own = FULL_INK * np.maximum(darkness, LEAST_DARK)
     contrast[along >= length[band] + BEYOND_MM] = 0.0
     return Strip(np.clip(contrast / own[band, None], 0.0, MOST_INK).T, band, along)
@@ -100,19 +99,19 @@ def answers(ink: FloatArray) -> FloatArray:
     for start in range(0, wide, useful):
         network = _network()
         network.setInput(np.ascontiguousarray(padded[None, None, :, start : start + STRIP]))
-        told = network.forward()[0]
+        output = network.forward()[0]
         part = slice(start // CELL, min(start + useful, wide) // CELL)
-        result[:, part] = told[:, APART // CELL : APART // CELL + part.stop - part.start]
+        result[:, part] = output[:, APART // CELL : APART // CELL + part.stop - part.start]
     return result
 
 
-def _peaks(strip: Strip, told: FloatArray, rows: IntArray) -> Tips:
+def _peaks(strip: Strip, scores: FloatArray, rows: IntArray) -> Tips:
     """Cells likelier than their neighbours on the same band."""
-    sure = 1.0 / (1.0 + np.exp(-np.clip(told[:KINDS], -30.0, 30.0)))
+    sure = 1.0 / (1.0 + np.exp(-np.clip(scores[:KINDS], -30.0, 30.0)))
     near = np.stack([np.roll(sure, shift, axis=1) for shift in (-2, -1, 1, 2)]).max(axis=0)
     kind, cell = np.nonzero((sure > LEAST_SURE) & (sure >= near))
     column = cell * CELL
-    along = strip.along[column] + np.clip(told[KINDS + kind, cell], -ASIDE_MM, ASIDE_MM)
+    along = strip.along[column] + np.clip(scores[KINDS + kind, cell], -ASIDE_MM, ASIDE_MM)
     return Tips(
         rows[strip.band[column]],
         along.astype(np.float64),

@@ -1,24 +1,30 @@
 """What a PDF page draws, followed through forms, patterns, fonts and stamps before anything is drawn.
 
+Compressed streams are unpacked only as far as they can be of use: a bomb is told, not set off.
+
 A form that draws another twice, that one a third twice, and so on, is a few kilobytes and never ends: each
 stream counts as often as it would be carried out.
 """
 
 import io
 import math
+import zlib
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import cast
 
+import numpy as np
 import pikepdf
 from PIL import Image
 
 from grader.intake import jpeg
 from grader.intake.fax import Coding, damaged_row
 from grader.intake.limits import InputFile, check_memory, damaged
-from grader.intake.unpacking import MAX_CONTENT, filters_of, unpacked
+from grader.records import GreyImage
 from reference.errors import InputFileError
 
+MAX_CONTENT = 32_000_000
+"""Bytes of drawing commands on a page, each as often as it is carried out; exported drawings have 5 MB."""
 _OPERATORS = "Do gs scn SCN Tf Tj TJ ' \" BI ID EI"
 _SHOWS_TEXT = frozenset(("Tj", "TJ", "'", '"'))
 _PIXELS_A_BYTE = 64
@@ -28,7 +34,8 @@ _GROUP_PIXELS_A_BYTE = 24
 _RENDERED_PIXELS_A_POINT = (300.0 / 72.0) ** 2
 _MAX_TILES = 1_000_000
 """Tiles of a pattern on a page: A3 in millimetre squares has 125,000."""
-_IMAGE_SLACK = 1 << 16
+_SLACK = 1 << 16
+"""Bytes behind the last row that writers may leave."""
 _PLANES = {"/DeviceRGB": 3, "/CalRGB": 3, "/Lab": 3, "/DeviceCMYK": 4}
 _BYTES_A_PLANE = {"/JPXDecode": 8}
 """Working memory for a pixel in one plane, where it is more than the pixel: JPEG 2000 works on tiles."""
@@ -41,12 +48,12 @@ class Drawn:
     Attributes
     ----------
     objects : number of forms and images that the page's own commands draw
-    images : each image drawn, by its object
+    images : each image drawn, by its object number and generation
     damage : damaged rows of the first fax image that has some; empty where none has
     """
 
     objects: int = 0
-    images: dict[object, pikepdf.Stream] = field(default_factory=dict)
+    images: dict[tuple[int, int], pikepdf.Stream] = field(default_factory=dict)
     damage: str = ""
 
 
@@ -94,8 +101,8 @@ class _Walk:
         self.area = abs(_area(page.mediabox))
         self.resources = page.obj.get("/Resources")
         self.drawn = Drawn()
-        self.costs: dict[object, float] = {}
-        self.open: set[object] = set()
+        self.costs: dict[tuple[int, int], float] = {}
+        self.open: set[tuple[int, int]] = set()
 
     def check(self, cost: float) -> None:
         """Raise InputFileError for more commands than a drawing has."""
@@ -116,7 +123,7 @@ class _Walk:
 
     def of_stream(self, stream: pikepdf.Stream, resources: pikepdf.Object | None) -> float:
         """Cost of carrying out a form, pattern or letter once; `resources` where it has none of its own."""
-        key = stream.objgen if stream.is_indirect else id(stream)
+        key = stream.objgen
         if key in self.open or stream.get("/Type") == pikepdf.Name.Page:
             self.check(math.inf)  # it draws itself, or hides its commands from qpdf
         if key not in self.costs:
@@ -149,19 +156,19 @@ class _Walk:
         total, letter = uses["pixels", ""] / _PIXELS_A_BYTE, 0.0
         for (operator, name), count in uses.items():
             group = {"Do": "/XObject", "gs": "/ExtGState", "Tf": "/Font"}.get(operator, "/Pattern")
-            one = self.named(group, name, resources)
-            if isinstance(one, pikepdf.Stream) and one.get("/Subtype") == "/Image":
-                total += count * self.image(one)
-            elif isinstance(one, pikepdf.Stream):
-                self.check_tiles(one)
-                total += count * self.of_stream(one, resources)
-            elif operator == "gs" and one is not None:
-                mask = one.get("/SMask")
+            resource = self.named(group, name, resources)
+            if isinstance(resource, pikepdf.Stream) and resource.get("/Subtype") == "/Image":
+                total += count * self.image(resource)
+            elif isinstance(resource, pikepdf.Stream):
+                self.check_tiles(resource)
+                total += count * self.of_stream(resource, resources)
+            elif operator == "gs" and resource is not None:
+                mask = resource.get("/SMask")
                 if isinstance(mask, pikepdf.Dictionary) and isinstance(mask.get("/G"), pikepdf.Stream):
                     total += count * self.of_stream(cast("pikepdf.Stream", mask.G), resources)
-            elif operator == "Tf" and one is not None and one.get("/Subtype") == "/Type3":
-                letters = (form for form in one.CharProcs.values() if isinstance(form, pikepdf.Stream))
-                own = one.get("/Resources", resources)
+            elif operator == "Tf" and resource is not None and resource.get("/Subtype") == "/Type3":
+                letters = (form for form in resource.CharProcs.values() if isinstance(form, pikepdf.Stream))
+                own = resource.get("/Resources", resources)
                 letter = max([letter, *(self.of_stream(form, own) for form in letters)])
             self.check(total)
         return total + uses["letters", ""] * letter
@@ -187,9 +194,8 @@ class _Walk:
     def image(self, stream: pikepdf.Stream) -> float:
         """Cost of drawing an image; raises InputFileError for one that a sheet cannot need."""
         width, height = int(stream.Width), int(stream.Height)
-        key = stream.objgen if stream.is_indirect else id(stream)
-        if key not in self.drawn.images:
-            self.drawn.images[key] = stream
+        if stream.objgen not in self.drawn.images:
+            self.drawn.images[stream.objgen] = stream
             _check_image(self.file, self.number, stream, width, height)
             row = _fax_damage(stream, height)
             if row is not None and not self.drawn.damage:
@@ -201,7 +207,7 @@ class _Walk:
 
 def _letters(operand: pikepdf.Object) -> int:
     if isinstance(operand, pikepdf.Array):
-        return sum(_letters(one) for one in operand)
+        return sum(_letters(part) for part in operand)
     return len(bytes(operand)) if isinstance(operand, pikepdf.String) else 0
 
 
@@ -220,7 +226,7 @@ def _check_image(file: InputFile, number: int, stream: pikepdf.Stream, width: in
             pixels = image.width * image.height
         check_memory(file, number, pixels, pixels * planes * _BYTES_A_PLANE["/JPXDecode"])
     elif filters and set(filters) == {"/FlateDecode"}:
-        most = height * (width * planes * bits // 8 + 2) * (1 if planes > 1 else 4) + _IMAGE_SLACK
+        most = height * (width * planes * bits // 8 + 2) * (1 if planes > 1 else 4) + _SLACK
         data = unpacked(stream, most)
         if data is not None and len(data) > most:
             raise damaged(file, number, "its data are more than its size asks for")
@@ -240,3 +246,57 @@ def _fax_damage(stream: pikepdf.Stream, height: int) -> int | None:
     known = parameters if isinstance(parameters, pikepdf.Dictionary) else pikepdf.Dictionary()
     coding = Coding(int(known.get("/K", 0)), bool(known.get("/EncodedByteAlign", False)))
     return damaged_row(data, int(known.get("/Columns", 1728)), height, coding)
+
+
+# Unpacking ----------------------------------------------------------------------------------------
+
+
+def unpacked(stream: pikepdf.Stream, most: int, filters: list[str] | None = None) -> bytes | None:
+    """A stream's bytes, at most `most` and one more; None where they are packed by more than deflation.
+
+    The one byte more tells that there would have been more. Of `filters`, by default all, those that
+    come first may be named alone. Rows that a predictor has changed stay so. Raises zlib.error.
+    """
+    filters = filters_of(stream) if filters is None else filters
+    if any(name != "/FlateDecode" for name in filters):
+        return None
+    data = stream.read_raw_bytes()
+    for _ in filters:
+        data = zlib.decompressobj().decompress(data, most + 1)
+    return data[: most + 1]
+
+
+def filters_of(stream: pikepdf.Stream) -> list[str]:
+    """How a stream is packed, the outermost first."""
+    named = stream.get("/Filter")
+    if named is None:
+        return []
+    if isinstance(named, pikepdf.Array):
+        return [str(name) for name in named]
+    return [str(named)]
+
+
+def plain_pixels(file: InputFile, number: int, image: pikepdf.PdfImage) -> GreyImage | None:
+    """(h, w) or (h, w, 3) pixels of an image stored by deflation alone, None for one stored otherwise.
+
+    Raises InputFileError for one whose data are not what its size asks for.
+    """
+    bits, space = image.bits_per_component, str(image.colorspace)
+    channels = {"/DeviceGray": 1, "/CalGray": 1, "/DeviceRGB": 3, "/CalRGB": 3}.get(space)
+    if channels is None or image.indexed or bits not in {1, 8} or (bits == 1 and channels != 1):
+        return None
+    per_row = (image.width * channels * bits + 7) // 8
+    size = per_row * image.height
+    if "/DecodeParms" in image.obj:
+        return None
+    data = unpacked(cast("pikepdf.Stream", image.obj), size + _SLACK)
+    if data is None:
+        return None
+    if len(data) < size:
+        raise damaged(file, number, "its data end before its last row")
+    if len(data) > size + _SLACK:
+        raise damaged(file, number, "its data are more than its size asks for")
+    rows = np.frombuffer(data, np.uint8, size).reshape(image.height, per_row)
+    if bits == 1:
+        return np.unpackbits(rows, axis=1)[:, : image.width] * np.uint8(255)
+    return rows if channels == 1 else rows.reshape(image.height, image.width, channels)

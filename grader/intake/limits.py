@@ -41,6 +41,7 @@ MAX_PIXELS = 178_000_000
 MAX_MEMORY_BYTES = 1_100_000_000
 """File, decoded pixels and grey of one page: leaves 400 MB of a worker's 1.5 GB to the program itself."""
 MAX_PAGES = 2000
+"""A class of 200 with five sheets each, scanned on both sides."""
 _LEAST_SIDE_PX = 100
 """A sheet's short side at 9 dpi: no stroke can be read of less."""
 _LEAST_SHARE = 0.1
@@ -132,7 +133,7 @@ class Door:
     """
 
     page: Callable[[InputFile, int], Page | None]
-    count: Callable[[InputFile], int]
+    count: Callable[[InputFile], int] = lambda _: 1
     code: str = "image_damaged"
     noun: str = "image"
 

@@ -2,33 +2,47 @@
 
 import io
 import logging
+import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 import pikepdf
 import pypdfium2
 
 from grader.intake import jpeg
-from grader.intake.content import drawn_by
+from grader.intake.content import drawn_by, filters_of, plain_pixels
 from grader.intake.grey import from_pillow, to_grey
 from grader.intake.limits import MAX_PAGES, Door, InputFile, check_memory, check_pages, check_size
-from grader.intake.placement import Placement, only_image
 from grader.intake.tags import plausible
-from grader.intake.unpacking import filters_of, plain_pixels
-from grader.records import GreyImage, Page
+from grader.pixels import MM_PER_INCH
+from grader.records import FloatArray, GreyImage, Page
 from reference.errors import InputFileError
 
 RENDER_DPI = 300.0
+"""As drawings are scanned."""
 _POINTS_PER_INCH = 72.0
-_MM_PER_INCH = 25.4
 _INHERITED = ("/Resources", "/MediaBox", "/CropBox", "/Rotate")
 _END, _END_WITHIN = (b"%%EOF", b"startxref"), 1 << 16
 MAX_UNPACKED = 450_000_000
 """Bytes that qpdf may unpack of one stream: A2 at 600 dpi in colour has 417 MB."""
 _GROUP_BYTES = 4
 """For a pixel of what is drawn together: its colour and how much it covers."""
+_COVERS = 0.9
+"""An image over this share of the page, alone on it, is the page."""
+_SHOWN = 0.94
+"""Of an image; where the page hides more, what a viewer shows is another picture."""
+_SQUARE = 1e-3
+"""Of the image's size: by more than rounding askew, it is resampled by what renders the page."""
+_PAINTS = frozenset(("S", "s", "f", "F", "f*", "B", "B*", "b", "b*", "sh", "BI", "INLINE IMAGE"))
+_SHOWS_TEXT = frozenset(("Tj", "TJ", "'", '"'))
+_INVISIBLE_TEXT = 3
+"""Text mode of what optical character recognition lays over a scan."""
+
+Matrix = tuple[float, float, float, float, float, float]
+_UNIT: Matrix = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 
 
 logging.getLogger("pikepdf").setLevel(logging.CRITICAL)
@@ -38,6 +52,16 @@ if hasattr(pikepdf.settings, "set_qpdf_limits"):
         flate_max_memory=MAX_UNPACKED, run_length_max_memory=MAX_UNPACKED, png_max_memory=MAX_UNPACKED,
         tiff_max_memory=MAX_UNPACKED, dct_max_memory=MAX_UNPACKED, max_stream_filters=4, parser_max_errors=0,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """A page's only image: its size on paper along its own rows and columns, and how viewers turn it."""
+
+    image: pikepdf.PdfImage
+    width_pt: float
+    height_pt: float
+    turn_deg: int
 
 
 def _page(file: InputFile, number: int) -> Page | None:
@@ -53,7 +77,7 @@ def _page(file: InputFile, number: int) -> Page | None:
         page = pikepdf.Page(leaf)
         drawn = drawn_by(file, number, page)
         # libtiff would print what it thinks of damaged rows.
-        placement = only_image(page) if drawn.objects == 1 and not drawn.damage else None
+        placement = _only_image(page) if drawn.objects == 1 and not drawn.damage else None
         taken = None if placement is None else _taken_out(file, number, placement)
         if taken is None:
             for image in drawn.images.values():
@@ -122,7 +146,7 @@ def _taken_out(file: InputFile, number: int, placement: Placement) -> Page | Non
         return None
     width_in, height_in = placement.width_pt / _POINTS_PER_INCH, placement.height_pt / _POINTS_PER_INCH
     dpi = plausible((image.width / width_in, image.height / height_in))
-    paper_mm = (width_in * _MM_PER_INCH, height_in * _MM_PER_INCH)
+    paper_mm = (width_in * MM_PER_INCH, height_in * MM_PER_INCH)
     return Page(file.name, number, grey, dpi, placement.turn_deg, paper_mm)
 
 
@@ -166,7 +190,7 @@ def _rendered(file: InputFile, number: int, pages: int, data: bytes) -> Page:
         grey = page.render(scale=scale, grayscale=True).to_numpy()
     plane = np.ascontiguousarray(grey.reshape(grey.shape[0], grey.shape[1], -1)[..., 0])
     dpi = (plane.shape[1] / width_pt * _POINTS_PER_INCH, plane.shape[0] / height_pt * _POINTS_PER_INCH)
-    paper_mm = (width_pt / _POINTS_PER_INCH * _MM_PER_INCH, height_pt / _POINTS_PER_INCH * _MM_PER_INCH)
+    paper_mm = (width_pt / _POINTS_PER_INCH * MM_PER_INCH, height_pt / _POINTS_PER_INCH * MM_PER_INCH)
     return Page(file.name, number, plane, dpi, 0, paper_mm)
 
 
@@ -175,6 +199,68 @@ def _count(file: InputFile) -> int:
         pages = len(_leaves(document))
     check_pages(file, pages)
     return pages
+
+
+# Where a page places its one image ----------------------------------------------------------------
+
+
+def _only_image(page: pikepdf.Page) -> Placement | None:
+    """The image that is the whole page, or None where the page shows more, less or a mirrored one."""
+    images: list[tuple[pikepdf.Stream, Matrix]] = []
+    matrix, stack, text_mode = _UNIT, [], 0
+    try:
+        for instruction in pikepdf.parse_content_stream(page):
+            operands, name = instruction.operands, str(instruction.operator)
+            if name == "q":
+                stack.append(matrix)
+            elif name == "Q" and stack:
+                matrix = stack.pop()
+            elif name == "cm":
+                matrix = _times(tuple(float(value) for value in operands), matrix)
+            elif name == "Tr":
+                text_mode = int(operands[0])
+            elif name == "Do":
+                images.append((cast("pikepdf.Stream", page.resources.XObject[str(operands[0])]), matrix))
+            elif name in _PAINTS or (name in _SHOWS_TEXT and text_mode != _INVISIBLE_TEXT):
+                return None
+    except (pikepdf.PdfError, AttributeError, KeyError, TypeError, ValueError):
+        return None
+    if len(images) != 1 or images[0][0].get("/Subtype") != "/Image" or "/Annots" in page.obj:
+        return None
+    return _placed(page, *images[0])
+
+
+def _placed(page: pikepdf.Page, image: pikepdf.Stream, matrix: Matrix) -> Placement | None:
+    a, b, c, d, e, f = matrix
+    width, height = math.hypot(a, b), math.hypot(c, d)
+    box = [float(value) for value in page.mediabox]
+    area = abs((box[2] - box[0]) * (box[3] - box[1]))
+    upright = a * d - b * c > 0
+    square = min(abs(a), abs(b)) <= _SQUARE * width and abs(a * c + b * d) <= _SQUARE * width * height
+    if not upright or not square or width * height < _COVERS * area:
+        return None
+    corners = np.array([(e, f), (e + a + c, f + b + d)])
+    shown = _overlap(corners, [float(value) for value in page.cropbox])
+    if shown < _SHOWN * width * height:
+        return None
+    drawn_turn = round(math.degrees(math.atan2(b, a)) / 90.0) * 90
+    page_turn = int(page.obj.get("/Rotate", 0))
+    unit = float(page.obj.get("/UserUnit", 1.0))
+    turn_deg = (drawn_turn - page_turn) % 360
+    return Placement(pikepdf.PdfImage(image), width * unit, height * unit, turn_deg)
+
+
+def _overlap(corners: FloatArray, box: list[float]) -> float:
+    """Area that a rectangle, by opposite corners, shares with a box."""
+    low = np.maximum(corners.min(axis=0), np.minimum(box[:2], box[2:]))
+    high = np.minimum(corners.max(axis=0), np.maximum(box[:2], box[2:]))
+    return float(np.prod(np.maximum(high - low, 0.0)))
+
+
+def _times(first: tuple[float, ...], second: Matrix) -> Matrix:
+    a, b, c, d, e, f = first
+    g, h, i, j, k, m = second
+    return (a * g + b * i, a * h + b * j, c * g + d * i, c * h + d * j, e * g + f * i + k, e * h + f * j + m)
 
 
 DOOR = Door(_page, _count, "pdf_damaged", "page")

@@ -88,9 +88,4 @@ def _tags(file: InputFile, chunks: Chunks) -> Tags:
     return tags_within(described_pixel)
 
 
-def _count(file: InputFile) -> int:
-    del file
-    return 1
-
-
-DOOR = Door(_page, _count)
+DOOR = Door(_page)

@@ -7,15 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from PIL import Image
 
+from grader.pixels import MM_PER_INCH
 from grader.records import GreyImage
 
 _ORIENTATION_TAG = 274
+"""EXIF 2.3 and TIFF 6.0."""
 _INCH, _CENTIMETRE = 2, 3
-_CM_PER_INCH = 2.54
+"""TIFF's units of the resolution."""
 _TURN_CCW = {1: 0, 2: 0, 3: 180, 4: 180, 5: 90, 6: 270, 7: 270, 8: 90}
 """EXIF/TIFF orientation to the counter-clockwise turn that a viewer applies, after undoing the mirror."""
 _MIRRORED = frozenset({2, 4, 5, 7})
 _PLAUSIBLE_DPI = (30.0, 4800.0)
+"""Below and above, a file states a number that is no resolution."""
 
 Dpi = tuple[float, float]
 
@@ -38,7 +41,7 @@ def from_unit(x: float, y: float, unit: int) -> Dpi | None:
     if unit == _INCH:
         return plausible((x, y))
     if unit == _CENTIMETRE:
-        return plausible((x * _CM_PER_INCH, y * _CM_PER_INCH))
+        return plausible((x * (MM_PER_INCH / 10.0), y * (MM_PER_INCH / 10.0)))
     return None
 
 

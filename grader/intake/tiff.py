@@ -34,6 +34,7 @@ logging.getLogger("tifffile").setLevel(logging.CRITICAL)
 _MAX_SEGMENTS = 500_000
 """Strips or tiles: A2 at 600 dpi in tiles of 16 x 16 has 540,000, in strips of one row 14,000."""
 _MAX_TAGS = 4096
+"""Pages have about 20 tags."""
 _THREADS = 2
 """Segments that are decoded at the same time."""
 _MAX_RATIO: dict[int, int] = {

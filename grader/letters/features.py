@@ -9,18 +9,23 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from grader.pixels import Float32Array
 from grader.records import FloatArray, GreyImage
 
-Float32Array = NDArray[np.float32]
 SIDE_PX = 28
 """Side of the picture that is looked at; the sign's longer side fills all but the margin."""
 _MARGIN_PX = 3
+"""Around the sign: its border's gradient lies inside the picture."""
 _ORIENTATIONS = 8
+"""Directions that borders are sorted by."""
 _CELLS = 6
+"""Cells along a side for the directions of borders,"""
 _ZONES = 7
+"""and for the ink."""
 _LOBE = 0.6
 """A border counts for a direction as far as its part along it exceeds this share of its strength."""
 _LEAST_PX = 1.0
+"""No side of a crop counts as shorter."""
 _AT_ONCE = 32
 """Pictures whose numbers fit into the processor's cache together."""
 
@@ -29,13 +34,9 @@ def normalised(crop: GreyImage) -> GreyImage:
     """(28, 28) uint8 picture of a sign: its crop, 255 = ink, at the one size, proportions kept."""
     high, wide = crop.shape
     scale = (SIDE_PX - 2 * _MARGIN_PX) / max(high, wide)
+    size = max(1, round(wide * scale)), max(1, round(high * scale))
     # The crop's middle comes to the picture's middle; areas are averaged where it becomes smaller.
-    if scale < 1.0:
-        size = max(1, round(wide * scale)), max(1, round(high * scale))
-        small = cv2.resize(crop, size, interpolation=cv2.INTER_AREA)
-    else:
-        size = max(1, round(wide * scale)), max(1, round(high * scale))
-        small = cv2.resize(crop, size, interpolation=cv2.INTER_LINEAR)
+    small = cv2.resize(crop, size, interpolation=cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR)
     picture = np.zeros((SIDE_PX, SIDE_PX), dtype=np.uint8)
     top, left = (SIDE_PX - size[1]) // 2, (SIDE_PX - size[0]) // 2
     picture[top : top + size[1], left : left + size[0]] = small

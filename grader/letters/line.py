@@ -16,13 +16,17 @@ _LEAST_PEAK = 40
 _INK = 0.3
 """Of the darkest: pencil's grain leaves gaps at half."""
 _SOFT_MM = 0.06
+"""Less than a pencil's stroke: its grain fades."""
 _DUST_MM = 0.22
+"""Smaller pieces are dust."""
 _WIDE = 0.95
 """Wider than so many heights of the line: probably two signs that touch."""
 _MOST_PIECES = 60
+"""No scale is written with so many signs."""
 _SHARED = 0.7
 """Of the smaller one's extent: two pieces of one sign share so much of it."""
 _BROKEN_PX = 2
+"""Gap of a stroke that the pencil's grain broke."""
 _MERGED = 3
 """A sign is of at most so many pieces of ink."""
 

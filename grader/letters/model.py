@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.letters.alphabet import SIGNS
-from grader.letters.features import Float32Array, features
+from grader.letters.features import features
+from grader.pixels import Float32Array
 from grader.records import FloatArray, GreyImage
 
 COOLING, STRANGE = 0.43, 0.02
@@ -31,16 +32,16 @@ class Model:
     biases: tuple[Float32Array, ...]
     cooling: float
 
-    def scores(self, told: Float32Array) -> FloatArray:
+    def scores(self, inputs: Float32Array) -> FloatArray:
         """(n, signs) scores of features (n, m)."""
-        layer = told
+        layer = inputs
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             layer = np.maximum(layer @ weight + bias, np.float32(0.0))
         return np.asarray(layer @ self.weights[-1] + self.biases[-1], dtype=np.float64)
 
-    def probability(self, told: Float32Array) -> FloatArray:
+    def probability(self, inputs: Float32Array) -> FloatArray:
         """(n, signs) probabilities, each row's sum 1."""
-        scores = self.cooling * self.scores(told)
+        scores = self.cooling * self.scores(inputs)
         grown = np.exp(scores - scores.max(axis=1, keepdims=True))
         return np.asarray(grown / grown.sum(axis=1, keepdims=True))
 
@@ -85,5 +86,5 @@ def recognise(
     if len(pictures) == 0:
         return np.zeros((0, len(SIGNS)))
     model = shipped() if cooling is None else replace(shipped(), cooling=cooling)
-    told = model.probability(features(pictures, sizes_px))
-    return (1.0 - strange) * told + strange / len(SIGNS)
+    known = model.probability(features(pictures, sizes_px))
+    return (1.0 - strange) * known + strange / len(SIGNS)

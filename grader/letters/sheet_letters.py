@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from grader.letters.alphabet import COLUMN
 from grader.letters.features import normalised
 from grader.letters.model import COOLING, STRANGE, recognise
+from grader.pixels import lengths_and_directions
 from grader.records import Box, FloatArray, GreyImage, Ink, Letters
 
 _LEAST_MM, _MOST_MM = 1.0, 9.0
@@ -24,6 +25,7 @@ _FAINT = 20
 _SHARE = 0.2
 """Of the usual darkness of the sheet's ink: fainter is squared paper, or the back showing through."""
 _PEAK_MM = 0.9
+"""Window of the darkest ink close by: three strokes wide."""
 _GROWN_MM = 0.16
 """Strokes are taken out with so much more than their width: the hand's wobble and the blur."""
 _LONG_MM = 6.0
@@ -151,8 +153,7 @@ def _drawn(ink: Ink, corner: tuple[int, int], shape: Sequence[int]) -> GreyImage
     def px(points: FloatArray) -> NDArray[np.int32]:
         return np.rint((points * unit - corner) * fine).astype(np.int32)
 
-    span = ink.strokes.ends[:, 1] - ink.strokes.ends[:, 0]
-    long = np.hypot(span[:, 0], span[:, 1]) >= _LONG_MM
+    long = lengths_and_directions(ink.strokes.ends)[0] >= _LONG_MM
     for ends, width in zip(px(ink.strokes.ends[long]), ink.strokes.width[long], strict=True):
         pen = max(1, round((width + _GROWN_MM) * unit))
         cv2.line(drawn, ends[0].tolist(), ends[1].tolist(), 1, pen, cv2.LINE_8, shift)

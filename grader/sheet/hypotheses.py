@@ -3,31 +3,42 @@
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-import cv2
 import numpy as np
 
+from grader.layout import PAGE_MM
+from grader.pixels import MM_PER_INCH, inverted, mapped, through_corners
 from grader.records import FloatArray
-from grader.sheet.fitting import Side, affine_of, affine_params, apply, inverted
+from grader.sheet.fitting import Side, affine_of, affine_params
 from grader.sheet.longlines import RIDGE, STEP, LongLine
-from grader.sheet.models import FRAMES, PAGE_MM, PAPER, Model
-from grader.sheet.upright import drawn_ends, title_block_mm
+from grader.sheet.models import FRAMES, PAPER, Model, drawn_ends, title_block_mm
 
 _LINES_EACH_WAY = 12
+"""Of the longest lines in each direction: a title block adds a few to the eight of paper and frame."""
 _APART = 0.4
+"""Of the image's width or height: opposite sides of a sheet are farther apart than this."""
 _LEAST_LENGTH = 0.4
 """Sides are at least this share of the image's width or height."""
 _SCAN_BEND_MM = 1.2
 """A quadrilateral whose corners lie nearer than this to a scanner's map is a scan."""
 _MATCH_MM = 2.0
+"""A line lies on a side of a model if both its ends are nearer than this."""
 _TILT_MM = 2.0
+"""A side ruled by hand is askew by less from end to end."""
 _UNEQUAL_SE = 0.004
+"""Relative difference of a scanner's scales along its two axes."""
 _DPI_SE = 0.005
+"""Of a stated resolution, with room for copies at a slightly other scale."""
 _WINDOW_SE = 0.02
+"""Of a resolution that was only guessed by the size of the image."""
 _HOPELESS = 12.0
+"""A reading with a larger penalty is no longer followed."""
 _FLAT = 1e-9
+"""Least determinant of a map that can be inverted."""
 _CAMERA_SE = 0.015
+"""How far off a camera's view may be, by the lines' errors: right angle in radians, ratio of the axes."""
 _LOOKED_AT = 80
 _BLOCK_MM = 200.0
+"""Length of a title block's ruled lines that counts as much as one side that agrees."""
 _BLOCK_WORTH = 3.0
 """The title block's ruled lines count as much as three sides that agree."""
 _FOCAL = np.geomspace(0.55, 3.0, 12)
@@ -124,7 +135,7 @@ def _in_each_turn(
         params = None if map_px is None else affine_params(map_px)
         if map_px is None or params is None or not np.all(np.isfinite(params)):
             continue
-        bend = np.abs(apply(affine_of(params), model.corners()) - apply(map_px, model.corners())).max()
+        bend = np.abs(mapped(affine_of(params), model.corners()) - mapped(map_px, model.corners())).max()
         perspective = bool(bend / np.exp(params[:2].mean()) > _SCAN_BEND_MM)
         penalty = _camera_misfit(map_px, shape) if perspective else _scan_misfit(params, resolution)
         if penalty < _HOPELESS:
@@ -136,9 +147,7 @@ def _in_each_turn(
 
 def _quad_map(model: Model, corners: FloatArray) -> FloatArray | None:
     """Homography from a model's corners to pixels; None for corners that span no area."""
-    matrix = cv2.getPerspectiveTransform(
-        model.corners().astype(np.float32), corners.astype(np.float32)
-    ).astype(np.float64)
+    matrix = through_corners(model.corners(), corners)
     good = bool(np.all(np.isfinite(matrix))) and abs(np.linalg.det(matrix)) > _FLAT
     return matrix if good else None
 
@@ -160,7 +169,7 @@ def _scan_misfit(params: FloatArray, resolution: Resolution | None) -> float:
     penalty = 0.5 * unequal**2
     if resolution is not None:
         se, most = (_DPI_SE, 3.0) if resolution.stated else (_WINDOW_SE, 1.5)
-        wrong = (params[:2] - np.log(np.array(resolution.dpi) / 25.4)) / se
+        wrong = (params[:2] - np.log(np.array(resolution.dpi) / MM_PER_INCH)) / se
         penalty += min(most, 0.25 * float(wrong @ wrong))
     return float(penalty)
 
@@ -211,7 +220,7 @@ def on_sides(
     if not lines:
         return []
     px = np.stack([line.ends for line in lines])
-    mm = apply(inverse, px.reshape(-1, 2)).reshape(-1, 2, 2)
+    mm = mapped(inverse, px)
     brighter = _brighter_mm(inverse, lines, px)
     drawn = np.array([line.kind == RIDGE for line in lines])
     x0, y0, x1, y1 = model.box
@@ -233,4 +242,4 @@ def _brighter_mm(inverse: FloatArray, lines: list[LongLine], px: FloatArray) -> 
     """(n, 2) the way on the sheet from each line to its bright side; 0 for drawn lines."""
     middle = px.mean(axis=1)
     step = np.array([[0.0, 5.0 * line.bright] if line.across else [5.0 * line.bright, 0.0] for line in lines])
-    return apply(inverse, middle + step) - apply(inverse, middle)
+    return mapped(inverse, middle + step) - mapped(inverse, middle)

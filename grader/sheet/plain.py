@@ -4,43 +4,65 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.pixels import Flat, flatten
+from grader.layout import PAGE_MM
+from grader.pixels import MM_PER_INCH, Flat, flatten, inverted, local_axes
 from grader.records import FloatArray, Page, Problem, Sheet, Unread
-from grader.sheet.bend import find_lens
-from grader.sheet.fitting import Fit, affine_of, apply, fit_sides, inverted
-from grader.sheet.grid import find_grid
-from grader.sheet.halves import looks_a4
+from grader.sheet.fitting import Fit, affine_of, fit_sides
 from grader.sheet.hypotheses import Hypothesis, Resolution, hypotheses, on_sides
-from grader.sheet.longlines import LongLine, long_lines
-from grader.sheet.models import PAGE_MM, PAPER, Model, drawable
-from grader.sheet.upright import drawn_ends, off_turn_deg, title_block_mm
+from grader.sheet.lens import find_lens
+from grader.sheet.longlines import LongLine, long_lines, without_grid
+from grader.sheet.models import (
+    PAPER,
+    Model,
+    drawable,
+    drawn_ends,
+    looks_a4,
+    off_turn_deg,
+    rotation_deg,
+    size_mm,
+    title_block_mm,
+)
 
-_MM_PER_INCH = 25.4
 _LEAST_PX_PER_MM = 3.0
+"""Along the long side: below this a pencil's stroke is less than a pixel wide."""
 _USUAL_DPI = (100.0, 150.0, 200.0, 240.0, 250.0, 300.0, 400.0, 500.0, 600.0, 800.0, 1200.0)
+"""Resolutions that scanners and copiers for A3 offer."""
 _UNSET_DPI = (72.0, 96.0)
 """What programs write when they do not know; no evidence either way."""
 _A3_SLACK_MM = (40.0, 22.0)
 """A scanner's window may be this much larger than the sheet; paper that is cut off is not A3."""
 _A3_SHORT_MM = 5.0
+"""A scanner may cut so much off the sheet's edges."""
 _WINDOW_SE = 0.004
+"""Relative error of a scale by a usual resolution that fits A3."""
 _BAD_FIT = 4.0
+"""Chi squared for each degree of freedom from which the evidence is said to disagree."""
 _NO_FIT_MM = 1.5
+"""Sides that disagree by more are not those of one A3 sheet."""
 _VAGUE_SE = 0.02
+"""A scale less sure than this is no better than a guess."""
 _MOST_SIDES = 3
+"""Sides by which a frame is known,"""
 _SOME_SIDES = 2
+"""and those of the paper that must be seen beside it."""
 _ALL_SIDES = 4
 _COPY_SE = 0.012
 """Copiers enlarge or reduce by a per cent or two unless told not to."""
 _SAMPLED, _WHITE = 7, 255
+"""Pixels between those that are looked at, and the value of white ones."""
 _FAR_OFF_MM = 1.5
+"""A side farther off after the fit was taken for the wrong line."""
 _EDGE_WITHIN_MM = 6.0
+"""Without a frame the sheet's place is known no better before its edges are looked for."""
 _ASSUMED_PAPER_SE = 0.004
+"""Paper that looks like A3 may be a trimmed sheet or another format of nearly its ratio."""
 _SCALE_DOUBTS = frozenset({"paper_assumed", "registration_disagrees"})
 _SAME = 1e-6
+"""Scores of readings that the drawing does not tell apart differ by rounding only."""
 _AS_LIKELY = 2.0
 """Scores of readings that differ by less: either may be the right one."""
 _ANOTHER_SCALE = 0.012
+"""Relative difference of two scales that is worth a warning."""
 
 
 def register_plain(page: Page) -> Sheet | Unread:
@@ -50,7 +72,7 @@ def register_plain(page: Page) -> Sheet | Unread:
         return Unread("sheet", f"{long_px} pixels along the long side are too few for an A3 drawing")
     flat = flatten(page.grey)
     shape = (page.grey.shape[0], page.grey.shape[1])
-    _, lines = find_grid(long_lines(flat), shape)
+    lines = without_grid(long_lines(flat), shape)
     problems: list[Problem] = []
     resolution = _resolution(page, problems)
     dpi = resolution.dpi if resolution is not None and resolution.stated else None
@@ -81,21 +103,16 @@ def _rival_scale(ranked: list[Hypothesis]) -> float | None:
     A sheet's edge may pass for a frame, their sides are nearly in the same ratio; a stated resolution
     tells them apart.
     """
-    best = ranked[0]
-    off = [
-        abs(_log_scale(other) - _log_scale(best)) for other in ranked if other.score > best.score - _AS_LIKELY
-    ]
-    return max(off) if max(off) > _ANOTHER_SCALE else None
+    likely = [one for one in ranked if one.score > ranked[0].score - _AS_LIKELY]
+    scales = np.log([_px_per_mm(one.mm_to_px, 1.0) for one in likely])
+    off = float(np.abs(scales - scales[0]).max())
+    return off if off > _ANOTHER_SCALE else None
 
 
-def _log_scale(hypothesis: Hypothesis) -> float:
-    """Of the mean resolution, at the sheet's middle."""
-    middle = np.array([[PAGE_MM[0] / 2.0, PAGE_MM[1] / 2.0]])
-    at, right, down = (
-        apply(hypothesis.mm_to_px, middle + np.array(step)) for step in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
-    )
-    u, v = (right - at)[0], (down - at)[0]
-    return float(0.5 * np.log(abs(u[0] * v[1] - u[1] * v[0])))
+def _px_per_mm(mm_to_px: FloatArray, step_mm: float) -> float:
+    """The mean resolution at the sheet's middle."""
+    (right,), (down,) = local_axes(mm_to_px, np.array([PAGE_MM]) / 2.0, step_mm)
+    return float(np.sqrt(abs(right[0] * down[1] - right[1] * down[0])))
 
 
 def _with_rival(sheet: Sheet, rival: float) -> Sheet:
@@ -114,14 +131,10 @@ def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
     if page.dpi is not None and _is_a3(page, page.dpi):
         return Resolution(page.dpi, stated=True)
     if page.dpi is not None and page.dpi[0] not in _UNSET_DPI:
-        size = " x ".join(
-            f"{n / d * _MM_PER_INCH:.0f}" for n, d in zip(page.grey.shape[::-1], page.dpi, strict=True)
-        )
-        problems.append(
-            Problem(
-                "resolution_wrong", f"by its stated resolution the page is {size} mm, not A3", page.source
-            )
-        )
+        high, wide = page.grey.shape
+        size = f"{wide / page.dpi[0] * MM_PER_INCH:.0f} x {high / page.dpi[1] * MM_PER_INCH:.0f}"
+        message = f"by its stated resolution the page is {size} mm, not A3"
+        problems.append(Problem("resolution_wrong", message, page.source))
     for usual in _USUAL_DPI:
         if _is_a3(page, (usual, usual)):
             return Resolution((usual, usual), stated=False)
@@ -129,12 +142,8 @@ def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
 
 
 def _is_a3(page: Page, dpi: tuple[float, float]) -> bool:
-    high, wide = page.grey.shape
-    size = sorted((wide / dpi[0] * _MM_PER_INCH, high / dpi[1] * _MM_PER_INCH), reverse=True)
-    return all(
-        -_A3_SHORT_MM <= found - wanted <= slack
-        for found, wanted, slack in zip(size, PAGE_MM, _A3_SLACK_MM, strict=True)
-    )
+    larger = np.subtract(size_mm(page, dpi), PAGE_MM)
+    return bool(np.all((larger >= -_A3_SHORT_MM) & (larger <= _A3_SLACK_MM)))
 
 
 def _from_lines(
@@ -245,7 +254,7 @@ def _from_resolution(
     tried: list[tuple[float, FloatArray]] = []
     for half in (0.0, np.pi):
         angle = tilt + quarter + half
-        params = np.array([*np.log(np.array(resolution.dpi) / _MM_PER_INCH), angle, wide / 2.0, high / 2.0])
+        params = np.array([*np.log(np.array(resolution.dpi) / MM_PER_INCH), angle, wide / 2.0, high / 2.0])
         matrix = affine_of(params)
         tried.append((title_block_mm(matrix, drawn), matrix))
     block, matrix = max(tried, key=lambda one: (one[0], -off_turn_deg(one[1], page.turn_deg)))
@@ -293,18 +302,12 @@ def _tilt(lines: list[LongLine]) -> float:
 
 def _sheet(fit: Fit, frame: Model | None, scale_se: float, problems: list[Problem]) -> Sheet:
     matrix = fit.mm_to_px / fit.mm_to_px[2, 2]
-    middle = np.array([[PAGE_MM[0] / 2.0, PAGE_MM[1] / 2.0]])
-    right = apply(matrix, middle + np.array([10.0, 0.0])) - apply(matrix, middle)
-    down = apply(matrix, middle + np.array([0.0, 10.0])) - apply(matrix, middle)
-    px_per_mm = float(np.sqrt(abs(right[0, 0] * down[0, 1] - right[0, 1] * down[0, 0])) / 10.0)
-    # Seen with y down, the sheet's x axis points at this angle; turning back by it is counter-clockwise.
-    rotation = float(np.degrees(np.arctan2(right[0, 1], right[0, 0])))
     return Sheet(
         mm_to_px=matrix,
         page_mm=PAGE_MM,
         method="combined",
-        px_per_mm=px_per_mm,
-        rotation_deg=rotation % 360.0,
+        px_per_mm=_px_per_mm(matrix, 10.0),
+        rotation_deg=rotation_deg(matrix),
         residual_mm=fit.rms_mm,
         scale_se=scale_se,
         drawable_mm=drawable(frame),

@@ -5,11 +5,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from grader.ink.bundles import PROBES, _neighbours, distances
-from grader.ink.centreline import Fitted, Pen, _crossings
-from grader.ink.hatching import _family_size, _linked
-from grader.ink.pairs import near_pairs
-from grader.ink.strokes import distinct
+from grader.ink.centreline import Fitted, Pen, _neighbours, crossings
+from grader.ink.joining import PROBES, distances, near_pairs
+from grader.ink.strokes import _family_size, _linked, distinct
 
 UNIT = 12.0
 """Pixels in a millimetre, about 300 dpi."""
@@ -95,7 +93,7 @@ def test_strokes_with_ink_of_their_own_are_those_of_comparing_every_two(share):
 def test_a_cut_meets_a_stroke_where_their_lines_cross():
     ends = np.array([[[0.0, 0.0], [100.0, 0.0]], [[0.0, 0.0], [100.0, 0.0]]])
     taken = np.array([[[0.0, -10.0], [100.0, 30.0]], [[80.0, 5.0], [100.0, 5.0]]])
-    offset = _crossings(ends, np.array([[25.0, 50.0], [20.0, 90.0]]), taken, UNIT)
+    offset, _ = crossings(ends, taken, np.array([[25.0, 50.0], [20.0, 90.0]]), 0.3 * UNIT)
     assert offset == pytest.approx(np.array([[0.0, 10.0], [np.inf, 5.0]]))
 
 
