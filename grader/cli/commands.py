@@ -165,9 +165,6 @@ def grade(
     ghosts: Annotated[
         bool, typer.Option("--ghosts/--no-ghosts", help="With --level full: draw expected vectors, dotted.")
     ] = True,
-    pdf: Annotated[
-        bool, typer.Option("--pdf/--no-pdf", help="Write each student's feedback.pdf, to be printed, too.")
-    ] = False,
     time_limit: Annotated[
         float, typer.Option("--time-limit", min=1.0, help="Seconds that a file or a sheet may take.")
     ] = 60.0,
@@ -181,7 +178,7 @@ def grade(
 
     open_ends = grade_folder(
         folder, assignment, out, roster=roster, pages_per_student=pages_per_student, jobs=jobs, lang=lang,
-        limits=Limits(time_limit, memory_limit), level=level, with_ghosts=ghosts, with_pdf=pdf,
+        limits=Limits(time_limit, memory_limit), level=level, with_ghosts=ghosts,
     )  # fmt: skip
     raise typer.Exit(1 if open_ends else 0)
 
@@ -197,7 +194,7 @@ def check(
         str, typer.Option("--level", help="symbol (right or off), hint (in which way), full (numbers).")
     ] = "hint",
     page: Annotated[
-        Path | None, typer.Option("--page", help="Draw and tell it in this file, too: .html or .pdf.")
+        Path | None, typer.Option("--page", help="Draw and tell it in this HTML file, too.")
     ] = None,
 ) -> None:
     """Check measured values: right, or off and in which way, without giving the answer away."""

@@ -34,7 +34,6 @@ def grade_folder(
     limits: Limits | None = None,
     level: str = "full",
     with_ghosts: bool = True,
-    with_pdf: bool = False,
 ) -> bool:
     """Grade a folder and tell what came of it; whether anything is left for a person."""
     check_language(lang)
@@ -45,7 +44,7 @@ def grade_folder(
     rubric = rubric_of(assignment)
     batch = Batch(
         assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1,
-        limits or Limits(), lang, wanted, with_ghosts, with_pdf,
+        limits or Limits(), lang, wanted, with_ghosts,
     )  # fmt: skip
     with progress() as tell:
         results = grade(batch, tell)
@@ -58,9 +57,7 @@ def demo(out: Path, lang: str, jobs: int | None) -> None:
     for name in ("pump", "press"):
         typer.echo(f"Grading the {name} class of the samples")
         folder = samples_folder() / name
-        grade_folder(
-            folder, name, out / name, roster=None, pages_per_student=None, jobs=jobs, lang=lang, with_pdf=True
-        )
+        grade_folder(folder, name, out / name, roster=None, pages_per_student=None, jobs=jobs, lang=lang)
 
 
 def read_scans(

@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from grader.documents import AlikeDocument, MovedDocument, ResultsDocument
-from grader.feedback.class_words import CAUSES, SIGNS
+from grader.feedback.class_page import CAUSES, SIGNS
 from grader.feedback.statistics import waiting
 from grader.moved import told_standing
 
