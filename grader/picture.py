@@ -202,27 +202,28 @@ def paint(scan: GreyImage, scene: Scene) -> ColourImage:
 
 def _paint_shape(image: ColourImage, shape: Shape, px_per_mm: float) -> None:
     """One shape with sub-pixel ends; the image is changed."""
-    fixed = {"lineType": cv2.LINE_AA, "shift": FRACTION_BITS}
+    smooth = (cv2.LINE_AA, FRACTION_BITS)
 
     def thick(width_mm: float) -> int:
         return max(1, round(width_mm * px_per_mm))
 
     match shape:
-        case Stroke(start, end, width, colour, dash):
+        case Stroke(start=start, end=end, width=width, colour=colour, dash=dash):
             for piece in _dashes(start, end, dash):
-                ends = _fixed_point(piece, px_per_mm)
-                cv2.line(image, *ends.tolist(), _bgr(colour), thick(width), **fixed)
-        case Ring(centre, radius, width, colour, fill):
-            at, reach = _fixed_point((centre,), px_per_mm)[0], round(radius * px_per_mm * 2**FRACTION_BITS)
-            for ink, line in ((fill, cv2.FILLED), (colour, thick(width) if width else 0)):
-                if ink != "none" and line:
-                    cv2.circle(image, at.tolist(), reach, _bgr(ink), line, **fixed)
-        case Area(points, fill):
-            cv2.fillPoly(image, [_fixed_point(points, px_per_mm)], _bgr(fill), **fixed)
-        case Curve(points, width, colour):
-            corners = _fixed_point(points, px_per_mm)
-            cv2.polylines(image, [corners], False, _bgr(colour), thick(width), **fixed)  # noqa: FBT003 - open
-        case _:
+                first, last = _fixed_point(piece, px_per_mm).tolist()
+                cv2.line(image, first, last, _bgr(colour), thick(width), *smooth)
+        case Ring(centre=centre, radius=radius, width=width, colour=colour, fill=fill):
+            (at,), reach = _fixed_point((centre,), px_per_mm).tolist(), radius * px_per_mm * 2**FRACTION_BITS
+            if fill != "none":
+                cv2.circle(image, at, round(reach), _bgr(fill), cv2.FILLED, *smooth)
+            if width > 0.0:
+                cv2.circle(image, at, round(reach), _bgr(colour), thick(width), *smooth)
+        case Area(points=points, fill=fill):
+            cv2.fillPoly(image, [_fixed_point(points, px_per_mm)], _bgr(fill), *smooth)
+        case Curve(points=points, width=width, colour=colour):
+            corners, is_closed = _fixed_point(points, px_per_mm), False
+            cv2.polylines(image, [corners], is_closed, _bgr(colour), thick(width), *smooth)
+        case Label():
             _write(image, shape, px_per_mm)
 
 
@@ -239,13 +240,13 @@ def _write(image: ColourImage, label: Label, px_per_mm: float) -> None:
         pen = ImageDraw.Draw(picture)
         at = (x - columns.start, y - rows.start)
         pen.text(at, piece.text, _bgr(label.colour), font, anchor="ls")
-        image[rows, columns] = picture
+        image[rows, columns] = np.asarray(picture)
 
 
 @cache
 def _font(size_px: float) -> ImageFont.FreeTypeFont:
-    with (files("grader") / "data" / "fonts" / "DejaVuSansCondensed-Bold.ttf").open("rb") as file:
-        return ImageFont.truetype(file, size_px)
+    file = files("grader") / "data" / "fonts" / "DejaVuSansCondensed-Bold.ttf"
+    return ImageFont.truetype(str(file), size_px)
 
 
 def _bgr(colour: str) -> Colour:
@@ -255,7 +256,8 @@ def _bgr(colour: str) -> Colour:
 
 def _fixed_point(points: Sequence[XY], px_per_mm: float) -> NDArray[np.int32]:
     """(n, 2) pixels times 2**FRACTION_BITS, as cv2 takes them."""
-    return np.rint((np.array(points) * px_per_mm - 0.5) * 2**FRACTION_BITS).astype(np.int32)
+    pixels = (np.array(points) * px_per_mm - 0.5) * 2**FRACTION_BITS
+    return np.asarray(np.rint(pixels), dtype=np.int32)
 
 
 def _dashes(start: XY, end: XY, dash: tuple[float, ...]) -> Iterator[tuple[XY, XY]]:

@@ -12,7 +12,9 @@ from grader.documents import (
     MistakeDocument,
     QuantityDocument,
     ReportDocument,
+    RivalDocument,
     ScaleDocument,
+    ScaleName,
     ToleranceDocument,
 )
 from grader.feedback import words
@@ -189,7 +191,7 @@ class StudentPage:
         """How lengths and directions are to be understood."""
         return self.speaker.gettext(UNITS)
 
-    def declared(self, name: str) -> str:
+    def declared(self, name: ScaleName) -> str:
         """A scale as it was declared."""
         return scale_text(self.report.scales[name].declared, name, self.speaker)
 
@@ -198,7 +200,7 @@ class StudentPage:
         source = self.speaker.gettext(words.SOURCES[scale.source]) if scale.source else ""
         return [remark for remark in (scale.text, source, scale.refused) if remark]
 
-    def used(self, name: str) -> str:
+    def used(self, name: ScaleName) -> str:
         """A scale as it was used; one that was not declared is an answer."""
         return scale_text(self.report.scales[name].used, name, self.speaker) if self.shows_expected else ""
 
@@ -293,9 +295,8 @@ class StudentPage:
         criteria = {criterion.id: criterion for criterion in self.report.criteria}
         explained = [criteria[name] for name in mistake.explains if name in criteria]
         off = {one.drawn for one in explained if one.verdict in {"none", "partial", "review"}}
-        titles = dict.fromkeys(
-            _title(cause.code, cause.at, cause.detail, self.speaker) for cause in (mistake, *mistake.rivals)
-        )
+        causes: list[MistakeDocument | RivalDocument] = [mistake, *mistake.rivals]
+        titles = dict.fromkeys(_title(cause, self.speaker) for cause in causes)
         joined = f" {self.speaker.gettext(OR)} ".join(titles)
         return Action(
             title=joined[:1].upper() + joined[1:],
@@ -347,9 +348,9 @@ def _is_left_out(criterion: CriterionDocument) -> bool:
     return criterion.verdict == "not_judged" and criterion.reasons[:1] == ["optional"]
 
 
-def _title(code: str, at: str, details: str, speaker: Tongue) -> str:
-    known = dict(part.split(" = ", 1) for part in details.split(", ") if " = " in part)
-    return speaker.gettext(words_of(code, at, known.get("line", "")).title)
+def _title(cause: MistakeDocument | RivalDocument, speaker: Tongue) -> str:
+    known = dict(part.split(" = ", 1) for part in cause.detail.split(", ") if " = " in part)
+    return speaker.gettext(words_of(cause.code, cause.at, known.get("line", "")).title)
 
 
 def _near(name: str, names: Sequence[str], pictures: Sequence[Picture]) -> set[str]:
