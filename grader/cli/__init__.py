@@ -3,6 +3,9 @@
 import gc
 import os
 
+from grader.cli import commands  # noqa: F401 - registers the commands on the application
+from grader.cli.app import app
+
 COLLECT_FROM = 50_000
 """New objects before Python looks for cycles: imports make many that all stay, and each look costs time."""
 
@@ -12,7 +15,4 @@ def main() -> None:
     gc.set_threshold(COLLECT_FROM)
     # planmark has no plugins of pydantic; a search for them reads the metadata of every installed package.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    from grader.cli import commands, exporting  # noqa: F401 - they register the commands
-    from grader.cli.app import app
-
     app()

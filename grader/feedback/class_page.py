@@ -176,7 +176,7 @@ def _rows(results: ResultsDocument, who: _Who, speaker: Tongue) -> list[dict[str
 def _scale(criterion: CriterionDocument, speaker: Tongue) -> str:
     """A scale that was not right: what was declared, and what it is."""
     told = [
-        f"{speaker.significant(one.value, 4)}\N{NO-BREAK SPACE}{speaker.unit(one.unit or '')}"
+        speaker.value(one.value, one.unit or "")
         for one in (criterion.measured, criterion.expected)
         if one.value is not None
     ]

@@ -26,6 +26,7 @@ from grader.feedback.templating import environment, score_text
 from grader.files import write_whole
 from grader.i18n import N_, Tongue, tongue
 from grader.scene import COLOURS, Picture
+from reference.drawing.subject import SCALE_UNITS
 
 NUMBER, POSITION, PAGE = N_("number"), N_("position"), N_("page")
 WIDENED = N_("widened")
@@ -47,7 +48,6 @@ UNITS = N_(
 )
 MOST_WAITING_DETAILS = 3
 """Close-ups of what waits for a person: they stand in one row."""
-SCALE_UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}
 PRINTED = "feedback.pdf"
 """Earlier versions wrote it; an old one is removed, it may show more than the page does now."""
 

@@ -276,8 +276,7 @@ def _real(speaker: Tongue, value: float, unit: str) -> str:
         return speaker.quantity(value, 2, unit)
     if unit == "°":
         return f"{speaker.number(value, 2)}°"
-    text = speaker.significant(value, 4)
-    return f"{text}\N{NO-BREAK SPACE}{speaker.unit(unit)}" if unit else text
+    return speaker.value(value, unit)
 
 
 _UNIT_WRITERS: dict[str, Callable[[Tongue, float], str]] = {
