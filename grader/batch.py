@@ -8,8 +8,7 @@ from pydantic import ValidationError
 
 from grader.documents import ReportDocument, ResultsDocument, UnmatchedDocument
 from grader.feedback.class_page import write_index
-from grader.feedback.leaflet import About
-from grader.feedback.pages import write_feedback
+from grader.feedback.pages import About, write_feedback
 from grader.feedback.sentences import Level
 from grader.files import make_folder, write_whole
 from grader.folder import submissions, told_name
@@ -53,7 +52,6 @@ class Batch:
     jobs, limits : worker processes, and what a file or a sheet may take in one
     lang, level : of feedback, where the roster does not say
     with_ghosts : whether pictures show expected vectors beside wrong ones, at level `full`
-    with_pdf : whether each student's feedback is written for the printer, too
     """
 
     assignment: Assignment
@@ -67,7 +65,6 @@ class Batch:
     lang: str = "en"
     level: Level = "full"
     with_ghosts: bool = True
-    with_pdf: bool = False
 
 
 def grade(batch: Batch, progress: Progress, workers: Pool | None = None) -> ResultsDocument:
@@ -179,9 +176,7 @@ def _jobs(batch: Batch, works: Sequence[Work]) -> list[Job]:
     """The works with digests of what they depend on."""
     assignment = (batch.assignment.file.model_dump_json(), batch.assignment.mechanism_file.model_dump_json())
     read = digest_of((*assignment, *asked_of(batch.assignment, batch.rubric)))
-    marked = digest_of(
-        (*assignment, batch.rubric.model_dump_json(), batch.level, batch.with_ghosts, batch.with_pdf)
-    )
+    marked = digest_of((*assignment, batch.rubric.model_dump_json(), batch.level, batch.with_ghosts))
     return [_job(work, folder, (read, marked)) for work, folder in zip(works, folders_of(works), strict=True)]
 
 
@@ -254,10 +249,7 @@ def _mark_one(batch: Batch, job: Job) -> ReportDocument:
     marked = mark_looked(
         work, batch.assignment, batch.rubric, _looked(batch, job), batch.level, with_ghosts=batch.with_ghosts
     )
-    write_feedback(
-        marked.report, marked.pictures, where, work.lang, batch.level, _about(batch, work),
-        with_pdf=batch.with_pdf,
-    )  # fmt: skip
+    write_feedback(marked.report, marked.pictures, where, work.lang, batch.level, _about(batch, work))
     write_whole(where / "report.json", marked.report.model_dump_json(indent=2))
     if not any(problem.code == _PASSING for problem in marked.report.problems):
         write_whole(_key_file(batch, job), job.key)
@@ -290,8 +282,7 @@ def _failed(batch: Batch, job: Job, problem: Problem) -> ReportDocument:
         batch.assignment, batch.rubric, work.variant or Variant(), work.student_id, "unreadable",
         problems=(*work.problems, problem),
     )  # fmt: skip
-    about = _about(batch, work)
-    write_feedback(report, [], where, work.lang, batch.level, about, with_pdf=batch.with_pdf)
+    write_feedback(report, [], where, work.lang, batch.level, _about(batch, work))
     write_whole(where / "report.json", report.model_dump_json(indent=2))
     return report
 
@@ -317,8 +308,7 @@ def _known(batch: Batch, job: Job) -> ReportDocument | None:
     try:
         if _key_file(batch, job).read_text(encoding="utf-8") != job.key:
             return None
-        wanted = ["feedback.html", *(["feedback.pdf"] if batch.with_pdf else [])]
-        if not all((where / name).is_file() for name in wanted):
+        if not (where / "feedback.html").is_file():
             return None
         return ReportDocument.model_validate_json((where / "report.json").read_bytes())
     except (OSError, UnicodeDecodeError, ValidationError):

@@ -79,6 +79,10 @@ class Tongue:
         """A number and its unit, which never part at a line's end."""
         return f"{self.number(value, decimals)}\N{NO-BREAK SPACE}{self.unit(unit)}"
 
+    def value(self, value: float, unit: str, digits: int = 4) -> str:
+        """A number with so many significant digits, and its unit if it has one."""
+        return f"{self.significant(value, digits)}\N{NO-BREAK SPACE}{self.unit(unit)}".rstrip()
+
     def unit(self, unit: str) -> str:
         """A unit in this language's letters; `m/s^2` and `m/s2` are written with a superscript."""
         return self.gettext(unit.replace("s^2", "s²").replace("s2", "s²"))

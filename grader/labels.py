@@ -1,16 +1,39 @@
-"""Where the marks and names of arrows stand: beside them, clear of other arrows and labels."""
+"""The marks of a scene as shapes: arrows, ghosts, nodes, and labels beside the arrows that they name.
+
+One description for all painters: `grader.picture` puts the shapes on the scan, feedback writes them as SVG.
+Labels stand clear of other arrows and labels.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from grader.records import Box, FloatArray
-from grader.scene import XY, Arrow, between
+from grader.scene import (
+    ARROW_WIDTH_MM,
+    COLOURS,
+    GHOST_COLOUR,
+    GHOST_DASH_MM,
+    GHOST_WIDTH_MM,
+    LEAST_ARROW_MM,
+    MARK_STROKES,
+    NODE_COLOUR,
+    XY,
+    Arrow,
+    Dot,
+    Ghost,
+    Scene,
+    between,
+)
+from reference.canvas import PAPER, Area, Curve, Ring, Shape, Stroke
+from reference.canvas import Label as Lettering
+from reference.lettering import Text, pieces_of, width_of
 
 LABEL_HEIGHT_MM = 3.4
-LETTER_MM = 1.75
+NAME_MM, BOLD_SHARE = 3.1, 1.1
+"""Size of names; pages set them bold, which is wider than the font that `width_of` knows by so much."""
 BADGE_MM = 3.8
 LEADER_FROM_MM = 3.0
 """A label farther than this from its arrow gets a thin line to it."""
@@ -22,6 +45,10 @@ OVERLAP_COST = 16.0
 """Of a square millimetre on another label; a millimetre of distance costs a half,"""
 CROSSING_COST = 2.0
 """and a millimetre of another arrow under the label this much."""
+ARROW_OPACITY, FAINT, GROUND_OPACITY = 0.85, 0.3, 0.82
+"""The drawing stays visible under arrows, and faintly under the ground of labels."""
+
+_NO_NAMES: Mapping[str, str] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +56,7 @@ class Label:
     """Where an arrow's mark and name stand; `size` as of `labels_of`."""
 
     arrow: Arrow
+    text: Text
     box: Box
     size: float
 
@@ -52,7 +80,9 @@ class Label:
         return (near, middle) if math.dist(near, middle) > self.size * LEADER_FROM_MM else None
 
 
-def labels_of(arrows: Sequence[Arrow], within: Box, size: float = 1.0) -> list[Label]:
+def labels_of(
+    arrows: Sequence[Arrow], within: Box, size: float = 1.0, names: Mapping[str, str] = _NO_NAMES
+) -> list[Label]:
     """A place for each arrow's mark and name; `size` 1 suits a whole sheet, less a close-up.
 
     Greedy, long arrows first: each label takes the cheapest of its places.
@@ -61,18 +91,20 @@ def labels_of(arrows: Sequence[Arrow], within: Box, size: float = 1.0) -> list[L
     labels = []
     for arrow in sorted(arrows, key=lambda one: -one.length):
         others = np.array([(*one.tail, *one.tip) for one in arrows if one is not arrow]).reshape(-1, 4)
-        far, boxes = _places(arrow, within, size)
+        text = pieces_of(names.get(arrow.name, arrow.name))
+        wide = BADGE_MM + 1.0 + BOLD_SHARE * width_of(text, NAME_MM)
+        far, boxes = _places(arrow, within, size, wide)
         crowded = OVERLAP_COST * _overlaps(boxes, taken) + CROSSING_COST * _crossings(boxes, others)
         best = boxes[int(np.argmin(far + crowded / size**2))]
         taken = np.vstack([taken, best])
-        labels.append(Label(arrow, (float(best[0]), float(best[1]), float(best[2]), float(best[3])), size))
+        x, y, width, height = best.tolist()
+        labels.append(Label(arrow, text, (x, y, width, height), size))
     return labels
 
 
-def _places(arrow: Arrow, within: Box, size: float) -> tuple[FloatArray, FloatArray]:
+def _places(arrow: Arrow, within: Box, size: float, wide_mm: float) -> tuple[FloatArray, FloatArray]:
     """How far-fetched each place is, (p,), and the places, (p, 4): x, y, width, height."""
-    letters = len(arrow.name.replace("_", ""))
-    box = size * np.array([BADGE_MM + 0.8 + LETTER_MM * letters, LABEL_HEIGHT_MM + 0.6])
+    box = size * np.array([wide_mm, LABEL_HEIGHT_MM + 0.6])
     tail, along = np.array(arrow.tail), np.array([1.0, 0.0])
     step = np.array(arrow.tip) - tail
     if arrow.length > 0.0:
@@ -106,3 +138,96 @@ def _crossings(boxes: FloatArray, arrows: FloatArray) -> FloatArray:
     lengths = np.hypot(arrows[:, 2] - arrows[:, 0], arrows[:, 3] - arrows[:, 1])
     inside: FloatArray = (np.maximum(leave - enter, 0.0) * lengths).sum(axis=1)
     return inside
+
+
+# Marks as shapes ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """Shapes that are equally opaque."""
+
+    shapes: tuple[Shape, ...]
+    opacity: float = 1.0
+
+
+def layers_of(
+    scene: Scene,
+    box: Box,
+    named: Collection[Arrow],
+    names: Mapping[str, str],
+    *,
+    size: float = 1.0,
+    faint: Collection[Arrow] = (),
+) -> tuple[Layer, ...]:
+    """The marks of a scene as shapes, the undermost first.
+
+    Arguments
+    ---------
+    box : what of the page is seen
+    named : the arrows that get a label
+    names : from names of vectors and links to those that students know
+    size : of marks and letters; 1 suits a whole sheet, less a close-up
+    faint : arrows that are there for orientation only
+    """
+    labels = labels_of(list(named), box, size, names)
+    dots = [dot for dot in scene.dots if is_in(dot.at, box)]
+    layers = (
+        Layer(tuple(shape for arrow in faint for shape in _arrow(arrow, size)), FAINT),
+        Layer(tuple(shape for ghost in scene.ghosts for shape in _ghost(ghost, size))),
+        Layer(tuple(shape for arrow in scene.arrows for shape in _arrow(arrow, size)), ARROW_OPACITY),
+        Layer(tuple(shape for dot in dots for shape in _dot(dot, size))),
+        Layer(tuple(_ground(label) for label in labels), GROUND_OPACITY),
+        Layer(tuple(shape for label in labels for shape in _label(label))),
+    )
+    return tuple(layer for layer in layers if layer.shapes)
+
+
+def is_in(at: XY, box: Box) -> bool:
+    """Whether a point is inside a box."""
+    return box[0] <= at[0] <= box[0] + box[2] and box[1] <= at[1] <= box[1] + box[3]
+
+
+def _ghost(ghost: Ghost, size: float) -> Iterator[Shape]:
+    width = GHOST_WIDTH_MM * size
+    dash = tuple(length * size for length in GHOST_DASH_MM)
+    yield Stroke(ghost.tail, ghost.tip, width, GHOST_COLOUR, dash)
+    yield Ring(ghost.tip, 0.9 * size, 0.3 * size, GHOST_COLOUR, "none")
+
+
+def _dot(dot: Dot, size: float) -> Iterator[Shape]:
+    colour = COLOURS["review"] if dot.doubtful else NODE_COLOUR
+    yield Ring(dot.at, 0.8 * size, 0.3 * size, colour, "none")
+    if dot.lettered:
+        at = (dot.at[0] + 1.3 * size, dot.at[1] - 1.3 * size)
+        yield Lettering(at, pieces_of(dot.name), 3.0 * size, "start", colour)
+
+
+def _arrow(arrow: Arrow, size: float) -> Iterator[Shape]:
+    if arrow.length < LEAST_ARROW_MM:
+        return
+    colour = COLOURS[arrow.verdict]
+    dash = tuple(length * size for length in arrow.dash or ())
+    width = ARROW_WIDTH_MM[arrow.verdict] * size
+    yield Stroke(arrow.tail, arrow.neck(size), width, colour, dash)
+    if not arrow.is_link:
+        yield Area(arrow.head(size), colour)
+
+
+def _ground(label: Label) -> Shape:
+    x, y, width, height = label.box
+    return Area(((x, y), (x + width, y), (x + width, y + height), (x, y + height)), PAPER)
+
+
+def _label(label: Label) -> Iterator[Shape]:
+    """The mark in a disc and the name, with a thin line to an arrow far off."""
+    arrow, size = label.arrow, label.size
+    colour = COLOURS[arrow.verdict]
+    if label.leader is not None:
+        yield Stroke(*label.leader, 0.2 * size, colour)
+    (x, y), radius = label.badge
+    yield Ring((x, y), radius, 0.0, colour, colour)
+    for stroke in MARK_STROKES[arrow.verdict]:
+        points = tuple((x + 0.95 * size * dx, y + 0.95 * size * dy) for dx, dy in stroke)
+        yield Curve(points, 0.42 * size, PAPER)
+    yield Lettering(label.foot, label.text, NAME_MM * size, "start", colour)

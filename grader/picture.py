@@ -4,36 +4,24 @@ Pixels of the output: sheet point (x, y) mm lies at (x s - 0.5, y s - 0.5) from 
 top left pixel, s = width / paper's width.
 """
 
-import itertools
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
 
-from grader.labels import Label, labels_of
+from grader.labels import layers_of
 from grader.outcomes import Outcome
-from grader.records import Box, FloatArray, GreyImage, Page, Reading, Sheet
-from grader.scene import (
-    ARROW_WIDTH_MM,
-    COLOURS,
-    GHOST_COLOUR,
-    GHOST_DASH_MM,
-    GHOST_WIDTH_MM,
-    LEAST_ARROW_MM,
-    MARK_STROKES,
-    NODE_COLOUR,
-    XY,
-    Arrow,
-    Dot,
-    Ghost,
-    Picture,
-    Scene,
-    scene_of,
-)
+from grader.records import FloatArray, GreyImage, Page, Reading, Sheet
+from grader.scene import XY, Picture, Scene, between, scene_of
+from reference.canvas import Area, Curve, Label, Ring, Shape, Stroke
 from reference.construction import Vector
+from reference.lettering import set_pieces
 
 ColourImage = NDArray[np.uint8]
 Colour = tuple[int, int, int]
@@ -60,7 +48,6 @@ _FLAT_PNG = [
     cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE,
 ]  # fmt: skip
 """Of pictures that are white for the most part."""
-OPACITY = 0.82
 FRACTION_BITS = 4
 JPEG_QUALITY = 78
 
@@ -201,21 +188,65 @@ def paint(scan: GreyImage, scene: Scene) -> ColourImage:
     """The scene drawn on a scan that shows exactly its page; (h, w, 3) uint8, blue green red."""
     image: ColourImage = np.asarray(cv2.cvtColor(scan, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     px_per_mm = scan.shape[1] / scene.page_mm[0]
-    brush = _Brush(image.copy(), px_per_mm)
-    for ghost in scene.ghosts:
-        # What waits for a person may well be right: its ghost is for a closer look.
-        if ghost.verdict != "review":
-            brush.ghost(ghost)
-    for arrow in scene.arrows:
-        brush.arrow(arrow)
-    for dot in scene.dots:
-        brush.dot(dot)
-    blended = np.asarray(cv2.addWeighted(brush.image, OPACITY, image, 1.0 - OPACITY, 0.0), dtype=np.uint8)
-    labels = _Brush(blended, px_per_mm)
+    # What waits for a person may well be right: its ghost is for a closer look.
+    ghosts = tuple(ghost for ghost in scene.ghosts if ghost.verdict != "review")
     named = [arrow for arrow in scene.arrows if arrow.is_named]
-    for label in labels_of(named, (0.0, 0.0, *scene.page_mm)):
-        labels.label(label)
-    return labels.image
+    for layer in layers_of(replace(scene, ghosts=ghosts), (0.0, 0.0, *scene.page_mm), named, {}):
+        over = image if layer.opacity == 1.0 else image.copy()
+        for shape in layer.shapes:
+            _paint_shape(over, shape, px_per_mm)
+        if over is not image:
+            cv2.addWeighted(over, layer.opacity, image, 1.0 - layer.opacity, 0.0, dst=image)
+    return image
+
+
+def _paint_shape(image: ColourImage, shape: Shape, px_per_mm: float) -> None:
+    """One shape with sub-pixel ends; the image is changed."""
+    smooth = (cv2.LINE_AA, FRACTION_BITS)
+
+    def thick(width_mm: float) -> int:
+        return max(1, round(width_mm * px_per_mm))
+
+    match shape:
+        case Stroke(start=start, end=end, width=width, colour=colour, dash=dash):
+            for piece in _dashes(start, end, dash):
+                first, last = _fixed_point(piece, px_per_mm).tolist()
+                cv2.line(image, first, last, _bgr(colour), thick(width), *smooth)
+        case Ring(centre=centre, radius=radius, width=width, colour=colour, fill=fill):
+            (at,), reach = _fixed_point((centre,), px_per_mm).tolist(), radius * px_per_mm * 2**FRACTION_BITS
+            if fill != "none":
+                cv2.circle(image, at, round(reach), _bgr(fill), cv2.FILLED, *smooth)
+            if width > 0.0:
+                cv2.circle(image, at, round(reach), _bgr(colour), thick(width), *smooth)
+        case Area(points=points, fill=fill):
+            cv2.fillPoly(image, [_fixed_point(points, px_per_mm)], _bgr(fill), *smooth)
+        case Curve(points=points, width=width, colour=colour):
+            corners, is_closed = _fixed_point(points, px_per_mm), False
+            cv2.polylines(image, [corners], is_closed, _bgr(colour), thick(width), *smooth)
+        case Label():
+            _write(image, shape, px_per_mm)
+
+
+def _write(image: ColourImage, label: Label, px_per_mm: float) -> None:
+    """A text; the image is changed."""
+    for piece in set_pieces(label.text, label.size):
+        x = (label.left + piece.right) * px_per_mm - 0.5
+        y = (label.at[1] - piece.above) * px_per_mm - 0.5
+        font = _font(round(piece.size * px_per_mm, 1))
+        left, top, right, bottom = font.getbbox(piece.text, anchor="ls")
+        rows = slice(max(0, math.floor(y + top)), max(0, math.ceil(y + bottom) + 1))
+        columns = slice(max(0, math.floor(x + left)), max(0, math.ceil(x + right) + 1))
+        picture = Image.fromarray(image[rows, columns])
+        pen = ImageDraw.Draw(picture)
+        at = (x - columns.start, y - rows.start)
+        pen.text(at, piece.text, _bgr(label.colour), font, anchor="ls")
+        image[rows, columns] = np.asarray(picture)
+
+
+@cache
+def _font(size_px: float) -> ImageFont.FreeTypeFont:
+    file = files("grader") / "data" / "fonts" / "DejaVuSansCondensed-Bold.ttf"
+    return ImageFont.truetype(str(file), size_px)
 
 
 def _bgr(colour: str) -> Colour:
@@ -223,107 +254,21 @@ def _bgr(colour: str) -> Colour:
     return (blue, green, red)
 
 
-class _Brush:
-    """Draws in millimetres, with sub-pixel ends."""
-
-    def __init__(self, image: ColourImage, px_per_mm: float) -> None:
-        self.image, self.px_per_mm = image, px_per_mm
-
-    def arrow(self, arrow: Arrow) -> None:
-        colour = _bgr(COLOURS[arrow.verdict])
-        if arrow.length < LEAST_ARROW_MM:
-            return
-        self.line(arrow.tail, arrow.neck(), colour, ARROW_WIDTH_MM[arrow.verdict], arrow.dash)
-        if not arrow.is_link:
-            self.fill(arrow.head(), colour)
-
-    def ghost(self, ghost: Ghost) -> None:
-        self.line(ghost.tail, ghost.tip, _bgr(GHOST_COLOUR), GHOST_WIDTH_MM, GHOST_DASH_MM)
-        self.ring(ghost.tip, 0.9, _bgr(GHOST_COLOUR), 0.3)
-
-    def dot(self, dot: Dot) -> None:
-        colour = _bgr(COLOURS["review"] if dot.doubtful else NODE_COLOUR)
-        self.ring(dot.at, 0.8, colour, 0.3)
-
-    def label(self, label: Label) -> None:
-        """The mark in a filled disc, the name beside it on a whitened ground."""
-        colour = _bgr(COLOURS[label.arrow.verdict])
-        self._whiten(label.box)
-        if label.leader is not None:
-            self.line(*label.leader, colour, 0.2, None)
-        centre, radius = label.badge
-        self.disc(centre, radius, colour)
-        self.mark(label.arrow.verdict, centre)
-        self.name(label.arrow.name, label.foot, colour)
-
-    def mark(self, verdict: str, centre: XY) -> None:
-        """✓ ✗ ~ ? → – as strokes: the drawing font has no such letters."""
-        for stroke in MARK_STROKES[verdict]:
-            points = [(centre[0] + 0.95 * px, centre[1] + 0.95 * py) for px, py in stroke]
-            for start, end in itertools.pairwise(points):
-                self.line(start, end, (255, 255, 255), 0.42, None)
-
-    def name(self, name: str, at: XY, colour: Colour) -> None:
-        """A vector's name with its indices small: v_BA, a_BA_n."""
-        letter, _, rest = name.partition("_")
-        size = self.px_per_mm * 0.125
-        x, y = self.to_px(at)
-        for text, scale, drop in ((letter, 1.0, 0.0), (rest.replace("_", ""), 0.72, 0.25)):
-            thick = max(1, round(size * scale * 2.2))
-            place = (round(x), round(y + drop * self.px_per_mm * 2))
-            cv2.putText(
-                self.image, text, place, cv2.FONT_HERSHEY_SIMPLEX, size * scale, colour, thick, cv2.LINE_AA
-            )
-            (wide, _high), _base = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size * scale, thick)
-            x += wide
-
-    def to_px(self, at: XY) -> tuple[float, float]:
-        return (at[0] * self.px_per_mm - 0.5, at[1] * self.px_per_mm - 0.5)
-
-    def _fixed(self, at: XY) -> tuple[int, int]:
-        x, y = self.to_px(at)
-        return (round(x * 2**FRACTION_BITS), round(y * 2**FRACTION_BITS))
-
-    def line(
-        self, start: XY, end: XY, colour: Colour, width_mm: float, dash: tuple[float, float] | None
-    ) -> None:
-        thick = max(1, round(width_mm * self.px_per_mm))
-        for a, b in _dashes(start, end, dash):
-            cv2.line(self.image, self._fixed(a), self._fixed(b), colour, thick, cv2.LINE_AA, FRACTION_BITS)
-
-    def fill(self, points: tuple[XY, ...], colour: Colour) -> None:
-        corners = np.array([self._fixed(point) for point in points], dtype=np.int32)
-        cv2.fillPoly(self.image, [corners], colour, cv2.LINE_AA, FRACTION_BITS)
-
-    def ring(self, at: XY, radius_mm: float, colour: Colour, width_mm: float) -> None:
-        radius = round(radius_mm * self.px_per_mm * 2**FRACTION_BITS)
-        thick = max(1, round(width_mm * self.px_per_mm))
-        cv2.circle(self.image, self._fixed(at), radius, colour, thick, cv2.LINE_AA, FRACTION_BITS)
-
-    def disc(self, at: XY, radius_mm: float, colour: Colour) -> None:
-        radius = round(radius_mm * self.px_per_mm * 2**FRACTION_BITS)
-        cv2.circle(self.image, self._fixed(at), radius, colour, -1, cv2.LINE_AA, FRACTION_BITS)
-
-    def _whiten(self, box: Box) -> None:
-        """Whiten the ground of a label, leaving the drawing faintly visible."""
-        x0, y0 = self.to_px((box[0], box[1]))
-        x1, y1 = self.to_px((box[0] + box[2], box[1] + box[3]))
-        rows = slice(max(0, round(y0)), max(0, round(y1) + 1))
-        columns = slice(max(0, round(x0)), max(0, round(x1) + 1))
-        part = self.image[rows, columns]
-        part[:] = (part * 0.2 + 255 * 0.8).astype(np.uint8)
+def _fixed_point(points: Sequence[XY], px_per_mm: float) -> NDArray[np.int32]:
+    """(n, 2) pixels times 2**FRACTION_BITS, as cv2 takes them."""
+    pixels = (np.array(points) * px_per_mm - 0.5) * 2**FRACTION_BITS
+    return np.asarray(np.rint(pixels), dtype=np.int32)
 
 
-def _dashes(start: XY, end: XY, dash: tuple[float, float] | None) -> list[tuple[XY, XY]]:
+def _dashes(start: XY, end: XY, dash: tuple[float, ...]) -> Iterator[tuple[XY, XY]]:
+    """The pieces of a line, of equal length, the first and last at its ends; cv2 has no dashed lines."""
     length = math.dist(start, end)
-    if dash is None or length < dash[0]:
-        return [(start, end)]
+    if not dash or length < dash[0]:
+        yield start, end
+        return
     on, off = dash
-    along = ((end[0] - start[0]) / length, (end[1] - start[1]) / length)
     count = max(1, round((length + off) / (on + off)))
     pitch = (length + off) / count
-    pieces = []
     for index in range(count):
-        first, last = index * pitch, index * pitch + pitch - off
-        pieces.append(tuple((start[0] + at * along[0], start[1] + at * along[1]) for at in (first, last)))
-    return [(a, b) for a, b in pieces]
+        first, last = index * pitch, (index + 1) * pitch - off
+        yield between(start, end, first / length), between(start, end, last / length)

@@ -5,6 +5,7 @@ wrong; 3 a mechanism does not assemble or is singular; 5 a file cannot be writte
 """
 
 import sys
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -74,6 +75,11 @@ NumberOption = Annotated[
     int | None, typer.Option("--n", help="The student's number, where data depend on it.")
 ]
 PositionOption = Annotated[int | None, typer.Option("--position", help="The position, where there are some.")]
+AssignmentOption = Annotated[str, typer.Option("--assignment", help="A built-in name or a .toml file.")]
+FolderArgument = Annotated[Path, typer.Argument(help="The folder with what was handed in.")]
+OutOption = Annotated[Path, typer.Option("--out", help="The folder for the results.")]
+RosterOption = Annotated[Path | None, typer.Option("--roster", help="The class: roster.csv.")]
+JobsOption = Annotated[int | None, typer.Option("--jobs", min=1, help="Processes; all processors if absent.")]
 LanguageOption = Annotated[str, typer.Option("--lang", help="Language of feedback: en, ro or ru.")]
 
 

@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 import typer
 from rich.console import Console
-from rich.table import Table
 
-from grader.cli.progress import progress
+from grader.cli.progress import new_table, progress
 from grader.pipeline import Place, read, see
 from grader.records import Reading
 from grader.roster import read_roster
@@ -136,9 +135,7 @@ def _print_tables(solver: Sequence[SolverRow], reading: Sequence[ReadingRow]) ->
 
 
 def _print_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    table = Table(box=None, header_style="bold")
-    for number, head in enumerate(heads):
-        table.add_column(head, justify="right" if number else "left")
+    table = new_table(*heads)
     for row in rows:
         table.add_row(*row)
     Console().print(table)

@@ -19,9 +19,6 @@ from reference.errors import CallError
 MARKS = {"right": ("✓", "green"), "off": ("✗", "red"), "open": ("?", "magenta")}
 
 
-PAGE_FILES = (".html", ".pdf")
-
-
 def check_measured(
     name: str,
     n: int | None,
@@ -69,8 +66,8 @@ def checked_level(level: str) -> Level:
 
 
 def _check_page(page: Path | None) -> None:
-    if page is not None and page.suffix.lower() not in PAGE_FILES:
-        raise CallError("page_file", f"--page {page}: the name must end in {' or '.join(PAGE_FILES)}")
+    if page is not None and page.suffix.lower() != ".html":
+        raise CallError("page_file", f"--page {page}: the name must end in .html; print the page for paper")
 
 
 def _write_page(
@@ -83,14 +80,14 @@ def _write_page(
     level: Level,
 ) -> None:
     """The same as a page, with the plans drawn as measured."""
-    from grader.feedback.leaflet import About
-    from grader.feedback.pages import write_leaflet
+    from grader.feedback.pages import About, feedback_page
+    from grader.files import write_whole
     from grader.pipeline import Work, mark_looked
 
     work = Work(entered.student_id or "", variant, measured=entered, lang=lang)
     marked = mark_looked(work, assignment, rubric, (), level)
     about = About(assignment.file.title.in_language(lang), "", assignment.file.names)
-    write_leaflet(page, marked.report, marked.pictures, lang, level, about)
+    write_whole(page, feedback_page(marked.report, marked.pictures, lang, level, about))
 
 
 def _variant(assignment: Assignment, entered: Measurements, n: int | None, position: int | None) -> Variant:

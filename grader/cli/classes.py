@@ -12,7 +12,7 @@ from grader.authoring.variant_checks import broken_findings, broken_variants
 from grader.authoring.variant_table import class_csv
 from grader.cli.app import check_language
 from grader.cli.plans import check_crank
-from grader.cli.progress import progress
+from grader.cli.progress import new_table, progress
 from grader.files import write_whole
 from grader.i18n import tongue
 from grader.plan_document import plan_documents
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 LONG = 20
 """So many drawings take seconds: their progress is shown."""
-DECIMAL_COMMA = frozenset({"ro", "ru"})
 
 
 def refuse_single(*, every: bool, options: Mapping[str, object]) -> None:
@@ -59,7 +58,7 @@ def show_class(
     plan = exact_plan(assignment, variants, assignment.scales(variants, crank_mm=crank_mm))
     is_open = len(variants) < len(assignment.variants())
     if csv is not None:
-        write_whole(csv, class_csv(plan, decimal_comma=lang in DECIMAL_COMMA))
+        write_whole(csv, class_csv(plan, decimal_comma=tongue(lang).decimal_mark == ","))
     if pdf is not None:
         _print_pages(assignment, plan, pdf, drawings=drawings, lang=lang)
     if as_json:
@@ -111,15 +110,12 @@ def _told(is_long: bool) -> "Iterator[Tell | None]":
 def _show_table(assignment: Assignment, plan: Plan) -> None:
     """Scales, and the drawn lengths of absolute vectors: what is asked for most while correcting."""
     from rich.console import Console
-    from rich.table import Table
 
     console = Console()
     console.print(f"[bold]{assignment.file.title.en}[/bold], drawn lengths in mm", highlight=False)
     joints = {joint for joint in plan.motion.position if not plan.mechanism.is_ground(joint)}
     names = [name for name in plan.vectors_si if name.removeprefix(name[:2]) in joints]
-    table = Table("variant", box=None, header_style="bold")
-    for heading in ("kL\nm/mm", "kv\n(m/s)/mm", "ka\n(m/s^2)/mm", *names):
-        table.add_column(heading, justify="right")
+    table = new_table("variant", "kL\nm/mm", "kv\n(m/s)/mm", "ka\n(m/s^2)/mm", *names)
     lengths = {name: abs(plan.drawn_mm(name)) for name in names}
     for index, variant in enumerate(plan.variants):
         scales = [f"{getattr(plan.scales, name)[index]:.4g}" for name in ("kL", "kv", "ka")]

@@ -5,7 +5,18 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.app import AssignmentArgument, LanguageOption, NumberOption, PositionOption, app
+from grader.cli.app import (
+    AssignmentArgument,
+    AssignmentOption,
+    FolderArgument,
+    JobsOption,
+    LanguageOption,
+    NumberOption,
+    OutOption,
+    PositionOption,
+    RosterOption,
+    app,
+)
 
 
 @app.command()
@@ -98,9 +109,18 @@ def new(
     ] = None,
 ) -> None:
     """Write a commented assignment to start from: three files that lint and plan take as they are."""
-    from grader.cli.authoring import write_new
+    from grader.authoring.new import new_assignment
+    from reference.assignment import load_assignment
 
-    write_new(file, like, mechanism)
+    written = new_assignment(file, like=like, mechanism=mechanism)
+    first = load_assignment(written.assignment).variants()[0]
+    numbers = (("n", first.n), ("position", first.position))
+    chosen = "".join(f" --{name} {value}" for name, value in numbers if value is not None)
+    for path in (written.assignment, written.mechanism, written.rubric):
+        typer.echo(f"written: {path}")
+    typer.echo("next: change them, then")
+    typer.echo(f"  planmark plan {written.assignment}{chosen} --svg plan.svg")
+    typer.echo(f"  planmark lint {written.assignment}")
 
 
 @app.command()
@@ -143,16 +163,11 @@ def schema(name: Annotated[str, typer.Argument(help="report, results, reading, m
     typer.echo(json.dumps(schemas.schema(name), indent=2, ensure_ascii=False))
 
 
-FolderArgument = Annotated[Path, typer.Argument(help="The folder with what was handed in.")]
-RosterOption = Annotated[Path | None, typer.Option("--roster", help="The class: roster.csv.")]
-JobsOption = Annotated[int | None, typer.Option("--jobs", min=1, help="Processes; all processors if absent.")]
-
-
 @app.command()
 def grade(
     folder: FolderArgument,
-    assignment: Annotated[str, typer.Option("--assignment", help="A built-in name or a .toml file.")],
-    out: Annotated[Path, typer.Option("--out", help="The folder for the results.")],
+    assignment: AssignmentOption,
+    out: OutOption,
     roster: RosterOption = None,
     pages_per_student: Annotated[
         int | None, typer.Option("--pages-per-student", help="Of one class file, in the roster's order.")
@@ -165,9 +180,6 @@ def grade(
     ghosts: Annotated[
         bool, typer.Option("--ghosts/--no-ghosts", help="With --level full: draw expected vectors, dotted.")
     ] = True,
-    pdf: Annotated[
-        bool, typer.Option("--pdf/--no-pdf", help="Write each student's feedback.pdf, to be printed, too.")
-    ] = False,
     time_limit: Annotated[
         float, typer.Option("--time-limit", min=1.0, help="Seconds that a file or a sheet may take.")
     ] = 60.0,
@@ -181,7 +193,7 @@ def grade(
 
     open_ends = grade_folder(
         folder, assignment, out, roster=roster, pages_per_student=pages_per_student, jobs=jobs, lang=lang,
-        limits=Limits(time_limit, memory_limit), level=level, with_ghosts=ghosts, with_pdf=pdf,
+        limits=Limits(time_limit, memory_limit), level=level, with_ghosts=ghosts,
     )  # fmt: skip
     raise typer.Exit(1 if open_ends else 0)
 
@@ -197,7 +209,7 @@ def check(
         str, typer.Option("--level", help="symbol (right or off), hint (in which way), full (numbers).")
     ] = "hint",
     page: Annotated[
-        Path | None, typer.Option("--page", help="Draw and tell it in this file, too: .html or .pdf.")
+        Path | None, typer.Option("--page", help="Draw and tell it in this HTML file, too.")
     ] = None,
 ) -> None:
     """Check measured values: right, or off and in which way, without giving the answer away."""
@@ -208,7 +220,7 @@ def check(
 
 @app.command()
 def demo(
-    out: Annotated[Path, typer.Option("--out", help="The folder for the results.")] = Path("planmark-demo"),
+    out: OutOption = Path("planmark-demo"),
     jobs: JobsOption = None,
     lang: LanguageOption = "en",
 ) -> None:
@@ -221,7 +233,7 @@ def demo(
 @app.command()
 def read(
     scans: Annotated[list[Path], typer.Argument(help="Scans of one student's sheets.")],
-    assignment: Annotated[str, typer.Option("--assignment", help="A built-in name or a .toml file.")],
+    assignment: AssignmentOption,
     n: NumberOption = None,
     position: PositionOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the readings as JSON.")] = False,
@@ -268,7 +280,7 @@ def calibrate(
 @app.command()
 def match(
     folder: FolderArgument,
-    assignment: Annotated[str, typer.Option("--assignment", help="A built-in name or a .toml file.")],
+    assignment: AssignmentOption,
     roster: Annotated[Path, typer.Option("--roster", help="The class: roster.csv.")],
     out: Annotated[Path, typer.Option("--out", help="The draft of the roster to write, a CSV file.")],
     pages_per_student: Annotated[int | None, typer.Option("--pages-per-student")] = None,
@@ -289,3 +301,80 @@ def bench(
     from grader.cli.benchmark import show_benchmark
 
     show_benchmark(quick=quick, as_json=as_json)
+
+
+@app.command()
+def export(
+    results: Annotated[Path, typer.Argument(metavar="OUT", help="The folder that `planmark grade` wrote.")],
+    to: Annotated[str, typer.Option("--to", help="csv, moodle, canvas, gradescope or lti.")],
+    what: Annotated[
+        str | None,
+        typer.Option(
+            "--what",
+            help="grades (totals), marks (points by criterion), rubric (the criteria), feedback (the pages).",
+        ),
+    ] = None,
+    file: Annotated[
+        Path | None, typer.Option("--file", help="The file to write; OUT/export-... if absent.")
+    ] = None,
+    roster: RosterOption = None,
+    worksheet: Annotated[
+        Path | None,
+        typer.Option("--worksheet", help="Moodle's downloaded offline grading worksheet, to fill in."),
+    ] = None,
+    gradebook: Annotated[
+        Path | None, typer.Option("--gradebook", help="Canvas's exported gradebook, to fill in.")
+    ] = None,
+    ids: Annotated[
+        Path | None,
+        typer.Option("--ids", help="The platform's numbers: a CSV student_id,id[,username,participant]."),
+    ] = None,
+    criteria: Annotated[
+        Path | None,
+        typer.Option("--criteria", help="The platform's criteria: its JSON answer, or a CSV criterion,id."),
+    ] = None,
+    identity: Annotated[
+        str | None,
+        typer.Option("--identity", help="How Moodle's gradebook knows users: idnumber, email, username, id."),
+    ] = None,
+    item: Annotated[
+        str, typer.Option("--item", help="The grade item's, assignment's or rubric's name.")
+    ] = "",
+    position: PositionOption = None,
+    combine: Annotated[
+        str | None, typer.Option("--combine", help="Of several positions: sum or mean.")
+    ] = None,
+    maximum: Annotated[float | None, typer.Option("--maximum", help="The grade item's maximum.")] = None,
+    rescale: Annotated[bool, typer.Option("--rescale", help="Convert points to the platform's.")] = False,
+    visibility: Annotated[
+        str | None,
+        typer.Option("--visibility", help="Gradescope: visible, hidden, after_due_date, after_published."),
+    ] = None,
+    course_id: Annotated[int | None, typer.Option("--course-id", min=1, help="Canvas's.")] = None,
+    assignment_id: Annotated[
+        int | None, typer.Option("--assignment-id", min=1, help="Canvas's or Moodle's.")
+    ] = None,
+    cmid: Annotated[
+        int | None,
+        typer.Option("--cmid", min=1, help="Moodle's number of the activity: the id in its address."),
+    ] = None,
+    context_id: Annotated[
+        int | None, typer.Option("--context-id", min=1, help="Moodle's number of the activity's context.")
+    ] = None,
+    lang: LanguageOption = "en",
+) -> None:
+    """Write the results for a learning platform, validated before anything is written."""
+    from grader.cli.exporting import export_results
+    from grader.lms.grades import Options
+    from reference.errors import CallError
+
+    if worksheet is not None and (gradebook is not None or to != "moodle"):
+        raise CallError("option_unused", "--worksheet is Moodle's: give it with --to moodle alone")
+    if gradebook is not None and to != "canvas":
+        raise CallError("option_unused", "--gradebook is Canvas's: give it with --to canvas alone")
+    options = Options(
+        to=to, what=what, form=worksheet or gradebook, criteria=criteria, identity=identity, item=item,
+        position=position, combine=combine, maximum=maximum, rescale=rescale, visibility=visibility,
+        course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id, lang=lang,
+    )  # fmt: skip
+    raise typer.Exit(1 if export_results(results, file, options, roster, ids) else 0)

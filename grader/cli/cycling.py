@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import typer
 
+from grader.cli.progress import new_table
 from grader.cycle.quantities import Selection, Subject, cycle_csv
 from grader.cycle.strokes import Extreme, extremes, strokes_of
 from grader.files import write_whole
@@ -19,7 +20,6 @@ from reference.errors import CallError
 if TYPE_CHECKING:
     from rich.table import Table
 
-DECIMAL_COMMA = frozenset({"ro", "ru"})
 CONSTANT = 1e-9
 """What changes by less over a cycle, against the largest of its kind, is constant but for rounding."""
 ZERO = 1e-8
@@ -47,7 +47,7 @@ def show_cycle(
     drawn_in = {kind: file for kind, file in (("svg", svg), ("pdf", pdf)) if file is not None}
     diagrams = _diagrams(assignment, variant, subject, selection, words, list(drawn_in))
     if csv is not None:
-        write_whole(csv, cycle_csv(subject, selection, decimal_comma=words.lang in DECIMAL_COMMA))
+        write_whole(csv, cycle_csv(subject, selection, decimal_comma=words.decimal_mark == ","))
         typer.echo(f"Written to {csv}")
     for file, diagram in zip(drawn_in.values(), diagrams, strict=True):
         write_whole(file, diagram)
@@ -80,16 +80,13 @@ def _diagrams(
 def _print(assignment: Assignment, variant: Variant, subject: Subject, selection: Selection) -> None:
     """The range, strokes, and the extremes of the selected quantities."""
     from rich.console import Console
-    from rich.table import Table
 
     console = Console()
     console.print(f"[bold]{assignment.file.title.en}[/bold], {variant}", highlight=False)
     for line in (*_range(subject), *_strokes(subject)):
         console.print(line, highlight=False, soft_wrap=True)
-    table = Table("", box=None, header_style="bold")
     where = "at deg" if subject.cycle.is_turned else "at mm"
-    for heading in ("unit", "least", where, "largest", where, "here"):
-        table.add_column(heading, justify="left" if heading == "unit" else "right")
+    table = new_table("", "unit", "least", where, "largest", where, "here", left=("unit",))
     for quantity in selection.quantities:
         least, largest = extremes(subject, quantity)
         here = float(subject.values_at(quantity, np.array([subject.cycle.start]))[0])

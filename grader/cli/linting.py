@@ -12,6 +12,7 @@ from rich.table import Table
 from grader.authoring.findings import named
 from grader.authoring.lint import Least, Lint, Row, lint, lint_document
 from grader.authoring.round_scales import WELL_READ_MM, Proposal, ratio_text
+from grader.cli.progress import new_table
 from grader.files import write_whole
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
@@ -53,17 +54,15 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
 
 
 def _variants_table(rows: Sequence[Row]) -> Table:
-    table = Table(box=None, header_style="bold")
-    table.add_column("variant", no_wrap=True)
-    table.add_column("assembles")
-    for heading in (
+    figures = (
         "transmis-\nsion sine",
         "crossing\ndegrees",
         "shortest\nasked mm",
         "under\n8 mm",
         "fits\ntimes",
-    ):
-        table.add_column(heading, justify="right")
+    )
+    table = new_table("variant", "assembles", *heads, left=("assembles",))
+    table.columns[0].no_wrap = True
     for group in _ranges(rows):
         broken = [row for row in group if row.problem]
         assembles = "yes" if not broken else "no" if len(broken) == len(group) else f"{len(broken)} do not"

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import typer
 
+from grader.cli.progress import new_table
 from grader.files import write_whole
 from grader.i18n import tongue
 from grader.plan_document import plan_document
@@ -106,7 +107,6 @@ def _draw(assignment: Assignment, plan: Plan, drawings: Drawings) -> None:
 
 def _print_table(assignment: Assignment, plan: Plan) -> None:
     from rich.console import Console
-    from rich.table import Table
 
     document = plan_document(assignment, plan)
     scales = document.scales
@@ -116,9 +116,7 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
         f"kL = {scales.kL:.6g} m/mm   kv = {scales.kv:.6g} (m/s)/mm   ka = {scales.ka:.6g} (m/s^2)/mm",
         highlight=False,
     )
-    table = Table("vector", box=None, header_style="bold")
-    for heading in ("drawn mm", "value", "unit", "direction deg"):
-        table.add_column(heading, justify="left" if heading == "unit" else "right")
+    table = new_table("vector", "drawn mm", "value", "unit", "direction deg", left=("unit",))
     for vector, row in document.vectors.items():
         direction = "-" if row.direction_deg is None else f"{row.direction_deg:.2f}"
         table.add_row(vector, f"{row.drawn_mm:.2f}", f"{row.value:.4f}", row.unit, direction)

@@ -1,7 +1,21 @@
-"""The progress bar on the terminal."""
+"""What the terminal shows: tables, and a progress bar."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def new_table(*headings: str, left: Collection[str] = ()) -> "Table":
+    """An empty table: names in the first column and those of `left`, numbers aligned right in the others."""
+    from rich.table import Table
+
+    table = Table(headings[0], box=None, header_style="bold")
+    for heading in headings[1:]:
+        table.add_column(heading, justify="left" if heading in left else "right")
+    return table
 
 
 @contextmanager

@@ -182,8 +182,7 @@ def _speed(subject: Subject, words: Tongue) -> str:
     for (letter, name, unit), is_optional in zip(rates, (False, True), strict=True):
         value = float(getattr(driver, name)[0])
         if value or not is_optional:
-            number = f"{words.significant(value, 4)}\N{NO-BREAK SPACE}{words.unit(unit)}"
-            texts.append(f"{mathtext(f'{letter}_{link}')} = {number}")
+            texts.append(f"{mathtext(f'{letter}_{link}')} = {words.value(value, unit)}")
     return ",  ".join(texts)
 
 

@@ -6,28 +6,48 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
+from markupsafe import Markup
+
 from grader.documents import (
     AlikeDocument,
+    Cause,
     CriterionDocument,
     MovedDocument,
     ReportDocument,
     ResultsDocument,
+    Sign,
     StandingDocument,
 )
 from grader.feedback import statistics
-from grader.feedback.charts import distribution_svg
-from grader.feedback.class_words import CAUSES, CHANCE, SIGNS
 from grader.feedback.mistakes import MISTAKES
 from grader.feedback.problems import problem_sentence, unmatched_sentence
-from grader.feedback.templating import environment, told_score
+from grader.feedback.statistics import BINS, histogram, open_shares, shares
+from grader.feedback.templating import environment, score_text
 from grader.feedback.words import STATES, VERDICTS
 from grader.files import write_whole
-from grader.i18n import Tongue, tongue
+from grader.i18n import N_, Tongue, tongue
 from grader.scene import COLOURS, MARKS
 
 _NO_NAMES: Mapping[str, str] = {}
 SHOWN = 12
 """Students named at once; the others unfold."""
+SIGNS: Mapping[Sign, str] = {
+    "hand_errors": N_("the same small errors of the hand"),
+    "same_place": N_("figures lie in the same places on the sheet"),
+    "same_numbers": N_("the same measured values"),
+    "same_picture": N_("the ink lies in the same places"),
+    "other_number": N_("drawn with the other's number"),
+}
+CHANCE = N_("By chance a class like this shows %(chance)s such pairs.")
+CAUSES: Mapping[Cause, str] = {
+    "assignment": N_("the assignment was changed"),
+    "rubric": N_("the rubric was changed"),
+    "submission": N_("other files were handed in"),
+    "roster": N_("the roster was changed"),
+    "program": N_("another version of the program"),
+    "new": N_("new"),
+    "gone": N_("no longer there"),
+}
 
 
 def write_index(
@@ -78,7 +98,7 @@ def index_page(
         alike=[_alike(one, who, speaker) for one in results.alike],
         moved=[_moved(one, who, speaker) for one in results.moved],
         causes=_causes(results.moved),
-        told_score=lambda report: told_score(report, speaker),
+        score_text=lambda report: score_text(report, speaker),
         shown=SHOWN,
         colours=COLOURS,
     )  # fmt: skip
@@ -142,7 +162,7 @@ def _rows(results: ResultsDocument, who: _Who, speaker: Tongue) -> list[dict[str
             "report": report,
             "name": who.names.get(report.student_id, ""),
             "link": who.link(index).page,
-            "score": told_score(report, speaker),
+            "score": score_text(report, speaker),
             "waiting": sum(criterion.verdict == "review" for criterion in report.criteria),
             "problems": Counter(
                 problem_sentence(problem, speaker, brief=True) for problem in report.problems
@@ -156,7 +176,7 @@ def _rows(results: ResultsDocument, who: _Who, speaker: Tongue) -> list[dict[str
 def _scale(criterion: CriterionDocument, speaker: Tongue) -> str:
     """A scale that was not right: what was declared, and what it is."""
     told = [
-        f"{speaker.significant(one.value, 4)}\N{NO-BREAK SPACE}{speaker.unit(one.unit or '')}"
+        speaker.value(one.value, one.unit or "")
         for one in (criterion.measured, criterion.expected)
         if one.value is not None
     ]
@@ -220,3 +240,43 @@ def _causes(moved: Sequence[MovedDocument]) -> list[tuple[str, int]]:
     """Why marks moved, and how often."""
     times = Counter(cause for one in moved for cause in one.why)
     return [(CAUSES[cause], count) for cause, count in times.most_common()]
+
+
+# The distribution of scores ----------------------------------------------------------------------
+
+_STEP, _WIDE, _HIGH, _FOOT = 34, 28, 80.0, 100.0
+
+
+def distribution_svg(results: ResultsDocument, speaker: Tongue) -> Markup:
+    """The distribution of scores; empty where there are none.
+
+    Final scores are full bars; what waits stands on top in dashes, at the middle of its range.
+    """
+    final, waiting = histogram(shares(results)), histogram(open_shares(results))
+    tallest = max(a + b for a, b in zip(final, waiting, strict=True))
+    if not tallest:
+        return Markup("")
+    parts = [_bar(index, final[index], waiting[index], tallest) for index in range(BINS)]
+    parts.append(Markup('<text class="axis" x="343" y="115">100</text>'))
+    summary = speaker.gettext("Scores in per cent of the maximum: how many students in each tenth.")
+    return Markup(
+        '<svg class="chart" viewBox="0 0 352 122" role="img" aria-label="{}">{}'
+        '<line class="foot" x1="2" y1="100.5" x2="350" y2="100.5"/></svg>'
+    ).format(summary, Markup("").join(parts))
+
+
+def _bar(index: int, final: int, waiting: int, tallest: int) -> Markup:
+    x, label = 6 + index * _STEP, f"{10 * index}–{10 * (index + 1)}"
+    parts = []
+    foot = _FOOT
+    for count, kind in ((final, "final"), (waiting, "waits")):
+        if count:
+            height = _HIGH * count / tallest
+            foot -= height
+            place = Markup('x="{}" y="{:.1f}" width="{}" height="{:.1f}"').format(x, foot, _WIDE, height)
+            told = f"{label} %: {count}"
+            parts.append(Markup('<rect class="{}" {}><title>{}</title></rect>').format(kind, place, told))
+    if final + waiting:
+        parts.append(Markup('<text x="{}" y="{:.1f}">{}</text>').format(x + 14, foot - 5, final + waiting))
+    parts.append(Markup('<text class="axis" x="{}" y="115">{}</text>').format(x - 3, 10 * index))
+    return Markup("").join(parts)

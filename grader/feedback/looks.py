@@ -1,36 +1,20 @@
 """What is to be seen of a sheet: the whole, each plan, what a mistake concerns; as shapes in millimetres.
 
-The page for the screen and the printed one show the same looks: `overlay` writes them as SVG, `printed`
-as PDF.
+Looks are written as SVG over the scan: sharp at every size, and read out by their vectors' verdicts.
 """
 
+import base64
 import math
 from collections.abc import Collection, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
-from grader.labels import Label, labels_of
+from markupsafe import Markup
+
+from grader.labels import Layer, is_in, layers_of
 from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Box
-from grader.scene import (
-    ARROW_WIDTH_MM,
-    COLOURS,
-    GHOST_COLOUR,
-    GHOST_DASH_MM,
-    GHOST_WIDTH_MM,
-    LEAST_ARROW_MM,
-    MARK_STROKES,
-    NODE_COLOUR,
-    XY,
-    Arrow,
-    Dot,
-    Ghost,
-    Picture,
-    Scene,
-    between,
-)
-from reference.canvas import PAPER, Area, Curve, Ring, Shape, Stroke
-from reference.canvas import Label as Lettering
-from reference.lettering import pieces_of
+from grader.scene import Arrow, Ghost, Picture, Scene, between
+from reference.canvas import FONTS, elements
 
 CLOSE_UP_MARGIN_MM = 12.0
 LEAST_CLOSE_UP_MM = 60.0
@@ -51,18 +35,9 @@ CLOSE_UP_SIZE_PER_MM = 0.0105
 DETAIL_SIZE_PER_MM = 0.0145
 """Size of marks and letters by the width shown: close-ups stand two in a row, details up to three."""
 LEAST_SIZE, LARGEST_SIZE = 0.3, 3.0
-ARROW_OPACITY, FAINT, GROUND_OPACITY = 0.85, 0.3, 0.82
 WRONG = frozenset({"none", "partial"})
 
 _NO_NAMES: Mapping[str, str] = {}
-
-
-@dataclass(frozen=True, slots=True)
-class Layer:
-    """Shapes that are equally opaque."""
-
-    shapes: tuple[Shape, ...]
-    opacity: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +77,7 @@ def looks_at(picture: Picture, index: int, names: Mapping[str, str] = _NO_NAMES)
         return [_plan(scene, index, figure, box, names) for figure, box in boxes.items()]
     whole = (0.0, 0.0, *scene.page_mm)
     named = [arrow for arrow in scene.arrows if arrow.figure not in close_ups and arrow.is_named]
-    layers = _layers(scene, whole, WHOLE_SIZE_PER_MM, named, names)
+    layers = _marks(scene, whole, WHOLE_SIZE_PER_MM, named, names)
     return [
         Look("sheet", index, whole, layers, tuple(arrow.name for arrow in named)),
         *(_plan(scene, index, figure, box, names) for figure, box in close_ups.items()),
@@ -111,7 +86,7 @@ def looks_at(picture: Picture, index: int, names: Mapping[str, str] = _NO_NAMES)
 
 def _plan(scene: Scene, index: int, figure: str, box: Box, names: Mapping[str, str]) -> Look:
     part = _part(scene, figure)
-    layers = _layers(part, box, CLOSE_UP_SIZE_PER_MM, part.arrows, names)
+    layers = _marks(part, box, CLOSE_UP_SIZE_PER_MM, part.arrows, names)
     return Look(figure, index, box, layers, tuple(arrow.name for arrow in part.arrows))
 
 
@@ -139,7 +114,7 @@ def detail(
             return None
         others = [arrow for arrow in _arrows_of(picture.scene, figure) if arrow not in part.arrows]
         named = [cut for arrow in part.arrows if (cut := _within(arrow, box)) is not None]
-        layers = _layers(part, box, DETAIL_SIZE_PER_MM, named, names, others)
+        layers = _marks(part, box, DETAIL_SIZE_PER_MM, named, names, others)
         return Look("detail", index, box, layers, tuple(arrow.name for arrow in named))
     return None
 
@@ -160,7 +135,7 @@ def _tips_of(part: Scene) -> Box | None:
 def _within(arrow: Arrow, box: Box) -> Arrow | None:
     """The part of an arrow that is in a box, to be named there; None where all of it is elsewhere."""
     steps = [between(arrow.tail, arrow.tip, share / CUTS) for share in range(CUTS + 1)]
-    inside = [step for step in steps if _is_in(step, box)]
+    inside = [step for step in steps if is_in(step, box)]
     return replace(arrow, tail=inside[0], tip=inside[-1]) if inside else None
 
 
@@ -205,10 +180,7 @@ def _box(things: Collection[Arrow | Ghost], scene: Scene, margin_mm: float, leas
     return (x, y, width, height)
 
 
-# What is drawn there ------------------------------------------------------------------------------
-
-
-def _layers(
+def _marks(
     scene: Scene,
     box: Box,
     size_per_mm: float,
@@ -216,66 +188,37 @@ def _layers(
     names: Mapping[str, str],
     faint: Collection[Arrow] = (),
 ) -> tuple[Layer, ...]:
-    """Ghosts, arrows and names over the scan; `faint` arrows are there for orientation only."""
+    """The marks in a box, as large as suits its width on the page."""
     size = min(max(size_per_mm * box[2], LEAST_SIZE), LARGEST_SIZE)
-    labels = labels_of(list(named), box, size)
-    dots = [dot for dot in scene.dots if _is_in(dot.at, box)]
-    layers = (
-        Layer(tuple(shape for arrow in faint for shape in _arrow(arrow, size)), FAINT),
-        Layer(tuple(shape for ghost in scene.ghosts for shape in _ghost(ghost, size))),
-        Layer(tuple(shape for arrow in scene.arrows for shape in _arrow(arrow, size)), ARROW_OPACITY),
-        Layer(tuple(shape for dot in dots for shape in _dot(dot, size))),
-        Layer(tuple(_ground(label) for label in labels), GROUND_OPACITY),
-        Layer(tuple(shape for label in labels for shape in _label(label, names))),
-    )
-    return tuple(layer for layer in layers if layer.shapes)
+    return layers_of(scene, box, named, names, size=size, faint=faint)
 
 
-def _is_in(at: XY, box: Box) -> bool:
-    return box[0] <= at[0] <= box[0] + box[2] and box[1] <= at[1] <= box[1] + box[3]
+# As elements of a page ----------------------------------------------------------------------------
 
 
-def _ghost(ghost: Ghost, size: float) -> Iterator[Shape]:
-    width = GHOST_WIDTH_MM * size
-    dash = tuple(length * size for length in GHOST_DASH_MM)
-    yield Stroke(ghost.tail, ghost.tip, width, GHOST_COLOUR, dash)
-    yield Ring(ghost.tip, 0.9 * size, 0.3 * size, GHOST_COLOUR, "none")
+def scan_element(picture: Picture, index: int) -> Markup:
+    """The scan itself, to be shown by its name in every look at the page; empty where there is none."""
+    if not picture.scan:
+        return Markup("")
+    width, height = picture.scene.page_mm
+    kind = "png" if picture.scan.startswith(b"\x89PNG") else "jpeg"
+    return Markup(
+        '<image id="scan-{}" width="{}" height="{}" preserveAspectRatio="none"'
+        ' href="data:image/{};base64,{}"/>'
+    ).format(index, width, height, kind, base64.b64encode(picture.scan).decode("ascii"))
 
 
-def _dot(dot: Dot, size: float) -> Iterator[Shape]:
-    colour = COLOURS["review"] if dot.doubtful else NODE_COLOUR
-    yield Ring(dot.at, 0.8 * size, 0.3 * size, colour, "none")
-    if dot.lettered:
-        at = (dot.at[0] + 1.3 * size, dot.at[1] - 1.3 * size)
-        yield Lettering(at, pieces_of(dot.name), 3.0 * size, "start", colour)
+def svg(look: Look, picture: Picture, told: str) -> Markup:
+    """A look; `told` says in words what is seen. The scan is taken from the page's `scan_element`."""
+    image = Markup('<use href="#scan-{}"/>').format(look.picture) if picture.scan else Markup("")
+    return Markup(
+        '<svg class="sheet" viewBox="{:.1f} {:.1f} {:.1f} {:.1f}" role="img" aria-label="{}"'
+        ' font-family="{}">{}<g class="marks">{}</g></svg>'
+    ).format(*look.box, told, FONTS, image, Markup("").join(_elements(look)))
 
 
-def _arrow(arrow: Arrow, size: float) -> Iterator[Shape]:
-    if arrow.length < LEAST_ARROW_MM:
-        return
-    colour = COLOURS[arrow.verdict]
-    dash = tuple(length * size for length in arrow.dash or ())
-    width = ARROW_WIDTH_MM[arrow.verdict] * size
-    yield Stroke(arrow.tail, arrow.neck(size), width, colour, dash)
-    if not arrow.is_link:
-        yield Area(arrow.head(size), colour)
-
-
-def _ground(label: Label) -> Shape:
-    x, y, width, height = label.box
-    return Area(((x, y), (x + width, y), (x + width, y + height), (x, y + height)), PAPER)
-
-
-def _label(label: Label, names: Mapping[str, str]) -> Iterator[Shape]:
-    """The mark in a disc and the name, with a thin line to an arrow far off."""
-    arrow, size = label.arrow, label.size
-    colour = COLOURS[arrow.verdict]
-    if label.leader is not None:
-        yield Stroke(*label.leader, 0.2 * size, colour)
-    (x, y), radius = label.badge
-    yield Ring((x, y), radius, 0.0, colour, colour)
-    for stroke in MARK_STROKES[arrow.verdict]:
-        points = tuple((x + 0.95 * size * dx, y + 0.95 * size * dy) for dx, dy in stroke)
-        yield Curve(points, 0.42 * size, PAPER)
-    name = names.get(arrow.name, arrow.name)
-    yield Lettering(label.foot, pieces_of(name), 3.1 * size, "start", colour)
+def _elements(look: Look) -> Iterator[Markup]:
+    for layer in look.layers:
+        shapes = Markup("".join(elements(layer.shapes)))  # noqa: S704 - written by the canvas
+        opaque = layer.opacity == 1.0
+        yield shapes if opaque else Markup('<g opacity="{:g}">{}</g>').format(layer.opacity, shapes)

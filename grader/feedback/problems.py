@@ -80,7 +80,7 @@ PROBLEMS: dict[str, str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class ProblemText:
     """A problem as a page shows it: what it is, and the program's own words where they say more."""
 
     text: str
@@ -88,14 +88,14 @@ class Told:
     file: str
 
 
-def problem_sentence(problem: ProblemDocument, speaker: Tongue, *, brief: bool = False) -> Told:
+def problem_sentence(problem: ProblemDocument, speaker: Tongue, *, brief: bool = False) -> ProblemText:
     """A problem of a submission; `brief` leaves the program's own words out where a sentence says it."""
     if brief and problem.code in PROBLEMS:
-        return Told(speaker.gettext(PROBLEMS[problem.code]), "", problem.file or "")
+        return ProblemText(speaker.gettext(PROBLEMS[problem.code]), "", problem.file or "")
     return _told(problem.code, problem.message, problem.file or "", speaker)
 
 
-def unmatched_sentence(unmatched: UnmatchedDocument, speaker: Tongue) -> Told:
+def unmatched_sentence(unmatched: UnmatchedDocument, speaker: Tongue) -> ProblemText:
     """A page or file that is nobody's."""
     place = unmatched.file
     if unmatched.page is not None:
@@ -103,9 +103,9 @@ def unmatched_sentence(unmatched: UnmatchedDocument, speaker: Tongue) -> Told:
     return _told(unmatched.code, unmatched.message, place, speaker)
 
 
-def _told(code: str, message: str, file: str, speaker: Tongue) -> Told:
+def _told(code: str, message: str, file: str, speaker: Tongue) -> ProblemText:
     known = PROBLEMS.get(code)
     # The English message is the more precise one: no summary is needed before it.
     if known is None or (speaker.lang == ROOT_LANGUAGE and message):
-        return Told(message or code, "", file)
-    return Told(speaker.gettext(known), message, file)
+        return ProblemText(message or code, "", file)
+    return ProblemText(speaker.gettext(known), message, file)

@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from typing import Literal
 
 from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, words_of
-from grader.feedback.reasons import told_reason
 from grader.i18n import N_, Tongue, tongue
 from grader.outcomes import NamedMistake, Outcome, Param, Reason
 
@@ -257,7 +256,7 @@ def _speak(params: Mapping[str, Param], speaker: Tongue, names: Mapping[str, str
     for key, value in params.items():
         stem, _, suffix = key.rpartition("_")
         if key == "reason":
-            said[key] = told_reason(str(value), speaker)
+            said[key] = reader_reason(str(value), speaker)
         elif isinstance(value, str):
             said[key] = place(value, speaker, names)
         elif suffix in {"mm", "deg"} and stem:
@@ -279,11 +278,43 @@ def _real(speaker: Tongue, value: float, unit: str) -> str:
         return speaker.quantity(value, 2, unit)
     if unit == "°":
         return f"{speaker.number(value, 2)}°"
-    text = speaker.significant(value, 4)
-    return f"{text}\N{NO-BREAK SPACE}{speaker.unit(unit)}" if unit else text
+    return speaker.value(value, unit)
 
 
 _UNIT_WRITERS: dict[str, Callable[[Tongue, float], str]] = {
     "mm": lambda speaker, value: speaker.quantity(value, 1, "mm"),
     "deg": lambda speaker, value: f"{speaker.number(value, 1)}°",
 }
+
+
+# Reasons of the reader ----------------------------------------------------------------------------
+
+REASONS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
+    (re.compile(pattern), text)
+    for pattern, text in (
+        (
+            r"no stroke between (?P<start>\S+) and (?P<end>\S+) could be told apart",
+            N_("no stroke between %(start)s and %(end)s could be told apart"),
+        ),
+        (
+            r"(?P<nodes>.+), on which it hangs, was not read for certain",
+            N_("%(nodes)s, on which it hangs, was not read for certain"),
+        ),
+        (r"(?P<name>\S+) was not found on the sheets", N_("%(name)s was not found on the sheets")),
+        (r"no mechanism sketch was found on the sheets", N_("no mechanism sketch was found on the sheets")),
+        (r"no velocity plan was found on the sheets", N_("no velocity plan was found on the sheets")),
+        (r"no acceleration plan was found on the sheets", N_("no acceleration plan was found on the sheets")),
+        (r"not drawn: (?P<node>\S+) found by similarity", N_("not drawn: %(node)s found by similarity")),
+        (r"not drawn: .*normal component.* left out", N_("not drawn: normal component left out")),
+        (r"not drawn: .*Coriolis component.* left out", N_("not drawn: Coriolis component left out")),
+    )
+)
+
+
+def reader_reason(reason: str, speaker: Tongue) -> str:
+    """A reason of the reader, in a language."""
+    for pattern, text in REASONS:
+        found = pattern.fullmatch(reason)
+        if found is not None:
+            return speaker.gettext(text) % found.groupdict()
+    return reason

@@ -36,7 +36,7 @@ def environment(lang: str) -> Environment:
     return made
 
 
-def told_score(report: ReportDocument, speaker: Tongue) -> str:
+def score_text(report: ReportDocument, speaker: Tongue) -> str:
     """The score, the range it lies in, or a dash."""
     if report.score is not None:
         return speaker.trimmed(report.score, 2)

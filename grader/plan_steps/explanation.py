@@ -115,7 +115,7 @@ def _datum(speaker: Speaker, step: Step, length: Scaled) -> tuple[Markup, float]
     if length.scale == "kL" and " " not in length.quantity:
         return speaker.name(length.quantity), real
     if isinstance(step, Given):
-        return sentences.named_vector(speaker, step), real
+        return speaker.vector(step.start, step.node), real
     letter, _, node = length.quantity.partition(" ")
     return Markup("<i>{}</i><sub>{}</sub>").format({"offset": "e"}.get(letter, letter), node), real
 
@@ -138,19 +138,19 @@ def _crank_formula(speaker: Speaker, length: Scaled) -> Markup | None:
 def _component(speaker: Speaker, step: Given) -> Iterator[Markup]:
     """A normal or Coriolis component, from velocities of the plan drawn before."""
     mm = abs(float(step.length.at(speaker.view)))
-    if sentences.is_nothing(speaker, step.node, mm):
+    if speaker.is_nothing(step.node, mm):
         return
-    name, real = sentences.named_vector(speaker, step), mm * speaker.scale_value("ka")
+    name, real = speaker.vector(step.start, step.node), mm * speaker.scale_value("ka")
     unit = speaker.unit_of("ka")
     if isinstance(step.length, Normal):
         squared, arm = _speed(speaker, (step.length.tail, step.length.head)), _arm(speaker, step.length)
-        link = sentences.link_of(speaker, step)
+        link = speaker.link_of(step.node)
         yield Markup("{} = {}² / {} = {}² / {} = {}").format(
             name, squared[0], link, speaker.bare(squared[1]), speaker.bare(arm), speaker.real(real, unit)
         )
     if isinstance(step.length, Coriolis):
         slide = _speed(speaker, step.length.slide)
-        carrier = sentences.coriolis_link(speaker, step)
+        carrier = speaker.carrier_of(step.node)
         rate, turn = f"omega_{carrier}", speaker.subject.plan.motion.omega[carrier]
         omega = abs(speaker.subject.one(np.asarray(turn)))
         yield Markup("{} = 2 · {} · {} = 2 · {} · {} = {}").format(
@@ -162,7 +162,7 @@ def _component(speaker: Speaker, step: Given) -> Iterator[Markup]:
 
 def _speed(speaker: Speaker, ends: tuple[str, str]) -> tuple[Markup, float]:
     """A velocity of the plan by its ends: its name and its amount."""
-    return sentences.named(speaker, *ends), sentences.distance(speaker, *ends) * speaker.scale_value("kv")
+    return speaker.vector(*ends), speaker.distance(*ends) * speaker.scale_value("kv")
 
 
 def _arm(speaker: Speaker, length: Normal) -> float:
@@ -195,9 +195,7 @@ def _read_off(speaker: Speaker, step: Step) -> Iterator[Markup]:
 
 def _measured(speaker: Speaker, vector: Vector) -> Markup:
     """A vector read off: drawn length times scale."""
-    mm = (
-        0.0 if speaker.subject.is_zero(vector.name) else sentences.distance(speaker, vector.tail, vector.head)
-    )
+    mm = 0.0 if speaker.subject.is_zero(vector.name) else speaker.distance(vector.tail, vector.head)
     by = speaker.scale_value(vector.scale)
     return Markup("{} = {} · {} = {} · {} = {}").format(
         speaker.name(vector.name), speaker.name(vector.tail, vector.head), speaker.scale(vector.scale),

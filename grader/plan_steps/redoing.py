@@ -87,29 +87,27 @@ def _told(speaker: Speaker, step: Step, *, with_numbers: bool) -> Markup:
 
 def _untold(speaker: Speaker, step: Step) -> Iterator[Markup]:
     """A step without a number: its formula, then what is drawn."""
-    node = speaker.name(step.node)
     match step:
         case TwoLines() | Coincide():
             yield sentences.sentence(speaker, step)
         case Given(along=Along()) | Given(length=Coriolis()):
             yield from _formula(speaker, step)
-            direction = sentences.direction_told(speaker, step)
+            segment, direction = (step.start, step.node), sentences.direction_of(speaker, step)
             yield speaker.say(
-                LAY_OFF_UNTOLD, start=speaker.name(step.start), node=node,
-                segment=speaker.name(step.start, step.node), direction=direction,
-            )  # fmt: skip
+                LAY_OFF_UNTOLD, start=step.start, node=step.node, segment=segment, direction=direction
+            )
         case Similar(base=base, model=model):
-            yield speaker.say(SIMILAR_UNTOLD, base=speaker.name(*base), model=speaker.name(*model), node=node)
+            yield speaker.say(SIMILAR_UNTOLD, base=base, model=model, node=step.node)
         case Divide(base=(p, q)):
-            yield speaker.say(DIVIDE_UNTOLD, node=node, p=speaker.name(p), q=speaker.name(q))
+            yield speaker.say(DIVIDE_UNTOLD, node=step.node, p=p, q=q)
 
 
 def _formula(speaker: Speaker, step: Given) -> Iterator[Markup]:
     """How the component is computed, in names alone."""
-    name = sentences.named_vector(speaker, step)
+    name = speaker.vector(step.start, step.node)
     if isinstance(step.length, Normal):
-        speed = sentences.named(speaker, step.length.tail, step.length.head)
-        yield Markup("{} = {}² / {}").format(name, speed, sentences.link_of(speaker, step))
+        speed = speaker.vector(step.length.tail, step.length.head)
+        yield Markup("{} = {}² / {}").format(name, speed, speaker.link_of(step.node))
     if isinstance(step.length, Coriolis):
-        rate = speaker.rate(f"omega_{sentences.coriolis_link(speaker, step)}")
-        yield Markup("{} = 2 · {} · {}").format(name, rate, sentences.named(speaker, *step.length.slide))
+        rate = speaker.rate(f"omega_{speaker.carrier_of(step.node)}")
+        yield Markup("{} = 2 · {} · {}").format(name, rate, speaker.vector(*step.length.slide))

@@ -33,6 +33,8 @@ COLUMNS = (N_("vector"), N_("on paper"), N_("mm"), N_("real value"), N_("directi
 TOO_LARGE = N_("does not fit A3 at these scales")
 OTHER_UNITS = (N_("rev/min"), N_("cm"), N_("rad"))
 DIGITS = 5
+NEXT_TO_NOTHING = 1e-9
+"""Of a figure's size: shorter lengths are told as zero; triangles flatter than this as lines."""
 
 
 def wording_of(tongue: Tongue) -> Wording:
@@ -56,6 +58,10 @@ def markup_of(pieces: tuple[Piece, ...]) -> Markup:
     return Markup("").join(Markup(marks[piece.height]).format(piece.text) for piece in pieces)  # noqa: S704
 
 
+Value = Markup | str | tuple[str, ...] | complex | float
+"""Of a sentence: a text, a name, names side by side, a direction, a drawn length in millimetres."""
+
+
 @dataclass(frozen=True, slots=True)
 class Speaker:
     """Says a variant's names and numbers in a language; `view` has all nodes, the centres too."""
@@ -64,9 +70,23 @@ class Speaker:
     tongue: Tongue
     view: View
 
-    def say(self, text: str, **values: object) -> Markup:
-        """A sentence of the catalogue with its values in place."""
-        return Markup(escape(self.tongue.gettext(text))) % values  # noqa: S704 - just escaped
+    def say(self, text: str, **values: Value) -> Markup:
+        """A sentence of the catalogue with its values in place, each as `Value` says."""
+        placed = {name: self._set(value) for name, value in values.items()}
+        return Markup(escape(self.tongue.gettext(text))) % placed  # noqa: S704 - just escaped
+
+    def _set(self, value: Value) -> Markup | str:
+        match value:
+            case Markup():
+                return value
+            case str():
+                return self.name(value)
+            case tuple():
+                return self.name(*value)
+            case complex():
+                return self.degrees(value)
+            case _:
+                return self.mm(value)
 
     def name(self, *names: str) -> Markup:
         """A node, a vector, or several nodes side by side."""
@@ -91,9 +111,9 @@ class Speaker:
             return self.tongue.trimmed(value, 12)
         return self.tongue.significant(value, DIGITS)
 
-    def real(self, value: float, unit: str) -> str:
+    def real(self, value: float, unit: str) -> Markup:
         """A real value with its unit."""
-        return f"{self.bare(value)}\N{NO-BREAK SPACE}{self.tongue.unit(unit)}"
+        return escape(f"{self.bare(value)}\N{NO-BREAK SPACE}{self.tongue.unit(unit)}")
 
     def mm(self, value: float) -> str:
         """A drawn length."""
@@ -103,6 +123,37 @@ class Speaker:
         """A direction counter-clockwise from +x."""
         angle = float(np.degrees(np.angle(direction))) % 360.0
         return f"{self.tongue.number(0.0 if round(angle, 2) == 360.0 else angle, 2)}°"
+
+    def place(self, node: str) -> complex:
+        """Where a node is, complex millimetres."""
+        return complex(self.view.nodes[node])
+
+    def distance(self, p: str, q: str) -> float:
+        """The drawn distance of two nodes, mm."""
+        return abs(self.place(q) - self.place(p))
+
+    def is_nothing(self, node: str, mm: float) -> bool:
+        """Whether a length is zero against the size of the figure that a node is in."""
+        figure = self.subject.plan.construction.figure_of(node)
+        size = float(np.max(np.abs(list(self.subject.nodes(figure).values()))))
+        return abs(mm) <= NEXT_TO_NOTHING * size
+
+    def vector(self, tail: str, head: str) -> Markup:
+        """The vector between two nodes of a plan."""
+        vectors = self.subject.plan.construction.vectors.values()
+        return next(
+            self.name(vector.name) for vector in vectors if (vector.tail, vector.head) == (tail, head)
+        )
+
+    def link_of(self, node: str) -> Markup:
+        """The link of the normal component that ends in a node."""
+        vectors = self.subject.plan.construction.vectors.values()
+        return next(self.name(*vector.link) for vector in vectors if vector.head == node and vector.link)
+
+    def carrier_of(self, node: str) -> str:
+        """The link that carries the guide of the Coriolis component that ends in a node."""
+        vectors = self.subject.plan.construction.vectors.values()
+        return next(vector.turning or "" for vector in vectors if vector.head == node)
 
     def scale_value(self, scale: str) -> float:
         """A scale, real units per millimetre."""
@@ -121,25 +172,24 @@ class Speaker:
         """Where a line runs, without a sense."""
         if isinstance(along, Along):
             text = PERPENDICULAR if along.quarters % 2 else PARALLEL
-            return self.say(text, link=self.name(along.tail, along.head))
+            return self.say(text, link=(along.tail, along.head))
         kind, joint = _guided(along)
         if kind == "slot":
-            return self.say(SLOT, joint=self.name(joint))
-        return self.say(ACROSS_GUIDE if along.quarters % 2 else GUIDE, joint=self.name(joint))
+            return self.say(SLOT, joint=joint)
+        return self.say(ACROSS_GUIDE if along.quarters % 2 else GUIDE, joint=joint)
 
     def vector_direction(self, along: Direction, sign: float) -> Markup:
         """Where a vector points: a negative length turns it about."""
         if not isinstance(along, Along):
-            angle = self.degrees(complex(along.at(self.view)) * (-1.0 if sign < 0.0 else 1.0))
+            angle = complex(along.at(self.view)) * (-1.0 if sign < 0.0 else 1.0)
             kind, joint = _guided(along)
             if kind == "guide":
-                return self.say(ALONG_GUIDE, joint=self.name(joint), angle=angle)
+                return self.say(ALONG_GUIDE, joint=joint, angle=angle)
             return self.say(AT_ANGLE, angle=angle)
-        link = self.name(along.tail, along.head)
         turns = (along.quarters + (2 if sign < 0.0 else 0)) % 4
         ends = (along.head, along.tail) if turns == 2 else (along.tail, along.head)
         text = {0: TOWARDS, 1: TURNED_LEFT, 2: TOWARDS, 3: TURNED_RIGHT}[turns]
-        return self.say(text, link=link, tail=self.name(ends[0]), head=self.name(ends[1]))
+        return self.say(text, link=(along.tail, along.head), tail=ends[0], head=ends[1])
 
 
 def speaker_of(subject: Subject, tongue: Tongue) -> Speaker:

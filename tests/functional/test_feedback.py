@@ -39,17 +39,13 @@ def test_print_ghosts_and_levels_are_as_asked_for(planmark, folder, tmp_path):
     assert f"{expected}\u00a0mm" in page
     assert ghost in page
 
-    again = planmark(
-        "grade", folder, "--assignment", "pump", "--out", "marks", "--jobs", 1, "--pdf", "--no-ghosts"
-    )
+    again = planmark("grade", folder, "--assignment", "pump", "--out", "marks", "--jobs", 1, "--no-ghosts")
     assert again.returncode == ran.returncode
-    assert (student / "feedback.pdf").read_bytes().startswith(b"%PDF")
     page = (student / "feedback.html").read_text(encoding="utf-8")
     assert f"{expected}\u00a0mm" in page
     assert ghost not in page
 
     planmark("grade", folder, "--assignment", "pump", "--out", "marks", "--jobs", 1, "--level", "hint")
-    assert not (student / "feedback.pdf").exists()
     page = (student / "feedback.html").read_text(encoding="utf-8")
     assert f"{expected}\u00a0mm" not in page
     assert ghost not in page
@@ -63,18 +59,16 @@ def test_a_level_that_there_is_not_is_refused_before_anything_is_written(folder,
 
 
 def test_a_student_gets_a_page_of_values_measured_at_home(planmark, folder, tmp_path):
-    for name in ("mine.html", "mine.pdf"):
-        ran = planmark("check", "pump", "--measured", folder / "s08.json", "--page", name, "--lang", "ru")
-        assert ran.returncode == 1, ran.stderr
+    ran = planmark("check", "pump", "--measured", folder / "s08.json", "--page", "mine.html", "--lang", "ru")
+    assert ran.returncode == 1, ran.stderr
     page = (tmp_path / "mine.html").read_text(encoding="utf-8")
     assert re.search(r"<svg[^>]* class=.sheet.|<svg class=.sheet.", page)
     assert "План скоростей" in page
-    assert (tmp_path / "mine.pdf").read_bytes().startswith(b"%PDF")
 
 
-@pytest.mark.parametrize("name", ["mine.doc", "mine"])
+@pytest.mark.parametrize("name", ["mine.pdf", "mine"])
 def test_a_page_of_another_kind_is_refused(folder, name):
-    with pytest.raises(CallError, match=r"\.html or \.pdf"):
+    with pytest.raises(CallError, match=r"must end in \.html"):
         check_measured("pump", None, None, folder / "s08.json", "en", "hint", Path(name))
 
 

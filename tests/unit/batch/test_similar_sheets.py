@@ -5,7 +5,7 @@ import json
 import pytest
 
 from grader.batch import Batch, grade
-from grader.cli.telling import tell_class
+from grader.cli.grading import tell_class
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
 from tests.inline import Inline

@@ -6,8 +6,7 @@ import pytest
 
 from grader.documents import ProblemDocument, ReadingDocument, ReadSheets, SheetDocument
 from grader.feedback.class_page import index_page
-from grader.feedback.leaflet import About
-from grader.feedback.pages import feedback_page, write_feedback
+from grader.feedback.pages import About, feedback_page, write_feedback
 from grader.i18n import LANGUAGES
 from grader.scene import MARKS
 from tests.unit.feedback.parsed import Page
@@ -152,6 +151,7 @@ def test_pictures_and_page_are_written_side_by_side(tmp_path):
 
 def test_pictures_of_an_earlier_run_do_not_stay_behind(tmp_path):
     write_feedback(report(), [picture(), picture("s07_2.jpg")], tmp_path, "en")
+    (tmp_path / "feedback.pdf").write_bytes(b"of a version that wrote it")
     write_feedback(report(), [picture()], tmp_path, "en")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["feedback.html", "overlay.png"]
 

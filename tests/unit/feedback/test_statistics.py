@@ -3,7 +3,7 @@
 import re
 
 from grader.documents import QuantityDocument, ScaleDocument
-from grader.feedback.charts import distribution_svg
+from grader.feedback.class_page import distribution_svg
 from grader.feedback.statistics import (
     commonest,
     followed,

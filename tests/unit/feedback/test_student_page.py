@@ -3,15 +3,14 @@
 from dataclasses import replace
 
 from grader.documents import MistakeDocument, ToleranceDocument
-from grader.feedback.leaflet import About
-from grader.feedback.leaflets import leaflet_of
+from grader.feedback.pages import About, StudentPage
 from grader.i18n import tongue
 from grader.scene import Arrow
 from tests.unit.feedback.works import criterion, picture, report
 
 
-def leaflet(one, pictures=(), level="full", names=None):
-    return leaflet_of(one, pictures, tongue("en"), level, About(names=names or {}))
+def page_of(one, pictures=(), level="full", names=None):
+    return StudentPage(one, tuple(pictures), tongue("en"), level, About(names=names or {}))
 
 
 def mistake(code, at, explains):
@@ -23,24 +22,24 @@ def test_mistakes_come_in_the_order_of_the_drawing_not_of_their_certainty():
         criteria=[criterion("v_A", "none", 0.0), criterion("v_B", "none", 0.0)],
         mistakes=[mistake("wrong_link", "b", ["v_B"]), mistake("sense_reversed", "a", ["v_A"])],
     )
-    assert [action.at for action in leaflet(one).actions] == ["a", "b"]
+    assert [action.at for action in page_of(one).actions] == ["a", "b"]
 
 
 def test_what_no_mistake_explains_is_told_too():
     one = report(criteria=[criterion("v_B", "none", 0.0), criterion("v_C", "partial", 1.0)], mistakes=[])
-    (action,) = leaflet(one).actions
-    assert [title.striptags() for title in action.explains] == ["Vector vB", "Vector vC"]
+    (action,) = page_of(one).actions
+    assert list(action.explains) == ["Vector v_B", "Vector v_C"]
 
 
 def test_a_right_drawing_has_nothing_to_put_right():
     one = report(criteria=[criterion("v_B")], mistakes=[])
-    assert leaflet(one).actions == ()
-    assert leaflet(one).waiting == ()
+    assert page_of(one).actions == []
+    assert page_of(one).waiting == []
 
 
 def test_a_mistake_is_shown_close_up_with_what_was_expected():
     one = report(criteria=[criterion("v_B", "none", 0.0)], mistakes=[mistake("wrong_link", "b", ["v_B"])])
-    (action,) = leaflet(one, [picture()]).actions
+    (action,) = page_of(one, [picture()]).actions
     assert action.look.names == ("v_B",)
     x, y, wide, high = action.look.box
     tip_and_aim = ((160.0, 130.0), (160.0, 150.0))
@@ -53,37 +52,39 @@ def test_what_waits_is_told_by_its_reason():
         criterion(name, "review", None).model_copy(update={"reasons": ["doubtful", "near_limit"]})
         for name in ("v_A", "v_C")
     ]
-    waiting = leaflet(report(criteria=[near, *doubtful], mistakes=[])).waiting
-    assert [[name.striptags() for name in one.names] for one in waiting] == [["vB"], ["vA", "vC"]]
-    assert waiting[1].why == "read with too little certainty"
+    waiting = page_of(report(criteria=[near, *doubtful], mistakes=[])).waiting
+    assert [names for _why, names in waiting] == [["v_B"], ["v_A", "v_C"]]
+    assert waiting[1][0] == "read with too little certainty"
 
 
 def test_a_review_for_a_reason_without_words_is_told_as_open():
     odd = criterion("v_B", "review", None).model_copy(update={"reasons": ["brand_new"]})
-    assert leaflet(report(criteria=[odd], mistakes=[])).waiting[0].why == "open"
+    assert page_of(report(criteria=[odd], mistakes=[])).waiting[0][0] == "open"
 
 
 def test_a_picture_is_told_in_words_for_those_who_do_not_see_it():
     one = report(criteria=[criterion("v_A"), criterion("v_B", "none", 0.0)], mistakes=[])
-    told = leaflet(one, [picture()])
-    plan = next(look for look in told.sheets[0].looks if look.kind == "velocity_plan")
-    assert told.told(plan) == "the velocity plan. v_A: right; v_B: wrong"
+    page = page_of(one, [picture()])
+    _source, looks = page.sheets[0]
+    plan = next(look for look in looks if look.kind == "velocity_plan")
+    assert page.description(plan) == "the velocity plan. v_A: right; v_B: wrong"
 
 
 def test_plans_as_measured_have_no_sheet_beneath_them():
-    told = leaflet(report(), [picture(scanned=False)])
-    assert [look.kind for look in told.sheets[0].looks] == ["velocity_plan"]
-    assert "entered measurements" in told.sheets[0].source
+    page = page_of(report(), [picture(scanned=False)])
+    source, looks = page.sheets[0]
+    assert [look.kind for look in looks] == ["velocity_plan"]
+    assert "entered measurements" in source
 
 
 def test_what_is_not_required_and_not_there_takes_one_line():
     omega = criterion("omega_2", "not_judged", None).model_copy(
         update={"reasons": ["optional", "not_measured"]}
     )
-    told = leaflet(report(criteria=[criterion("v_A"), omega], mistakes=[]))
-    assert [row.vector for row in told.rows] == ["v_A"]
-    assert [one.striptags() for one in told.not_required] == ["ω2 (1.670 m/s)"]
-    hinted = leaflet(report(criteria=[omega], mistakes=[]), level="hint")
+    page = page_of(report(criteria=[criterion("v_A"), omega], mistakes=[]))
+    assert [row.vector for row in page.criteria] == ["v_A"]
+    assert [one.striptags() for one in page.not_required] == ["ω2 (1.670 m/s)"]
+    hinted = page_of(report(criteria=[omega], mistakes=[]), level="hint")
     assert [one.striptags() for one in hinted.not_required] == ["ω2"]
 
 
@@ -91,14 +92,14 @@ def test_a_widened_tolerance_is_told_as_such_with_the_reason():
     wider = criterion("v_B").model_copy(
         update={"tolerance": ToleranceDocument(length_mm=2.4, direction_deg=3.0, widened=True)}
     )
-    told = leaflet(report(criteria=[wider, criterion("v_A")], mistakes=[]))
-    assert [row.tolerance for row in told.rows] == [
-        ("±2.4\u00a0mm ±3.0°", "widened"),
-        ("±1.0\u00a0mm ±1.5°",),
+    page = page_of(report(criteria=[wider, criterion("v_A")], mistakes=[]))
+    assert [page.tolerance(row) for row in page.criteria] == [
+        ["±2.4\u00a0mm ±3.0°", "widened"],
+        ["±1.0\u00a0mm ±1.5°"],
     ]
-    assert "small angle" in told.widening
-    assert leaflet(report(criteria=[wider], mistakes=[]), level="hint").widening == ""
-    assert leaflet(report(mistakes=[])).widening == ""
+    assert "small angle" in page.widening
+    assert page_of(report(criteria=[wider], mistakes=[]), level="hint").widening == ""
+    assert page_of(report(mistakes=[])).widening == ""
 
 
 def test_a_link_that_is_off_is_shown_on_the_sketch():
@@ -108,13 +109,13 @@ def test_a_link_that_is_off_is_shown_on_the_sketch():
     sketched = picture()
     arrow = Arrow("O1A", "mechanism", (200.0, 200.0), (250.0, 220.0), "none", doubtful=False, is_link=True)
     sketched = replace(sketched, scene=replace(sketched.scene, arrows=(*sketched.scene.arrows, arrow)))
-    (action,) = leaflet(report(criteria=[link], mistakes=[]), [sketched]).actions
+    (action,) = page_of(report(criteria=[link], mistakes=[]), [sketched]).actions
     assert action.look.names == ("O1A",)
 
 
 def test_what_hangs_on_something_open_says_so_unless_there_is_a_better_reason():
     hangs = criterion("v_C", "review", None).model_copy(update={"reasons": ["follows", "too_long"]})
     near = criterion("v_D", "review", None).model_copy(update={"reasons": ["follows", "near_limit"]})
-    waiting = leaflet(report(criteria=[hangs, near], mistakes=[])).waiting
-    assert waiting[0].why == "it hangs on what is still open"
-    assert waiting[1].why.startswith("so near the limit")
+    waiting = page_of(report(criteria=[hangs, near], mistakes=[])).waiting
+    assert waiting[0][0] == "it hangs on what is still open"
+    assert waiting[1][0].startswith("so near the limit")
