@@ -24,9 +24,18 @@ from pydantic import ValidationError
 
 from grader.documents import MeasurementsDocument
 from grader.quantities import MAX_LENGTH as LONGEST_SCALE
-from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Figure, Problem, Reading, ReadVector, Unread
+from grader.records import (
+    ACCELERATION_PLAN,
+    VELOCITY_PLAN,
+    Figure,
+    PageRef,
+    Problem,
+    Reading,
+    ReadVector,
+    Unread,
+)
 from grader.roster import MAX_LINES, delimiter_of, why_no_id
-from reference.assignment import Assignment
+from reference.assignment import Assignment, Variant
 from reference.authored import findings_of
 from reference.construction import Construction
 from reference.derivation import construction_of
@@ -88,6 +97,30 @@ class Measurements:
                 if vector.direction_deg is not None:
                     entered[f"{name}_deg"] = vector.direction_deg
         return entered | {f"{name}_value": value for name, value in self.values.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class StudentSubmission:
+    """What one student handed in for one variant.
+
+    Attributes
+    ----------
+    variant : None where nothing says the student's number or position
+    declared : scales as declared, text by ``kL``, ``kv``, ``ka``
+    measured : entered measurements, or None
+    problems : what was noticed before marking
+    has_unusable : whether something was handed in that cannot be used; `problems` say what
+    """
+
+    student_id: str
+    variant: Variant | None
+    pages: tuple[PageRef, ...] = ()
+    declared: Mapping[str, str] = field(default_factory=dict)
+    measured: Measurements | None = None
+    lang: str = "en"
+    name: str = ""
+    problems: tuple[Problem, ...] = ()
+    has_unusable: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ top left pixel, s = width / paper's width.
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from grader.labels import Label, labels_of
 from grader.outcomes import Outcome
-from grader.records import Box, FloatArray, GreyImage, Page, Reading, Sheet
+from grader.records import Backdrop, Box, FloatArray, GreyImage, Page, Reading, Sheet
 from grader.scene import (
     ARROW_WIDTH_MM,
     COLOURS,
@@ -65,24 +64,6 @@ FRACTION_BITS = 4
 JPEG_QUALITY = 78
 
 
-@dataclass(frozen=True, slots=True)
-class Backdrop:
-    """A page cleaned to draw on: upright where it could be registered, else turned as its file asks.
-
-    Attributes
-    ----------
-    scan : (h, w) uint8
-    page_mm : what its whole width and height are on paper
-    registered : whether sheet millimetres are known on it
-    """
-
-    source: str
-    page: int
-    scan: GreyImage
-    page_mm: XY
-    registered: bool
-
-
 def backdrop(page: Page, sheet: Sheet | None, *, width_px: int = WIDTH_PX) -> Backdrop:
     """The scan to draw on; `sheet` is None where the page could not be registered."""
     if sheet is None:
@@ -128,17 +109,6 @@ def _smaller(scan: GreyImage, plain: GreyImage) -> bytes:
     """A cleaned scan as a small file: pencil on white paper needs few tones, a photo's shades many."""
     jpeg = _encode(".jpg", scan, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return min(jpeg, _encode(".png", plain, _FLAT_PNG), key=len)
-
-
-def stored(behind: Backdrop) -> bytes:
-    """A backdrop's scan as a PNG file, without loss."""
-    return _encode(".png", behind.scan, [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION])
-
-
-def restored(data: bytes) -> GreyImage | None:
-    """The scan of a backdrop from its PNG file; None where the file is damaged."""
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
-    return None if image is None else _grey(image)
 
 
 def _encode(kind: str, image: NDArray[np.uint8], options: list[int]) -> bytes:

@@ -13,21 +13,22 @@ from grader.sheet.lens import straighten
 from grader.sheet.markers import middles as marker_middles
 from grader.sheet.plain import register_plain
 
-__all__ = ["marker_middles", "rectify", "straighten", "whose"]
+__all__ = ["marker_middles", "rectify", "register", "straighten"]
+
+
+def register(page: Page) -> tuple[Sheet | Unread, Identity | None]:
+    """The page's map from millimetres to pixels, or why there is none; and whose page it is by its code.
+
+    A printed sheet's code is looked for in its place; elsewhere a quick look must do.
+    """
+    printed = markers.register(page)
+    identity = (None if printed is None else printed.identity) or identify(page)
+    sheet = printed or register_plain(page)
+    if isinstance(sheet, Unread):
+        return Unread(sheet.name, f"{sheet.reason}{half_hint(page)}"), identity
+    return whole(page, sheet), identity
 
 
 def rectify(page: Page) -> Sheet | Unread:
     """The page's map from millimetres to pixels, or, false in a condition, why there is none."""
-    sheet = markers.register(page) or register_plain(page)
-    if isinstance(sheet, Unread):
-        return Unread(sheet.name, f"{sheet.reason}{half_hint(page)}")
-    return whole(page, sheet)
-
-
-def whose(page: Page) -> Identity | None:
-    """Whose page it is by its code: a quick look first, then one where a printed sheet has it."""
-    found = identify(page)
-    if found is not None:
-        return found
-    sheet = markers.register(page)
-    return None if sheet is None else sheet.identity
+    return register(page)[0]
