@@ -58,7 +58,8 @@ RECORDS: Mapping[str, type] = {
 # What a stage depends on --------------------------------------------------------------------------
 
 SCAN_STAGE = (
-    "grader.intake", "grader.sheet", "grader.ink", "grader.letters", "grader.letters.lengths", "grader.picture",
+    "grader.intake", "grader.sheet", "grader.ink", "grader.letters", "grader.letters.lengths",
+    "grader.picture",
 )  # fmt: skip
 """What `grader.pipeline.scan` calls."""
 READ_STAGE = ("grader.reading", "grader.quantities")

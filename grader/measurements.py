@@ -99,6 +99,9 @@ class Measurements:
         return entered | {f"{name}_value": value for name, value in self.values.items()}
 
 
+NOTHING_MEASURED = Measurements(None, None, None, {}, Reading({}), {}, "")
+
+
 @dataclass(frozen=True, slots=True)
 class StudentSubmission:
     """What one student handed in for one variant.

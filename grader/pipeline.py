@@ -20,17 +20,17 @@ from grader.documents import ReportDocument
 from grader.feedback.sentences import Level, criterion_feedback
 from grader.feedback.telling import with_mistakes_told
 from grader.ink import find_ink
-from grader.intake import changed, is_blank, load, page_of
+from grader.intake import decode, is_blank
 from grader.judging import Submission, Task, judge, task_of
 from grader.letters import find_letters, written_scales
 from grader.letters.lengths import written_lengths
-from grader.measurements import Measurements, StudentSubmission
+from grader.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
 from grader.outcomes import Judgement
 from grader.picture import backdrop, overlay
 from grader.quantities import declared_scales, sure_texts
 from grader.reading import read_figures
 from grader.reading_document import reading_document
-from grader.records import MECHANISM, Box, Page, PageRef, Problem, Reading, ScannedPage, Sheet, Unread
+from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
 from grader.reports import report_of, unjudged_report
 from grader.rubric import RubricFile
 from grader.scene import Picture
@@ -39,10 +39,6 @@ from grader.sheet import register, straighten
 from reference.assignment import Assignment, Variant
 from reference.construction import Construction
 from reference.errors import InputFileError, MechanismError
-
-ZONE_SLACK_MM = 2.0
-"""Half of the gap between the zones of a printed sheet."""
-
 
 # One page: pixels to strokes ----------------------------------------------------------------------
 
@@ -69,7 +65,7 @@ def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
     timing: dict[str, float] = {}
     try:
         with _timed(timing, "decode"):
-            image = _decoded(ref)
+            image = decode(ref)
     except InputFileError as error:
         problem = Problem(error.code, error.message, ref.file)
         return ScannedPage(replace(ref, problem=problem), problems=(problem,), timing_ms=timing)
@@ -90,7 +86,7 @@ def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
     if not isinstance(sheet, Sheet):
         return _refused(page, "sheet_refused", f"{ref.file}: page {ref.page}: {sheet.reason}")
     problems = tuple(replace(problem, file=ref.file) for problem in sheet.problems)
-    boxes = _zones_to_look_at(sheet, figures)
+    boxes = sheet.boxes_of(figures)
     page = replace(page, image=image, sheet=sheet, problems=problems)
     with _timed(timing, "ink"):
         if boxes is None or boxes:
@@ -105,25 +101,6 @@ def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
 
 def _refused(page: ScannedPage, code: str, message: str) -> ScannedPage:
     return replace(page, problems=(Problem(code, message, page.ref.file),))
-
-
-def _decoded(ref: PageRef) -> Page:
-    """The page's pixels; raises InputFileError, also where the file is not what it was when it was listed."""
-    file = load(ref.path)
-    if ref.digest and ref.digest != file.digest:
-        raise changed(ref.file)
-    return replace(page_of(file, ref.page), source=ref.file)
-
-
-def _zones_to_look_at(sheet: Sheet, figures: Collection[str]) -> list[Box] | None:
-    """Zones with the gap around them, none where only the sketch would be left; None for the whole sheet."""
-    if not figures or sheet.zones.keys() <= set(figures):
-        return None
-    zones = [box for figure, box in sheet.zones.items() if figure in figures]
-    if set(sheet.zones) & set(figures) <= {MECHANISM}:
-        return []
-    slack = ZONE_SLACK_MM
-    return [(x - slack, y - slack, wide + 2 * slack, high + 2 * slack) for x, y, wide, high in zones]
 
 
 # One student's pages: strokes to named vectors ------------------------------------------------------
@@ -198,13 +175,12 @@ def mark(
         )  # fmt: skip
         return report, tuple(overlay(page.backdrop, page.reading, {}, {}) for page in pages if page.backdrop)
     task, judgement, declared = judged
-    names, lang, measured = assignment.file.names, submission.lang, submission.measured
-    entered = () if measured is None else (*measured.problems, *measured.reading.problems)
+    names, lang, measured = assignment.file.names, submission.lang, submission.measured or NOTHING_MEASURED
     report = report_of(
         task, judgement, submission.student_id,
         language=lang,
         sentences={one.criterion: criterion_feedback(one, lang, level, names) for one in judgement.outcomes},
-        problems=(*problems, *entered, *declared.problems),
+        problems=(*problems, *measured.problems, *measured.reading.problems, *declared.problems),
         sheets=sheets,
         sources=declared.sources,
     )  # fmt: skip
@@ -217,12 +193,11 @@ def _judged(
 ) -> tuple[Task, Judgement, Declarations] | Problem:
     """The judgement and the scales that counted as declared, or why there is none."""
     drawn = tuple(reading for reading in readings if reading.figures)
-    measured = submission.measured
     if submission.variant is None:
         return Problem(
             "variant_unknown", "nothing says this student's number or position: add it to the roster"
         )
-    if not drawn and measured is None:
+    if not drawn and submission.measured is None:
         if submission.has_unusable:
             return Problem("nothing_usable", "nothing that was handed in can be used")
         if not submission.pages:
@@ -232,23 +207,19 @@ def _judged(
         task = task_of(assignment, rubric, submission.variant)
     except MechanismError as error:
         return Problem(error.code, error.message)
-    entered: dict[Source, Mapping[str, str]] = {"roster": submission.declared}
-    if measured is not None:
-        entered["measurements"] = measured.scales
-    declared = declarations(task, entered, readings, () if measured is None else measured.further_scales)
-    by_hand = Reading({}) if measured is None else measured.reading
-    evidence = Submission(
-        readings=drawn,
-        measured=replace(by_hand, unread=(*by_hand.unread, *declared.unread)),
-        values={} if measured is None else measured.values,
-        declared=declared.texts,
-    )
+    measured = submission.measured or NOTHING_MEASURED
+    entered: dict[Source, Mapping[str, str]] = {
+        "roster": submission.declared, "measurements": measured.scales,
+    }  # fmt: skip
+    declared = declarations(task, entered, readings, measured.further_scales)
+    by_hand = replace(measured.reading, unread=(*measured.reading.unread, *declared.unread))
+    evidence = Submission(drawn, by_hand, measured.values, declared.texts)
     return task, judge(task, evidence), declared
 
 
 def _pictures(
     pages: Sequence[ScannedPage],
-    measured: Measurements | None,
+    measured: Measurements,
     construction: Construction,
     judgement: Judgement,
     *,
@@ -262,7 +233,7 @@ def _pictures(
         for page in pages
         if page.backdrop is not None
     ]
-    if not pictures and measured is not None:
+    if not pictures:
         source, reading = measured.source, measured.reading
         drawn = measured_picture(source, reading, construction, outcomes, show_expected=show_expected)
         pictures = [] if drawn is None else [drawn]

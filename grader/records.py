@@ -18,6 +18,9 @@ GreyImage = NDArray[np.uint8]
 Box = tuple[float, float, float, float]
 """x, y, width, height in sheet millimetres."""
 
+ZONE_SLACK_MM = 2.0
+"""Half of the gap between the zones of a printed sheet: a line may run a little past its zone's edge."""
+
 MECHANISM = "mechanism"
 VELOCITY_PLAN = "velocity_plan"
 ACCELERATION_PLAN = "acceleration_plan"
@@ -147,6 +150,19 @@ class Sheet:
     identity: Identity | None = None
     problems: tuple[Problem, ...] = ()
     lens: Lens | None = None
+
+    def boxes_of(self, figures: Collection[str]) -> list[Box] | None:
+        """The zones of these figures with the gap around them, where they are not all there are.
+
+        None stands for the whole sheet; of the sketch alone there are no boxes.
+        """
+        if not figures or self.zones.keys() <= set(figures):
+            return None
+        zones = {figure: box for figure, box in self.zones.items() if figure in figures}
+        if zones.keys() <= {MECHANISM}:
+            return []
+        gap = ZONE_SLACK_MM
+        return [(x - gap, y - gap, wide + 2 * gap, high + 2 * gap) for x, y, wide, high in zones.values()]
 
 
 @dataclass(frozen=True, slots=True)

@@ -183,7 +183,7 @@ def test_a_file_with_other_content_is_read_again_and_one_only_touched_is_not(cla
 @pytest.mark.usefixtures("reader")
 def test_each_page_is_decoded_registered_and_tested_for_blankness_once(class_folder, tmp_path, monkeypatch):
     calls = []
-    for name in ("page_of", "is_blank", "register"):
+    for name in ("decode", "is_blank", "register"):
         function = getattr(pipeline, name)
         monkeypatch.setattr(
             pipeline,
@@ -191,11 +191,11 @@ def test_each_page_is_decoded_registered_and_tested_for_blankness_once(class_fol
             lambda *given, name=name, function=function: calls.append(name) or function(*given),
         )
     run(class_folder, tmp_path / "out")
-    assert calls == ["page_of", "is_blank", "register"] * 2
+    assert calls == ["decode", "is_blank", "register"] * 2
     calls.clear()
     scan(class_folder / "s2.png", 150)
     run(class_folder, tmp_path / "out", wider(RUBRIC))
-    assert calls == ["page_of", "is_blank", "register"]
+    assert calls == ["decode", "is_blank", "register"]
     assert len(list((tmp_path / "out" / ".planmark" / "pages").glob("*.page"))) == 2
 
 
@@ -341,7 +341,7 @@ def test_every_module_that_the_order_of_work_calls_is_in_a_stage():
 
 
 SCANS_AND_READS = (
-    "backdrop", "changed", "declared_scales", "find_ink", "find_letters", "is_blank", "load", "page_of",
+    "backdrop", "declared_scales", "decode", "find_ink", "find_letters", "is_blank",
     "read_figures", "register", "straighten", "sure_texts", "written_lengths", "written_scales",
 )  # fmt: skip
 
