@@ -100,8 +100,7 @@ class MechanismError(PlanmarkError):
         self.told, self.group, self.gap_m = told, group, gap_m
 
     def __reduce__(self) -> tuple[object, ...]:
-        fields = {"group": self.group, "gap_m": self.gap_m}
-        return (partial(type(self), **fields), (self.code, self.told))
+        return (partial(type(self), group=self.group, gap_m=self.gap_m), (self.code, self.told))
 
 
 class InputFileError(PlanmarkError):
