@@ -6,26 +6,36 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from grader.answer_sheet.sheets import asked_of
 from grader.documents import ReportDocument, ResultsDocument, UnmatchedDocument
 from grader.feedback.class_page import write_index
 from grader.feedback.pages import About, write_feedback
 from grader.feedback.sentences import Level
 from grader.files import make_folder, write_whole
-from grader.folder import submissions, told_name
+from grader.folder import submissions
 from grader.jobs import Job, folders_of, inputs_of_run, similar_of_run
-from grader.kept import digest_of, keep_looked, keep_maps, kept_looked
+from grader.kept import (
+    MARK_STAGE,
+    READ_STAGE,
+    SCAN_STAGE,
+    PageCache,
+    digest_of,
+    keep_reading,
+    kept_reading,
+    stage_digest,
+)
 from grader.lms.table import write_summary
-from grader.measurements import names_of
+from grader.measurements import StudentSubmission, names_of
 from grader.moved import earlier, moved, note_inputs, noted_inputs
 from grader.ownership import Unmatched, assign_pages
-from grader.pipeline import Looked, Work, asked_of, look, mark_looked
-from grader.records import Problem
+from grader.pipeline import mark, read_submission
+from grader.records import Problem, ScannedPage
 from grader.reports import unjudged_report
 from grader.roster import Roster, read_roster
 from grader.rubric import RubricFile
-from grader.survey import Progress, Survey, survey_folder
+from grader.survey import FileContent, Progress, survey_folder
 from grader.workers import ENDED, Limits, Pool, Workers
-from grader.works import Unusable, works_of
+from grader.works import Unusable, submissions_of
 from reference.assignment import Assignment, Variant
 from reference.errors import CallError, PlanmarkError
 
@@ -90,15 +100,15 @@ def _graded(
     batch: Batch, roster: Roster | None, files: Sequence[Path], progress: Progress, workers: Pool
 ) -> ResultsDocument:
     notes = batch.out / KEPT_FOLDER
-    names = names_of(batch.assignment)
-    surveys = survey_folder(files, batch.folder, names, workers, progress, notes / "surveys")
-    works, unmatched = _works(batch, roster, files, surveys)
-    if not works and not unmatched:
+    names, cache = names_of(batch.assignment), _page_cache(batch)
+    contents = survey_folder(files, batch.folder, names, workers, progress, cache)
+    students, unmatched = _submissions(batch, roster, contents)
+    if not students and not unmatched:
         raise _nothing(batch)
     before = earlier(batch.out / "results.json", batch.assignment.id)
-    jobs = _jobs(batch, works)
-    reports = _marked(batch, jobs, progress, workers)
-    inputs = inputs_of_run(batch.assignment, batch.rubric, jobs, surveys)
+    jobs = _jobs(batch, cache, students)
+    reports = _marked(batch, cache, jobs, progress, workers)
+    inputs = inputs_of_run(batch.assignment, batch.rubric, jobs, contents)
     results = ResultsDocument(
         assignment=batch.assignment.id,
         reports=reports,
@@ -106,7 +116,7 @@ def _graded(
         moved=moved(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
         alike=similar_of_run(batch.assignment, jobs, reports, notes / "readings"),
     )
-    _write_results(batch, results, works)
+    _write_results(batch, results, students)
     note_inputs(notes, inputs)
     return results
 
@@ -134,162 +144,177 @@ def _files(batch: Batch) -> list[Path]:
     return submissions(batch.folder, batch.roster, passed_over=(batch.out,))
 
 
-def _works(
-    batch: Batch, roster: Roster | None, files: Sequence[Path], surveys: Sequence[Survey]
-) -> tuple[list[Work], list[UnmatchedDocument]]:
-    """Every student's work, and what is nobody's."""
-    sources = [source for one in surveys for source in one.pages]
-    measured = [row for one in surveys for row in one.measurements]
+def _submissions(
+    batch: Batch, roster: Roster | None, contents: Sequence[FileContent]
+) -> tuple[list[StudentSubmission], list[UnmatchedDocument]]:
+    """Every student's submission, and what is nobody's."""
+    measured = [row for content in contents for row in content.measurements]
     ownership = assign_pages(
-        sources,
+        [page for content in contents for page in content.pages],
         roster,
         batch.assignment.id,
         pages_per_student=batch.pages_per_student,
         student_ids=[row.student_id for row in measured if row.student_id],
     )
-    paths = {told_name(path, batch.folder): path for path in files}
-    refused = [(survey.refused, survey.students) for survey in surveys if survey.refused is not None]
+    refused = [(content.refused, content.students) for content in contents if content.refused is not None]
     unusable = [Unusable((Problem(file.code, file.message, file.file),), who) for file, who in refused]
-    works, strangers = works_of(
-        batch.assignment, roster, ownership, measured, paths, batch.lang, refused=unusable
+    students, strangers = submissions_of(
+        batch.assignment, roster, ownership, measured, batch.lang, refused=unusable
     )
-    unmatched = [_unmatched(one) for one in ownership.unmatched]
-    told = [
-        UnmatchedDocument(file=one.file or "", code=one.code, message=one.message)
-        for one in ownership.problems
+    unmatched = [_unmatched(page) for page in ownership.unmatched]
+    missing = [
+        UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
+        for problem in ownership.problems
     ]
-    return works, [*(file for file, _ in refused), *unmatched, *strangers, *told]
+    return students, [*(file for file, _ in refused), *unmatched, *strangers, *missing]
 
 
-def _unmatched(one: Unmatched) -> UnmatchedDocument:
-    broken = one.source.problem
-    message = one.problem.message if broken is None else f"{one.problem.message}; {broken.message}"
+def _unmatched(page: Unmatched) -> UnmatchedDocument:
+    broken = page.source.problem
+    message = page.problem.message if broken is None else f"{page.problem.message}; {broken.message}"
     return UnmatchedDocument(
-        file=one.source.file, page=one.source.page, code=one.problem.code, message=message
+        file=page.source.file, page=page.source.page, code=page.problem.code, message=message
     )
 
 
 # Marking ------------------------------------------------------------------------------------------
 
 
-def _jobs(batch: Batch, works: Sequence[Work]) -> list[Job]:
-    """The works with digests of what they depend on."""
+def _page_cache(batch: Batch) -> PageCache:
+    asked = asked_of(batch.assignment, batch.rubric)
+    key = digest_of((stage_digest(SCAN_STAGE), asked.figures))
+    return PageCache(batch.out / KEPT_FOLDER / "pages", asked, key, digest_of([asked.cells]))
+
+
+def _jobs(batch: Batch, cache: PageCache, students: Sequence[StudentSubmission]) -> list[Job]:
+    """The submissions with digests of what they depend on."""
     assignment = (batch.assignment.file.model_dump_json(), batch.assignment.mechanism_file.model_dump_json())
-    read = digest_of((*assignment, *asked_of(batch.assignment, batch.rubric)))
-    marked = digest_of((*assignment, batch.rubric.model_dump_json(), batch.level, batch.with_ghosts))
-    return [_job(work, folder, (read, marked)) for work, folder in zip(works, folders_of(works), strict=True)]
+    read = digest_of((stage_digest(READ_STAGE), cache.key, *assignment, cache.asked.vectors))
+    settings = (batch.rubric.model_dump_json(), batch.level, batch.with_ghosts)
+    marked = digest_of((stage_digest(MARK_STAGE), *assignment, *settings))
+    return [
+        _job(submission, folder, (read, marked))
+        for submission, folder in zip(students, folders_of(students), strict=True)
+    ]
 
 
-def _job(work: Work, folder: str, depends: tuple[str, str]) -> Job:
+def _job(submission: StudentSubmission, folder: str, depends: tuple[str, str]) -> Job:
     """A submission's job; `depends` are digests of what all readings, and all marks, depend on."""
     read, marked = depends
-    pages = [(place.name, place.page, place.digest, place.problem) for place in work.pages]
-    reading_key = digest_of((read, work.student_id, work.variant, sorted(work.declared.items()), pages))
-    key = digest_of((marked, reading_key, replace(work, pages=())))
-    return Job(work, folder, reading_key, key)
+    pages = [(page.file, page.page, page.digest, page.problem) for page in submission.pages]
+    reading_key = digest_of((read, submission.variant, sorted(submission.declared.items()), pages))
+    key = digest_of((marked, reading_key, replace(submission, pages=())))
+    return Job(submission, folder, reading_key, key)
 
 
-def _marked(batch: Batch, jobs: Sequence[Job], progress: Progress, workers: Pool) -> list[ReportDocument]:
+def _marked(
+    batch: Batch, cache: PageCache, jobs: Sequence[Job], progress: Progress, workers: Pool
+) -> list[ReportDocument]:
     """Reports in the order of the jobs; each with its files written."""
     reports = {index: known for index, job in enumerate(jobs) if (known := _known(batch, job)) is not None}
     progress("marking", len(reports), len(jobs))
     waiting = [(index, job) for index, job in enumerate(jobs) if index not in reports]
     try:
-        for index, report in _marked_anew(batch, waiting, workers):
+        for index, report in _marked_anew(batch, cache, waiting, workers):
             reports[index] = report
             progress("marking", len(reports), len(jobs))
     except KeyboardInterrupt as error:
-        kept = f"{len(reports)} of {len(jobs)} submissions are marked and kept in {batch.out}"
-        raise InterruptedRunError("interrupted", f"interrupted; {kept}; the same command goes on") from error
+        done = f"{len(reports)} of {len(jobs)} submissions are marked and kept in {batch.out}"
+        raise InterruptedRunError("interrupted", f"interrupted; {done}; the same command goes on") from error
     return [reports[index] for index in range(len(jobs))]
 
 
 def _marked_anew(
-    batch: Batch, jobs: Sequence[tuple[int, Job]], workers: Pool
+    batch: Batch, cache: PageCache, jobs: Sequence[tuple[int, Job]], workers: Pool
 ) -> Iterator[tuple[int, ReportDocument]]:
     """Reports as they come, with the jobs' numbers.
 
     A job that ended its worker is marked without the pages that do so alone.
     """
     ended: list[tuple[int, Job, Problem]] = []
-    sheets = [len(job.work.pages) for _, job in jobs]
-    for number, result in workers.run(_mark_one, [(batch, job) for _, job in jobs], sheets):
+    sheets = [len(job.submission.pages) for _, job in jobs]
+    for number, result in workers.run(_mark_one, [(batch, cache, job) for _, job in jobs], sheets):
         index, job = jobs[number]
         if not isinstance(result, Problem):
             yield index, result
-        elif result.code in ENDED and job.work.pages:
+        elif result.code in ENDED and job.submission.pages:
             ended.append((index, job, result))
         else:
             yield index, _failed(batch, job, result)
-    again = [(batch, _without(job, problem, batch, workers)) for _, job, problem in ended]
+    again = [(batch, cache, _without(job, problem, batch, cache, workers)) for _, job, problem in ended]
     for number, result in workers.run(_mark_one, again):
         index, job, problem = ended[number]
         yield index, _failed(batch, job, problem) if isinstance(result, Problem) else result
 
 
-def _without(job: Job, problem: Problem, batch: Batch, workers: Pool) -> Job:
+def _without(job: Job, problem: Problem, batch: Batch, cache: PageCache, workers: Pool) -> Job:
     """The job with the problem at those of its pages that end a worker alone."""
-    pages = job.work.pages
-    calls = [(batch, replace(job.work, pages=(page,), measured=None)) for page in pages]
-    alone = dict(workers.run(_look_only, calls)) if len(pages) > 1 else {0: problem}
+    pages = job.submission.pages
+    calls = [(batch, cache, replace(job.submission, pages=(page,), measured=None)) for page in pages]
+    alone = dict(workers.run(_read_only, calls)) if len(pages) > 1 else {0: problem}
     marked = tuple(
-        replace(page, problem=replace(result, file=page.name)) if isinstance(result, Problem) else page
+        replace(page, problem=replace(result, file=page.file)) if isinstance(result, Problem) else page
         for page, result in ((page, alone[index]) for index, page in enumerate(pages))
     )
-    return _job(replace(job.work, pages=marked), job.folder, (job.reading_key, job.key))
+    return _job(replace(job.submission, pages=marked), job.folder, (job.reading_key, job.key))
 
 
-def _look_only(batch: Batch, work: Work) -> None:
-    look(work, batch.assignment, batch.rubric)
+def _read_only(batch: Batch, cache: PageCache, submission: StudentSubmission) -> None:
+    _read(batch, cache, submission)
 
 
-def _mark_one(batch: Batch, job: Job) -> ReportDocument:
+def _read(batch: Batch, cache: PageCache, submission: StudentSubmission) -> list[ScannedPage]:
+    """A submission's pages as scanned, with what was drawn on them."""
+    pages = [cache.page(ref) for ref in submission.pages]
+    return read_submission(submission, pages, batch.assignment, cache.asked)
+
+
+def _mark_one(batch: Batch, cache: PageCache, job: Job) -> ReportDocument:
     """Mark one submission and write its files; its key last, so that it stands for all of them."""
-    work, where = job.work, batch.out / job.folder
-    marked = mark_looked(
-        work, batch.assignment, batch.rubric, _looked(batch, job), batch.level, with_ghosts=batch.with_ghosts
+    submission, where = job.submission, batch.out / job.folder
+    pages = _pages_read(batch, cache, job)
+    report, pictures = mark(
+        submission, pages, batch.assignment, batch.rubric, batch.level, with_ghosts=batch.with_ghosts
     )
-    write_feedback(marked.report, marked.pictures, where, work.lang, batch.level, _about(batch, work))
-    write_whole(where / "report.json", marked.report.model_dump_json(indent=2))
-    if not any(problem.code == _PASSING for problem in marked.report.problems):
+    write_feedback(report, pictures, where, submission.lang, batch.level, _about(batch, submission))
+    write_whole(where / "report.json", report.model_dump_json(indent=2))
+    if not any(problem.code == _PASSING for problem in report.problems):
         write_whole(_key_file(batch, job), job.key)
-    return marked.report
+    return report
 
 
-def _about(batch: Batch, work: Work) -> About:
-    """How the feedback calls the assignment, the student and the names in it."""
-    title = batch.assignment.file.title.in_language(work.lang)
-    return About(title, work.name, batch.assignment.file.names)
-
-
-def _looked(batch: Batch, job: Job) -> Sequence[Looked]:
+def _pages_read(batch: Batch, cache: PageCache, job: Job) -> list[ScannedPage]:
     """The pages as read by an earlier run, else now."""
     folder = batch.out / KEPT_FOLDER / "readings"
-    kept = kept_looked(folder, job.name, job.reading_key)
-    if kept is not None:
-        return kept
-    looked = look(job.work, batch.assignment, batch.rubric)
-    passing = any(problem.code == _PASSING for page in looked for problem in page.problems)
-    if looked and not passing:
-        keep_looked(folder, job.name, job.reading_key, looked)
-        keep_maps(folder, job.name, looked)
-    return looked
+    known = kept_reading(folder, job.name, job.reading_key, cache)
+    if known is not None:
+        return known
+    pages = _read(batch, cache, job.submission)
+    if pages and not any(problem.code == _PASSING for page in pages for problem in page.problems):
+        keep_reading(folder, job.name, job.reading_key, pages, cache)
+    return pages
+
+
+def _about(batch: Batch, submission: StudentSubmission) -> About:
+    """How the feedback calls the assignment, the student and the names in it."""
+    title = batch.assignment.file.title.in_language(submission.lang)
+    return About(title, submission.name, batch.assignment.file.names)
 
 
 def _failed(batch: Batch, job: Job, problem: Problem) -> ReportDocument:
-    work, where = job.work, batch.out / job.folder
+    submission, where = job.submission, batch.out / job.folder
     report = unjudged_report(
-        batch.assignment, batch.rubric, work.variant or Variant(), work.student_id, "unreadable",
-        problems=(*work.problems, problem),
+        batch.assignment, batch.rubric, submission.variant or Variant(), submission.student_id, "unreadable",
+        problems=(*submission.problems, problem),
     )  # fmt: skip
-    write_feedback(report, [], where, work.lang, batch.level, _about(batch, work))
+    write_feedback(report, [], where, submission.lang, batch.level, _about(batch, submission))
     write_whole(where / "report.json", report.model_dump_json(indent=2))
     return report
 
 
-def _write_results(batch: Batch, results: ResultsDocument, works: Sequence[Work]) -> None:
+def _write_results(batch: Batch, results: ResultsDocument, students: Sequence[StudentSubmission]) -> None:
     write_summary(results, batch.out / "summary.csv")
-    names = {work.student_id: work.name for work in works}
+    names = {submission.student_id: submission.name for submission in students}
     title = batch.assignment.file.title.in_language(batch.lang)
     write_index(results, batch.out, batch.lang, title=title, student_names=names)
     write_whole(batch.out / "results.json", results.model_dump_json(indent=2))

@@ -10,17 +10,16 @@ from typing import Literal
 
 from grader.comparison import Submission, Task
 from grader.comparison.evidence import Evidence, gather
-from grader.quantities import ByRule, Declared, ParsedScale, parse_scale
+from grader.quantities import SCALE_NAMES, SURE, ByRule, Declared, ParsedScale, parse_scale
 from grader.records import Problem, Reading, Unread, Written
 
-LIKELY, SURE, BEYOND_DOUBT = 0.2, 0.9, 0.985
+LIKELY, BEYOND_DOUBT = 0.2, 0.985
 """Confidence at which a box is believed where the drawing or the rule has the very scale (a misreading
-would hit it once in hundreds), where they have nearly that scale, and where they have another."""
+would hit it once in hundreds), and where they have another; `SURE` where they have nearly that scale."""
 SAME = 0.005
 """Relative: two scales that differ less are one, rounded."""
 BORNE_OUT = 0.02
 """Relative: as near as that the drawing or the rule bears a scale out."""
-SCALE_NAMES = ("kL", "kv", "ka")
 Source = Literal["roster", "measurements", "box"]
 
 
@@ -40,16 +39,6 @@ class Declarations:
     sources: Mapping[str, Source]
     problems: tuple[Problem, ...] = ()
     unread: tuple[Unread, ...] = ()
-
-
-def sure_texts(readings: Sequence[Mapping[str, Written]]) -> dict[str, str]:
-    """What is surely read in the boxes of some pages, by scale; before anything else was read there."""
-    found: dict[str, str] = {}
-    for name in SCALE_NAMES:
-        boxes = [written[name] for written in readings if name in written]
-        if boxes and all(box.confidence >= SURE for box in boxes):
-            found[name] = max(boxes, key=lambda box: box.confidence).text
-    return found
 
 
 def declarations(

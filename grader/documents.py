@@ -25,9 +25,14 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Document(BaseModel):
-    """A table of a JSON document: frozen, nothing unknown, only finite numbers."""
+    """A table of a JSON document: frozen, nothing unknown, only finite numbers.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
+    A record with attributes of these names is taken as it is: nobody copies it field by field.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True, from_attributes=True
+    )
 
 
 # Measurements: what a student measured ------------------------------------------------------------

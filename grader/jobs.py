@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.documents import AlikeDocument, ReportDocument
-from grader.kept import code_version, kept_maps
+from grader.kept import MARK_STAGE, kept_maps, stage_digest
+from grader.measurements import StudentSubmission
 from grader.moved import Inputs, inputs_of
-from grader.pipeline import Work
 from grader.rubric import RubricFile
 from grader.similarity import compared_submission, find_similar
-from grader.survey import Survey
+from grader.survey import FileContent
 from reference.assignment import Assignment
 
 
@@ -26,7 +26,7 @@ class Job:
     key : a digest of everything that its report depends on
     """
 
-    work: Work
+    submission: StudentSubmission
     folder: str
     reading_key: str
     key: str
@@ -37,33 +37,35 @@ class Job:
         return self.folder.replace("/", "#")
 
 
-def folders_of(works: Iterable[Work]) -> list[str]:
-    """Each work's folder below the results: the student's, with several positions one for each."""
-    works = list(works)
-    count = Counter(work.student_id for work in works)
+def folders_of(submissions: Iterable[StudentSubmission]) -> list[str]:
+    """Each submission's folder below the results: the student's, with several positions one for each."""
+    submissions = list(submissions)
+    count = Counter(submission.student_id for submission in submissions)
     return [
-        work.student_id if count[work.student_id] == 1 else f"{work.student_id}/{_position(work)}"
-        for work in works
+        submission.student_id
+        if count[submission.student_id] == 1
+        else f"{submission.student_id}/{_position(submission)}"
+        for submission in submissions
     ]
 
 
-def _position(work: Work) -> str:
-    position = None if work.variant is None else work.variant.position
+def _position(submission: StudentSubmission) -> str:
+    position = None if submission.variant is None else submission.variant.position
     return "unknown" if position is None else str(position)
 
 
 def inputs_of_run(
-    assignment: Assignment, rubric: RubricFile, jobs: Sequence[Job], surveys: Sequence[Survey]
+    assignment: Assignment, rubric: RubricFile, jobs: Sequence[Job], contents: Sequence[FileContent]
 ) -> Inputs:
     """What this run's marks come from, for the next run to tell what has changed."""
     files = (assignment.file.model_dump_json(), assignment.mechanism_file.model_dump_json())
     authored = {
         "assignment": repr(files),
         "rubric": rubric.model_dump_json(),
-        "program": code_version(),
+        "program": stage_digest(MARK_STAGE),
     }
-    content = {source.file: source.digest for one in surveys for source in one.pages}
-    return inputs_of(authored, [job.work for job in jobs], [job.folder for job in jobs], content)
+    digests = {page.file: page.digest for content in contents for page in content.pages}
+    return inputs_of(authored, [job.submission for job in jobs], [job.folder for job in jobs], digests)
 
 
 def similar_of_run(
@@ -71,9 +73,9 @@ def similar_of_run(
 ) -> list[AlikeDocument]:
     """The similar sheets among those that were marked."""
     marked = [
-        (job, compared_submission(report, job.work.variant, job.work.measured))
+        (job, compared_submission(report, job.submission.variant, job.submission.measured))
         for job, report in zip(jobs, reports, strict=True)
-        if job.work.variant is not None and report.criteria
+        if job.submission.variant is not None and report.criteria
     ]
     maps = [kept_maps(readings, job.name) for job, _ in marked]
     return find_similar(assignment, [one for _, one in marked], maps)

@@ -1,15 +1,19 @@
-"""What an earlier run read and a later one need not read again.
+"""The cache: what an earlier run read and a later one need not read again.
 
-Everything is kept beside the results, in small files that are written whole, each with a digest of
-all that it depends on: the file's content, the assignment, the code that reads. What does not
-match, or cannot be understood, is found out again.
+Everything lies beside the results in small files that are written whole. A file's name or first line
+is a digest of all that its content depends on: what was handed in, what is asked for, and the code of
+the stage with its data (networks, templates, translations). What does not match, or cannot be
+understood, is found out again.
 """
 
 import hashlib
+import io
 import json
+import re
+import zipfile
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,141 +21,294 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.documents import ReadingDocument
+from grader.answer_sheet.sheets import Asked
 from grader.files import write_whole
-from grader.picture import Backdrop, restored, stored
-from grader.pipeline import Looked
-from grader.records import Figure, Identity, Problem, Reading, ReadNode, ReadVector, Swapped, Unread, Written
+from grader.pipeline import scan
+from grader.records import (
+    Backdrop,
+    Figure,
+    Identity,
+    Ink,
+    InkMap,
+    Lens,
+    Letters,
+    PageRef,
+    Problem,
+    Reading,
+    ReadNode,
+    ReadVector,
+    ScannedPage,
+    Sheet,
+    Strokes,
+    Swapped,
+    Tips,
+    Unread,
+    Written,
+)
 from grader.similarity import CELLS, ink_map
 
 RECORDS: Mapping[str, type] = {
-    one.__name__: one
-    for one in (Figure, Identity, Problem, Reading, ReadNode, ReadVector, Swapped, Unread, Written)
-}
+    record.__name__: record
+    for record in (
+        Backdrop, Figure, Identity, Ink, InkMap, Lens, Letters, PageRef, Problem, Reading, ReadNode,
+        ReadVector, ScannedPage, Sheet, Strokes, Swapped, Tips, Unread, Written,
+    )
+}  # fmt: skip
+
+# What a stage depends on --------------------------------------------------------------------------
+
+SCAN_STAGE = (
+    "grader.intake", "grader.sheet", "grader.ink", "grader.letters", "grader.letters.lengths",
+    "grader.picture",
+)  # fmt: skip
+"""What `grader.pipeline.scan` calls."""
+READ_STAGE = ("grader.reading", "grader.quantities")
+"""What `grader.pipeline.read_submission` calls beside them."""
+MARK_STAGE = ("grader.batch",)
+"""What marks and writes, with all that it rests on."""
+_ORDER = "grader.pipeline"
+"""The order of all stages: each depends on its text, none on all that it imports."""
 _PACKAGES = ("grader", "reference")
-_SOURCES = (".py", ".npz")
+_IMPORT = re.compile(
+    r"^\s*(?:from|import) ((?:grader|reference)[\w.]*)(?: import (\([^)]*\)|[^\n]*))?", re.MULTILINE
+)
 
 
 @cache
-def code_version() -> str:
-    """A digest of the program itself: another version may find something else."""
+def stage_digest(modules: tuple[str, ...], top: Path = Path(__file__).parent.parent) -> str:
+    """A digest of the code and data that modules rest on: all they import, and the files beside it.
+
+    Arguments: `top` is the folder of the packages.
+    """
+    sources = _closure(modules, top)
+    sources.setdefault(_ORDER, top / "grader" / "pipeline.py")
     digest = hashlib.sha256()
-    top = Path(__file__).parent.parent
-    for package in _PACKAGES:
-        for path in sorted((top / package).rglob("*")):
-            if path.suffix in _SOURCES:
-                digest.update(path.relative_to(top).as_posix().encode())
-                digest.update(path.read_bytes())
+    for path in sorted({*sources.values(), *_data_of(sources, top)}):
+        digest.update(path.relative_to(top).as_posix().encode() + b"\0")
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 
 
+def _closure(modules: Iterable[str], top: Path) -> dict[str, Path]:
+    """The modules, all modules that they import directly or not, and the packages that these are in."""
+    sources: dict[str, Path] = {}
+    waiting = list(modules)
+    while waiting:
+        name = waiting.pop()
+        stem = top.joinpath(*name.split("."))
+        path = next((p for p in (stem.with_suffix(".py"), stem / "__init__.py") if p.is_file()), None)
+        if path is None or name in sources:
+            continue
+        sources[name] = path
+        waiting += [name.rpartition(".")[0]]
+        for module, names in _IMPORT.findall(path.read_text(encoding="utf-8")):
+            waiting += [module, *(f"{module}.{part}" for part in re.findall(r"\w+", names))]
+    return sources
+
+
+def _data_of(sources: Mapping[str, Path], top: Path) -> set[Path]:
+    """The files that are no code and that belong to modules.
+
+    They lie in a module's room; those of the package as a whole (`data`, `locale`) belong to the modules that
+    name the file, or its folder.
+    """
+    data = [
+        path
+        for package in _PACKAGES
+        for path in (top / package).rglob("*")
+        if path.is_file() and path.suffix not in {".py", ".pyc"}
+    ]
+    rooms = {path.parent for path in sources.values()}
+    texts = "".join(path.read_text(encoding="utf-8") for path in sources.values())
+
+    def belongs(path: Path) -> bool:
+        room = next(folder for folder in path.parents if (folder / "__init__.py").is_file())
+        if room.parent != top:
+            return room in rooms
+        return any(f'"{name}"' in texts for name in (path.name, path.relative_to(room).parts[0]))
+
+    return {path for path in data if belongs(path)}
+
+
 def digest_of(parts: Iterable[object]) -> str:
-    """A digest of what is told; the program's own version goes into it."""
-    digest = hashlib.sha256(code_version().encode())
+    """A digest of some values."""
+    digest = hashlib.sha256()
     for part in parts:
-        # Sets have another order in every process.
-        told = sorted(part) if isinstance(part, set | frozenset) else part
-        digest.update(repr(told).encode())
+        digest.update(repr(_ordered(part)).encode())
         digest.update(b"\0")
     return digest.hexdigest()
 
 
-# Records as JSON ----------------------------------------------------------------------------------
+def _ordered(value: object) -> object:
+    """Sets have another order in every process."""
+    if isinstance(value, set | frozenset):
+        return sorted(value)
+    return (
+        sorted((_ordered(key), item) for key, item in value.items()) if isinstance(value, Mapping) else value
+    )
 
 
-def packed(value: Any) -> Any:  # noqa: ANN401 - any of the records, down to their numbers
-    """A record as JSON-like data, numbers to the last digit."""
+# Records in files ---------------------------------------------------------------------------------
+
+
+def packed(value: Any, arrays: list[NDArray[Any]]) -> Any:  # noqa: ANN401 - any record, down to its numbers
+    """A record as JSON-like data, numbers to the last digit; its arrays are added to `arrays`."""
     if is_dataclass(value) and not isinstance(value, type):
-        told = {one.name: packed(getattr(value, one.name)) for one in fields(value)}
-        return {"record": type(value).__name__, **told}
+        items = {one.name: packed(getattr(value, one.name), arrays) for one in fields(value)}
+        return {"record": type(value).__name__, **items}
     if isinstance(value, complex):
         return {"record": "complex", "parts": [value.real, value.imag]}
     if isinstance(value, np.ndarray):
-        return {"record": "array", "values": value.tolist()}
+        arrays.append(value)
+        return {"record": "array", "number": len(arrays) - 1}
     if isinstance(value, np.generic):
         return value.item()
+    if isinstance(value, Path):
+        return {"record": "path", "text": str(value)}
     if isinstance(value, Mapping):
-        return {"record": "mapping", "items": [[key, packed(one)] for key, one in value.items()]}
+        return {"record": "mapping", "items": [[key, packed(item, arrays)] for key, item in value.items()]}
     if isinstance(value, list | tuple):
-        return [packed(one) for one in value]
+        return [packed(item, arrays) for item in value]
     return value
 
 
-def unpacked(data: Any) -> Any:  # noqa: ANN401 - as above
+def unpacked(data: Any, arrays: Sequence[NDArray[Any]]) -> Any:  # noqa: ANN401 - as above
     """The record again; lists come back as tuples.
 
-    Raises KeyError, TypeError or ValueError for what is no packed record.
+    Raises KeyError, IndexError, TypeError or ValueError for what is no packed record.
     """
     if isinstance(data, list):
-        return tuple(unpacked(one) for one in data)
+        return tuple(unpacked(item, arrays) for item in data)
     if not isinstance(data, dict):
         return data
-    kind = data["record"]
-    if kind == "complex":
-        return complex(*data["parts"])
-    if kind == "array":
-        return np.array(data["values"], dtype=np.float64)
-    if kind == "mapping":
-        return {key: unpacked(one) for key, one in data["items"]}
-    return RECORDS[kind](**{name: unpacked(one) for name, one in data.items() if name != "record"})
+    match data["record"]:
+        case "complex":
+            return complex(*data["parts"])
+        case "array":
+            return arrays[data["number"]]
+        case "path":
+            return Path(data["text"])
+        case "mapping":
+            return {key: unpacked(item, arrays) for key, item in data["items"]}
+        case kind:
+            items = {name: unpacked(item, arrays) for name, item in data.items() if name != "record"}
+            return RECORDS[kind](**items)
+
+
+def dumped(value: object) -> bytes:
+    """A record as the bytes of a file."""
+    arrays: list[NDArray[Any]] = []
+    record = json.dumps(packed(value, arrays)).encode()
+    buffer = io.BytesIO()
+    np.savez(buffer, np.frombuffer(record, np.uint8), *arrays)
+    return zlib.compress(buffer.getvalue(), 1)
+
+
+def loaded(data: bytes) -> Any:  # noqa: ANN401 - as above
+    """The record in the bytes of a file. Raises ValueError for what is none."""
+    try:
+        with np.load(io.BytesIO(zlib.decompress(data)), allow_pickle=False) as file:
+            record, *arrays = (file[f"arr_{number}"] for number in range(len(file.files)))
+        return unpacked(json.loads(record.tobytes()), arrays)
+    except (KeyError, IndexError, TypeError, OSError, EOFError, zlib.error, zipfile.BadZipFile) as error:
+        raise ValueError(f"no record of a cache: {error}") from error
+
+
+# Pages --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class PageCache:
+    """Pages as scanned, by this run or an earlier one, and the way to scan others.
+
+    Attributes
+    ----------
+    asked : what is looked for on them
+    key : digest of all that a page's scan depends on, beside the page
+    printed_key : the same of what is read in the cells of a printed sheet
+    """
+
+    folder: Path
+    asked: Asked = Asked()  # noqa: RUF009 - frozen
+    key: str = ""
+    printed_key: str = ""
+
+    def path_of(self, ref: PageRef) -> Path:
+        """Where a page's scan is; beside it, in a file that is quickly read, is what `identified` tells."""
+        return self.folder / f"{digest_of((self.key, ref.file, ref.page, ref.digest))}.page"
+
+    def identified(self, ref: PageRef) -> PageRef:
+        """The page with what is on it: whether it is blank, and whose by its QR code. Scans it if need be."""
+        try:
+            (page,) = _pages_in(self.path_of(ref).with_suffix(".ref"), "", "")
+        except (OSError, ValueError):
+            page = self._scanned(ref)
+        return replace(page.ref, pages=ref.pages, path=ref.path)
+
+    def page(self, ref: PageRef) -> ScannedPage:
+        """The page as scanned by this run or an earlier one."""
+        try:
+            (page,) = _pages_in(self.path_of(ref), "", self.printed_key)
+        except (OSError, ValueError):
+            page = self._scanned(ref)
+        return replace(page, ref=ref)
+
+    def _scanned(self, ref: PageRef) -> ScannedPage:
+        """The page scanned now, and kept unless it could not be."""
+        page = scan(ref, self.asked)
+        if page.ref.problem is None:
+            path = self.path_of(ref)
+            write_whole(path, dumped(("", self.printed_key, [page])))
+            write_whole(path.with_suffix(".ref"), dumped(("", "", [ScannedPage(page.ref)])))
+        return page
+
+    def drop_others(self, refs: Iterable[PageRef]) -> None:
+        """Forget what is not among these pages."""
+        names = {self.path_of(ref).stem for ref in refs}
+        for path in self.folder.glob("*"):
+            if path.stem not in names:
+                path.unlink(missing_ok=True)
+
+
+def _pages_in(path: Path, key: str, printed_key: str) -> list[ScannedPage]:
+    """The pages in a file of the cache.
+
+    Arguments: `key` is what the file must be of, `printed_key` the same of printed sheets in it.
+
+    Raises OSError where there is no file, ValueError for a damaged one and for another key.
+    """
+    match loaded(path.read_bytes()):
+        case (known, of_printed, tuple(pages)) if all(isinstance(page, ScannedPage) for page in pages):
+            is_printed = any(page.sheet is not None and page.sheet.zones for page in pages)
+            if known == key and (of_printed == printed_key or not is_printed):
+                return list(pages)
+    raise ValueError("the file is of something else")
 
 
 # Readings -----------------------------------------------------------------------------------------
 
 
-def keep_looked(folder: Path, name: str, key: str, looked: Sequence[Looked]) -> None:
-    """Keep a submission's pages as read, in place of what was kept of it before."""
-    note = folder / f"{name}.json"
-    # Pictures of one reading must never be found beside another's.
-    note.unlink(missing_ok=True)
-    pages = []
-    for index, one in enumerate(looked):
-        behind = one.backdrop
-        if behind is not None:
-            write_whole(folder / f"{name}.{index}.png", stored(behind))
-        about = None if behind is None else [behind.source, behind.page, behind.page_mm, behind.registered]
-        pages.append(
-            {
-                "document": one.document.model_dump(mode="json"),
-                "reading": packed(one.reading),
-                "problems": packed(one.problems),
-                "backdrop": about,
-            }
-        )
-    write_whole(note, json.dumps({"key": key, "pages": pages}))
+def keep_reading(folder: Path, name: str, key: str, pages: Sequence[ScannedPage], cache: PageCache) -> None:
+    """Keep a submission's pages as read, in place of what was kept of it before.
 
-
-def kept_looked(folder: Path, name: str, key: str) -> tuple[Looked, ...] | None:
-    """A submission's pages as an earlier run read them; None where anything has changed since."""
-    try:
-        told = json.loads((folder / f"{name}.json").read_bytes())
-        if told["key"] != key:
-            return None
-        return tuple(
-            Looked(
-                ReadingDocument.model_validate_json(json.dumps(page["document"])),
-                unpacked(page["reading"]),
-                unpacked(page["problems"]),
-                _backdrop(folder / f"{name}.{index}.png", page["backdrop"]),
-            )
-            for index, page in enumerate(told["pages"])
-        )
-    except (OSError, KeyError, TypeError, ValueError):
-        return None
-
-
-# Ink maps -----------------------------------------------------------------------------------------
-
-
-def keep_maps(folder: Path, name: str, looked: Sequence[Looked]) -> None:
-    """Keep where the ink lies on a submission's registered pages, for holding a class's sheets together."""
-    maps = [
-        ink_map(one.backdrop.scan, one.backdrop.page_mm)
-        for one in looked
-        if one.backdrop is not None and one.backdrop.registered
-    ]
+    What a page's scan has already is left out. With it goes where the ink lies on registered pages, for
+    comparing the sheets of a class.
+    """
+    bare = [replace(page, ink=None, backdrop=None) for page in pages]
+    write_whole(folder / f"{name}.reading", dumped((key, cache.printed_key, bare)))
+    scans = [page.backdrop for page in pages if page.backdrop is not None and page.backdrop.registered]
+    maps = [ink_map(backdrop.scan, backdrop.page_mm) for backdrop in scans]
     if maps:
         write_whole(folder / f"{name}.ink", zlib.compress(np.array(maps).tobytes()))
+
+
+def kept_reading(folder: Path, name: str, key: str, cache: PageCache) -> list[ScannedPage] | None:
+    """A submission's pages as an earlier run read them; None where anything has changed since."""
+    try:
+        pages = _pages_in(folder / f"{name}.reading", key, cache.printed_key)
+    except (OSError, ValueError):
+        return None
+    return [replace(page, backdrop=cache.page(page.ref).backdrop) for page in pages]
 
 
 def kept_maps(folder: Path, name: str) -> list[NDArray[np.uint8]]:
@@ -161,13 +318,3 @@ def kept_maps(folder: Path, name: str) -> list[NDArray[np.uint8]]:
         return list(np.frombuffer(data, np.uint8).reshape(-1, *CELLS))
     except (OSError, ValueError, zlib.error):
         return []
-
-
-def _backdrop(path: Path, about: Sequence[Any] | None) -> Backdrop | None:
-    if about is None:
-        return None
-    scan = restored(path.read_bytes())
-    if scan is None:
-        raise ValueError(f"{path} is damaged")
-    source, page, (wide, high), registered = about
-    return Backdrop(source, page, scan, (wide, high), registered=registered)

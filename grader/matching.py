@@ -17,8 +17,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from grader.ownership import How, Owned, PageSource, assign_pages
-from grader.records import FloatArray, Problem
+from grader.ownership import How, Owned, assign_pages
+from grader.records import FloatArray, PageRef, Problem
 from grader.roster import COLUMNS, DRAFT_COLUMNS, SCALES, Roster, RosterRow
 from reference.assignment import Assignment, Variant
 from reference.construction import Construction, evaluate
@@ -49,7 +49,7 @@ _ANCHORS = 4
 _TRIED = 24
 """Strokes tried as the anchor, those nearest in direction."""
 
-Look = Callable[[PageSource], FloatArray | None]
+Look = Callable[[PageRef], FloatArray | None]
 """The strokes (n, 2, 2) of a page in sheet millimetres, y down; None where there are none to be had."""
 
 
@@ -65,7 +65,7 @@ class Suggestion:
     among : rows between which similarity leaves the choice
     """
 
-    source: PageSource
+    source: PageRef
     row: RosterRow | None
     why: str
     sure: bool
@@ -81,7 +81,7 @@ class Draft:
 
 
 def suggest(
-    pages: Sequence[PageSource],
+    pages: Sequence[PageRef],
     roster: Roster,
     assignment: Assignment,
     *,
@@ -133,7 +133,7 @@ def _variants(roster: Roster, assignment: Assignment) -> dict[Variant, list[Rost
 
 
 def _by_similarity(
-    page: PageSource,
+    page: PageRef,
     strokes: FloatArray | None,
     assignment: Assignment,
     variants: Mapping[Variant, list[RosterRow]],
@@ -161,11 +161,11 @@ def _by_similarity(
 
 
 def _by_likely_order(
-    pages: Sequence[PageSource],
+    pages: Sequence[PageRef],
     roster: Roster,
     assignment: Assignment,
-    settled: Mapping[PageSource, Suggestion],
-) -> dict[PageSource, Suggestion]:
+    settled: Mapping[PageRef, Suggestion],
+) -> dict[PageRef, Suggestion]:
     """The roster's order, where the pages of one class file come out even and no code speaks against it."""
     drawn = sum(page.pages > 1 and not page.blank for page in pages)
     each, rest = divmod(drawn, max(len(roster.rows), 1))
@@ -197,7 +197,7 @@ def _in_order(found: list[Suggestion], roster: Roster) -> list[Suggestion]:
     return settled
 
 
-def _reason(problem: Problem, page: PageSource) -> str:
+def _reason(problem: Problem, page: PageRef) -> str:
     return problem.message.removeprefix(f"{page}: ")
 
 

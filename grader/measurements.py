@@ -10,13 +10,11 @@ A value that is refused costs that value alone: it is a problem of that student,
 names what it was entered for, so that no criterion is judged without it.
 """
 
-import csv
-import io
 import json
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -24,9 +22,18 @@ from pydantic import ValidationError
 
 from grader.documents import MeasurementsDocument
 from grader.quantities import MAX_LENGTH as LONGEST_SCALE
-from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Figure, Problem, Reading, ReadVector, Unread
-from grader.roster import MAX_LINES, delimiter_of, why_no_id
-from reference.assignment import Assignment
+from grader.records import (
+    ACCELERATION_PLAN,
+    VELOCITY_PLAN,
+    Figure,
+    PageRef,
+    Problem,
+    Reading,
+    ReadVector,
+    Unread,
+)
+from grader.roster import MAX_LINES, delimiter_of, surplus_of, table_lines, whole_number, why_no_id
+from reference.assignment import Assignment, Variant
 from reference.authored import findings_of
 from reference.construction import Construction
 from reference.derivation import construction_of
@@ -39,7 +46,6 @@ TABLES = {"segments_mm": "", "directions_deg": "_deg", "values": "_value"}
 """The tables of a JSON file, and what a CSV file's columns add to the names in them."""
 MAX_BYTES = 1_000_000
 """A class of a thousand with every length, direction and value writes half of it."""
-_LONG = f"a scale has at most {LONGEST_SCALE} characters"
 MAX_LENGTH_MM = 2000.0
 """Longer than any sheet: a length in other units, or a slip of the pen."""
 
@@ -88,6 +94,33 @@ class Measurements:
                 if vector.direction_deg is not None:
                     entered[f"{name}_deg"] = vector.direction_deg
         return entered | {f"{name}_value": value for name, value in self.values.items()}
+
+
+NOTHING_MEASURED = Measurements(None, None, None, {}, Reading({}), {}, "")
+
+
+@dataclass(frozen=True, slots=True)
+class StudentSubmission:
+    """What one student handed in for one variant.
+
+    Attributes
+    ----------
+    variant : None where nothing says the student's number or position
+    declared : scales as declared, text by ``kL``, ``kv``, ``ka``
+    measured : entered measurements, or None
+    problems : what was noticed before marking
+    has_unusable : whether something was handed in that cannot be used; `problems` say what
+    """
+
+    student_id: str
+    variant: Variant | None
+    pages: tuple[PageRef, ...] = ()
+    declared: Mapping[str, str] = field(default_factory=dict)
+    measured: Measurements | None = None
+    lang: str = "en"
+    name: str = ""
+    problems: tuple[Problem, ...] = ()
+    has_unusable: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,51 +224,88 @@ def _columns(names: Names) -> Mapping[str, tuple[str, str]]:
 
 @dataclass(slots=True)
 class _Entries:
-    """The numbers of one student while they are being read; what is refused costs that number alone."""
+    """What one student entered, while it is being read; what is refused costs that entry alone.
+
+    Attributes
+    ----------
+    columns : by a CSV file's columns, the table and the name in it
+    line : of a CSV file
+    """
 
     names: Names
     columns: Mapping[str, tuple[str, str]]
     file: str
+    line: int | None = None
+    scales: dict[str, str] = field(default_factory=dict)
     tables: dict[str, dict[str, float]] = field(default_factory=lambda: {table: {} for table in TABLES})
     faults: list[Finding] = field(default_factory=list)
     unread: list[Unread] = field(default_factory=list)
 
-    def take(self, column: str, value: float) -> str | None:
-        """Keep a number of a column that is known; why it is refused where it cannot be what it is for."""
-        table, name = self.columns[column]
+    def fault(self, path: str, why: str) -> None:
+        """Note what is wrong, where a path or a column says; the whole line for none."""
+        if self.line is not None:
+            path = f"line {self.line}, {path}" if path else f"line {self.line}"
+        self.faults.append(Finding(path, why))
+
+    def number(self, path: str, column: str, text: str, value: "float | _NoValue") -> None:
+        """Enter the number that a column or table has, or note why it is refused."""
+        why = value.why if isinstance(value, _NoValue) else self._refusal(column, value)
+        if why is None and isinstance(value, float):
+            table, name = self.columns[column]
+            self.tables[table][name] = value
+        else:
+            self.fault(path, f"'{text}': {why}")
+            self.unread.append(Unread(self.columns[column][1], f"{column}: '{text}'"))
+
+    def _refusal(self, column: str, value: float) -> str | None:
+        """Why a number cannot be what it is entered for, or None."""
+        table, _ = self.columns[column]
         if not math.isfinite(value):
             return "is no finite number"
         if table == "segments_mm" and not 0.0 <= value <= MAX_LENGTH_MM:
             return f"a drawn length is from 0 to {MAX_LENGTH_MM:g} mm"
         if table == "directions_deg" and abs(value) > 360.0:
             return "a direction is from -360 to 360 degrees"
-        self.tables[table][name] = value
         return None
 
-    def refuse(self, name: str, column: str, text: str) -> None:
-        """Note that something entered for a name is not used."""
-        self.unread.append(Unread(name, f"{column}: '{text}'"))
+    def scale(self, path: str, name: str, text: "str | _NoValue") -> None:
+        """Enter a scale as declared, or note why it is refused."""
+        if isinstance(text, str) and len(text) > LONGEST_SCALE:
+            text = _NoValue(f"{text[:40]}...", f"a scale has at most {LONGEST_SCALE} characters")
+        if isinstance(text, str):
+            self.scales[name] = text
+        else:
+            self.fault(path, f"'{text}': {text.why}")
+            self.unread.append(Unread(name, f"{name}: '{text}'"))
 
-    def values(self) -> dict[str, float]:
-        """The computed values, in the order of the construction."""
-        values = self.tables["values"]
-        return {name: values[name] for name in self.names.values if name in values}
-
-    def reading(self) -> Reading:
-        """Lengths and directions as a reading, with what was refused."""
-        lengths, directions = self.tables["segments_mm"], self.tables["directions_deg"]
-        return replace(reading_of(self.names.vectors, lengths, directions), unread=tuple(self.unread))
-
-    def problems(self) -> tuple[Problem, ...]:
-        """The faults, no more than a person reads, and what was entered and is not asked for."""
+    def measurements(
+        self, student_id: str | None, n: int | None, position: int | None, *, is_usable: bool = True
+    ) -> Measurements:
+        """All that was entered, in the order of the construction."""
+        lengths, directions, values = (self.tables[table] for table in TABLES)
+        reading = reading_of(self.names.vectors, lengths, directions)
         problems = [
             Problem("measurement_fault", str(fault), self.file) for fault in self.faults[:MOST_FINDINGS]
         ]
         if len(self.faults) > MOST_FINDINGS:
             more = f"... and {len(self.faults) - MOST_FINDINGS} more faults"
             problems.append(Problem("measurement_fault", more, self.file))
-        given = {name for table in self.tables.values() for name in table}
-        return (*problems, *_unused(self.names, given, self.file))
+        unused = sorted(self.names.unused.intersection({*lengths, *directions, *values}))
+        if unused:
+            message = f"{', '.join(unused)}: not drawn in this mechanism's plans, and not judged"
+            problems.append(Problem("measurement_not_used", message, self.file))
+        return Measurements(
+            student_id=student_id,
+            n=n,
+            position=position,
+            scales=self.scales,
+            reading=replace(reading, unread=tuple(self.unread)),
+            values={name: values[name] for name in self.names.values if name in values},
+            source=self.file,
+            line=self.line,
+            problems=tuple(problems),
+            is_usable=is_usable,
+        )
 
 
 # CSV ----------------------------------------------------------------------------------------------
@@ -243,33 +313,16 @@ class _Entries:
 
 def _parse_csv(text: str, file: str, names: Names) -> Iterator[Measurements]:
     delimiter = delimiter_of(text)
-    lines = _lines(text, delimiter, file)
-    if not lines:
-        raise _refuse(file, [Finding("line 1", "the file is empty; its first line must name the columns")])
-    header = [cell.strip() for cell in lines[0][1]]
-    faults = list(_check_header(header, names))
+    lines, faults = table_lines(text, delimiter)
+    if not lines and not faults:
+        faults = [Finding("line 1", "the file is empty; its first line must name the columns")]
+    header = [cell.strip() for cell in lines[0][1]] if lines else []
+    faults = faults or list(_check_header(header, names))
     if faults:
         raise _refuse(file, faults)
     columns = _columns(names)
     for number, cells in lines[1:]:
-        yield _Row(number, header, cells, delimiter, _Entries(names, columns, file)).read()
-
-
-def _lines(text: str, delimiter: str, file: str) -> list[tuple[int, list[str]]]:
-    """Lines that are not blank, with their numbers from 1."""
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
-    lines: list[tuple[int, list[str]]] = []
-    first = 1
-    try:
-        for cells in reader:
-            if any(cell.strip() for cell in cells):
-                lines.append((first, cells))
-            if len(lines) > MAX_LINES:
-                raise _refuse(file, [Finding(f"line {first}", f"more than {MAX_LINES} lines are no class")])
-            first = reader.line_num + 1
-    except csv.Error as error:
-        raise _refuse(file, [Finding(f"line {first}", f"is no CSV: {error}; check its quotes")]) from error
-    return lines
+        yield _line(header, cells, delimiter, _Entries(names, columns, file, number))
 
 
 def _check_header(header: list[str], names: Names) -> Iterator[Finding]:
@@ -288,100 +341,45 @@ def _did_you_mean(near: Sequence[str]) -> str:
     return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
-    """One line of a class file while it is being read."""
+def _line(header: list[str], cells: list[str], delimiter: str, entries: _Entries) -> Measurements:
+    """What one line says; what it says wrongly is left out and told."""
+    known = {name: cell.strip() for name, cell in zip(header, cells, strict=False) if name and cell.strip()}
+    surplus = surplus_of(header, cells, delimiter)
+    if surplus is not None:
+        entries.fault("", f"{surplus}; nothing of it is used")
+        known = {"student_id": cells[0].strip()} if header[0] == "student_id" else {}
+    student = known.get("student_id", "")
+    why = why_no_id(student)
+    if why is not None:
+        entries.fault("student_id", f"'{student[:40]}' is refused: {why}")
+    numbers = {name: whole_number(known[name], delimiter) for name in ("n", "position") if name in known}
+    for name, number in numbers.items():
+        if number is None:
+            entries.fault(name, f"'{known[name][:40]}' is no whole number")
+    # Without its student, n and position nobody knows what it is held against.
+    is_usable = not entries.faults
+    for column, text in known.items():
+        if column in entries.columns:
+            entries.number(column, column, text[:40], _number(text, delimiter))
+    for scale in SCALES:
+        if scale in known:
+            entries.scale(scale, scale, known[scale])
+    owner = None if why else student
+    return entries.measurements(owner, numbers.get("n"), numbers.get("position"), is_usable=is_usable)
 
-    line: int
-    header: list[str]
-    cells: list[str]
-    delimiter: str
-    entries: _Entries
 
-    def read(self) -> Measurements:
-        """What the line says; what it says wrongly is left out and told."""
-        cells = [cell.strip() for cell in self.cells]
-        known = {name: cell for name, cell in zip(self.header, cells, strict=False) if cell and name}
-        if any(cells[len(self.header) :]):
-            told = f"has {len(cells)} fields, the first line names {len(self.header)} columns"
-            self.fault("", f"{told}; quote a field that holds a '{self.delimiter}'; nothing of it is used")
-            known = {"student_id": cells[0]} if self.header[0] == "student_id" else {}
-        student = self.student(known.get("student_id", ""))
-        n, position = (self.whole(name, known.get(name, "")) for name in ("n", "position"))
-        # Without its student, n and position nobody knows what it is held against.
-        is_usable = not self.entries.faults
-        for column, text in known.items():
-            if column in self.entries.columns:
-                self.number(column, text)
-        return Measurements(
-            student_id=student,
-            n=n,
-            position=position,
-            scales=self.scales(known),
-            reading=self.entries.reading(),
-            values=self.entries.values(),
-            source=self.entries.file,
-            line=self.line,
-            problems=self.entries.problems(),
-            is_usable=is_usable,
-        )
-
-    def scales(self, known: Mapping[str, str]) -> dict[str, str]:
-        """The scales as declared."""
-        scales = {name: known[name] for name in SCALES if name in known}
-        for name in [name for name, text in scales.items() if len(text) > LONGEST_SCALE]:
-            self.fault(name, f"'{scales[name][:40]}...': {_LONG}")
-            self.entries.refuse(name, name, f"{scales.pop(name)[:40]}...")
-        return scales
-
-    def fault(self, column: str, why: str) -> None:
-        """Note a fault of this line."""
-        where = f"line {self.line}, {column}" if column else f"line {self.line}"
-        self.entries.faults.append(Finding(where, why))
-
-    def student(self, text: str) -> str | None:
-        """The student's id, None with a fault where it is missing or refused."""
-        why = why_no_id(text)
-        if why is not None:
-            self.fault("student_id", f"'{text[:40]}' is refused: {why}")
-        return text if why is None else None
-
-    def whole(self, name: str, text: str) -> int | None:
-        """A whole number; spreadsheets may have added zeros as decimals."""
-        if not text:
-            return None
-        mark = "," if self.delimiter == ";" else r"\."
-        found = re.fullmatch(rf"([+-]?\d{{1,9}})(?:{mark}0+)?", text, re.ASCII)
-        if found is None:
-            self.fault(name, f"'{text[:40]}' is no whole number")
-            return None
-        return int(found[1])
-
-    def number(self, column: str, text: str) -> None:
-        """Enter the number that stands in a column, or note why it is refused."""
-        plain = text.replace("\N{MINUS SIGN}", "-")
-        if self.delimiter == ";":
-            plain = plain.replace(",", ".", 1)
-        if _NUMBER.fullmatch(plain) is None:
-            comma = "," in text and self.delimiter == ","
-            advice = "; write a decimal point, or separate fields by semicolons" if comma else ""
-            why: str | None = f"is no number{advice}"
-        else:
-            why = self.entries.take(column, float(plain))
-        if why is not None:
-            self.fault(column, f"'{text[:40]}': {why}")
-            self.entries.refuse(self.entries.columns[column][1], column, text[:40])
+def _number(text: str, delimiter: str) -> "float | _NoValue":
+    plain = text.replace("\N{MINUS SIGN}", "-")
+    if delimiter == ";":
+        plain = plain.replace(",", ".", 1)
+    if _NUMBER.fullmatch(plain) is not None:
+        return float(plain)
+    comma = "," in text and delimiter == ","
+    advice = "; write a decimal point, or separate fields by semicolons" if comma else ""
+    return _NoValue(text, f"is no number{advice}")
 
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
-
-
-def _unused(names: Names, given: Collection[str], file: str) -> Iterator[Problem]:
-    """Vectors measured that nothing can be held against."""
-    unused = sorted(names.unused.intersection(given))
-    if unused:
-        message = f"{', '.join(unused)}: not drawn in this mechanism's plans, and not judged"
-        yield Problem("measurement_not_used", message, file)
 
 
 def reading_of(
@@ -499,94 +497,65 @@ def _parse_json(text: str, file: str, names: Names) -> Measurements:
     if not isinstance(data, dict):
         raise _refuse(file, [Finding("$", "is no table: a file of measurements begins with a brace")])
     entries = _Entries(names, _columns(names), file)
-    document = _Document(data, entries)
-    scales = document.scales()
+    for name, value in _take(data, "scales"):
+        if name not in SCALES:
+            entries.fault(f"$.scales.{name[:40]}", f"is not known here; there are {', '.join(SCALES)}")
+        else:
+            entries.scale(f"$.scales.{name}", name, str(value) if _is_number(value) else _text(value))
     for table, end in TABLES.items():
-        document.numbers(table, end)
-    about = document.rest()
-    return Measurements(
-        student_id=about.student_id,
-        n=about.n,
-        position=about.position,
-        scales=scales,
-        reading=entries.reading(),
-        values=entries.values(),
-        source=file,
-        problems=entries.problems(),
-    )
+        _enter(dict(_take(data, table)), table, end, entries)
+    about = _about(data, file)
+    return entries.measurements(about.student_id, about.n, about.position)
 
 
-@dataclass(frozen=True, slots=True)
-class _Document:
-    """A JSON file while it is being read: what is understood is taken out of `data`."""
+def _take(data: dict[str, object], key: str) -> list[tuple[str, object]]:
+    """The pairs of a table, taken out of `data`; what is no table stays, and is a fault of the whole file."""
+    table = data.get(key)
+    if not isinstance(table, dict):
+        return []
+    del data[key]
+    return list(table.items())
 
-    data: dict[str, object]
-    entries: _Entries
 
-    def fault(self, path: str, why: str) -> None:
-        """Note a fault of one value."""
-        self.entries.faults.append(Finding(f"$.{path}", why))
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
-    def scales(self) -> dict[str, str]:
-        """The scales as text; a number is a text without a unit."""
-        scales: dict[str, str] = {}
-        for name, value in self.table("scales"):
-            if name not in SCALES:
-                self.fault(f"scales.{name[:40]}", f"is not known here; there are {', '.join(SCALES)}")
-            elif isinstance(value, str) and len(value) > LONGEST_SCALE:
-                self.refuse(name, name, f"scales.{name}", _NoValue(value, _LONG))
-            elif isinstance(value, str | int | float) and not isinstance(value, bool):
-                scales[name] = str(value)
-            else:
-                self.refuse(name, name, f"scales.{name}", value)
-        return scales
 
-    def numbers(self, table: str, end: str) -> None:
-        """Enter the numbers of a table."""
-        names = self.entries.names
-        known = names.values if table == "values" else tuple(names.vectors)
-        given = dict(self.table(table))
-        for name, value in given.items():
-            path = f"{table}.{name[:40]}"
-            if name not in known:
-                near = near_names(name, known) if len(self.entries.faults) < MOST_FINDINGS else []
-                self.fault(path, f"is not known here{_did_you_mean(near)}")
-                for meant in near:
-                    if meant not in given:
-                        self.entries.refuse(meant, name, _shown(value))
-            elif isinstance(value, int | float) and not isinstance(value, bool):
-                why = self.entries.take(f"{name}{end}", float(value))
-                if why is not None:
-                    self.refuse(name, f"{name}{end}", path, _NoValue(_shown(value), why))
-            else:
-                self.refuse(name, f"{name}{end}", path, value)
+def _text(value: object) -> "str | _NoValue":
+    return value if isinstance(value, str | _NoValue) else _NoValue(_shown(value), "is no number")
 
-    def table(self, key: str) -> list[tuple[str, object]]:
-        """The pairs of a table; what is none stays in `data`, and is a fault of the whole file."""
-        value = self.data.get(key)
-        return list(self.data.pop(key).items()) if isinstance(value, dict) else []  # type: ignore[attr-defined]
 
-    def refuse(self, name: str, column: str, path: str, value: object) -> None:
-        """Note that a value is not used, and why."""
-        why = value.why if isinstance(value, _NoValue) else "is no number"
-        self.fault(path, f"'{_shown(value)}': {why}")
-        self.entries.refuse(name, column, _shown(value))
+def _enter(given: Mapping[str, object], table: str, end: str, entries: _Entries) -> None:
+    """Enter the numbers of a table."""
+    known = entries.names.values if table == "values" else tuple(entries.names.vectors)
+    for name, value in given.items():
+        path, shown = f"$.{table}.{name[:40]}", _shown(value)
+        if name not in known:
+            near = near_names(name, known) if len(entries.faults) < MOST_FINDINGS else []
+            entries.fault(path, f"is not known here{_did_you_mean(near)}")
+            entries.unread += [Unread(meant, f"{name}: '{shown}'") for meant in near if meant not in given]
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            entries.number(path, f"{name}{end}", shown, float(value))
+        else:
+            refused = value if isinstance(value, _NoValue) else _NoValue(shown, "is no number")
+            entries.number(path, f"{name}{end}", shown, refused)
 
-    def rest(self) -> MeasurementsDocument:
-        """Whose they are and for which variant. Raises InputFileError with all faults in what is left."""
-        faults = [
-            Finding(f"$.{key[:40]}", f"{value.why}: {value}")
-            for key, value in self.data.items()
-            if isinstance(value, _NoValue)
-        ]
-        data = {key: value for key, value in self.data.items() if not isinstance(value, _NoValue)}
-        try:
-            document = MeasurementsDocument.model_validate(data)
-        except ValidationError as error:
-            raise _refuse(self.entries.file, [*faults, *findings_of(error, MeasurementsDocument)]) from error
-        why = None if document.student_id is None else why_no_id(document.student_id)
-        if why is not None:
-            faults.append(Finding("$.student_id", f"'{_shown(document.student_id)}' is refused: {why}"))
-        if faults:
-            raise _refuse(self.entries.file, faults)
-        return document
+
+def _about(data: Mapping[str, object], file: str) -> MeasurementsDocument:
+    """Whose they are and for which variant. Raises InputFileError with all faults in what is left."""
+    faults = [
+        Finding(f"$.{key[:40]}", f"{value.why}: {value}")
+        for key, value in data.items()
+        if isinstance(value, _NoValue)
+    ]
+    rest = {key: value for key, value in data.items() if not isinstance(value, _NoValue)}
+    try:
+        document = MeasurementsDocument.model_validate(rest)
+    except ValidationError as error:
+        raise _refuse(file, [*faults, *findings_of(error, MeasurementsDocument)]) from error
+    why = None if document.student_id is None else why_no_id(document.student_id)
+    if why is not None:
+        faults.append(Finding("$.student_id", f"'{_shown(document.student_id)}' is refused: {why}"))
+    if faults:
+        raise _refuse(file, faults)
+    return document

@@ -22,7 +22,7 @@ from grader.documents import (
     Verdict,
 )
 from grader.files import write_whole
-from grader.pipeline import Work
+from grader.measurements import StudentSubmission
 
 Key = tuple[str, int | None]
 """Student and position."""
@@ -32,7 +32,7 @@ OWN = ("submission", "roster")
 
 
 @dataclass(frozen=True, slots=True)
-class Marked:
+class MarkedCriterion:
     """A criterion as it was marked."""
 
     title: str
@@ -45,7 +45,7 @@ class Earlier:
     """Where a student stood, and each criterion by its id."""
 
     standing: StandingDocument
-    criteria: Mapping[str, Marked]
+    criteria: Mapping[str, MarkedCriterion]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,24 +63,30 @@ class Inputs:
 
 
 def inputs_of(
-    authored: Mapping[str, str], works: Sequence[Work], folders: Sequence[str], content: Mapping[str, str]
+    authored: Mapping[str, str],
+    submissions: Sequence[StudentSubmission],
+    folders: Sequence[str],
+    digests: Mapping[str, str],
 ) -> Inputs:
     """What a run's marks come from.
 
     Arguments
     ---------
     authored : texts of the ``assignment``, the ``rubric`` and the version of the ``program``
-    folders : of the works
-    content : digests of the files handed in, by their names
+    folders : of the submissions
+    digests : of the files handed in, by their names
     """
     own = {
         folder: {
             "submission": _digest(
-                [(one.name, one.page, content.get(one.name)) for one in work.pages], work.measured
+                [(page.file, page.page, digests.get(page.file)) for page in submission.pages],
+                submission.measured,
             ),
-            "roster": _digest(work.variant, sorted(work.declared.items()), work.lang, work.name),
+            "roster": _digest(
+                submission.variant, sorted(submission.declared.items()), submission.lang, submission.name
+            ),
         }
-        for work, folder in zip(works, folders, strict=True)
+        for submission, folder in zip(submissions, folders, strict=True)
     }
     return Inputs({name: _digest(text) for name, text in authored.items()}, own)
 
@@ -106,7 +112,7 @@ def earlier(results: Path, assignment: str) -> Mapping[Key, Earlier] | None:
 def _earlier(told: Mapping[str, Any]) -> Earlier:
     standing = StandingDocument(status=told["status"], score=told["score"], score_range=told["score_range"])
     criteria = {
-        one["id"]: Marked(str(one["title"]), one["verdict"], one["points"])
+        one["id"]: MarkedCriterion(str(one["title"]), one["verdict"], one["points"])
         for one in told["criteria"]
         if one["verdict"] in get_args(Verdict)
     }
@@ -167,7 +173,7 @@ def _criteria_moved(then: Earlier | None, now: ReportDocument | None) -> list[Cr
     """The criteria marked otherwise; none where there was or is nothing to compare."""
     if then is None or now is None:
         return []
-    after = {one.id: Marked(one.title, one.verdict, one.points) for one in now.criteria}
+    after = {one.id: MarkedCriterion(one.title, one.verdict, one.points) for one in now.criteria}
     if not after or not then.criteria:
         return []
     return [

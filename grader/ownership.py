@@ -22,7 +22,7 @@ from enum import Enum
 from pathlib import PurePath
 
 from grader.class_order import OrderRefused, deal
-from grader.records import Identity, Problem
+from grader.records import Identity, PageRef, Problem
 from grader.roster import Roster, RosterRow, ScanRef, why_no_id
 
 
@@ -36,35 +36,10 @@ class How(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class PageSource:
-    """A page of a file, and what was seen on it.
-
-    Attributes
-    ----------
-    file, page, pages : the file's name in its folder, the page from 1, how many pages the file has
-    blank : nobody drew on it
-    identity : from its QR code, or None
-    digest : of the file's content, empty where it is not known
-    problem : why the page cannot be used, or None
-    """
-
-    file: str
-    page: int
-    pages: int
-    blank: bool = False
-    identity: Identity | None = None
-    digest: str = ""
-    problem: Problem | None = None
-
-    def __str__(self) -> str:
-        return self.file if self.pages == 1 else f"{self.file}#{self.page}"
-
-
-@dataclass(frozen=True, slots=True)
 class Owned:
     """A page that has its owner."""
 
-    source: PageSource
+    source: PageRef
     student_id: str
     n: int | None
     position: int | None
@@ -75,7 +50,7 @@ class Owned:
 class Unmatched:
     """A page without an owner, why, and the students whose it may be."""
 
-    source: PageSource
+    source: PageRef
     problem: Problem
     students: tuple[str, ...] = ()
 
@@ -92,7 +67,7 @@ class Ownership:
 
     owned: tuple[Owned, ...]
     unmatched: tuple[Unmatched, ...]
-    blank: tuple[PageSource, ...]
+    blank: tuple[PageRef, ...]
     problems: tuple[Problem, ...] = ()
 
 
@@ -106,7 +81,7 @@ class _Claim:
 
 
 def assign_pages(
-    pages: Sequence[PageSource],
+    pages: Sequence[PageRef],
     roster: Roster | None,
     assignment_id: str,
     *,
@@ -126,7 +101,7 @@ def assign_pages(
     order, refusals = _order_claims(pages, listed, certain, pages_per_student)
     owned: list[Owned] = []
     unmatched: list[Unmatched] = []
-    blank: list[PageSource] = []
+    blank: list[PageRef] = []
     for index, page in enumerate(pages):
         if page.blank and page.identity is None:
             blank.append(page)
@@ -152,7 +127,7 @@ def student_of_name(file: str, student_ids: Iterable[str]) -> str | None:
     return None
 
 
-def _improvised(pages: Sequence[PageSource], student_ids: Iterable[str]) -> Roster:
+def _improvised(pages: Sequence[PageRef], student_ids: Iterable[str]) -> Roster:
     """A roster from what the pages say, for a folder that has none.
 
     Nobody is on it under an id that could not name a folder of its own.
@@ -181,7 +156,7 @@ def _improvised(pages: Sequence[PageSource], student_ids: Iterable[str]) -> Rost
     return Roster("", tuple(rows.values()))
 
 
-def _certain_claims(page: PageSource, roster: Roster) -> list[_Claim]:
+def _certain_claims(page: PageRef, roster: Roster) -> list[_Claim]:
     """What the code, the roster's scans and the file's name say."""
     claims: list[_Claim] = []
     if page.identity is not None:
@@ -208,7 +183,7 @@ def _code_claim(identity: Identity, roster: Roster) -> _Claim:
 
 
 def _order_claims(
-    pages: Sequence[PageSource], roster: Roster, certain: Sequence[Sequence[_Claim]], each: int | None
+    pages: Sequence[PageRef], roster: Roster, certain: Sequence[Sequence[_Claim]], each: int | None
 ) -> tuple[dict[int, _Claim], dict[str, str]]:
     """What the roster's order says of the one class file's pages, by index; or why not, by file."""
     if each is None:
@@ -252,7 +227,7 @@ def _order_claims(
     return claims_by_index, {}
 
 
-def _rows_elsewhere(pages: Sequence[PageSource], certain: Sequence[Sequence[_Claim]], file: str) -> set[int]:
+def _rows_elsewhere(pages: Sequence[PageRef], certain: Sequence[Sequence[_Claim]], file: str) -> set[int]:
     """Lines of the rows that have pages in other files."""
     return {
         row.line
@@ -271,7 +246,7 @@ def _common(claims: Sequence[_Claim]) -> tuple[RosterRow, ...]:
 
 
 def _settle(
-    page: PageSource, claims: list[_Claim], roster: Roster, assignment_id: str, refusal: str | None
+    page: PageRef, claims: list[_Claim], roster: Roster, assignment_id: str, refusal: str | None
 ) -> Owned | Problem:
     """The owner on whom all claims agree, or the problem."""
     claims = sorted(claims, key=lambda claim: list(How).index(claim.how))
@@ -304,7 +279,7 @@ def _settle(
 
 
 def _owned(
-    page: PageSource, row: RosterRow, claims: list[_Claim], problem: Callable[[str, str], Problem]
+    page: PageRef, row: RosterRow, claims: list[_Claim], problem: Callable[[str, str], Problem]
 ) -> Owned | Problem:
     """The row's page, unless the code's number is another."""
     identity = page.identity
@@ -330,7 +305,7 @@ def _near(file: str, roster: Roster) -> str:
     return f" (is {by_lower[near[0]]} meant?)" if near else ""
 
 
-def _missing_scans(pages: Sequence[PageSource], roster: Roster) -> Iterable[Problem]:
+def _missing_scans(pages: Sequence[PageRef], roster: Roster) -> Iterable[Problem]:
     there: Mapping[str, int] = {page.file: page.pages for page in pages}
     for row in roster.rows:
         for ref in row.scans:

@@ -6,7 +6,7 @@ top left pixel, s = width / paper's width.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 
@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from grader.labels import layers_of
 from grader.outcomes import Outcome
-from grader.records import FloatArray, GreyImage, Page, Reading, Sheet
+from grader.records import Backdrop, FloatArray, GreyImage, Page, Reading, Sheet
 from grader.scene import XY, Picture, Scene, between, scene_of
 from reference.canvas import Area, Curve, Label, Ring, Shape, Stroke
 from reference.construction import Vector
@@ -50,24 +50,6 @@ _FLAT_PNG = [
 """Of pictures that are white for the most part."""
 FRACTION_BITS = 4
 JPEG_QUALITY = 78
-
-
-@dataclass(frozen=True, slots=True)
-class Backdrop:
-    """A page cleaned to draw on: upright where it could be registered, else turned as its file asks.
-
-    Attributes
-    ----------
-    scan : (h, w) uint8
-    page_mm : what its whole width and height are on paper
-    registered : whether sheet millimetres are known on it
-    """
-
-    source: str
-    page: int
-    scan: GreyImage
-    page_mm: XY
-    registered: bool
 
 
 def backdrop(page: Page, sheet: Sheet | None, *, width_px: int = WIDTH_PX) -> Backdrop:
@@ -115,17 +97,6 @@ def _smaller(scan: GreyImage, plain: GreyImage) -> bytes:
     """A cleaned scan as a small file: pencil on white paper needs few tones, a photo's shades many."""
     jpeg = _encode(".jpg", scan, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return min(jpeg, _encode(".png", plain, _FLAT_PNG), key=len)
-
-
-def stored(behind: Backdrop) -> bytes:
-    """A backdrop's scan as a PNG file, without loss."""
-    return _encode(".png", behind.scan, [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION])
-
-
-def restored(data: bytes) -> GreyImage | None:
-    """The scan of a backdrop from its PNG file; None where the file is damaged."""
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
-    return None if image is None else _grey(image)
 
 
 def _encode(kind: str, image: NDArray[np.uint8], options: list[int]) -> bytes:

@@ -11,9 +11,16 @@ written instead.
 
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from grader.records import Written
+from reference.assignment import Assignment, Scales, Variant
+from reference.mechanism import Crank
+
+SCALE_NAMES = ("kL", "kv", "ka")
+SURE = 0.9
+"""Probability from which a text read in a printed box is taken for what was written."""
 MAX_LENGTH = 120
 LEAST_PER_MM, MOST_PER_MM = 1e-9, 1e9
 """No drawing has a scale beyond these, SI per millimetre."""
@@ -379,3 +386,31 @@ def _correspondence(name: str, paper_text: str, real: list[_Quantity]) -> float 
         return None
     found = {q.times(paper, -1).value for q in real if q.times(paper, -1).fits(name)}
     return found.pop() if len(found) == 1 else None
+
+
+# Scales that count before anything is marked --------------------------------------------------------
+
+
+def sure_texts(readings: Sequence[Mapping[str, Written]]) -> dict[str, str]:
+    """What is surely read in the boxes of some pages, by scale; before anything else was read there."""
+    found: dict[str, str] = {}
+    for name in SCALE_NAMES:
+        boxes = [written[name] for written in readings if name in written]
+        if boxes and all(box.confidence >= SURE for box in boxes):
+            found[name] = max(boxes, key=lambda box: box.confidence).text
+    return found
+
+
+def declared_scales(assignment: Assignment, variant: Variant, texts: Mapping[str, str]) -> Scales:
+    """The scales that texts declare, where they can be understood; the others by the assignment's rule."""
+    known: dict[str, float] = {}
+    units: Mapping[str, str] = dict(assignment.file.scales.bare_units.items())
+    driver = assignment.mechanism([variant]).driver
+    omega = {"omega": abs(float(driver.omega[0]))} if isinstance(driver, Crank) else {}
+    for name, text in texts.items():
+        match parse_scale(name, text, bare_unit=units.get(name)):
+            case Declared(per_mm=value):
+                known[name] = value
+            case ByRule() as rule if rule.powers.keys() <= {**omega, **known}.keys():
+                known[name] = rule.per_mm({**omega, **known})
+    return assignment.scales([variant], **known)

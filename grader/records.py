@@ -5,8 +5,9 @@ Where a record holds a *complex* position it is x - i y: y points up, so that th
 difference is the direction counter-clockwise from the sheet's +x, as in `reference`.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ IntArray = NDArray[np.int64]
 GreyImage = NDArray[np.uint8]
 Box = tuple[float, float, float, float]
 """x, y, width, height in sheet millimetres."""
+
+ZONE_SLACK_MM = 2.0
+"""Half of the gap between the zones of a printed sheet: a line may run a little past its zone's edge."""
 
 MECHANISM = "mechanism"
 VELOCITY_PLAN = "velocity_plan"
@@ -64,6 +68,33 @@ class Identity:
     position: int | None
     kind: str
     """`all`, `velocity` or `acceleration`: which drawing the page is for."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageRef:
+    """A page of a file that was handed in, and what is known of it.
+
+    Attributes
+    ----------
+    file, page, pages : the file's name as the user knows it, the page from 1, how many pages the file has
+    blank : nobody drew on it
+    identity : from its QR code, or None
+    digest : of the file's content, empty where any content will do
+    problem : why the page cannot be used, or None; such a page is not opened again
+    path : where the file is
+    """
+
+    file: str
+    page: int = 1
+    pages: int = 1
+    blank: bool = False
+    identity: Identity | None = None
+    digest: str = ""
+    problem: Problem | None = None
+    path: Path = Path()
+
+    def __str__(self) -> str:
+        return self.file if self.pages == 1 else f"{self.file}#{self.page}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +150,19 @@ class Sheet:
     identity: Identity | None = None
     problems: tuple[Problem, ...] = ()
     lens: Lens | None = None
+
+    def boxes_of(self, figures: Collection[str]) -> list[Box] | None:
+        """The zones of these figures with the gap around them, where they are not all there are.
+
+        None stands for the whole sheet; of the sketch alone there are no boxes.
+        """
+        if not figures or self.zones.keys() <= set(figures):
+            return None
+        zones = {figure: box for figure, box in self.zones.items() if figure in figures}
+        if zones.keys() <= {MECHANISM}:
+            return []
+        gap = ZONE_SLACK_MM
+        return [(x - gap, y - gap, wide + 2 * gap, high + 2 * gap) for x, y, wide, high in zones.values()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -353,3 +397,51 @@ class Reading:
     written: Mapping[str, Written] = field(default_factory=dict)
     lengths: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     swapped: tuple[Swapped, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Backdrop:
+    """A page cleaned to draw on: upright where it could be registered, else turned as its file asks.
+
+    Attributes
+    ----------
+    scan : (h, w) uint8
+    page_mm : what its whole width and height are on paper
+    registered : whether sheet millimetres are known on it
+    """
+
+    source: str
+    page: int
+    scan: GreyImage
+    page_mm: tuple[float, float]
+    registered: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ScannedPage:
+    """One page and all that is known of it; each step of `grader.pipeline` adds what it finds.
+
+    Attributes
+    ----------
+    image : its pixels; None before it is decoded, and once they are not needed any more
+    sheet, ink : its registration and its strokes; None from where the page was refused, `problems` say why
+    reading : what was written and drawn, with names
+    timing_ms : by stage
+    narrowed : zones of the printed sheet were passed over because nothing in them is asked for
+    backdrop : the cleaned scan to draw on; None where the page could not be decoded
+    """
+
+    ref: PageRef
+    image: Page | None = None
+    sheet: Sheet | None = None
+    ink: Ink | None = None
+    reading: Reading = field(default_factory=lambda: Reading({}))
+    problems: tuple[Problem, ...] = ()
+    timing_ms: Mapping[str, float] = field(default_factory=dict)
+    narrowed: bool = False
+    backdrop: Backdrop | None = None
+
+    def asked_only(self, names: Collection[str]) -> "ScannedPage":
+        """The page, with what could not be read as far as it is asked for; all of it without `names`."""
+        unread = tuple(gap for gap in self.reading.unread if not names or gap.name in names)
+        return replace(self, reading=replace(self.reading, unread=unread))

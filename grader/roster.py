@@ -9,17 +9,13 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from grader.quantities import MAX_LENGTH as LONGEST_SCALE
 from grader.records import Problem
 from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
-
-if TYPE_CHECKING:
-    from _csv import Reader
 
 _STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
@@ -126,9 +122,7 @@ def read_roster(path: Path | str) -> Roster:
 def parse_roster(text: str, file: str = "roster.csv") -> Roster:
     """The roster in a text; raises as `read_roster` does."""
     delimiter = delimiter_of(text)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
-    findings: list[Finding] = []
-    lines = list(_lines(reader, findings))
+    lines, findings = table_lines(text, delimiter)
     if not lines:
         findings = findings or [Finding("line 1", "the file is empty; its first line must name the columns")]
         raise AuthoredFileError(file, tuple(findings))
@@ -136,10 +130,8 @@ def parse_roster(text: str, file: str = "roster.csv") -> Roster:
     findings.extend(_check_header(header))
     rows: list[RosterRow] = []
     if not findings:
-        for number, cells in lines[1:]:
-            row = _Row(number, header, cells, delimiter).read(findings)
-            if row is not None:
-                rows.append(row)
+        read = (_row(number, header, cells, delimiter, findings) for number, cells in lines[1:])
+        rows = [row for row in read if row is not None]
         findings.extend(_check_together(rows))
         if not rows and not findings:
             findings.append(Finding("line 2", "there are no students below the line of column names"))
@@ -162,29 +154,51 @@ def _text_of(path: Path) -> str:
         raise AuthoredFileError(str(path), (Finding("$", advice),)) from error
 
 
+# Tables, of a roster and of measurements ----------------------------------------------------------
+
+
 def delimiter_of(text: str) -> str:
     """`;` or `,`, whichever the first line of a CSV text has more of."""
     first = next((line for line in text.splitlines() if line.strip()), "")
     return ";" if first.count(";") > first.count(",") else ","
 
 
-def _lines(reader: "Reader", findings: list[Finding]) -> Iterator[tuple[int, list[str]]]:
-    """Numbered lines that are not blank; a line number is that of the record's first line."""
-    begin = 1
-    while True:
-        try:
-            cells = next(reader)
-        except StopIteration:
-            return
-        except csv.Error as error:
-            findings.append(Finding(f"line {begin}", f"is no CSV: {error}; check its quotes"))
-            return
-        if begin > MAX_LINES:
-            findings.append(Finding(f"line {begin}", f"more than {MAX_LINES} lines are no class"))
-            return
-        if any(cell.strip() for cell in cells):
-            yield begin, cells
-        begin = reader.line_num + 1
+def table_lines(text: str, delimiter: str) -> tuple[list[tuple[int, list[str]]], list[Finding]]:
+    """Lines of a CSV text that are not blank, and the fault that ends them before the text does.
+
+    A record of several lines has the number of its first, from 1.
+    """
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
+    lines: list[tuple[int, list[str]]] = []
+    number = 1
+    try:
+        for cells in reader:
+            if number > MAX_LINES:
+                return lines, [Finding(f"line {number}", f"more than {MAX_LINES} lines are no class")]
+            if any(cell.strip() for cell in cells):
+                lines.append((number, cells))
+            number = reader.line_num + 1
+    except csv.Error as error:
+        return lines, [Finding(f"line {number}", f"is no CSV: {error}; check its quotes")]
+    return lines, []
+
+
+def surplus_of(header: Sequence[str], cells: Sequence[str], delimiter: str) -> str | None:
+    """What is wrong with a line of more fields than there are columns; None for any other."""
+    if not any(cell.strip() for cell in cells[len(header) :]):
+        return None
+    told = f"has {len(cells)} fields, the first line names {len(header)} columns"
+    return f"{told}; quote a field that holds a '{delimiter}'"
+
+
+def whole_number(text: str, delimiter: str) -> int | None:
+    """A whole number; spreadsheets may have added zeros as decimals (7.0, or 7,0 beside semicolons)."""
+    mark = "," if delimiter == ";" else r"\."
+    digits = re.fullmatch(rf"([+-]?\d{{1,9}})(?:{mark}0+)?", text, re.ASCII)
+    return None if digits is None else int(digits[1])
+
+
+# The roster's own columns -------------------------------------------------------------------------
 
 
 def _check_header(header: list[str]) -> Iterator[Finding]:
@@ -219,78 +233,49 @@ def _passed_over(header: list[str], file: str) -> Iterator[Problem]:
         yield Problem("roster_columns", message, file)
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
-    """One line while it is being read."""
+def _row(
+    number: int, header: list[str], cells: list[str], delimiter: str, findings: list[Finding]
+) -> RosterRow | None:
+    """A line's row, or None with its faults added to `findings`."""
+    surplus = surplus_of(header, cells, delimiter)
+    if surplus is not None:
+        findings.append(Finding(f"line {number}", surplus))
+        return None
+    text = dict.fromkeys(COLUMNS, "")
+    text |= {name: cell.strip() for name, cell in zip(header, cells, strict=False) if name in COLUMNS}
+    scans = [parse_scan(part.strip()) for part in text["scans"].split(";") if part.strip()]
+    row = RosterRow(
+        student_id=text["student_id"],
+        name=text["name"],
+        n=whole_number(text["n"], delimiter),
+        position=whole_number(text["position"], delimiter),
+        email=text["email"] or None,
+        scales={name: text[name] for name in SCALES if text[name]},
+        lang=text["lang"].lower() or None,
+        scans=tuple(ref for ref in scans if isinstance(ref, ScanRef)),
+        line=number,
+    )
+    faults = list(_faults_of(row, text))
+    faults += [("scans", why) for why in scans if isinstance(why, str)]
+    findings.extend(Finding(f"line {number}, {column}", why) for column, why in faults)
+    return None if faults else row
 
-    line: int
-    header: list[str]
-    cells: list[str]
-    delimiter: str
 
-    def read(self, findings: list[Finding]) -> RosterRow | None:
-        """The row, or None with its faults added to `findings`."""
-        before = len(findings)
-        if len(self.cells) > len(self.header) and any(
-            cell.strip() for cell in self.cells[len(self.header) :]
-        ):
-            advice = f"; quote a field that holds a '{self.delimiter}'"
-            told = f"has {len(self.cells)} fields, the first line names {len(self.header)} columns{advice}"
-            findings.append(Finding(f"line {self.line}", told))
-            return None
-        cells = [cell.strip() for cell in self.cells] + [""] * (len(self.header) - len(self.cells))
-        known = {name: cell for name, cell in zip(self.header, cells, strict=False) if name in COLUMNS}
-        long = [name for name in SCALES if len(known.get(name, "")) > LONGEST_SCALE]
-        findings.extend(self._told(name, f"has more than {LONGEST_SCALE} characters") for name in long)
-        row = RosterRow(
-            student_id=self._student_id(known["student_id"], findings),
-            name=known["name"],
-            n=self._whole("n", known.get("n", ""), findings),
-            position=self._whole("position", known.get("position", ""), findings),
-            email=known.get("email") or None,
-            scales={name: known[name] for name in SCALES if known.get(name)},
-            lang=self._language(known.get("lang", ""), findings),
-            scans=tuple(self._scans(known.get("scans", ""), findings)),
-            line=self.line,
-        )
-        return row if len(findings) == before else None
-
-    def _told(self, column: str, message: str) -> Finding:
-        return Finding(f"line {self.line}, {column}", message)
-
-    def _student_id(self, text: str, findings: list[Finding]) -> str:
-        why = why_no_id(text)
-        if not text:
-            findings.append(self._told("student_id", "is empty"))
-        elif why is not None:
-            findings.append(self._told("student_id", f"'{_short(text)}' is refused: {why}"))
-        return text
-
-    def _whole(self, column: str, text: str, findings: list[Finding]) -> int | None:
-        """A whole number; spreadsheets may have added zeros as decimals (7.0, or 7,0 beside semicolons)."""
-        if not text:
-            return None
-        mark = "," if self.delimiter == ";" else "."
-        found = re.fullmatch(rf"([+-]?\d{{1,9}})(?:{re.escape(mark)}0+)?", text, re.ASCII)
-        if found is None:
-            findings.append(self._told(column, f"'{_short(text)}' is no whole number"))
-            return None
-        return int(found[1])
-
-    def _language(self, text: str, findings: list[Finding]) -> str | None:
-        if text and text.lower() not in LANGUAGES:
-            told = f"'{_short(text)}' is not known; there are {', '.join(LANGUAGES)}"
-            findings.append(self._told("lang", told))
-        return text.lower() or None
-
-    def _scans(self, text: str, findings: list[Finding]) -> Iterator[ScanRef]:
-        for part in (part.strip() for part in text.split(";")):
-            if part:
-                ref = parse_scan(part)
-                if isinstance(ref, str):
-                    findings.append(self._told("scans", ref))
-                else:
-                    yield ref
+def _faults_of(row: RosterRow, text: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """The columns of a row whose text cannot be used, and why."""
+    for name in SCALES:
+        if len(text[name]) > LONGEST_SCALE:
+            yield name, f"has more than {LONGEST_SCALE} characters"
+    why = why_no_id(row.student_id)
+    if not row.student_id:
+        yield "student_id", "is empty"
+    elif why is not None:
+        yield "student_id", f"'{_short(row.student_id)}' is refused: {why}"
+    for name, value in (("n", row.n), ("position", row.position)):
+        if text[name] and value is None:
+            yield name, f"'{_short(text[name])}' is no whole number"
+    if row.lang is not None and row.lang not in LANGUAGES:
+        yield "lang", f"'{_short(text['lang'])}' is not known; there are {', '.join(LANGUAGES)}"
 
 
 def parse_scan(text: str) -> ScanRef | str:

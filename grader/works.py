@@ -1,4 +1,4 @@
-"""From pages with owners, measurements and the roster to each student's work.
+"""From pages with owners, measurements and the roster to each student's submission.
 
 What cannot be used, and what two students may have handed in, stands in the reports of both: nobody
 is missing where a file of theirs lies in the folder. Codes of the problems of measurements, beside
@@ -11,14 +11,13 @@ those of `grader.ownership`:
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PurePath
+from pathlib import PurePath
 
 from grader.documents import UnmatchedDocument
-from grader.measurements import Measurements, combined
-from grader.ownership import How, Owned, Ownership, PageSource, student_of_name
-from grader.pipeline import Place, Work
+from grader.measurements import Measurements, StudentSubmission, combined
+from grader.ownership import How, Owned, Ownership, student_of_name
 from grader.records import Problem
 from grader.roster import Roster, RosterRow, why_no_id
 from reference.assignment import Assignment, Variant
@@ -149,21 +148,19 @@ class _Submissions:
                 self.at(key).unusable.extend(unusable.problems)
 
 
-def works_of(  # noqa: PLR0913 - whatever a folder holds
+def submissions_of(
     assignment: Assignment,
     roster: Roster | None,
     ownership: Ownership,
     measured: Sequence[Measurements],
-    paths: Mapping[str, Path],
     lang: str,
     *,
     refused: Sequence[Unusable] = (),
-) -> tuple[list[Work], list[UnmatchedDocument]]:
-    """Each student's work (with a roster: of everybody on it), and measurements that are nobody's.
+) -> tuple[list[StudentSubmission], list[UnmatchedDocument]]:
+    """Each student's submission (with a roster: of everybody on it), and measurements that are nobody's.
 
     Arguments
     ---------
-    paths : of the files by their names in the folder
     lang : where the roster does not say
     refused : measurement files that cannot be used, with the students whom they name in themselves
     """
@@ -179,13 +176,13 @@ def works_of(  # noqa: PLR0913 - whatever a folder holds
     pages = [Unusable((page.problem,), page.students) for page in ownership.unmatched]
     for refusal in (*unusable, *(_by_name(submissions, file) for file in refused), *pages):
         submissions.report(refusal)
-    works = [_work(assignment, key, gathered, paths, lang) for key, gathered in submissions.by_key.items()]
+    students = [_submission(assignment, key, gathered, lang) for key, gathered in submissions.by_key.items()]
     strangers = [
         UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
         for refusal in unusable
         for problem in refusal.problems
     ]
-    return works, strangers
+    return students, strangers
 
 
 def _by_name(submissions: _Submissions, refused: Unusable) -> Unusable:
@@ -220,31 +217,26 @@ def _blank_only(ownership: Ownership, roster: Roster | None) -> list[Owned]:
     return list(found.values())
 
 
-def _work(assignment: Assignment, key: Key, one: _Gathered, paths: Mapping[str, Path], lang: str) -> Work:
+def _submission(assignment: Assignment, key: Key, gathered: _Gathered, lang: str) -> StudentSubmission:
     student_id, position = key
-    row = one.row or RosterRow(student_id)
-    problems = list(one.unusable)
-    numbers = [row.n, *(owned.n for owned in one.owned), *(entered.n for entered in one.measured)]
-    positions = [position, *(entered.position for entered in one.measured)]
+    row = gathered.row or RosterRow(student_id)
+    problems = list(gathered.unusable)
+    numbers = [row.n, *(owned.n for owned in gathered.owned), *(entered.n for entered in gathered.measured)]
+    positions = [position, *(entered.position for entered in gathered.measured)]
     n = _agreed("n", numbers, problems)
-    place = _agreed("position", positions, problems)
-    variant = _variant(assignment, n, place, problems)
-    pages = tuple(_place(owned.source, paths) for owned in one.owned)
-    return Work(
+    agreed_position = _agreed("position", positions, problems)
+    variant = _variant(assignment, n, agreed_position, problems)
+    return StudentSubmission(
         student_id=student_id,
         variant=variant,
-        pages=pages,
+        pages=tuple(owned.source for owned in gathered.owned),
         declared=row.scales,
-        measured=combined(one.measured) if one.measured else None,
+        measured=combined(gathered.measured) if gathered.measured else None,
         lang=row.lang or lang,
         name=row.name,
         problems=tuple(problems),
-        has_unusable=bool(one.unusable),
+        has_unusable=bool(gathered.unusable),
     )
-
-
-def _place(source: PageSource, paths: Mapping[str, Path]) -> Place:
-    return Place(paths[source.file], source.page, source.file, source.digest, source.problem)
 
 
 def _agreed(name: str, values: Iterable[int | None], problems: list[Problem]) -> int | None:

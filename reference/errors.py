@@ -11,6 +11,7 @@ PlanmarkError            caught once, at the rim
 import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 MOST_FINDINGS = 20
 """A person reads no more at a time; a hostile file has a million."""
@@ -83,9 +84,23 @@ class AuthoredFileError(PlanmarkError):
 
 
 class MechanismError(PlanmarkError):
-    """The mechanism has no position here, or its velocities are not determined."""
+    """The mechanism has no position here, or its velocities are not determined.
+
+    Attributes
+    ----------
+    told : the message, with ``{gap}`` where the gap stands in it
+    group : the joint that the failing group places; None where no single group is meant
+    gap_m : by how much the group's links miss each other; None where they meet
+    """
 
     exit_status = 3
+
+    def __init__(self, code: str, told: str, *, group: str | None = None, gap_m: float | None = None) -> None:
+        super().__init__(code, told if gap_m is None else told.replace("{gap}", f"{gap_m:.6g} m"))
+        self.told, self.group, self.gap_m = told, group, gap_m
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (partial(type(self), group=self.group, gap_m=self.gap_m), (self.code, self.told))
 
 
 class InputFileError(PlanmarkError):

@@ -32,13 +32,17 @@ WHAT_IS_IN_LINE = {
 
 
 def reason(mechanism: Mechanism, broken: NDArray[np.bool_]) -> MechanismError:
-    """The error for the first of the broken variants, from the first group that fails there."""
+    """The error for the first of the broken variants, which says how many there are."""
     first = int(np.argmax(broken))
     where = f" ({int(broken.sum())} of {broken.size} variant(s), the first at index {first})"
-    if broken.size == 1:
-        where = ""
-    take = one_variant(first, _quiet)
+    return reason_at(mechanism, first, "" if broken.size == 1 else where)
+
+
+def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismError:
+    """The error for the variant at an index, from the first group that fails there."""
+    take = one_variant(index, _quiet)
     groups = mechanism.groups
+    driven = "crank angle" if isinstance(mechanism.driver, Crank) else "displacement of the driven slider"
     with np.errstate(all="ignore"):
         for count, group in enumerate(groups):
             before = solve(replace(mechanism, groups=groups[:count]), take)
@@ -51,41 +55,36 @@ def reason(mechanism: Mechanism, broken: NDArray[np.bool_]) -> MechanismError:
                 gap, reach = _gap(group, before), max(abs(one.position) for one in before.joints.values())
                 # A gap of rounding alone: the group is flat, and its data say so as well as they can.
                 if gap > ROUNDING * reach:
-                    return _open(group, gap, where, _driven(mechanism))
-                return _singular(group, where, _driven(mechanism))
+                    return _open(group, gap, where, driven)
+                return _singular(group, where, driven)
             if not np.isfinite(node.amplification * np.abs(node.acceleration + node.velocity)):
                 break
         else:
             group = min(groups, key=lambda one: float(after.transmission.get(one.node, 1.0)))
-    return _singular(group, where, _driven(mechanism))
-
-
-def _driven(mechanism: Mechanism) -> str:
-    """What places the driven link."""
-    return "crank angle" if isinstance(mechanism.driver, Crank) else "displacement of the driven slider"
+    return _singular(group, where, driven)
 
 
 def _quiet(number: complex) -> np.generic:
     """NumPy's own scalar: it divides by zero without an error."""
-    one: np.generic = np.asarray(number)[()]  # type: ignore[assignment]
-    return one
+    scalar: np.generic = np.asarray(number)[()]  # type: ignore[assignment]
+    return scalar
 
 
 def _open(group: Group, gap_m: float, where: str, driven: str) -> MechanismError:
     return MechanismError(
         "does_not_assemble",
-        f"the group of {group.node} does not assemble: its links miss each other by {gap_m:.6g} m{where};"
+        f"the group of {group.node} does not assemble: its links miss each other by {{gap}}{where};"
         f" check the lengths, the {driven}, and the sides of the groups before it",
+        group=group.node,
+        gap_m=gap_m,
     )
 
 
 def _singular(group: Group, where: str, driven: str) -> MechanismError:
     advice = "give slot and guide two directions" if isinstance(group, Yoke) else f"choose another {driven}"
     why = WHAT_IS_IN_LINE.get(type(group), "its base has no length")
-    return MechanismError(
-        "singular",
-        f"the velocities of the group of {group.node} are not determined: {why}{where}; {advice}",
-    )
+    message = f"the velocities of the group of {group.node} are not determined: {why}{where}; {advice}"
+    return MechanismError("singular", message, group=group.node)
 
 
 def _gap(group: Group, before: Solution) -> float:

@@ -178,7 +178,7 @@ def _sorted(findings: Sequence[LintFinding]) -> tuple[LintFinding, ...]:
 
 
 def _row_of(broken: Broken) -> Row:
-    return Row(broken.variant, broken.message)
+    return Row(broken.variant, broken.error.message)
 
 
 def _rows(

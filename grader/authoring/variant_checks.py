@@ -1,6 +1,5 @@
 """Checks of single variants and of pairs: unsolvable ones, badly conditioned plans, equal drawings."""
 
-import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,15 +18,12 @@ from grader.authoring.findings import (
 from grader.authoring.round_scales import AskedVectors
 from grader.rubric import RubricFile
 from reference.assignment import Assignment, Variant
+from reference.errors import MechanismError
 from reference.geometry import FloatArray
 from reference.motion import move_where_possible
 from reference.plan import Plan, conditioning
-from reference.refusal import reason
+from reference.refusal import reason_at
 
-_GAP = re.compile(r"\bby ([0-9.]+(?:e[-+]?[0-9]+)?) m\b")
-_ABOUT_ARRAYS = re.compile(r" \(1 of \d+ variant\(s\), the first at index \d+\)")
-"""What a message says of how many variants of how many: here it is always one."""
-_GROUP = re.compile(r"the group of (\w+)")
 LEAST_TRANSMISSION = 0.25
 """|sin| of a transmission angle of about 15 degrees: below it, plans are hard to draw."""
 LEAST_CROSSING_DEG = 20.0
@@ -52,39 +48,28 @@ class Broken:
     """A variant that cannot be solved, and why."""
 
     variant: Variant
-    code: str
-    message: str
+    error: MechanismError
 
 
 def broken_variants(assignment: Assignment, variants: list[Variant]) -> list[Broken]:
     """The variants that do not assemble or are singular: all at once, the reason of each by itself."""
     mechanism = assignment.mechanism(variants)
     lost = ~np.isfinite(move_where_possible(mechanism).predicted_error)
-    found = []
-    for index in np.flatnonzero(lost):
-        error = reason(mechanism, np.arange(len(variants)) == index)
-        found.append(Broken(variants[index], error.code, _ABOUT_ARRAYS.sub("", error.message)))
-    return found
+    return [Broken(variants[index], reason_at(mechanism, int(index))) for index in np.flatnonzero(lost)]
 
 
 def broken_findings(assignment: Assignment, broken: Sequence[Broken]) -> Iterator[LintFinding]:
     """A fault for each group and reason, with all its variants and the range of the gaps."""
-    alike: dict[tuple[str, str], list[Broken]] = defaultdict(list)
-    for one in broken:
-        alike[one.code, _GAP.sub("by {}", one.message)].append(one)
-    for (code, _), ones in alike.items():
-        group = _GROUP.search(ones[0].message)
-        file, path = group_place(assignment, group.group(1) if group else None)
-        variants = tuple(one.variant for one in ones)
-        yield LintFinding("fault", code, file, path, _together([one.message for one in ones]), variants)
-
-
-def _together(messages: Sequence[str]) -> str:
-    """Messages that differ only in the gap as one, with the gap's range."""
-    gaps = [float(found.group(1)) for message in messages if (found := _GAP.search(message))]
-    if not gaps or max(gaps) == min(gaps):
-        return messages[0]
-    return _GAP.sub(f"by {min(gaps):.3g} to {max(gaps):.3g} m", messages[0], count=1)
+    by_reason: dict[str, list[Broken]] = defaultdict(list)
+    for variant in broken:
+        by_reason[variant.error.told].append(variant)
+    for told, variants in by_reason.items():
+        error = variants[0].error
+        gaps = sorted(variant.error.gap_m for variant in variants if variant.error.gap_m is not None)
+        same = not gaps or f"{gaps[0]:.6g}" == f"{gaps[-1]:.6g}"
+        message = error.message if same else told.replace("{gap}", f"{gaps[0]:.3g} to {gaps[-1]:.3g} m")
+        place = group_place(assignment, error.group)
+        yield LintFinding("fault", error.code, *place, message, tuple(one.variant for one in variants))
 
 
 # Conditioning: transmission angles, crossing angles, predicted error ------------------------------

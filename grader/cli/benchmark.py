@@ -19,8 +19,8 @@ import typer
 from rich.console import Console
 
 from grader.cli.progress import new_table, progress
-from grader.pipeline import Place, read, see
-from grader.records import Reading
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef, Reading
 from grader.roster import read_roster
 from grader.rubric import rubric_of
 from grader.samples_folder import samples_folder
@@ -191,12 +191,14 @@ def measure_reading(name: str, *, students: int | None = None) -> ReadingRow:
     for student, truths in list(_truths(folder).items())[:students]:
         row = roster.rows_of(student)[0]
         start = time.process_time()
-        seen = [see(Place(folder / truth["file"], truth["page"], truth["file"])) for truth in truths]
-        readings = read(seen, assignment, assignment.variant(row.n, row.position), row.scales, wanted)
+        scans = [
+            open_page(PageRef(truth["file"], truth["page"], path=folder / truth["file"])) for truth in truths
+        ]
+        read = read_pages(scans, assignment, assignment.variant(row.n, row.position), row.scales, wanted)
         seconds += time.process_time() - start
         pages += len(truths)
-        for truth, reading in zip(truths, readings, strict=True):
-            results += [result for result in vector_results(truth, reading) if result.name in wanted]
+        for truth, page in zip(truths, read, strict=True):
+            results += [result for result in vector_results(truth, page.reading) if result.name in wanted]
     believed = [result for result in results if result.confidence >= SURE]
     return ReadingRow(
         name,

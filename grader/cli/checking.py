@@ -82,12 +82,13 @@ def _write_page(
     """The same as a page, with the plans drawn as measured."""
     from grader.feedback.pages import About, feedback_page
     from grader.files import write_whole
-    from grader.pipeline import Work, mark_looked
+    from grader.measurements import StudentSubmission
+    from grader.pipeline import mark
 
-    work = Work(entered.student_id or "", variant, measured=entered, lang=lang)
-    marked = mark_looked(work, assignment, rubric, (), level)
+    submission = StudentSubmission(entered.student_id or "", variant, measured=entered, lang=lang)
+    report, pictures = mark(submission, (), assignment, rubric, level)
     about = About(assignment.file.title.in_language(lang), "", assignment.file.names)
-    write_whole(page, feedback_page(marked.report, marked.pictures, lang, level, about))
+    write_whole(page, feedback_page(report, pictures, lang, level, about))
 
 
 def _variant(assignment: Assignment, entered: Measurements, n: int | None, position: int | None) -> Variant:

@@ -79,7 +79,9 @@ def _sound(assignment: Assignment) -> list[Variant]:
     broken = broken_variants(assignment, variants)
     without = {one.variant for one in broken}
     if len(without) == len(variants):
-        raise MechanismError(broken[0].code, f"no variant can be solved; {variants[0]}: {broken[0].message}")
+        error = broken[0].error
+        told = f"no variant can be solved; {variants[0]}: {error.told}"
+        raise MechanismError(error.code, told, group=error.group, gap_m=error.gap_m)
     for finding in broken_findings(assignment, broken):
         typer.secho(f"left out: {finding}", err=True, fg="red")
     return [variant for variant in variants if variant not in without]

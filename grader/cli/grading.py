@@ -17,7 +17,9 @@ from grader.feedback.class_page import CAUSES, SIGNS
 from grader.feedback.statistics import waiting
 from grader.intake import count_pages
 from grader.moved import told_standing
-from grader.pipeline import Place, Seen, documents_of, read, see
+from grader.pipeline import open_page, read_pages
+from grader.reading_document import reading_document
+from grader.records import PageRef, ScannedPage
 from grader.rubric import rubric_of
 from grader.samples_folder import samples_folder
 from grader.workers import Limits, Workers, result_of
@@ -70,8 +72,8 @@ def read_scans(
     assignment = load_assignment(name)
     variant = _variant(assignment, n, position)
     with Workers(1, Limits(), __name__) as workers:
-        places = [place for path in scans for place in result_of(workers, _places, path)]
-        documents = result_of(workers, _read, places, assignment, variant, sheets=len(places))
+        refs = [ref for path in scans for ref in result_of(workers, _refs, path)]
+        documents = result_of(workers, _read, refs, assignment, variant, sheets=len(refs))
     if as_json:
         typer.echo(json.dumps([document.model_dump(mode="json") for document in documents], indent=2))
     else:
@@ -80,11 +82,16 @@ def read_scans(
     return any(not document.figures or document.unread or _doubtful(document) for document in documents)
 
 
-def _read(places: Sequence[Place], assignment: Assignment, variant: Variant | None) -> list[ReadingDocument]:
-    seen = [see(place) for place in places]
-    readings = read(seen, assignment, variant, {}, rubric_of(assignment).vectors)
-    documents = documents_of(seen, readings, None)
-    return [_identified(document, one) for document, one in zip(documents, seen, strict=True)]
+def _read(refs: Sequence[PageRef], assignment: Assignment, variant: Variant | None) -> list[ReadingDocument]:
+    pages = [open_page(ref) for ref in refs]
+    read = read_pages(pages, assignment, variant, {}, rubric_of(assignment).vectors)
+    return [reading_document(page, _student_of(page)) for page in read]
+
+
+def _student_of(page: ScannedPage) -> str | None:
+    """Whose printed sheet it is."""
+    identity = None if page.sheet is None else page.sheet.identity
+    return None if identity is None else identity.student_id
 
 
 def _variant(assignment: Assignment, n: int | None, position: int | None) -> Variant | None:
@@ -97,18 +104,14 @@ def _variant(assignment: Assignment, n: int | None, position: int | None) -> Var
     return assignment.variant(n, position)
 
 
-def _places(path: Path) -> list[Place]:
+def _refs(path: Path) -> list[PageRef]:
+    """A file's pages; of a file that cannot be opened the first, which will say why."""
     try:
-        return [Place(path, page, path.name) for page in range(1, count_pages(path) + 1)]
+        return [PageRef(path.name, page, path=path) for page in range(1, count_pages(path) + 1)]
     except InputFileError as error:
         if error.code == "file_missing":
             raise
-        return [Place(path, 1, path.name)]
-
-
-def _identified(document: ReadingDocument, one: Seen) -> ReadingDocument:
-    identity = None if one.sheet is None else one.sheet.identity
-    return document if identity is None else document.model_copy(update={"student_id": identity.student_id})
+        return [PageRef(path.name, path=path)]
 
 
 def _doubtful(document: ReadingDocument) -> bool:

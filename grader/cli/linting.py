@@ -61,7 +61,7 @@ def _variants_table(rows: Sequence[Row]) -> Table:
         "under\n8 mm",
         "fits\ntimes",
     )
-    table = new_table("variant", "assembles", *heads, left=("assembles",))
+    table = new_table("variant", "assembles", *figures, left=("assembles",))
     table.columns[0].no_wrap = True
     for group in _ranges(rows):
         broken = [row for row in group if row.problem]

@@ -2,7 +2,6 @@
 
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import typer
@@ -15,13 +14,11 @@ from grader.cli.app import check_language
 from grader.cli.progress import progress
 from grader.contact_sheet import Thumbnail, contact_sheet, thumbnail
 from grader.files import write_whole
-from grader.folder import submissions, told_name
-from grader.intake import page_of
+from grader.folder import submissions
+from grader.kept import PageCache
 from grader.matching import SURE, draft_csv, suggest
 from grader.measurements import names_of
-from grader.ownership import PageSource
-from grader.pipeline import Place, see
-from grader.records import FloatArray, Problem
+from grader.records import FloatArray, PageRef, Problem
 from grader.roster import read_roster
 from grader.rubric import rubric_of
 from grader.survey import survey_folder
@@ -93,24 +90,26 @@ def draft_matches(
         raise CallError("folder_missing", f"{folder}: there is no such folder")
     assignment, roster = load_assignment(name), read_roster(roster_file)
     paths = submissions(folder, roster_file, (out,))
-    files = {told_name(path, folder): path for path in paths}
     with (
         progress() as tell,
         tempfile.TemporaryDirectory() as notes,
         Workers(os.cpu_count() or 1, Limits(), __name__) as workers,
     ):
-        surveys = survey_folder(paths, folder, names_of(assignment), workers, tell, Path(notes))
-        sources = [source for found in surveys for source in found.pages]
+        cache = PageCache(Path(notes))
+        contents = survey_folder(paths, folder, names_of(assignment), workers, tell, cache)
+        sources = [page for content in contents for page in content.pages]
         draft = suggest(sources, roster, assignment, pages_per_student=pages_per_student)
         loose = [one.source for one in draft.suggestions if not one.sure]
-        strokes: dict[PageSource, FloatArray] = {}
-        for done, (index, ends) in enumerate(workers.run(_strokes, _calls(loose, files)), start=1):
+        strokes: dict[PageRef, FloatArray] = {}
+        for done, (index, ends) in enumerate(
+            workers.run(_strokes, [(cache, page) for page in loose]), start=1
+        ):
             if not isinstance(ends, Problem | None):
                 strokes[loose[index]] = ends
             tell("reading", done, len(loose))
         draft = suggest(sources, roster, assignment, look=strokes.get, pages_per_student=pages_per_student)
         shown = [one.source for one in draft.suggestions]
-        thumbnails = dict(workers.run(_thumbnail, _calls(shown, files)))
+        thumbnails = dict(workers.run(_thumbnail, [(cache, page) for page in shown]))
     entries = []
     for index, suggestion in enumerate(draft.suggestions):
         picture = thumbnails[index]
@@ -129,20 +128,14 @@ def draft_matches(
     return open_ends > 0
 
 
-def _calls(sources: Sequence[PageSource], files: Mapping[str, Path]) -> list[tuple[Place]]:
-    return [
-        (Place(files[source.file], source.page, source.file, source.digest, source.problem),)
-        for source in sources
-    ]
-
-
-def _strokes(place: Place) -> FloatArray | None:
+def _strokes(cache: PageCache, ref: PageRef) -> FloatArray | None:
     """(n, 2, 2) strokes drawn on a page, sheet millimetres; None where there are none to be had."""
-    ink = see(place).ink
+    ink = cache.page(ref).ink
     return None if ink is None else ink.strokes.ends
 
 
-def _thumbnail(place: Place) -> Thumbnail:
-    if place.problem is not None:
-        raise InputFileError(place.problem.code, place.problem.message)
-    return thumbnail(page_of(place.path, place.page).grey)
+def _thumbnail(cache: PageCache, ref: PageRef) -> Thumbnail:
+    page = cache.page(ref)
+    if page.backdrop is None:
+        raise InputFileError(page.problems[0].code, page.problems[0].message)
+    return thumbnail(page.backdrop.scan)

@@ -7,6 +7,7 @@ What cannot be used raises `InputFileError` with a stable code and a message for
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -15,10 +16,10 @@ import numpy as np
 from grader.intake import jpeg, pdf, png, tiff
 from grader.intake.limits import Door, InputFile, changed, kind_of, load
 from grader.pixels import shrink
-from grader.records import Page
+from grader.records import Page, PageRef
 from reference.errors import InputFileError
 
-__all__ = ["InputFile", "changed", "count_pages", "is_blank", "load", "page_of", "pages_of"]
+__all__ = ["InputFile", "count_pages", "decode", "is_blank", "load", "page_of", "pages_of"]
 
 _DOORS: dict[str, Door] = {"jpeg": jpeg.DOOR, "png": png.DOOR, "tiff": tiff.DOOR, "pdf": pdf.DOOR}
 _LONG_SIDE_PX = 1700
@@ -58,6 +59,14 @@ def page_of(source: InputFile | Path | str, number: int) -> Page:
             "page_missing", f"{file.name}: there is no page {number}; it has {count_pages(file)}"
         )
     return page
+
+
+def decode(ref: PageRef) -> Page:
+    """The page's pixels. Raises as `pages_of`, and where the file is not what it was when it was listed."""
+    file = load(ref.path)
+    if ref.digest and ref.digest != file.digest:
+        raise changed(ref.file)
+    return replace(page_of(file, ref.page), source=ref.file)
 
 
 def count_pages(source: InputFile | Path | str) -> int:

@@ -16,7 +16,8 @@ from grader.sheet.markers import middles as marker_middles
 from grader.sheet.models import HALVES_ADVICE, looks_a4
 from grader.sheet.plain import register_plain
 
-__all__ = ["marker_middles", "rectify", "straighten", "whose"]
+__all__ = ["marker_middles", "rectify", "register", "straighten"]
+
 
 _LEAST_IN_PICTURE = 0.95
 """Share of the drawing area below which the picture shows a part of the sheet only."""
@@ -24,16 +25,27 @@ _BESIDE_MM = 3.0
 """A place so far beside the picture still counts: the map's own error, and a frame cut close."""
 
 
-def rectify(page: Page) -> Sheet | Unread:
-    """The page's map from millimetres to pixels, or, false in a condition, why there is none."""
-    sheet = markers.register(page) or register_plain(page)
+def register(page: Page) -> tuple[Sheet | Unread, Identity | None]:
+    """The page's map from millimetres to pixels, or why there is none; and whose page it is by its code.
+
+    A printed sheet's code is looked for in its place; elsewhere a quick look must do.
+    """
+    printed = markers.register(page)
+    identity = (None if printed is None else printed.identity) or identify(page)
+    sheet = printed or register_plain(page)
     if isinstance(sheet, Unread):
         hint = f"; the page is as large as A4, and {HALVES_ADVICE}" if looks_a4(page) else ""
-        return Unread(sheet.name, f"{sheet.reason}{hint}")
+        return Unread(sheet.name, f"{sheet.reason}{hint}"), identity
     share = _share_in_picture(page, sheet)
     if share < _LEAST_IN_PICTURE:
-        return Unread("sheet", f"only {100.0 * share:.0f} % of the sheet is in the picture; {HALVES_ADVICE}")
-    return sheet
+        reason = f"only {100.0 * share:.0f} % of the sheet is in the picture; {HALVES_ADVICE}"
+        return Unread("sheet", reason), identity
+    return sheet, identity
+
+
+def rectify(page: Page) -> Sheet | Unread:
+    """The page's map from millimetres to pixels, or, false in a condition, why there is none."""
+    return register(page)[0]
 
 
 def _share_in_picture(page: Page, sheet: Sheet) -> float:
@@ -43,12 +55,3 @@ def _share_in_picture(page: Page, sheet: Sheet) -> float:
     at = mapped(sheet.mm_to_px, mm)
     beside = _BESIDE_MM * sheet.px_per_mm
     return float(np.mean(np.all((at > -beside) & (at < page.grey.shape[::-1] + np.array(beside)), axis=-1)))
-
-
-def whose(page: Page) -> Identity | None:
-    """Whose page it is by its code: a quick look first, then one where a printed sheet has it."""
-    identity = identify(page)
-    if identity is not None:
-        return identity
-    sheet = markers.register(page)
-    return None if sheet is None else sheet.identity

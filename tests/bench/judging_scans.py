@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 
 from grader.judging import Submission, judge, task_of
-from grader.pipeline import Place, read, see
-from grader.records import Reading
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef, Reading
 from samples.simulation import Settings, SimulatedSheet, any_settings, simulate
 from samples.simulation.student import drawn_by
 from tests.bench.judging_assignments import assignment_named
@@ -81,5 +81,10 @@ def _settings(key: Key, seed: int, lot: np.random.Generator) -> Settings:
 def _read(work: Work, pages: Sequence[SimulatedSheet]) -> list[Reading]:
     with tempfile.TemporaryDirectory() as folder:
         paths = [page.save(Path(folder) / str(number)) for number, page in enumerate(pages)]
-        seen = [see(Place(path, 1, path.name)) for path in paths]
-        return read(seen, work.assignment, work.variant, texts(work.task.declared), work.rubric.vectors)
+        seen = [open_page(PageRef(path.name, path=path)) for path in paths]
+        return [
+            page.reading
+            for page in read_pages(
+                seen, work.assignment, work.variant, texts(work.task.declared), work.rubric.vectors
+            )
+        ]

@@ -27,7 +27,8 @@ import numpy as np
 
 from grader.answer_sheet.sheets import make_sheets
 from grader.authoring.lint import lint
-from grader.pipeline import Place, read, see
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef
 from grader.roster import RosterRow
 from grader.rubric import load_rubric
 from reference.assignment import Assignment, Variant, load_assignment
@@ -128,8 +129,8 @@ def count(
     declared = {name: f"{value!r} {UNITS[name]}" for name, value in told.items()}
     with tempfile.TemporaryDirectory() as folder:
         paths = [sheet.save(Path(folder) / f"s{index}") for index, sheet in enumerate(sheets)]
-        seen = [see(Place(path, 1, path.name)) for path in paths]
-    readings = read(seen, assignment, variant, declared, rubric.vectors)
+        seen = [open_page(PageRef(path.name, path=path)) for path in paths]
+    readings = [page.reading for page in read_pages(seen, assignment, variant, declared, rubric.vectors)]
     whole = True
     for sheet, reading in zip(sheets, readings, strict=True):
         for name, figure in sheet.truth["figures"].items():

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import cv2
 
-from grader.pipeline import Place, Seen, read, see
-from grader.records import Reading
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef, ScannedPage
 from reference.derivation import construction_of
 from tests.bench.lines import LinesFigures, measure_lines
 from tests.bench.reading_foreign import BREAKDOWNS, ForeignRow, measure_foreign
@@ -81,22 +81,22 @@ def measure_scene(scene: Scene, students: int, first_seed: int = 1, *, memory: b
 
 def _read_one(tally: Tally, work: Work, paths: Sequence[Path]) -> None:
     start, clock = time.process_time(), time.perf_counter()
-    seen = [see(Place(path, 1, path.name)) for path in paths]
-    readings, failed = read_all(seen, work)
+    scans = [open_page(PageRef(path.name, path=path)) for path in paths]
+    pages, failed = read_all(scans, work)
     spent, passed = time.process_time() - start, time.perf_counter() - clock
     construction = construction_of(work.assignment.mechanism([work.variant]))
     tally.students += 1
     tally.failed += failed
-    for sheet, page, reading in zip(work.sheets, seen, readings, strict=True):
-        tally.add_times(page.timing_ms, spent / passed, 1000.0 * spent / len(seen))
+    for sheet, page in zip(work.sheets, pages, strict=True):
+        tally.add_times(page.timing_ms, spent / passed, 1000.0 * spent / len(pages))
         figures = figures_of(sheet.truth, construction)
-        tally.add_sheet(sheet.truth, figures, work.rubric.vectors, page, reading)
+        tally.add_sheet(sheet.truth, figures, work.rubric.vectors, page, page.reading)
 
 
-def read_all(seen: Sequence[Seen], work: Work) -> tuple[list[Reading], bool]:
-    """What is read on a student's pages; nothing, and True, where the reader breaks down."""
+def read_all(pages: Sequence[ScannedPage], work: Work) -> tuple[list[ScannedPage], bool]:
+    """A student's pages with what is read on them; nothing, and True, where the reader breaks down."""
     try:
         wanted = work.rubric.vectors
-        return read(seen, work.assignment, work.variant, work.declared, wanted), False
+        return read_pages(pages, work.assignment, work.variant, work.declared, wanted), False
     except BREAKDOWNS:
-        return [Reading({}) for _ in seen], True
+        return list(pages), True

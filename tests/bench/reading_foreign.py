@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from grader.pipeline import Place, Seen, read, see
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef, ScannedPage
 from samples.simulation import Scan, Settings, SimulatedSheet, any_settings, simulate
 from samples.simulation.lettering import any_handwriting
 from samples.simulation.page import FRAMES_MM, draw_frame, print_squares
@@ -80,7 +81,7 @@ def _row(kind: str, pages: Sequence[tuple[SimulatedSheet, Sequence[str]]]) -> Fo
     with tempfile.TemporaryDirectory() as folder:
         for number, (sheet, names) in enumerate(pages):
             path = sheet.save(Path(folder) / f"{number}")
-            seen = see(Place(path, 1, path.name))
+            seen = open_page(PageRef(path.name, path=path))
             for name in names:
                 row = _counted(row, _confidences(seen, name, number))
     return row
@@ -95,12 +96,14 @@ def _counted(row: ForeignRow, found: Sequence[float] | None) -> ForeignRow:
     )  # fmt: skip
 
 
-def _confidences(seen: Seen, name: str, number: int) -> list[float] | None:
+def _confidences(seen: ScannedPage, name: str, number: int) -> list[float] | None:
     """Of everything that is reported of a page when it is read as some student's of an assignment."""
     assignment, rubric = task_named(name)
     variants = assignment.variants()
     try:
-        reading = read([seen], assignment, variants[number % len(variants)], {}, rubric.vectors)[0]
+        reading = read_pages([seen], assignment, variants[number % len(variants)], {}, rubric.vectors)[
+            0
+        ].reading
     except BREAKDOWNS:
         return None
     return [one.confidence for figure in reading.figures.values() for one in figure.vectors.values()]

@@ -11,7 +11,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from grader.pipeline import Place, read, see
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef
 from grader.rubric import load_rubric
 from reference.assignment import Variant, load_assignment
 
@@ -38,7 +39,7 @@ def main(name: str, n: str, position: str, *files: str) -> None:
     assignment = load_assignment(name)
     variant = Variant(*(None if told == "-" else int(told) for told in (n, position)))
     wanted = load_rubric(assignment.file.rubric, beside=assignment.path).vectors
-    read([see(Place(Path(file), 1, file)) for file in files], assignment, variant, {}, wanted)
+    read_pages([open_page(PageRef(file, path=Path(file))) for file in files], assignment, variant, {}, wanted)
     sys.stdout.write(f"{_own_peak_mb():.1f}")
 
 

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from grader.pipeline import Seen
-from grader.records import Figure, Reading
+from grader.records import Figure, Reading, ScannedPage
 from tests.bench.honesty import Honesty, Spread, calibration, whitened
 from tests.bench.reading_places import OnPaper
 from tests.bench.reading_truth import SURE, Judged, TrueFigure, each_vector
@@ -52,17 +51,17 @@ class Tally:
 
     def add_sheet(
         self, truth: Mapping[str, Any], figures: Mapping[str, TrueFigure], wanted: Sequence[str],
-        seen: Seen, reading: Reading,
+        seen: ScannedPage, reading: Reading,
     ) -> None:  # fmt: skip
         """One page with what was read on it."""
         self.judged.append(list(each_vector(figures, wanted, reading.figures)))
-        if seen.sheet is None or seen.page is None:
+        if seen.sheet is None or seen.image is None:
             self.refused += 1
             return
         turn = (seen.sheet.rotation_deg - truth["rotation_deg"] + 180.0) % 360.0 - 180.0
         self.turned += abs(turn) > UPRIGHT_DEG
         self.off_scale += abs(seen.sheet.px_per_mm / truth["px_per_mm"] - 1.0) > SCALE_SHARE
-        on_paper = OnPaper(truth, seen.sheet, seen.page.grey.shape)
+        on_paper = OnPaper(truth, seen.sheet, seen.image.grey.shape)
         for name, drawn in truth["figures"].items():
             found = reading.figures.get(name)
             if found is not None:

@@ -17,7 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from grader.pipeline import Place, read, see
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef
 from grader.roster import read_roster
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
@@ -71,8 +72,9 @@ def measure(folder: Path, name: str, tally: Tally) -> None:
     for student, sheets in truths(folder).items():
         row = roster.rows_of(student)[0]
         start = time.perf_counter()
-        seen = [see(Place(folder / t["class_file"], t["page"], t["class_file"])) for t in sheets]
-        readings = read(seen, assignment, assignment.variant(row.n, row.position), row.scales, wanted)
+        seen = [open_page(PageRef(t["class_file"], t["page"], path=folder / t["class_file"])) for t in sheets]
+        variant = assignment.variant(row.n, row.position)
+        readings = [page.reading for page in read_pages(seen, assignment, variant, row.scales, wanted)]
         tally.seconds.append((time.perf_counter() - start) / len(sheets))
         for truth, reading in zip(sheets, readings, strict=True):
             right = [

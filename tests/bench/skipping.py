@@ -16,8 +16,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from grader import pipeline
-from grader.answer_sheet.sheets import make_sheets
+from grader import batch
+from grader.answer_sheet.sheets import Asked, make_sheets
 from grader.batch import Batch, grade
 from grader.roster import RosterRow
 from grader.rubric import load_rubric
@@ -75,12 +75,12 @@ def shares(one: list, other: list) -> str:
 
 def without_narrowing(run):
     """Run with every zone looked at and everything read, whatever the rubric asks for."""
-    usual = pipeline.asked_of
-    pipeline.asked_of = lambda *_: (frozenset(), ())
+    usual = batch.asked_of
+    batch.asked_of = lambda *_: Asked()
     try:
         return run()
     finally:
-        pipeline.asked_of = usual
+        batch.asked_of = usual
 
 
 def main() -> None:

@@ -28,8 +28,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from grader.pipeline import Place, Seen, read, see
-from grader.records import Figure, Reading
+from grader.pipeline import open_page, read_pages
+from grader.records import Figure, PageRef, Reading, ScannedPage
 from grader.roster import read_roster
 from grader.rubric import load_rubric
 from reference.assignment import Assignment, Variant, load_assignment
@@ -63,7 +63,7 @@ class Student:
     declared: dict[str, str]
     wanted: tuple[str, ...]
     truths: list[dict[str, Any]]
-    places: list[Place]
+    places: list[PageRef]
 
 
 def simulated(scene: str, students: int, first: int, folder: Path) -> Iterator[Student]:
@@ -72,7 +72,7 @@ def simulated(scene: str, students: int, first: int, folder: Path) -> Iterator[S
         paths = [sheet.save(folder / f"{name}_{number}") for number, sheet in enumerate(work.sheets, 1)]
         yield Student(
             name, work.assignment, work.variant, work.declared, work.rubric.vectors,
-            [sheet.truth for sheet in work.sheets], [Place(path, 1, path.name) for path in paths],
+            [sheet.truth for sheet in work.sheets], [PageRef(path.name, path=path) for path in paths],
         )  # fmt: skip
 
 
@@ -86,7 +86,7 @@ def from_folder(folder: Path, students: int | None) -> Iterator[Student]:
         assignment = load_assignment(own[0]["assignment"])
         row = roster.rows_of(student)[0]
         wanted = load_rubric(assignment.file.rubric, beside=assignment.path).vectors
-        places = [Place(folder / t["class_file"], t["page"], t["class_file"]) for t in own]
+        places = [PageRef(t["class_file"], t["page"], path=folder / t["class_file"]) for t in own]
         variant = assignment.variant(row.n, row.position)
         yield Student(f"{folder.name}-{student}", assignment, variant, dict(row.scales), wanted, own, places)
 
@@ -150,11 +150,11 @@ def is_off(figure: TrueFigure, found: Figure | None, on_paper: OnPaper) -> bool:
     return bool((np.abs(read - true) > NEAR_NODE_MM).mean() > 0.5)
 
 
-def paper_of(truth: dict[str, Any], seen: Seen) -> OnPaper | None:
+def paper_of(truth: dict[str, Any], seen: ScannedPage) -> OnPaper | None:
     """Where things lie on the paper; None where the page was refused."""
-    if seen.sheet is None or seen.page is None or seen.ink is None:
+    if seen.sheet is None or seen.image is None or seen.ink is None:
         return None
-    return OnPaper(truth, seen.sheet, seen.page.grey.shape)
+    return OnPaper(truth, seen.sheet, seen.image.grey.shape)
 
 
 def fault_of(on_paper: OnPaper) -> str:
@@ -168,14 +168,16 @@ def fault_of(on_paper: OnPaper) -> str:
     )
 
 
-def sheet_fault(seen: Seen, on_paper: OnPaper | None) -> str:
+def sheet_fault(seen: ScannedPage, on_paper: OnPaper | None) -> str:
     """Why the page's millimetres cannot be used; empty where they can."""
     if on_paper is not None:
         return fault_of(on_paper)
     return "; ".join(problem.message for problem in seen.problems) or "no sheet"
 
 
-def misses_of(student: Student, seen: Seen, reading: Reading, truth: dict[str, Any]) -> Iterator[tuple]:
+def misses_of(
+    student: Student, seen: ScannedPage, reading: Reading, truth: dict[str, Any]
+) -> Iterator[tuple]:
     """Every asked vector of a page: how it fared, and the miss, if it is one."""
     construction = construction_of(student.assignment.mechanism([student.variant]))
     on_paper = paper_of(truth, seen)
@@ -205,9 +207,9 @@ def misses_of(student: Student, seen: Seen, reading: Reading, truth: dict[str, A
 # Pictures -----------------------------------------------------------------------------------------------
 
 
-def close_up(miss: Miss, seen: Seen, truth: dict[str, Any], path: Path) -> None:
+def close_up(miss: Miss, seen: ScannedPage, truth: dict[str, Any], path: Path) -> None:
     """The miss as a whole, and below it the surroundings of its two ends."""
-    on_paper = OnPaper(truth, seen.sheet, seen.page.grey.shape)
+    on_paper = OnPaper(truth, seen.sheet, seen.image.grey.shape)
     segments = [*filter(None, (miss.judged.true.ends, miss.judged.true.stroke, miss.read))]
     places = on_paper.back(np.array(segments).ravel())
     low = complex(places.real.min(), places.imag.min()) - complex(CLOSE_UP_MM, CLOSE_UP_MM)
@@ -222,13 +224,15 @@ def close_up(miss: Miss, seen: Seen, truth: dict[str, Any], path: Path) -> None:
     cv2.imwrite(str(path), np.vstack(padded))
 
 
-def panel(miss: Miss, seen: Seen, on_paper: OnPaper, box: tuple[complex, complex, float]) -> np.ndarray:
+def panel(
+    miss: Miss, seen: ScannedPage, on_paper: OnPaper, box: tuple[complex, complex, float]
+) -> np.ndarray:
     """A box of the sheet (low and high corner as read, px/mm) with truth, reading and found strokes."""
     low, high, scale = box
     size = round((high - low).real * scale), round((high - low).imag * scale)
     window = np.array([[1 / scale, 0, low.real], [0, 1 / scale, -high.imag], [0, 0, 1.0]])
     warp, flags = on_paper.sheet.mm_to_px @ window, cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    grey = cv2.warpPerspective(seen.page.grey, warp, size, flags=flags, borderValue=255)
+    grey = cv2.warpPerspective(seen.image.grey, warp, size, flags=flags, borderValue=255)
     canvas = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
 
     def line(ends, colour, thick) -> None:
@@ -256,8 +260,9 @@ def look_at(title: str, students: Iterator[Student], pictures: Path | None, *, t
     counts: dict[str, Counter[str]] = {"long": Counter(), "short": Counter()}
     sheets = Counter()
     for student in students:
-        seen = [see(place) for place in student.places]
-        readings = read(seen, student.assignment, student.variant, student.declared, student.wanted)
+        seen = [open_page(place) for place in student.places]
+        seen = read_pages(seen, student.assignment, student.variant, student.declared, student.wanted)
+        readings = [page.reading for page in seen]
         for page, reading, truth in zip(seen, readings, student.truths, strict=True):
             right = True
             fault = sheet_fault(page, paper_of(truth, page))

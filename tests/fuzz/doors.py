@@ -24,7 +24,7 @@ from grader.measurements import names_of, read_measurements
 from grader.records import Problem
 from grader.roster import read_roster
 from grader.rubric import load_rubric
-from grader.sheet import whose
+from grader.sheet import register
 from grader.workers import Limits, Workers
 from reference.assignment import load_assignment
 from reference.errors import PlanmarkError
@@ -86,7 +86,7 @@ def _pictures(path: Path) -> str:
             answers.append(error.code)
             continue
         answers.append("blank" if is_blank(page) else "drawn")
-        whose(page)
+        register(page)
     return " ".join(answers)
 
 

@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.ownership import PageSource, assign_pages
-from grader.records import Identity
+from grader.ownership import assign_pages
+from grader.records import Identity, PageRef
 from grader.roster import Roster, RosterRow, ScanRef
 
 STUDENTS = ("s1", "s2", "s_3", "s")
@@ -44,7 +44,7 @@ def folders(draw):
         count = draw(st.integers(1, 5))
         for number in range(1, count + 1):
             identity = draw(st.none() | st.none() | identities)
-            pages.append(PageSource(file, number, count, draw(st.booleans()), identity))
+            pages.append(PageRef(file, number, count, draw(st.booleans()), identity))
     return pages
 
 

@@ -14,7 +14,8 @@ import pytest
 
 from grader.intake import is_blank, page_of
 from grader.measurements import names_of, read_measurements
-from grader.pipeline import Place, read, see
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef
 from grader.roster import read_roster
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment
@@ -99,7 +100,8 @@ def marks(name, student):
     folder, assignment = SAMPLES / name, load_assignment(name)
     row = read_roster(folder / "roster.csv").rows_of(student)[0]
     truths = truths_of(name)[student]
-    seen = [see(Place(folder / truth["file"], truth["page"], truth["file"])) for truth in truths]
+    seen = [open_page(PageRef(truth["file"], truth["page"], path=folder / truth["file"])) for truth in truths]
     wanted = load_rubric(assignment.file.rubric).vectors
-    readings = read(seen, assignment, assignment.variant(row.n, row.position), row.scales, wanted)
+    variant = assignment.variant(row.n, row.position)
+    readings = [page.reading for page in read_pages(seen, assignment, variant, row.scales, wanted)]
     return counted(truths, readings)

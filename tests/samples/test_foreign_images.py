@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.pipeline import Place, read, see
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef
 from tests.bench import reading_foreign
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "real"
@@ -14,16 +15,16 @@ IMAGES = sorted(path for path in REAL.rglob("*") if path.suffix in {".jpg", ".pn
 @pytest.mark.skipif(not IMAGES, reason="the real images are not here")
 @pytest.mark.parametrize("path", IMAGES, ids=lambda path: path.name)
 def test_a_foreign_image_is_refused_with_a_reason(path):
-    seen = see(Place(path, 1, path.name))
+    seen = open_page(PageRef(path.name, path=path))
     assert seen.sheet is None
     assert seen.problems
 
 
 def test_a_page_of_text_is_read_as_nothing(tmp_path):
     path = reading_foreign._page(reading_foreign._text, seed=700).save(tmp_path / "text")
-    seen = see(Place(path, 1, path.name))
+    seen = open_page(PageRef(path.name, path=path))
     for name in reading_foreign.READ_AS:
         assignment, rubric = reading_foreign.task_named(name)
-        reading = read([seen], assignment, assignment.variants()[0], {}, rubric.vectors)[0]
+        reading = read_pages([seen], assignment, assignment.variants()[0], {}, rubric.vectors)[0].reading
         sure = [one.confidence for figure in reading.figures.values() for one in figure.vectors.values()]
         assert max(sure, default=0.0) < 0.5

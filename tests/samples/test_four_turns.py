@@ -16,7 +16,8 @@ import pytest
 from PIL import Image
 
 from grader.answer_sheet.sheets import make_sheets
-from grader.pipeline import Place, read, see
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef
 from grader.roster import RosterRow
 from grader.rubric import rubric_of
 from reference.assignment import load_assignment
@@ -65,8 +66,10 @@ def reading_of(kind, turns, folder):
     stored = Image.fromarray(np.ascontiguousarray(np.rot90(grey, turns)))
     stored.save(path, compress_level=1, **({} if dpi is None else {"dpi": (dpi, dpi)}))
     assignment = load_assignment("pump")
-    seen = see(Place(path, 1, path.name))
-    return seen, read([seen], assignment, assignment.variant(N), {}, rubric_of(assignment).vectors)[0]
+    seen = open_page(PageRef(path.name, path=path))
+    return seen, read_pages([seen], assignment, assignment.variant(N), {}, rubric_of(assignment).vectors)[
+        0
+    ].reading
 
 
 def nodes_of(reading):

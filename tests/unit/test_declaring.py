@@ -3,8 +3,9 @@
 import pytest
 
 from grader.comparison import task_of
-from grader.declaring import BEYOND_DOUBT, SURE, declarations, sure_texts
+from grader.declaring import BEYOND_DOUBT, declarations
 from grader.declaring import LIKELY as LEAST
+from grader.quantities import SURE, sure_texts
 from grader.records import Reading, Written
 from grader.rubric import load_rubric
 from reference.assignment import load_assignment

@@ -18,8 +18,9 @@ from torch import nn
 from torch.nn import functional
 
 from grader.ink.tips import BEYOND_MM, CELL, HALF, KINDS, LEAST_MM, STEP_MM, strip_of
-from grader.pipeline import Place, see
+from grader.pipeline import open_page
 from grader.pixels import flatten
+from grader.records import PageRef
 from reference.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 
@@ -73,14 +74,14 @@ def draw(folder: Path, seed: int) -> None:
         return
     for number, sheet in enumerate(sheets):
         with tempfile.TemporaryDirectory() as place:
-            seen = see(Place(sheet.save(Path(place) / "sheet"), 1, "sheet"))
-        if seen.ink is None or seen.page is None or seen.sheet is None:
+            seen = open_page(PageRef("sheet", path=sheet.save(Path(place) / "sheet")))
+        if seen.ink is None or seen.image is None or seen.sheet is None:
             continue
         strokes = seen.ink.strokes
         long = np.hypot(*(strokes.ends[:, 1] - strokes.ends[:, 0]).T) >= LEAST_MM
         ends, dark = strokes.ends[long], strokes.darkness[long]
         vectors, links = _drawn(sheet.truth["figures"])
-        strip = strip_of(flatten(seen.page.grey), ends, dark, seen.sheet.mm_to_px)
+        strip = strip_of(flatten(seen.image.grey), ends, dark, seen.sheet.mm_to_px)
         kept = [
             (
                 np.rint(strip.ink[:, strip.band == row] * 100.0).astype(np.uint8),

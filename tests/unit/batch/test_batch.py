@@ -4,7 +4,7 @@ import pytest
 
 from grader.batch import Batch, folders_of, grade, needs_person
 from grader.files import OutputError
-from grader.pipeline import Work
+from grader.measurements import StudentSubmission
 from grader.plan_document import plan_document
 from grader.rubric import load_rubric
 from reference.assignment import Variant, load_assignment
@@ -126,5 +126,6 @@ def test_results_that_cannot_be_written_are_told_before_anything_is_marked(class
 
 
 def test_several_positions_have_a_folder_each():
-    works = [Work("a", Variant(position=1)), Work("a", Variant(position=2)), Work("b", Variant(position=1))]
-    assert folders_of(works) == ["a/1", "a/2", "b"]
+    handed_in = [("a", 1), ("a", 2), ("b", 1)]
+    submissions = [StudentSubmission(student, Variant(position=position)) for student, position in handed_in]
+    assert folders_of(submissions) == ["a/1", "a/2", "b"]

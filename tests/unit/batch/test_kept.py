@@ -1,22 +1,50 @@
 import json
+import shutil
+import zlib
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+import grader
 from grader import batch as batch_module
 from grader import jobs as jobs_module
 from grader import kept as kept_module
-from grader import survey as survey_module
+from grader import pipeline
 from grader.batch import Batch, InterruptedRunError, grade
-from grader.kept import digest_of, keep_looked, keep_maps, kept_looked, kept_maps, packed, unpacked
+from grader.kept import (
+    MARK_STAGE,
+    READ_STAGE,
+    SCAN_STAGE,
+    PageCache,
+    digest_of,
+    dumped,
+    keep_reading,
+    kept_maps,
+    kept_reading,
+    loaded,
+    stage_digest,
+)
 from grader.moved import told_standing
 from grader.picture import backdrop
-from grader.pipeline import Looked, Place, Seen, Work, documents_of
 from grader.plan_document import plan_document
-from grader.records import Figure, Page, Problem, Reading, ReadNode, ReadVector, Swapped, Unread
+from grader.records import (
+    Figure,
+    Page,
+    PageRef,
+    Problem,
+    Reading,
+    ReadNode,
+    ReadVector,
+    ScannedPage,
+    Sheet,
+    Swapped,
+    Unread,
+)
 from grader.rubric import load_rubric
+from grader.samples_folder import samples_folder
 from grader.similarity import CELLS
 from reference.assignment import Variant, load_assignment
 from reference.plan import exact_plan
@@ -42,27 +70,26 @@ def drawn_exactly(n, off_mm=0.0):
 
 
 class Reader:
-    """Stands for reading scans, and knows whose it has read."""
+    """Stands for the naming of what scans show, and knows whose it has named."""
 
     def __init__(self, off_mm=4.0):
         self.read, self.off_mm = [], off_mm
 
-    def __call__(self, work, _assignment, _rubric):
-        self.read.append(work.student_id)
-        looked = []
-        for place in work.pages:
-            reading = drawn_exactly(work.variant.n, off_mm=self.off_mm)
-            page = Page(place.name, place.page, np.full((60, 80), 255, np.uint8))
-            (document,) = documents_of([Seen(place, page)], [reading], work.student_id)
-            problems = (Problem("told", "something", place.name),)
-            looked.append(Looked(document, reading, problems, backdrop(page, None)))
-        return tuple(looked)
+    def __call__(self, submission, pages, _assignment, _asked):
+        self.read.append(submission.student_id)
+        reading = drawn_exactly(submission.variant.n, off_mm=self.off_mm)
+        return [
+            replace(
+                page, reading=reading, problems=(Problem("told", "something", page.ref.file),), timing_ms={}
+            )
+            for page in pages
+        ]
 
 
 @pytest.fixture
 def reader(monkeypatch):
     found = Reader()
-    monkeypatch.setattr(batch_module, "look", found)
+    monkeypatch.setattr(batch_module, "read_submission", found)
     return found
 
 
@@ -154,20 +181,30 @@ def test_a_file_with_other_content_is_read_again_and_one_only_touched_is_not(cla
 
 
 @pytest.mark.usefixtures("reader")
-def test_pages_are_surveyed_once(class_folder, tmp_path, monkeypatch):
-    seen = []
-
-    def noted(path, source, look_at=survey_module.look_at):
-        seen.append(source.file)
-        return look_at(path, source)
-
-    monkeypatch.setattr(survey_module, "look_at", noted)
+def test_each_page_is_decoded_registered_and_tested_for_blankness_once(class_folder, tmp_path, monkeypatch):
+    calls = []
+    for name in ("decode", "is_blank", "register"):
+        function = getattr(pipeline, name)
+        monkeypatch.setattr(
+            pipeline,
+            name,
+            lambda *given, name=name, function=function: calls.append(name) or function(*given),
+        )
     run(class_folder, tmp_path / "out")
-    assert seen == ["s1.png", "s2.png"]
+    assert calls == ["decode", "is_blank", "register"] * 2
+    calls.clear()
     scan(class_folder / "s2.png", 150)
     run(class_folder, tmp_path / "out", wider(RUBRIC))
-    assert seen == ["s1.png", "s2.png", "s2.png"]
-    assert len(list((tmp_path / "out" / ".planmark" / "surveys").iterdir())) == 2
+    assert calls == ["decode", "is_blank", "register"]
+    assert len(list((tmp_path / "out" / ".planmark" / "pages").glob("*.page"))) == 2
+
+
+@pytest.mark.usefixtures("reader")
+def test_a_page_under_another_name_is_not_told_under_the_old_one(class_folder, tmp_path):
+    run(class_folder, tmp_path / "out")
+    (class_folder / "s1.png").rename(class_folder / "s1_again.png")
+    (first, _) = run(class_folder, tmp_path / "out").reports
+    assert [sheet.source for sheet in first.reading.sheets] == ["s1_again.png"]
 
 
 def test_an_interrupted_run_goes_on_where_it_was(class_folder, tmp_path, reader):
@@ -183,28 +220,24 @@ def test_an_interrupted_run_goes_on_where_it_was(class_folder, tmp_path, reader)
     assert results.reports == run(class_folder, tmp_path / "other").reports
 
 
-@pytest.mark.parametrize("damage", [b"", b"{", b'{"key": 1}', b"[]"])
+@pytest.mark.parametrize(
+    "damage",
+    [b"", b"{", b"[]", zlib.compress(b"[]"), dumped([1, 2]), dumped(["", "", [3]]), dumped({})],
+)
 def test_notes_that_are_damaged_are_not_relied_on(class_folder, tmp_path, reader, damage):
     first = run(class_folder, tmp_path / "out")
-    for note in (tmp_path / "out" / ".planmark").rglob("*.json"):
-        note.write_bytes(damage)
+    for note in (tmp_path / "out" / ".planmark").rglob("*.*"):
+        if note.suffix in {".json", ".page", ".ref", ".reading"}:
+            note.write_bytes(damage)
     (tmp_path / "out" / "s1" / "feedback.html").unlink()
     reader.read.clear()
     assert run(class_folder, tmp_path / "out").reports == first.reports
     assert reader.read == ["s1"]
 
 
-def test_another_version_of_the_program_reads_again(class_folder, tmp_path, reader, monkeypatch):
-    run(class_folder, tmp_path / "out")
-    reader.read.clear()
-    monkeypatch.setattr(kept_module, "code_version", lambda: "another")
-    run(class_folder, tmp_path / "out")
-    assert sorted(reader.read) == ["s1", "s2"]
-
-
 def test_records_come_back_as_they_were():
     reading = drawn_exactly(4)
-    back = unpacked(json.loads(json.dumps(packed(reading))))
+    back = loaded(dumped(reading))
     assert back.unread == reading.unread
     assert back.figures["velocity_plan"].vectors == reading.figures["velocity_plan"].vectors
     node, kept = reading.figures["velocity_plan"].nodes["o"], back.figures["velocity_plan"].nodes["o"]
@@ -212,20 +245,113 @@ def test_records_come_back_as_they_were():
     assert np.array_equal(kept.cov, node.cov)
 
 
-def test_pictures_of_one_reading_are_never_found_beside_another(tmp_path, monkeypatch):
-    work = Work("s1", Variant(n=4), (Place(tmp_path / "s1.png", 1, "s1.png"),))
-    looked = Reader()(work, PUMP, RUBRIC)
-    keep_looked(tmp_path, "s1", "one", looked)
-    assert kept_looked(tmp_path, "s1", "one") is not None
-    assert kept_looked(tmp_path, "s1", "two") is None
+def test_a_scanned_page_comes_back_with_its_ink_to_the_last_digit(tmp_path):
+    sample = samples_folder() / "pump" / "s01_1.jpg"
+    ref = PageRef(sample.name, path=sample)
+    cache = PageCache(tmp_path)
+    now, then = cache.page(ref), cache.page(ref)
+    assert now.ink is not None
+    assert then is not now
+    assert dumped(then) == dumped(now)
+    assert then.ink.strokes.ends.dtype == now.ink.strokes.ends.dtype
+    assert cache.identified(ref) == now.ref
+
+
+def test_cells_that_moved_are_read_again_on_printed_sheets_alone(tmp_path):
+    plain = ScannedPage(PageRef("s1.png"))
+    sheet = Sheet(np.eye(3), (420.0, 297.0), "markers", 8.0, 0.0, 0.1, 0.002, (0.0, 0.0, 1.0, 1.0))
+    printed = replace(plain, sheet=replace(sheet, zones={"mechanism": (0.0, 0.0, 1.0, 1.0)}))
+    before, after = PageCache(tmp_path, printed_key="before"), PageCache(tmp_path, printed_key="after")
+    for page in (plain, printed):
+        keep_reading(
+            tmp_path, "s1", "key", [replace(page, ref=PageRef("s1", problem=Problem("a", "b")))], before
+        )
+        assert (kept_reading(tmp_path, "s1", "key", after) is None) == (page is printed)
+
+
+def test_a_reading_is_not_found_under_another_key_nor_half_written(tmp_path, monkeypatch):
+    pages = [ScannedPage(PageRef("s1.png", problem=Problem("told", "something")), reading=drawn_exactly(4))]
+    cache = PageCache(tmp_path)
+    keep_reading(tmp_path, "s1", "one", pages, cache)
+    assert kept_reading(tmp_path, "s1", "one", cache) is not None
+    assert kept_reading(tmp_path, "s1", "two", cache) is None
 
     def full_disk(*_):
         raise OSError("no room")
 
     monkeypatch.setattr(kept_module, "write_whole", full_disk)
     with pytest.raises(OSError, match="no room"):
-        keep_looked(tmp_path, "s1", "two", looked)
-    assert kept_looked(tmp_path, "s1", "one") is None
+        keep_reading(tmp_path, "s1", "two", pages, cache)
+    assert kept_reading(tmp_path, "s1", "two", cache) is None
+
+
+# What a stage depends on --------------------------------------------------------------------------
+
+STAGES = {"scan": SCAN_STAGE, "read": READ_STAGE, "mark": MARK_STAGE}
+TOP = Path(grader.__file__).parent.parent
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory):
+    """A copy of the program that may be changed."""
+    top = tmp_path_factory.mktemp("sources")
+    for package in ("grader", "reference"):
+        shutil.copytree(TOP / package, top / package, ignore=shutil.ignore_patterns("__pycache__", "samples"))
+    (top / "tests").mkdir()
+    (top / "tests" / "bench.py").write_text("")
+    return top
+
+
+@pytest.mark.parametrize(
+    ("file", "stale"),
+    [
+        ("grader/ink/tips.onnx", {"scan", "mark"}),
+        ("grader/data/letters.npz", {"scan", "mark"}),
+        ("grader/intake/jpeg.py", {"scan", "mark"}),
+        ("grader/records.py", {"scan", "read", "mark"}),
+        ("grader/pipeline.py", {"scan", "read", "mark"}),
+        ("grader/reading/plans.py", {"read", "mark"}),
+        ("grader/scoring/__init__.py", {"mark"}),
+        ("grader/feedback/templates/feedback.html", {"mark"}),
+        ("grader/locale/ro/LC_MESSAGES/planmark.mo", {"mark"}),
+        ("grader/cli/grading.py", set()),
+        ("tests/bench.py", set()),
+    ],
+)
+def test_what_a_change_makes_stale(sources, file, stale):
+    def digests():
+        stage_digest.cache_clear()
+        return {stage: stage_digest(modules, sources) for stage, modules in STAGES.items()}
+
+    before, path = digests(), sources / file
+    content = path.read_bytes()
+    path.write_bytes(content + b"\n# changed\n")
+    after = digests()
+    path.write_bytes(content)
+    assert {stage for stage in STAGES if after[stage] != before[stage]} == stale
+    assert digests() == before
+
+
+def test_every_module_that_the_order_of_work_calls_is_in_a_stage():
+    """The scan and the reading are all that `grader.pipeline` does before it marks."""
+    assert stage_digest(MARK_STAGE) != stage_digest(READ_STAGE)
+    modules = kept_module._closure([*SCAN_STAGE, *READ_STAGE], TOP)
+    for name in SCANS_AND_READS:
+        assert getattr(pipeline, name).__module__ in modules
+
+
+SCANS_AND_READS = (
+    "backdrop", "declared_scales", "decode", "find_ink", "find_letters", "is_blank",
+    "read_figures", "register", "straighten", "sure_texts", "written_lengths", "written_scales",
+)  # fmt: skip
+
+
+def test_another_version_of_the_program_reads_again(class_folder, tmp_path, reader, monkeypatch):
+    run(class_folder, tmp_path / "out")
+    reader.read.clear()
+    monkeypatch.setattr(batch_module, "READ_STAGE", (*READ_STAGE, "grader.cli"))
+    run(class_folder, tmp_path / "out")
+    assert sorted(reader.read) == ["s1", "s2"]
 
 
 # Regrading ----------------------------------------------------------------------------------------
@@ -308,15 +434,16 @@ def test_a_criterion_that_is_new_or_dropped_is_told_against_nothing(class_folder
 def test_a_new_scan_and_a_new_number_are_told_as_the_why(class_folder, tmp_path, monkeypatch):
     out = tmp_path / "out"
     run(class_folder, out)
-    monkeypatch.setattr(batch_module, "look", Reader(off_mm=0.0))
+    monkeypatch.setattr(batch_module, "read_submission", Reader(off_mm=0.0))
     scan(class_folder / "s2.png", 150)
     assert [(one.student_id, one.why) for one in run(class_folder, out).moved] == [("s2", ["submission"])]
     roster(class_folder, s1=5, s2=9)
-    monkeypatch.setattr(batch_module, "look", Reader(off_mm=0.0))
+    monkeypatch.setattr(batch_module, "read_submission", Reader(off_mm=0.0))
     assert [(one.student_id, one.why) for one in run(class_folder, out).moved] == [("s1", ["roster"])]
-    monkeypatch.setattr(kept_module, "code_version", lambda: "another")
-    monkeypatch.setattr(jobs_module, "code_version", lambda: "another")
-    monkeypatch.setattr(batch_module, "look", Reader(off_mm=4.0))
+    for module in (batch_module, jobs_module):
+        monkeypatch.setattr(module, "MARK_STAGE", (*MARK_STAGE, "grader.cli"))
+    monkeypatch.setattr(batch_module, "READ_STAGE", (*READ_STAGE, "grader.cli"))
+    monkeypatch.setattr(batch_module, "read_submission", Reader(off_mm=4.0))
     assert {cause for one in run(class_folder, out).moved for cause in one.why} == {"program"}
 
 
@@ -345,14 +472,15 @@ def test_sheets_scanned_twice_are_told_beside_the_marks(class_folder, tmp_path):
 
 def test_swapped_letters_are_kept_with_a_reading():
     reading = Reading({}, swapped=(Swapped("velocity_plan", "b", "c", 0.97),))
-    assert unpacked(json.loads(json.dumps(packed(reading)))).swapped == reading.swapped
+    assert loaded(dumped(reading)).swapped == reading.swapped
 
 
 def test_ink_maps_come_back_and_damaged_ones_are_none(tmp_path):
     page = Page("s1.png", 1, np.full((600, 800), 120, np.uint8))
     behind = replace(backdrop(page, None), registered=True, page_mm=(420.0, 297.0))
-    (document,) = documents_of([Seen(Place(tmp_path / "s1.png", 1, "s1.png"), page)], [Reading({})], "s1")
-    keep_maps(tmp_path, "s1", [Looked(document, Reading({}), (), behind)])
+    keep_reading(
+        tmp_path, "s1", "key", [ScannedPage(PageRef("s1.png"), backdrop=behind)], PageCache(tmp_path)
+    )
     (found,) = kept_maps(tmp_path, "s1")
     assert found.shape == CELLS
     (tmp_path / "s1.ink").write_bytes(b"no map")

@@ -19,9 +19,10 @@ from grader import intake
 from grader.intake import InputFile, count_pages, is_blank, load, page_of, pages_of, png
 from grader.intake.fax import Coding, damaged_row
 from grader.intake.limits import MAX_FILE_BYTES
-from grader.pipeline import Place, see
-from grader.records import Page
-from grader.sheet import rectify, whose
+from grader.kept import PageCache
+from grader.pipeline import open_page
+from grader.records import Page, PageRef
+from grader.sheet import register
 from grader.survey import survey_folder
 from reference.errors import InputFileError
 from tests import hostile
@@ -111,13 +112,14 @@ def test_pages_of_any_accepted_size_come_through_the_sheet_stage(seed):
     grey = rng.integers(0, 256, shape, dtype=np.uint8) if seed % 3 else hostile.paper(*shape)
     page = page_of(handed_in(hostile.stored(grey)), 1)
     assert page.grey.shape == shape
-    whose(page)
-    rectify(page)
+    register(page)
 
 
 def surveyed(path):
     """The pages of one file, as a run over its folder finds them."""
-    (survey,) = survey_folder([path], path.parent, None, Inline(), lambda *_: None, path.parent / "notes")
+    (survey,) = survey_folder(
+        [path], path.parent, None, Inline(), lambda *_: None, PageCache(path.parent / "notes")
+    )
     return survey.pages
 
 
@@ -228,10 +230,10 @@ def test_a_page_of_a_file_that_has_changed_since_it_was_surveyed_is_not_read(tmp
     path = tmp_path / "scan.png"
     path.write_bytes(hostile.stored(hostile.paper()))
     digest = surveyed(path)[0].digest
-    assert see(Place(path, 1, "scan.png", digest)).page is not None
+    assert open_page(PageRef("scan.png", digest=digest, path=path)).image is not None
     path.write_bytes(hostile.stored(255 - hostile.paper()))
-    changed = see(Place(path, 1, "scan.png", digest))
-    assert (changed.page, [problem.code for problem in changed.problems]) == (None, ["file_changed"])
+    changed = open_page(PageRef("scan.png", digest=digest, path=path))
+    assert (changed.image, [problem.code for problem in changed.problems]) == (None, ["file_changed"])
 
 
 def test_a_pipe_is_not_waited_for(tmp_path):
@@ -360,7 +362,7 @@ def test_damaged_rows_are_seen_in_a_pdf_too(stamp):
 def test_a_page_with_damaged_rows_is_told_and_not_read(tmp_path):
     path = tmp_path / "copy.tif"
     path.write_bytes(hostile.fax())
-    page = see(Place(path, 1, "copy.tif"))
+    page = open_page(PageRef("copy.tif", path=path))
     assert [problem.code for problem in page.problems] == ["image_damaged_rows"]
     assert page.sheet is None
     assert not surveyed(path)[0].blank

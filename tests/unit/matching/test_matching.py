@@ -4,8 +4,7 @@ import simplejpeg
 
 from grader.contact_sheet import contact_sheet, thumbnail
 from grader.matching import draft_csv, figure_similarity, suggest
-from grader.ownership import PageSource
-from grader.records import Identity
+from grader.records import Identity, PageRef
 from grader.roster import parse_roster
 from reference.assignment import load_assignment
 from reference.construction import evaluate
@@ -17,7 +16,7 @@ ROSTER = parse_roster("student_id,name,n,kv,scans\ns1,Ana,1,0.2 (m/s)/mm,\ns2,Io
 
 
 def page(number, pages=3, file="class.pdf", **more):
-    return PageSource(file, number, pages, **more)
+    return PageRef(file, number, pages, **more)
 
 
 def code(student, n):
@@ -33,8 +32,8 @@ def test_codes_and_names_are_sure_and_the_rest_is_to_be_checked():
         page(1, identity=code("s2", 10)),
         page(2),
         page(3, blank=True),
-        PageSource("s3.jpg", 1, 1),
-        PageSource("x.jpg", 1, 1),
+        PageRef("s3.jpg", 1, 1),
+        PageRef("x.jpg", 1, 1),
     ]
     draft = suggest(pages, ROSTER, PUMP)
     assert by_page(draft) == {
@@ -76,7 +75,7 @@ def drawn(n, *, turn_deg=0.0, seed=0, hand_mm=0.2):
 
 @pytest.mark.parametrize("n", [1, 10, 20])
 def test_a_drawing_of_one_students_variant_suggests_that_student(n):
-    sheet = PageSource("x.jpg", 1, 1)
+    sheet = PageRef("x.jpg", 1, 1)
     (suggestion,) = suggest([sheet], ROSTER, PUMP, look=lambda _: drawn(n)).suggestions
     assert suggestion.row.n == n
     assert not suggestion.sure
@@ -91,7 +90,7 @@ def test_likeness_tells_neighbours_apart_by_two_degrees():
 
 @pytest.mark.parametrize("strokes", [None, np.zeros((0, 2, 2)), drawn(15), drawn(10)[-40:]])
 def test_a_drawing_that_looks_like_nobodys_variant_suggests_nobody(strokes):
-    (suggestion,) = suggest([PageSource("x.jpg", 1, 1)], ROSTER, PUMP, look=lambda _: strokes).suggestions
+    (suggestion,) = suggest([PageRef("x.jpg", 1, 1)], ROSTER, PUMP, look=lambda _: strokes).suggestions
     assert suggestion.row is None
     assert "looks like" not in suggestion.why
 
@@ -152,7 +151,7 @@ def test_pages_that_come_out_even_are_suggested_in_order_to_be_checked():
 
 
 def test_sources_that_disagree_are_left_to_the_person_whatever_is_drawn():
-    contested = PageSource("s1.jpg", 1, 1, identity=code("s2", 10))
+    contested = PageRef("s1.jpg", 1, 1, identity=code("s2", 10))
     (suggestion,) = suggest([contested], ROSTER, PUMP, look=lambda _: drawn(1)).suggestions
     assert suggestion.row is None
     assert "s1" in suggestion.why
@@ -187,7 +186,7 @@ def test_scans_that_the_roster_has_already_stay_and_are_not_doubled():
 
 
 def test_the_contact_sheet_shows_every_page_with_its_reason_and_nothing_from_outside():
-    hostile = PageSource("<img src=x onerror=alert(1)>.jpg", 1, 1)
+    hostile = PageRef("<img src=x onerror=alert(1)>.jpg", 1, 1)
     draft = suggest([page(1, identity=code("s2", 10)), hostile], ROSTER, PUMP)
     picture = thumbnail(np.full((300, 400), 200, np.uint8))
     html = contact_sheet([(suggestion, picture) for suggestion in draft.suggestions])

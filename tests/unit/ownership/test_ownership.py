@@ -1,7 +1,7 @@
 import pytest
 
-from grader.ownership import How, PageSource, assign_pages, student_of_name
-from grader.records import Identity
+from grader.ownership import How, assign_pages, student_of_name
+from grader.records import Identity, PageRef
 from grader.roster import parse_roster
 
 THREE = parse_roster("student_id,name,n\ns1,A,1\ns2,B,2\ns_3,C,3\n")
@@ -13,7 +13,7 @@ def code(student, n=None, position=None, assignment="pump", kind="velocity"):
 
 def class_file(marks, file="class.pdf"):
     """A page per character: x drawn on, b blank."""
-    return [PageSource(file, page, len(marks), blank=mark == "b") for page, mark in enumerate(marks, start=1)]
+    return [PageRef(file, page, len(marks), blank=mark == "b") for page, mark in enumerate(marks, start=1)]
 
 
 def owners(ownership):
@@ -50,9 +50,9 @@ def test_the_longer_of_two_ids_that_begin_alike_is_meant():
 def test_every_page_ends_in_exactly_one_place():
     pages = [
         *class_file("xbx"),
-        PageSource("s1.jpg", 1, 1),
-        PageSource("who.jpg", 1, 1),
-        PageSource("s2.jpg", 1, 1, blank=True),
+        PageRef("s1.jpg", 1, 1),
+        PageRef("who.jpg", 1, 1),
+        PageRef("s2.jpg", 1, 1, blank=True),
     ]
     found = assign_pages(pages, THREE, "pump")
     told = [*(o.source for o in found.owned), *(u.source for u in found.unmatched), *found.blank]
@@ -64,28 +64,26 @@ def test_every_page_ends_in_exactly_one_place():
 
 def test_a_code_decides_and_brings_n_and_position():
     roster = parse_roster("student_id,name\ns1,A\n")
-    (owned,) = assign_pages(
-        [PageSource("scan0001.jpg", 1, 1, identity=code("s1", 7, 2))], roster, "pump"
-    ).owned
+    (owned,) = assign_pages([PageRef("scan0001.jpg", 1, 1, identity=code("s1", 7, 2))], roster, "pump").owned
     assert (owned.student_id, owned.n, owned.position, owned.how) == ("s1", 7, 2, (How.CODE,))
 
 
 def test_sources_that_agree_are_all_told():
     roster = parse_roster("student_id,name,scans\ns1,A,s1.jpg\n")
-    (owned,) = assign_pages([PageSource("s1.jpg", 1, 1, identity=code("s1"))], roster, "pump").owned
+    (owned,) = assign_pages([PageRef("s1.jpg", 1, 1, identity=code("s1"))], roster, "pump").owned
     assert owned.how == (How.CODE, How.SCANS, How.NAME)
 
 
 @pytest.mark.parametrize(
     ("roster", "page"),
     [
-        ("student_id,name\ns1,A\ns2,B\n", PageSource("s1.jpg", 1, 1, identity=code("s2"))),
-        ("student_id,name,scans\ns1,A,x.jpg\ns2,B,\n", PageSource("x.jpg", 1, 1, identity=code("s2"))),
-        ("student_id,name,scans\ns1,A,s2.jpg\ns2,B,\n", PageSource("s2.jpg", 1, 1)),
-        ("student_id,name,n\ns2,B,3\ns1,A,1\n", PageSource("x.jpg", 1, 1, identity=code("s2", n=4))),
+        ("student_id,name\ns1,A\ns2,B\n", PageRef("s1.jpg", 1, 1, identity=code("s2"))),
+        ("student_id,name,scans\ns1,A,x.jpg\ns2,B,\n", PageRef("x.jpg", 1, 1, identity=code("s2"))),
+        ("student_id,name,scans\ns1,A,s2.jpg\ns2,B,\n", PageRef("s2.jpg", 1, 1)),
+        ("student_id,name,n\ns2,B,3\ns1,A,1\n", PageRef("x.jpg", 1, 1, identity=code("s2", n=4))),
         (
             "student_id,name,position\ns2,B,3\ns1,A,1\n",
-            PageSource("s2.jpg", 1, 1, identity=code("s2", position=4)),
+            PageRef("s2.jpg", 1, 1, identity=code("s2", position=4)),
         ),
     ],
 )
@@ -100,8 +98,8 @@ def test_two_sources_that_disagree_leave_the_page_unmatched_with_both_told(roste
 
 def test_a_code_of_a_stranger_or_of_another_assignment_matches_nobody():
     pages = [
-        PageSource("a.jpg", 1, 1, identity=code("s99")),
-        PageSource("s1.jpg", 1, 1, identity=code("s1", assignment="press")),
+        PageRef("a.jpg", 1, 1, identity=code("s99")),
+        PageRef("s1.jpg", 1, 1, identity=code("s1", assignment="press")),
     ]
     assert codes(assign_pages(pages, THREE, "pump")) == {
         "a.jpg": "owner_not_listed",
@@ -110,7 +108,7 @@ def test_a_code_of_a_stranger_or_of_another_assignment_matches_nobody():
 
 
 def test_a_code_on_an_otherwise_blank_page_is_still_a_submission():
-    found = assign_pages([PageSource("a.jpg", 1, 1, blank=True, identity=code("s1"))], THREE, "pump")
+    found = assign_pages([PageRef("a.jpg", 1, 1, blank=True, identity=code("s1"))], THREE, "pump")
     assert owners(found) == {"a.jpg": "s1"}
 
 
@@ -151,8 +149,8 @@ def test_an_empty_sheet_handed_in_shifts_nobody():
 
 def test_a_code_that_disproves_the_order_stops_it_for_pages_that_nothing_else_names():
     pages = class_file("xxxxxx")
-    pages[2] = PageSource("class.pdf", 3, 6, identity=code("s1"))
-    pages[4] = PageSource("class.pdf", 5, 6, identity=code("s_3"))
+    pages[2] = PageRef("class.pdf", 3, 6, identity=code("s1"))
+    pages[4] = PageRef("class.pdf", 5, 6, identity=code("s_3"))
     found = assign_pages(pages, THREE, "pump", pages_per_student=2)
     assert owners(found) == {"class.pdf#5": "s_3"}
     assert codes(found)["class.pdf#3"] == "owner_disagree"
@@ -160,7 +158,7 @@ def test_a_code_that_disproves_the_order_stops_it_for_pages_that_nothing_else_na
 
 
 def test_students_with_a_file_of_their_own_are_left_out_where_the_order_then_comes_out_even():
-    pages = [PageSource("s2.jpg", 1, 1), *class_file("xxxx")]
+    pages = [PageRef("s2.jpg", 1, 1), *class_file("xxxx")]
     found = assign_pages(pages, THREE, "pump", pages_per_student=2)
     assert [owned.student_id for owned in found.owned] == ["s2", "s1", "s1", "s_3", "s_3"]
 
@@ -184,24 +182,24 @@ def test_each_position_of_a_student_is_a_place_in_the_order():
 
 def test_a_name_alone_does_not_tell_which_of_several_positions():
     roster = parse_roster("student_id,name,position,scans\ns1,A,1,\ns1,A,2,s1_b.jpg\n")
-    found = assign_pages([PageSource("s1_a.jpg", 1, 1), PageSource("s1_b.jpg", 1, 1)], roster, "press")
+    found = assign_pages([PageRef("s1_a.jpg", 1, 1), PageRef("s1_b.jpg", 1, 1)], roster, "press")
     assert codes(found) == {"s1_a.jpg": "owner_ambiguous"}
     assert [(owned.student_id, owned.position) for owned in found.owned] == [("s1", 2)]
 
 
 def test_scans_that_are_not_there_are_told():
     roster = parse_roster("student_id,name,scans\ns1,A,Scan.jpg\ns2,B,class.pdf#9\n")
-    found = assign_pages([*class_file("x"), PageSource("scan.jpg", 1, 1)], roster, "pump")
+    found = assign_pages([*class_file("x"), PageRef("scan.jpg", 1, 1)], roster, "pump")
     assert [problem.code for problem in found.problems] == ["scan_missing", "scan_missing"]
     assert "is scan.jpg meant?" in found.problems[0].message
 
 
 def test_without_a_roster_codes_and_names_say_who_the_students_are():
     pages = [
-        PageSource("s1.jpg", 1, 1),
-        PageSource("s1_2.jpg", 1, 1),
-        PageSource("scan.jpg", 1, 1, identity=code("s7", 7)),
-        PageSource("not valid.jpg", 1, 1),
+        PageRef("s1.jpg", 1, 1),
+        PageRef("s1_2.jpg", 1, 1),
+        PageRef("scan.jpg", 1, 1, identity=code("s7", 7)),
+        PageRef("not valid.jpg", 1, 1),
     ]
     found = assign_pages(pages, None, "pump")
     assert owners(found) == {"s1.jpg": "s1", "s1_2.jpg": "s1", "scan.jpg": "s7"}
@@ -210,7 +208,7 @@ def test_without_a_roster_codes_and_names_say_who_the_students_are():
 
 def test_without_a_roster_nobody_is_called_as_no_folder_can_be():
     files = ["results.json.jpg", "CON.jpg", "s1.jpg", "S1.png"]
-    found = assign_pages([PageSource(file, 1, 1) for file in files], None, "pump")
+    found = assign_pages([PageRef(file, 1, 1) for file in files], None, "pump")
     assert sorted([*owners(found), *codes(found)]) == sorted(files)
     assert len(owners(found)) == 1
     told = {str(loose.source): loose.problem.message for loose in found.unmatched}
@@ -219,7 +217,7 @@ def test_without_a_roster_nobody_is_called_as_no_folder_can_be():
 
 
 def test_a_page_that_two_students_may_own_names_both():
-    page = PageSource("s2.jpg", 1, 1, identity=code("s1", 1))
+    page = PageRef("s2.jpg", 1, 1, identity=code("s1", 1))
     (loose,) = assign_pages([page], THREE, "pump").unmatched
     assert loose.problem.code == "owner_disagree"
     assert loose.students == ("s1", "s2")

@@ -9,7 +9,7 @@ import pytest
 
 from grader.labels import labels_of
 from grader.outcomes import Outcome, Quantity, Tolerance
-from grader.picture import backdrop, overlay, paint, restored, stored
+from grader.picture import backdrop, overlay, paint
 from grader.records import Figure, Page, Reading, ReadNode, ReadVector, Sheet
 from grader.scene import ARROW_WIDTH_MM, COLOURS, MARKS, Arrow, Ghost, Scene, scene_of
 from reference.construction import Vector
@@ -95,15 +95,6 @@ def test_the_scan_is_shown_upright_with_every_point_in_its_place(rotation_deg, p
         rows, columns = np.indices(ink.shape)
         assert (rows * ink).sum() / ink.sum() == pytest.approx(19.5, abs=0.6)
         assert (columns * ink).sum() / ink.sum() == pytest.approx(19.5, abs=0.6)
-
-
-def test_a_stored_backdrop_comes_back_to_the_last_pixel_and_a_damaged_one_not_at_all():
-    registered = sheet()
-    behind = backdrop(drawn_page(registered), registered)
-    data = stored(behind)
-    assert np.array_equal(restored(data), behind.scan)
-    assert restored(data[:40]) is None
-    assert restored(b"") is None
 
 
 def test_paper_becomes_white_in_a_shadow():

@@ -15,7 +15,8 @@ from reference.motion import move
     "error",
     [
         CallError("n_needed", "needs --n"),
-        MechanismError("singular", "in line"),
+        MechanismError("singular", "in line", group="B"),
+        MechanismError("does_not_assemble", "the links of B miss each other by {gap}", group="B", gap_m=0.5),
         AuthoredFileError("my.toml", (Finding("$.id", "is missing"),)),
     ],
 )
@@ -24,6 +25,14 @@ def test_an_error_is_the_same_after_a_journey_between_processes(error):
     assert type(again) is type(error)
     assert (again.code, again.message, again.exit_status) == (error.code, error.message, error.exit_status)
     assert str(again) == str(error)
+    assert vars(again) == vars(error)
+
+
+def test_a_mechanism_says_which_group_fails_and_by_how_much():
+    apart = {"type": "RRR", "node": "B", "pins": ["A", "O2"], "links": ["3", "4"], "lengths": [0.5, 0.5]}
+    with pytest.raises(MechanismError, match=r"miss each other by 1 m;") as caught:
+        move(build_mechanism(flat({**apart, "side": "left"}), {}, 1))
+    assert (caught.value.group, caught.value.gap_m) == ("B", pytest.approx(1.0))
 
 
 def flat(group: dict, angle_deg: float = 0.0) -> MechanismFile:

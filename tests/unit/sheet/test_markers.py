@@ -14,7 +14,8 @@ from grader.intake import pages_of
 from grader.layout import MARKER_CORNERS, TEMPLATES
 from grader.records import Identity, Page
 from grader.roster import RosterRow
-from grader.sheet import straighten, whose
+from grader.sheet import register as register_page
+from grader.sheet import straighten
 from grader.sheet.markers import register
 from reference.assignment import load_assignment
 
@@ -92,8 +93,8 @@ def test_a_code_too_fine_for_a_quick_look_is_read_in_its_place():
     student = RosterRow("s" * 64, "Ana", 7)
     pdf = make_sheets(load_assignment("pump"), [student]).pdf
     page = Page("s.jpg", 1, scanned(rasterised(pdf, 150)[0], blur=1.2))
-    assert whose(page).student_id == student.student_id
-    assert whose(Page("s.jpg", 1, np.full((300, 400), 255, np.uint8))) is None
+    assert register_page(page)[1].student_id == student.student_id
+    assert register_page(Page("s.jpg", 1, np.full((300, 400), 255, np.uint8)))[1] is None
 
 
 def test_the_markers_say_where_the_zones_are():

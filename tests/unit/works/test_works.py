@@ -1,13 +1,12 @@
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from grader.measurements import Measurements
-from grader.ownership import How, Owned, Ownership, PageSource, Unmatched
-from grader.records import Problem, Reading
+from grader.ownership import How, Owned, Ownership, Unmatched
+from grader.records import PageRef, Problem, Reading
 from grader.roster import Roster, RosterRow
-from grader.works import Unusable, works_of
+from grader.works import Unusable, submissions_of
 from reference.assignment import Variant, load_assignment
 
 PUMP = load_assignment("pump")
@@ -15,7 +14,7 @@ PRESS = load_assignment("press")
 
 
 def owned(file, student, n=None, position=None):
-    return Owned(PageSource(file, 1, 1), student, n, position, (How.NAME,))
+    return Owned(PageRef(file, 1, 1), student, n, position, (How.NAME,))
 
 
 def ownership(*pages, blank=()):
@@ -27,9 +26,7 @@ def entered(student, n=None, position=None, source="class.csv"):
 
 
 def works(assignment, roster, pages, measured=()):
-    paths = {page.source.file: Path("in") / page.source.file for page in pages.owned}
-    paths |= {source.file: Path("in") / source.file for source in pages.blank}
-    return works_of(assignment, roster, pages, list(measured), paths, "en")
+    return submissions_of(assignment, roster, pages, list(measured), "en")
 
 
 def test_everybody_on_the_roster_has_a_work_even_with_nothing_handed_in():
@@ -165,7 +162,7 @@ def test_a_file_that_cannot_be_used_is_told_to_those_whom_its_name_or_content_te
     fault = Problem("measurements", "s1.json: cannot be used", "s1.json")
     class_file = Problem("measurements", "class.csv: cannot be used", "class.csv")
     refused = [Unusable((fault,)), Unusable((class_file,), ("s2", "zz"))]
-    found, strangers = works_of(PUMP, ROSTER, ownership(), [], {}, "en", refused=refused)
+    found, strangers = submissions_of(PUMP, ROSTER, ownership(), [], "en", refused=refused)
     assert [(work.student_id, work.has_unusable, codes(work)) for work in found] == [
         ("s1", True, ["measurements"]),
         ("s2", True, ["measurements"]),
@@ -175,7 +172,7 @@ def test_a_file_that_cannot_be_used_is_told_to_those_whom_its_name_or_content_te
 
 def test_without_a_roster_a_students_file_that_cannot_be_used_is_a_submission():
     fault = Problem("measurements", "s1.json: cannot be used", "s1.json")
-    found, _ = works_of(PUMP, None, ownership(), [], {}, "en", refused=[Unusable((fault,))])
+    found, _ = submissions_of(PUMP, None, ownership(), [], "en", refused=[Unusable((fault,))])
     assert [(work.student_id, work.has_unusable) for work in found] == [("s1", True)]
 
 
@@ -198,7 +195,7 @@ def test_measurements_that_may_be_of_several_positions_are_told_at_each():
 
 def test_a_page_on_whose_owner_sources_disagree_is_told_to_each_of_them():
     problem = Problem("owner_disagree", "x.jpg: the QR code: s1; the file's name: s2", "x.jpg")
-    pages = Ownership((), (Unmatched(PageSource("x.jpg", 1, 1), problem, ("s1", "s2")),), ())
+    pages = Ownership((), (Unmatched(PageRef("x.jpg", 1, 1), problem, ("s1", "s2")),), ())
     found, strangers = works(PUMP, ROSTER, pages)
     assert all(work.has_unusable and work.problems[0] == problem for work in found)
     assert not strangers
@@ -212,8 +209,8 @@ def test_without_a_roster_an_id_that_only_case_tells_from_another_is_nobodys():
 
 def test_a_blank_page_that_is_all_a_student_handed_in_is_looked_at():
     roster = Roster("roster.csv", (RosterRow("s1", n=3), RosterRow("s2", n=4)))
-    blank = PageSource("s1.png", 1, 1, blank=True)
-    back = PageSource("s2_back.png", 1, 1, blank=True)
+    blank = PageRef("s1.png", 1, 1, blank=True)
+    back = PageRef("s2_back.png", 1, 1, blank=True)
     found, _ = works(PUMP, roster, ownership(owned("s2.jpg", "s2", n=4), blank=(blank, back)))
     assert [len(work.pages) for work in found] == [1, 1]
-    assert found[0].pages[0].name == "s1.png"
+    assert found[0].pages[0].file == "s1.png"
