@@ -1,5 +1,6 @@
 import ast
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -233,10 +234,15 @@ def test_variants_are_named_shortly(variants, told):
 
 
 def within(tmp_path: Path, start: str, old: str, new: str, criterion: str) -> Path:
-    """A start, whose mechanism stands within its assignment, with one text replaced and a rubric."""
-    text = (library() / "starts" / f"{start}.assignment.toml").read_text(encoding="utf-8")
-    assert old in text
-    (tmp_path / f"{start}.assignment.toml").write_text(text.replace(old, new), encoding="utf-8")
+    """A start with its mechanism within its assignment, one text of it replaced, and a rubric."""
+    text, mechanism = (
+        (library() / "starts" / f"{start}.{kind}.toml").read_text(encoding="utf-8")
+        for kind in ("assignment", "mechanism")
+    )
+    assert old in mechanism
+    tables = re.sub(r"(?m)^(\[\[?)", r"\1mechanism.", mechanism.replace(old, new))
+    text = re.sub(r"(?m)^mechanism = .*\n", "", text) + f"\n[mechanism]\n{tables}"
+    (tmp_path / f"{start}.assignment.toml").write_text(text, encoding="utf-8")
     rubric = f'schema_version = 1\nid = "{start}"\ntitle = {{ en = "R" }}\n[[criterion]]\n{criterion}\n'
     (tmp_path / f"{start}.rubric.toml").write_text(
         rubric + 'id = "x"\ntitle = { en = "X" }\npoints = 1\n', "utf-8"
