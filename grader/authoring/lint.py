@@ -5,6 +5,7 @@ A row of figures for each variant, all findings, and the JSON document of both.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
@@ -17,6 +18,7 @@ from grader.authoring.round_scales import (
     PageRoom,
     Proposal,
     asked_vectors,
+    ends_of,
     extents_of,
     length_findings,
     pages_of,
@@ -28,7 +30,6 @@ from grader.authoring.round_scales import (
 from grader.authoring.variant_checks import (
     LEAST_CROSSING_DEG,
     LEAST_TRANSMISSION,
-    Broken,
     Conditions,
     broken_findings,
     broken_variants,
@@ -58,46 +59,6 @@ from reference.plan import Plan, exact_plan
 
 
 @dataclass(frozen=True, slots=True)
-class Least:
-    """The least of several figures, and whose it is (a joint, a node, a vector, a drawing)."""
-
-    value: float
-    at: str
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One variant's figures; `problem` says why there are none.
-
-    Attributes
-    ----------
-    transmission : least |sin| of a transmission angle
-    crossing_deg : least angle at which construction lines meet
-    shortest_mm : the shortest asked vector as drawn at the proposed scales, zero vectors apart
-    short : how many asked vectors are under 8 mm
-    room : how many times as large the tightest figure could be drawn in its zone
-    error : predicted relative error of the computed plan
-    """
-
-    variant: Variant
-    problem: str | None = None
-    transmission: Least | None = None
-    crossing_deg: Least | None = None
-    shortest_mm: Least | None = None
-    short: int = 0
-    room: Least | None = None
-    error: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Worst:
-    """The variant that is hardest to draw: its index in the plan, and why."""
-
-    index: int
-    why: str
-
-
-@dataclass(frozen=True, slots=True)
 class Lint:
     """What lint found.
 
@@ -107,15 +68,15 @@ class Lint:
     findings : the gravest first
     scales : the proposed ones, and round ones; none where no variant can be solved
     plan : of the variants that can be solved
-    worst : of those; None where there are none
+    worst : the variant of those that is hardest to draw; None where there are none
     """
 
     assignment: Assignment
-    rows: tuple[Row, ...]
+    rows: tuple[LintVariant, ...]
     findings: tuple[LintFinding, ...]
     scales: tuple[Proposal, ...] = ()
     plan: Plan | None = None
-    worst: Worst | None = None
+    worst: LintWorst | None = None
 
     @property
     def needs_a_person(self) -> bool:
@@ -140,50 +101,46 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     )
     broken = broken_variants(assignment, variants)
     findings = [*broken_findings(assignment, broken), *data_findings(assignment, rubric, construction)]
-    without = {one.variant for one in broken}
-    sound = [variant for variant in variants if variant not in without]
+    rows = {each.variant: _row(each.variant, problem=each.error.message) for each in broken}
+    sound = [variant for variant in variants if variant not in rows]
     if not sound:
-        return Lint(assignment, tuple(_row_of(one) for one in broken), _sorted(findings))
+        return Lint(assignment, tuple(rows.values()), _sorted(findings))
     plan = exact_plan(assignment, sound, accelerations=accelerations)
-    return _inspected(assignment, rubric, plan, broken, findings)
-
-
-def _inspected(
-    assignment: Assignment,
-    rubric: RubricFile,
-    plan: Plan,
-    broken: Sequence[Broken],
-    findings: list[LintFinding],
-) -> Lint:
     conditions, asked, extents = conditions_of(plan), asked_vectors(rubric, plan), extents_of(plan)
     rooms = {index: room_of(figures, extents) for index, figures in pages_of(assignment, plan)}
     scales = proposals(assignment, plan, extents, asked, rooms)
-    found = [
-        *findings,
+    findings += [
         *condition_findings(assignment, plan, conditions),
         *length_findings(rubric, plan, asked),
         *room_findings(assignment, plan, rooms),
         *tie_findings(plan, ties_of(rubric, plan, asked)),
         *scale_findings(assignment, plan, scales),
     ]
-    rows = {row.variant: row for row in _rows(plan, conditions, asked, rooms)}
-    rows |= {one.variant: _row_of(one) for one in broken}
-    ordered = tuple(rows[variant] for variant in assignment.variants())
-    worst = _worst([rows[variant] for variant in plan.variants])
-    return Lint(assignment, ordered, _sorted(found), tuple(scales), plan, worst)
+    solved = _rows(plan, conditions, asked, rooms)
+    rows |= dict(zip(sound, solved, strict=True))
+    ordered = tuple(rows[variant] for variant in variants)
+    return Lint(assignment, ordered, _sorted(findings), tuple(scales), plan, _worst(solved))
 
 
 def _sorted(findings: Sequence[LintFinding]) -> tuple[LintFinding, ...]:
     return tuple(sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity)))
 
 
-def _row_of(broken: Broken) -> Row:
-    return Row(broken.variant, broken.error.message)
+def _numbers(variant: Variant | LintVariant) -> dict[str, int | None]:
+    return {"n": variant.n, "position": variant.position}
+
+
+def _row(variant: Variant, problem: str | None = None, **figures: Any) -> LintVariant:  # noqa: ANN401
+    """One variant's figures; none where it cannot be solved."""
+    row: dict[str, Any] = dict.fromkeys(LintVariant.model_fields)
+    row |= {**_numbers(variant), "assembles": problem is None, "problem": problem, "under_8_mm": 0}
+    return LintVariant.model_validate(row | figures)
 
 
 def _rows(
     plan: Plan, conditions: Conditions, asked: AskedVectors, rooms: Mapping[int, PageRoom]
-) -> list[Row]:
+) -> list[LintVariant]:
+    """The figures of each variant of a plan."""
     count = len(plan.variants)
     lengths = {
         name: np.where(asked.is_zero[row], np.inf, asked.length_mm[row])
@@ -197,47 +154,56 @@ def _rows(
     transmission, crossing = _least(conditions.transmission, count), _least(conditions.crossing_deg, count)
     shortest, room = _least(lengths, count), _least(zones, count)
     short = asked.short(WELL_READ_MM).sum(axis=0) if asked.names else np.zeros(count, dtype=int)
-    figures = zip(
-        transmission, crossing, shortest, short.tolist(), room, conditions.error.tolist(), strict=True
-    )
-    return [Row(variant, None, *told) for variant, told in zip(plan.variants, figures, strict=True)]
+    return [
+        _row(
+            variant,
+            transmission=transmission[index],
+            crossing_deg=crossing[index],
+            shortest_mm=shortest[index],
+            under_8_mm=int(short[index]),
+            room=room[index],
+            predicted_error=float(conditions.error[index]),
+        )
+        for index, variant in enumerate(plan.variants)
+    ]
 
 
-def _least(figures: Mapping[str, FloatArray], count: int) -> list[Least | None]:
+def _least(figures: Mapping[str, FloatArray], count: int) -> list[LintLeast | None]:
     """The least of several arrays for each variant; None where there is none that is finite."""
     if not figures:
         return [None] * count
-    names, values = list(figures), np.stack([np.broadcast_to(one, (count,)) for one in figures.values()])
+    names, values = list(figures), np.stack([np.broadcast_to(each, (count,)) for each in figures.values()])
     which = np.argmin(values, axis=0)
     least = values[which, np.arange(count)]
     return [
-        Least(float(value), names[index]) if np.isfinite(value) else None
+        LintLeast(value=float(value), at=names[index]) if np.isfinite(value) else None
         for value, index in zip(least, which, strict=True)
     ]
 
 
-def _worst(rows: Sequence[Row]) -> Worst:
+_REASONS = (
+    ("transmission", LEAST_TRANSMISSION, "the sine of the transmission angle at {at} is {value:.2g}"),
+    ("crossing_deg", LEAST_CROSSING_DEG, "the construction lines of {at} meet at {value:.1f} degrees"),
+    ("room", 1.0, "the {at} would fit its zone at only {value:.2f} of its size"),
+    ("shortest_mm", np.inf, "{at} is the shortest vector asked for, {value:.2g} mm"),
+    (
+        "crossing_deg",
+        np.inf,
+        "the construction lines of {at} meet at {value:.1f} degrees, the least of all",
+    ),
+)
+"""Figures of a row, the limit below which each makes a variant hard to draw, and the reason in words;
+the gravest first."""
+
+
+def _worst(rows: Sequence[LintVariant]) -> LintWorst:
     """The variant that is hardest to draw: badly conditioned before too large before too short."""
-
-    def least(name: str) -> tuple[int, Least] | None:
-        known = [(index, figure) for index, row in enumerate(rows) if (figure := getattr(row, name))]
-        return min(known, key=lambda one: one[1].value, default=None)
-
-    for name, limit, told in (
-        ("transmission", LEAST_TRANSMISSION, "the sine of the transmission angle at {at} is {value:.2g}"),
-        ("crossing_deg", LEAST_CROSSING_DEG, "the construction lines of {at} meet at {value:.1f} degrees"),
-        ("room", 1.0, "the {at} would fit its zone at only {value:.2f} of its size"),
-        ("shortest_mm", np.inf, "{at} is the shortest vector asked for, {value:.2g} mm"),
-        (
-            "crossing_deg",
-            np.inf,
-            "the construction lines of {at} meet at {value:.1f} degrees, the least of all",
-        ),
-    ):
-        found = least(name)
-        if found is not None and found[1].value < limit:
-            return Worst(found[0], told.format(at=found[1].at, value=found[1].value))
-    return Worst(0, "all are alike")
+    for name, limit, reason in _REASONS:
+        known = [(least, row) for row in rows if (least := getattr(row, name)) is not None]
+        least, row = min(known, key=lambda entry: entry[0].value, default=(None, rows[0]))
+        if least is not None and least.value < limit:
+            return LintWorst(**_numbers(row), why=reason.format(at=least.at, value=least.value))
+    return LintWorst(**_numbers(rows[0]), why="all are alike")
 
 
 # Names in the files: unknown, unused, not told to the student -------------------------------------
@@ -277,24 +243,24 @@ def data_findings(
 def _rubric_faults(rubric: RubricFile, construction: Construction) -> Iterator[LintFinding]:
     for fault in check_rubric(rubric, construction):
         yield LintFinding("fault", "unknown_in_rubric", "rubric", fault.path, fault.message)
-    seen: dict[str, str] = {}
+    judged_by: dict[str, str] = {}
     for index, criterion in enumerate(rubric.criterion):
-        if criterion.name in seen:
-            told = f"{criterion.name} is judged by {seen[criterion.name]} already"
-            yield LintFinding("hint", "asked_twice", "rubric", f"$.criterion[{index}]", told)
-        seen.setdefault(criterion.name, criterion.id)
+        if criterion.name in judged_by:
+            message = f"{criterion.name} is judged by {judged_by[criterion.name]} already"
+            yield LintFinding("hint", "asked_twice", "rubric", f"$.criterion[{index}]", message)
+        judged_by.setdefault(criterion.name, criterion.id)
 
 
 def _with_their_own(assignment: Assignment, names: Iterable[str]) -> set[str]:
     """Names, and the names that their formulas are made of."""
     values = assignment.file.variant.values
-    found, waiting = set(), list(names)
+    needed, waiting = set(), list(names)
     while waiting:
         name = waiting.pop()
-        if name not in found:
-            found.add(name)
+        if name not in needed:
+            needed.add(name)
             waiting.extend(values[name].names if name in values else ())
-    return found
+    return needed
 
 
 def _unused_values(assignment: Assignment) -> Iterator[LintFinding]:
@@ -308,23 +274,23 @@ def _unused_values(assignment: Assignment) -> Iterator[LintFinding]:
     drawn = _with_their_own(assignment, names_in(assignment.mechanism_file))
     for name in ("n", "position"):
         if getattr(file.variant, name) is not None and name not in drawn:
-            told = f"the mechanism does not depend on {name}: every student has the same"
-            yield LintFinding("warning", "same_for_all", "assignment", f"$.variant.{name}", told)
+            message = f"the mechanism does not depend on {name}: every student has the same"
+            yield LintFinding("warning", "same_for_all", "assignment", f"$.variant.{name}", message)
 
 
 def _not_told(assignment: Assignment) -> Iterator[LintFinding]:
     """Data that differ between students and set the mechanism, but that no [[given]] tells them."""
     values, given = assignment.file.variant.values, assignment.file.given
-    told = names_in(given)
+    stated = names_in(given)
 
-    def is_told(name: str) -> bool:
-        if name in told or name not in values:
-            # A number that stands in the mechanism itself is told where a formula with it is: 45*position.
-            return name in told
-        own = values[name].names
-        return not own or all(is_told(one) for one in own)
+    def is_stated(name: str) -> bool:
+        if name in stated or name not in values:
+            # A number that stands in the mechanism itself is given where a formula with it is: 45*position.
+            return name in stated
+        parts = values[name].names
+        return not parts or all(map(is_stated, parts))
 
-    missing = [name for name in sorted(names_in(assignment.mechanism_file)) if not is_told(name)]
+    missing = [name for name in sorted(names_in(assignment.mechanism_file)) if not is_stated(name)]
     if missing:
         message = f"{', '.join(missing)}: sets the mechanism, and no [[given]] tells it to the student"
         yield LintFinding("hint", "not_told", "assignment", "$.given", message)
@@ -336,8 +302,8 @@ def _unknown_names(assignment: Assignment, construction: Construction) -> Iterat
     known |= TRADITIONS.get(assignment.file.tradition, {}).keys()
     for name in assignment.file.names:
         if name not in known:
-            told = "is neither a node nor a vector nor a scale of this assignment"
-            yield LintFinding("hint", "unused", "assignment", f'$.names."{name}"', told)
+            message = "is neither a node nor a vector nor a scale of this assignment"
+            yield LintFinding("hint", "unused", "assignment", f'$.names."{name}"', message)
 
 
 def _unneeded(
@@ -351,21 +317,21 @@ def _unneeded(
         if name is not None and name in construction.rates
     ]
     if not asked:
-        told = "asks for no vector: only what is declared can be marked"
-        yield LintFinding("hint", "no_vector_asked", "rubric", "$.criterion", told)
+        message = "asks for no vector: only what is declared can be marked"
+        yield LintFinding("hint", "no_vector_asked", "rubric", "$.criterion", message)
         return
     needed = ancestors(construction, {end for vector in asked for end in (vector.tail, vector.head)})
     for index, table in enumerate(assignment.mechanism_file.group):
         joint = table.node
         if needed.isdisjoint({joint, image_name(joint), image_name(joint, primed=True)}):
-            told = f"nothing that the rubric asks for depends on {joint}"
-            yield LintFinding("hint", "unused", *mechanism_place(assignment, f".group[{index}]"), told)
+            message = f"nothing that the rubric asks for depends on {joint}"
+            yield LintFinding("hint", "unused", *mechanism_place(assignment, f".group[{index}]"), message)
     figures = {construction.figure_of(vector.head) for vector in asked}
     for index, page in enumerate(assignment.file.page):
         for figure in page.figures:
             if figure != "mechanism" and figure not in figures:
-                told = f"the rubric asks for nothing in the {figure.replace('_', ' ')}"
-                yield LintFinding("hint", "unused", "assignment", f"$.page[{index}].figures", told)
+                message = f"the rubric asks for nothing in the {figure.replace('_', ' ')}"
+                yield LintFinding("hint", "unused", "assignment", f"$.page[{index}].figures", message)
 
 
 # JSON document ------------------------------------------------------------------------------------
@@ -373,9 +339,6 @@ def _unneeded(
 
 def lint_document(result: Lint) -> LintDocument:
     """The document of `planmark lint --json`."""
-    worst = None
-    if result.worst is not None and result.plan is not None:
-        worst = LintWorst(**_variant(result.plan.variants[result.worst.index]), why=result.worst.why)
     return LintDocument(
         assignment=result.assignment.id,
         needs_a_person=result.needs_a_person,
@@ -386,54 +349,22 @@ def lint_document(result: Lint) -> LintDocument:
                 file=finding.file,
                 path=finding.path,
                 message=finding.message,
-                variants=[VariantDocument(**_variant(variant)) for variant in finding.variants],
+                variants=[VariantDocument(**_numbers(variant)) for variant in finding.variants],
             )
             for finding in result.findings
         ],
-        variants=[_row(row) for row in result.rows],
-        scales=[_scales(proposal) for proposal in result.scales],
-        worst=worst,
+        variants=list(result.rows),
+        scales=[
+            LintScales(
+                name=proposal.name,
+                **{name: ends_of(getattr(proposal.scales, name)) for name in ("kL", "kv", "ka")},
+                room=proposal.room,
+                shortest_mm=proposal.shortest_mm,
+                under_8_mm=proposal.under_8_mm,
+                asked=proposal.asked,
+                shortest_link_mm=proposal.link_mm,
+            )
+            for proposal in result.scales
+        ],
+        worst=result.worst,
     )
-
-
-def _variant(variant: Variant) -> dict[str, int | None]:
-    return {"n": variant.n, "position": variant.position}
-
-
-def _row(row: Row) -> LintVariant:
-    return LintVariant(
-        n=row.variant.n,
-        position=row.variant.position,
-        assembles=row.problem is None,
-        problem=row.problem,
-        transmission=_least_document(row.transmission),
-        crossing_deg=_least_document(row.crossing_deg),
-        shortest_mm=_least_document(row.shortest_mm),
-        under_8_mm=row.short,
-        room=_least_document(row.room),
-        predicted_error=row.error,
-    )
-
-
-def _least_document(figure: Least | None) -> LintLeast | None:
-    return None if figure is None else LintLeast(value=figure.value, at=figure.at)
-
-
-def _scales(proposal: Proposal) -> LintScales:
-    return LintScales(
-        name=proposal.name,
-        kL=_ends(proposal.scales.kL),
-        kv=_ends(proposal.scales.kv),
-        ka=_ends(proposal.scales.ka),
-        room=proposal.room,
-        shortest_mm=None
-        if proposal.shortest_mm is None
-        else LintLeast(value=proposal.shortest_mm, at=proposal.shortest),
-        under_8_mm=proposal.under_8_mm,
-        asked=proposal.asked,
-        shortest_link_mm=proposal.link_mm,
-    )
-
-
-def _ends(values: FloatArray) -> tuple[float, float]:
-    return float(np.min(values)), float(np.max(values))

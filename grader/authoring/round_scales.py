@@ -6,12 +6,14 @@ them.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grader.answer_sheet.fit import MARGIN_MM, template_for
 from grader.authoring.findings import NAMED, BoolArray, LintFinding, chosen
+from grader.documents import LintLeast
 from grader.layout import FRAME_MM, TEMPLATES, Template
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box
 from grader.rubric import RubricFile
@@ -21,8 +23,10 @@ from reference.plan import ZERO_SHARE, Plan
 
 WELL_READ_MM = 8.0
 """Shorter vectors are read from scans with less certainty."""
-Extents = Mapping[str, tuple[FloatArray, FloatArray]]
-"""Width and height of each figure, millimetres, (N,) each."""
+Size = tuple[FloatArray, FloatArray]
+"""Width and height of a figure in every variant, millimetres, (N,) each."""
+Extents = Mapping[str, Size]
+"""The size of each figure."""
 IntArray = NDArray[np.intp]
 LENGTH_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 """Of 1 : 10^k. ISO 5455 has 1, 2, 5; GOST 2.302 and SR EN practice add 2.5."""
@@ -63,18 +67,14 @@ class AskedVectors:
 
 def asked_vectors(rubric: RubricFile, plan: Plan) -> AskedVectors:
     """The vectors asked for that the mechanism has."""
-    known = [
-        (index, criterion.vector, rubric.tolerance_of(criterion).least_mm)
+    asked = {
+        index: criterion
         for index, criterion in enumerate(rubric.criterion)
         if criterion.vector is not None and criterion.vector in plan.vectors_si
-    ]
-    names = tuple(name for _, name, _ in known)
-    return AskedVectors(
-        tuple(index for index, _, _ in known),
-        names,
-        *_lengths(plan, names),
-        np.array([one[2] for one in known]),
-    )
+    }
+    names = tuple(criterion.vector or "" for criterion in asked.values())
+    least_mm = np.array([rubric.tolerance_of(criterion).least_mm for criterion in asked.values()])
+    return AskedVectors(tuple(asked), names, *_lengths(plan, names), least_mm)
 
 
 def is_zero(plan: Plan, vector: str) -> BoolArray:
@@ -93,45 +93,42 @@ def _lengths(plan: Plan, names: tuple[str, ...]) -> tuple[FloatArray, BoolArray]
 
 
 def length_findings(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Iterator[LintFinding]:
-    """Short vectors one by one where they are asked for, together where they are not."""
+    """Short vectors, each by itself where it is asked for, together where they are not."""
     for row, name in enumerate(asked.names):
         path = f"$.criterion[{asked.criteria[row]}]"
         least = float(asked.least_mm[row])
-        short = asked.short(least)[row]
+        short, zero = asked.short(least)[row], asked.is_zero[row]
         if np.any(short):
-            told = f"{name} is shorter than {least:g} mm at the proposed scales, down to"
             shortest = float(np.min(asked.length_mm[row][short]))
-            yield LintFinding(
-                "warning", "short_vector", "rubric", path,
-                f"{told} {shortest:.2g} mm", chosen(plan.variants, short),
-            )  # fmt: skip
-        zero = asked.is_zero[row]
+            message = f"{name} is shorter than {least:g} mm at the proposed scales, down to {shortest:.2g} mm"
+            meant = chosen(plan.variants, short)
+            yield LintFinding("warning", "short_vector", "rubric", path, message, meant)
         if np.any(zero):
-            told = f"{name} is zero: it has a length to be judged, and no direction"
-            yield LintFinding("hint", "zero_vector", "rubric", path, told, chosen(plan.variants, zero))
+            message = f"{name} is zero: it has a length to be judged, and no direction"
+            yield LintFinding("hint", "zero_vector", "rubric", path, message, chosen(plan.variants, zero))
     few = asked.short(WELL_READ_MM)
     if np.any(few):
-        told = (
+        message = (
             f"{int(few.sum())} of {int((~asked.is_zero).sum())} asked vectors are shorter than"
             f" {WELL_READ_MM:g} mm at the proposed scales: on scans they are read with less certainty"
         )
         meant = chosen(plan.variants, np.any(few, axis=0))
-        yield LintFinding("hint", "hard_to_read", "assignment", "$.scales", told, meant)
-    yield from _unasked(rubric, plan, asked)
+        yield LintFinding("hint", "hard_to_read", "assignment", "$.scales", message, meant)
+    yield from _unasked_findings(rubric, plan, asked)
 
 
-def _unasked(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Iterator[LintFinding]:
+def _unasked_findings(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Iterator[LintFinding]:
     names = tuple(name for name in plan.vectors_si if name not in asked.names)
     lengths, zeros = _lengths(plan, names)
     short = (lengths < rubric.tolerance.least_mm) & ~zeros
-    told = [
+    unasked = [
         f"{name} (down to {np.min(lengths[row][short[row]]):.2g} mm)"
         for row, name in enumerate(names)
         if np.any(short[row])
     ]
-    if told:
+    if unasked:
         least = f"{rubric.tolerance.least_mm:g} mm"
-        message = f"shorter than {least}, though not asked for: {', '.join(told)}"
+        message = f"shorter than {least}, though not asked for: {', '.join(unasked)}"
         meant = chosen(plan.variants, np.any(short, axis=0))
         yield LintFinding("hint", "short_unasked", "assignment", "$.scales", message, meant)
 
@@ -153,14 +150,14 @@ class PageRoom:
     frame: FloatArray
 
 
-def extents_of(plan: Plan) -> dict[str, tuple[FloatArray, FloatArray]]:
+def extents_of(plan: Plan) -> dict[str, Size]:
     """How wide and high each figure of every variant is drawn."""
     count = len(plan.variants)
-    found = {}
+    extents = {}
     for figure, nodes in plan.nodes_mm.items():
         places = np.stack([np.broadcast_to(place, (count,)) for place in nodes.values()])
-        found[figure] = (np.ptp(places.real, axis=0), np.ptp(places.imag, axis=0))
-    return found
+        extents[figure] = (np.ptp(places.real, axis=0), np.ptp(places.imag, axis=0))
+    return extents
 
 
 def pages_of(assignment: Assignment, plan: Plan) -> list[tuple[int, tuple[str, ...]]]:
@@ -189,76 +186,68 @@ def growth(box: Box, wide: FloatArray, high: FloatArray) -> FloatArray:
         return np.asarray(np.minimum((box_wide - 2 * MARGIN_MM) / wide, (box_high - 2 * MARGIN_MM) / high))
 
 
-def _frame_growth(sizes: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    """The same for all figures of a page in the frame: in a row, in a column, or one beside two."""
+def _frame_growth(sizes: Sequence[Size]) -> FloatArray:
+    """The same for all figures of a page in the frame: in a row, in a column, or a figure beside two."""
     wide, high = FRAME_MM[2], FRAME_MM[3]
-    options = [_in_line(sizes, wide, high)]
-    options.append(_in_line([size[::-1] for size in sizes], high, wide))
+    turned = [size[::-1] for size in sizes]
+    options = [_in_line(sizes, wide, high), _in_line(turned, high, wide)]
     if len(sizes) == 3:
         for alone in range(3):
-            pair = [size for index, size in enumerate(sizes) if index != alone]
-            options.append(_beside_pair(sizes[alone], pair, wide, high))
-            turned = [size[::-1] for size in pair]
-            options.append(_beside_pair(sizes[alone][::-1], turned, high, wide))
+            pair = [index for index in range(3) if index != alone]
+            for each, along, across in ((sizes, wide, high), (turned, high, wide)):
+                options.append(_beside_pair(each[alone], [each[index] for index in pair], along, across))
     return np.asarray(np.max(options, axis=0))
 
 
-def _in_line(sizes: Sequence[tuple[FloatArray, FloatArray]], along: float, across: float) -> FloatArray:
+def _in_line(sizes: Sequence[Size], along: float, across: float) -> FloatArray:
+    """The growth of figures side by side."""
     free = along - 2 * MARGIN_MM * len(sizes)
     lengths, widths = sum(size[0] for size in sizes), np.max([size[1] for size in sizes], axis=0)
     with np.errstate(divide="ignore"):
         return np.asarray(np.minimum(free / lengths, (across - 2 * MARGIN_MM) / widths))
 
 
-def _beside_pair(
-    alone: tuple[FloatArray, FloatArray], pair: Sequence[tuple[FloatArray, FloatArray]],
-    along: float, across: float,
-) -> FloatArray:  # fmt: skip
-    """One figure, and beside it two that share the sheet's other dimension."""
+def _beside_pair(alone: Size, pair: Sequence[Size], along: float, across: float) -> FloatArray:
+    """The growth of a figure, and beside it two that share the sheet's other dimension."""
     longer = np.max([size[0] for size in pair], axis=0)
-    total = pair[0][1] + pair[1][1]
+    limits = (
+        (along - 4 * MARGIN_MM, alone[0] + longer),
+        (across - 2 * MARGIN_MM, alone[1]),
+        (across - 4 * MARGIN_MM, pair[0][1] + pair[1][1]),
+    )
     with np.errstate(divide="ignore"):
-        return np.asarray(
-            np.min(
-                [
-                    (along - 4 * MARGIN_MM) / (alone[0] + longer),
-                    (across - 2 * MARGIN_MM) / alone[1],
-                    (across - 4 * MARGIN_MM) / total,
-                ],
-                axis=0,
-            )
-        )
+        return np.asarray(np.min([free / size for free, size in limits], axis=0))
 
 
 def room_findings(assignment: Assignment, plan: Plan, rooms: Mapping[int, PageRoom]) -> Iterator[LintFinding]:
     """Figures too large for their zone, and pages whose figures do not fit a plain A3 sheet either."""
     for index, room in rooms.items():
-        path = f"$.page[{index}]"
-        for figure, factor in room.zones.items():
-            tight = factor < 1.0
-            if np.any(tight):
-                told = f"the {figure.replace('_', ' ')} does not fit its zone on the A3 answer sheet"
-                yield LintFinding(
-                    "warning", "does_not_fit", "assignment", path,
-                    f"{told}: it would at {np.min(factor):.2f} of the proposed size",
-                    chosen(plan.variants, tight),
-                )  # fmt: skip
-        tight = room.frame < 1.0
-        if np.any(tight):
-            told = "the page's figures do not fit side by side into the frame of a plain A3 sheet"
-            yield LintFinding(
-                "warning", "does_not_fit_a3", "assignment", path,
-                f"{told}: they would at {np.min(room.frame):.2f} of the proposed size",
-                chosen(plan.variants, tight),
-            )  # fmt: skip
+        checks = [
+            (
+                "does_not_fit",
+                factor,
+                f"the {figure.replace('_', ' ')} does not fit its zone on the A3 answer sheet: it would",
+            )
+            for figure, factor in room.zones.items()
+        ]
+        side_by_side = "the page's figures do not fit side by side into the frame of a plain A3 sheet"
+        checks.append(("does_not_fit_a3", room.frame, f"{side_by_side}: they would"))
+        for code, factor, what in checks:
+            if np.any(factor < 1.0):
+                message = f"{what} at {np.min(factor):.2f} of the proposed size"
+                meant = chosen(plan.variants, factor < 1.0)
+                yield LintFinding("warning", code, "assignment", f"$.page[{index}]", message, meant)
     shown = {figure for page in assignment.file.page for figure in page.figures}
     for figure in plan.nodes_mm:
         if figure not in shown:
-            told = f"no page has the {figure.replace('_', ' ')}, which the rubric needs"
-            yield LintFinding("warning", "no_page", "assignment", "$.page", told)
+            message = f"no page has the {figure.replace('_', ' ')}, which the rubric needs"
+            yield LintFinding("warning", "no_page", "assignment", "$.page", message)
 
 
 # Round scales -------------------------------------------------------------------------------------
+
+
+ProposalName = Literal["proposed", "round", "round_each"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,20 +256,19 @@ class Proposal:
 
     Attributes
     ----------
-    name : ``proposed`` (by the assignment), ``round`` (one for all), ``round_each`` (each its own)
+    name : ``proposed`` (by the assignment), ``round`` (the same for all), ``round_each`` (each its own)
     room : the least enlargement that any figure's zone has left; below 1 it does not fit
-    shortest_mm : the shortest asked vector that is not zero, with its name; None where none is asked
+    shortest_mm : the shortest asked vector that is not zero; None where none is asked
     under_8_mm, asked : how many asked vectors are shorter than 8 mm, of how many
     link_mm : the shortest link of the sketch
     short : (N,) how many asked vectors of each variant are shorter than 8 mm
     still_short : names of the vectors that are, the most frequent first
     """
 
-    name: str
+    name: ProposalName
     scales: Scales
     room: float
-    shortest_mm: float | None
-    shortest: str
+    shortest_mm: LintLeast | None
     under_8_mm: int
     asked: int
     link_mm: float
@@ -300,14 +288,14 @@ def proposals(
     assignment: Assignment, plan: Plan, extents: Extents, asked: AskedVectors, rooms: Mapping[int, PageRoom]
 ) -> list[Proposal]:
     """The assignment's own scales, round ones for all, and round ones for each variant."""
-    own_room = min(
-        (float(np.min(one)) for room in rooms.values() for one in room.zones.values()), default=np.inf
-    )
+    factors = [factor for room in rooms.values() for factor in room.zones.values()]
+    own_room = min((float(np.min(factor)) for factor in factors), default=np.inf)
     pages = [figures for _, figures in pages_of(assignment, plan)]
     links = _shortest_link_m(plan)
     templates = [_best_template(figures, plan, extents, links) for figures in pages]
     proposed = [_judged("proposed", plan.scales, plan, asked, own_room)]
-    for name in ("round", "round_each"):
+    names: tuple[ProposalName, ...] = ("round", "round_each")
+    for name in names:
         scales = _round_scales(templates, plan, extents, together=name == "round")
         proposed.append(_judged(name, scales, plan, asked, _room(templates, _redrawn(extents, plan, scales))))
     return proposed
@@ -321,11 +309,9 @@ def _shortest_link_m(plan: Plan) -> FloatArray:
     known = [np.abs(at[head] - at[tail]) for tail, head in links if {tail, head} <= at.keys()]
     # A slider lies on the point under it: that is no link.
     lengths = [length for length in known if np.all(length > ZERO_SHARE * np.max(known))]
-    return (
-        np.min([np.broadcast_to(length, (count,)) for length in lengths], axis=0)
-        if lengths
-        else np.ones(count)
-    )
+    if not lengths:
+        return np.ones(count)
+    return np.asarray(np.min([np.broadcast_to(length, (count,)) for length in lengths], axis=0))
 
 
 def _needed(template: Template, plan: Plan, extents: Extents) -> dict[str, FloatArray]:
@@ -352,7 +338,7 @@ def _best_template(figures: Sequence[str], plan: Plan, extents: Extents, links_m
         plans = -sum(np.log(scale) for scale in scales.values())
         return (min(link_mm, LEAST_LINK_MM), float(plans), link_mm)
 
-    return max((one for one in TEMPLATES if one.figures == set(figures)), key=worth)
+    return max((each for each in TEMPLATES if each.figures == set(figures)), key=worth)
 
 
 def steps_of(scale: str) -> tuple[float, ...]:
@@ -374,14 +360,13 @@ def _round_scales(templates: Sequence[Template], plan: Plan, extents: Extents, *
     return Scales(scales["kL"], scales["kv"], scales["ka"])
 
 
-def _redrawn(extents: Extents, plan: Plan, scales: Scales) -> dict[str, tuple[FloatArray, FloatArray]]:
+def _redrawn(extents: Extents, plan: Plan, scales: Scales) -> dict[str, Size]:
     """The figures' sizes at other scales."""
-    found = {}
-    for figure, (wide, high) in extents.items():
-        name = SCALE_OF[figure]
-        factor = getattr(plan.scales, name) / getattr(scales, name)
-        found[figure] = (wide * factor, high * factor)
-    return found
+    factors = {name: getattr(plan.scales, name) / getattr(scales, name) for name in SCALE_OF.values()}
+    return {
+        figure: (wide * factors[SCALE_OF[figure]], high * factors[SCALE_OF[figure]])
+        for figure, (wide, high) in extents.items()
+    }
 
 
 def _room(templates: Sequence[Template], extents: Extents) -> float:
@@ -393,22 +378,23 @@ def _room(templates: Sequence[Template], extents: Extents) -> float:
     return min(rooms, default=np.inf)
 
 
-def _judged(name: str, scales: Scales, plan: Plan, asked: AskedVectors, room: float) -> Proposal:
+def _judged(name: ProposalName, scales: Scales, plan: Plan, asked: AskedVectors, room: float) -> Proposal:
     lengths = np.array(asked.length_mm)
     for row, vector in enumerate(asked.names):
         own = plan.construction.vectors[vector].scale
         lengths[row] *= getattr(plan.scales, own) / getattr(scales, own)
     real = np.where(asked.is_zero, np.inf, lengths)
-    place = np.unravel_index(int(np.argmin(real)), real.shape) if real.size else None
-    known = place is not None and np.isfinite(real[place])
+    shortest = None
+    if np.isfinite(real).any():
+        least = int(np.argmin(real.min(axis=1)))
+        shortest = LintLeast(value=float(real[least].min()), at=asked.names[least])
     short = real < WELL_READ_MM
-    often = sorted(zip(asked.names, short.sum(axis=1).tolist(), strict=True), key=lambda one: -one[1])
+    often = sorted(zip(asked.names, short.sum(axis=1).tolist(), strict=True), key=lambda entry: -entry[1])
     return Proposal(
         name=name,
         scales=scales,
         room=room,
-        shortest_mm=float(real[place]) if place is not None and known else None,
-        shortest=asked.names[place[0]] if place is not None and known else "",
+        shortest_mm=shortest,
         under_8_mm=int(np.sum(short)),
         asked=int(real.size - asked.is_zero.sum()),
         link_mm=float(np.min(_shortest_link_m(plan) / scales.kL)),
@@ -423,7 +409,9 @@ def scale_findings(assignment: Assignment, plan: Plan, proposed: Sequence[Propos
     names = [name for figure, name in SCALE_OF.items() if figure in drawn]
     own, round_, each = proposed
     values = {name: np.asarray(getattr(plan.scales, name)) for name in names}
-    is_round = all(np.allclose(round_up(one, steps_of(name)), one, rtol=1e-6) for name, one in values.items())
+    is_round = all(
+        np.allclose(round_up(scale, steps_of(name)), scale, rtol=1e-6) for name, scale in values.items()
+    )
     if own.room < 1.0 or not is_round:
         why = "do not fit" if own.room < 1.0 else "are not round"
         message = (
@@ -447,19 +435,18 @@ def _short_findings(plan: Plan, own: Proposal, each: Proposal) -> Iterator[LintF
     if own.under_8_mm == 0:
         return
     if each.under_8_mm == 0:
-        told = f"with round scales of each variant's own no asked vector is under {WELL_READ_MM:g} mm"
-        yield LintFinding("hint", "scales_of_its_own", "assignment", "$.scales", told)
+        message = f"with round scales of each variant's own no asked vector is under {WELL_READ_MM:g} mm"
+        yield LintFinding("hint", "scales_of_its_own", "assignment", "$.scales", message)
         return
     left = each.short > 0
     names = ", ".join(each.still_short[:NAMED]) + (" and more" if len(each.still_short) > NAMED else "")
-    told = (
+    message = (
         f"even at the largest round scales that fit the sheet, {each.under_8_mm} of {each.asked} asked"
         f" vectors stay under {WELL_READ_MM:g} mm ({names}): no scale makes them easy to read; a page for"
         " each plan, or a criterion that is optional, would help"
     )
-    yield LintFinding(
-        "hint", "short_at_any_scale", "assignment", "$.scales", told, chosen(plan.variants, left)
-    )
+    meant = chosen(plan.variants, left)
+    yield LintFinding("hint", "short_at_any_scale", "assignment", "$.scales", message, meant)
 
 
 def suggestions(proposed: Sequence[Proposal], plan: Plan, figures: Collection[str]) -> dict[Variant, str]:
@@ -492,3 +479,8 @@ def ratio_text(scale_m_per_mm: float) -> str:
     """A scale of lengths as a ratio: 1:5, 1:2.5, 10:1."""
     ratio = 1000.0 * scale_m_per_mm
     return f"1:{ratio:.4g}" if ratio >= 1.0 - _SLACK else f"{1.0 / ratio:.4g}:1"
+
+
+def ends_of(values: FloatArray) -> tuple[float, float]:
+    """The least and the largest of a scale over the variants."""
+    return float(np.min(values)), float(np.max(values))

@@ -87,65 +87,52 @@ class Conditions:
 def conditions_of(plan: Plan) -> Conditions:
     """The figures of every variant of a plan."""
     count = len(plan.variants)
-    found: dict[str, dict[str, FloatArray]] = {"transmission": {}, "crossing": {}}
-    error = np.zeros(count)
-    for name, values in conditioning(plan).items():
-        kind, _, node = name.partition(" ")
-        whole = np.broadcast_to(values, (count,))
-        if kind in found:
-            found[kind][node] = whole
-        elif kind == "predicted_error":
-            error = whole
-    return Conditions(found["transmission"], found["crossing"], error)
+    figures = {name: np.broadcast_to(values, (count,)) for name, values in conditioning(plan).items()}
+    transmission, crossing = (
+        {name.removeprefix(kind): values for name, values in figures.items() if name.startswith(kind)}
+        for kind in ("transmission ", "crossing ")
+    )
+    return Conditions(transmission, crossing, figures.get("predicted_error", np.zeros(count)))
 
 
 def condition_findings(assignment: Assignment, plan: Plan, conditions: Conditions) -> Iterator[LintFinding]:
     """Groups near a singular position, lines that meet at a small angle, results that lose digits."""
+    variants, whole = plan.variants, mechanism_place(assignment)
     for node, sine in conditions.transmission.items():
-        weak = sine < LEAST_TRANSMISSION
-        if np.any(weak):
+        if np.any(weak := sine < LEAST_TRANSMISSION):
             told = f"near a singular position: the sine of the transmission angle at {node} falls to"
-            yield LintFinding(
-                "warning", "transmission", *group_place(assignment, node),
-                f"{told} {np.min(sine):.2g}", chosen(plan.variants, weak),
-            )  # fmt: skip
-    for nodes, angle in _alike(conditions.crossing_deg).items():
-        flat = angle < LEAST_CROSSING_DEG
-        if np.any(flat):
+            message, meant = f"{told} {np.min(sine):.2g}", chosen(variants, weak)
+            yield LintFinding("warning", "transmission", *group_place(assignment, node), message, meant)
+    for nodes, angle in _joined(conditions.crossing_deg).items():
+        if np.any(flat := angle < LEAST_CROSSING_DEG):
             least = float(np.min(angle))
-            moved = (
-                f"; a line {1:g} mm off moves the node by {1.0 / np.sin(np.radians(max(least, 1e-3))):.2g} mm"
+            error_mm = 1.0 / np.sin(np.radians(max(least, 1e-3)))
+            message = (
+                f"the construction lines of {' and '.join(nodes)} meet at only {least:.1f} degrees;"
+                f" a line 1 mm off moves the node by {error_mm:.2g} mm"
             )
-            yield LintFinding(
-                "warning", "crossing", *group_of_image(assignment, nodes[0]),
-                f"the construction lines of {' and '.join(nodes)} meet at only {least:.1f} degrees{moved}",
-                chosen(plan.variants, flat),
-            )  # fmt: skip
-    sines = [np.ones(len(plan.variants)), *plan.motion.transmission.values()]
+            place = group_of_image(assignment, nodes[0])
+            yield LintFinding("warning", "crossing", *place, message, chosen(variants, flat))
+    sines = [np.ones(len(variants)), *plan.motion.transmission.values()]
     again = plan.motion.recomputed & (np.min(sines, axis=0) < LEAST_TRANSMISSION)
     if np.any(again):
-        told = "would lose a digit or two in double precision, and was computed with more"
-        yield LintFinding(
-            "hint", "recomputed", *mechanism_place(assignment), told, chosen(plan.variants, again)
-        )
-    lost = conditions.error > LARGEST_ERROR
-    if np.any(lost):
-        told = f"the computed plan may be off by {np.max(conditions.error):.1g} of its size"
-        yield LintFinding(
-            "warning", "predicted_error", *mechanism_place(assignment), told, chosen(plan.variants, lost)
-        )
+        message = "would lose a digit or two in double precision, and was computed with more"
+        yield LintFinding("hint", "recomputed", *whole, message, chosen(variants, again))
+    if np.any(lost := conditions.error > LARGEST_ERROR):
+        message = f"the computed plan may be off by {np.max(conditions.error):.1g} of its size"
+        yield LintFinding("warning", "predicted_error", *whole, message, chosen(variants, lost))
 
 
-def _alike(angles: Mapping[str, FloatArray]) -> dict[tuple[str, ...], FloatArray]:
-    """Nodes whose lines meet at the same angles in every variant (b and b') told as one."""
-    found: list[tuple[list[str], FloatArray]] = []
+def _joined(angles: Mapping[str, FloatArray]) -> dict[tuple[str, ...], FloatArray]:
+    """The angles, nodes whose lines meet at the same angles in every variant (b and b') put together."""
+    joined: dict[tuple[str, ...], FloatArray] = {}
     for node, angle in angles.items():
-        same = next((names for names, other in found if np.allclose(angle, other, rtol=0, atol=1e-6)), None)
-        if same is None:
-            found.append(([node], angle))
+        same = [names for names, other in joined.items() if np.allclose(angle, other, rtol=0, atol=1e-6)]
+        if same:
+            joined = {(*names, node) if names in same[:1] else names: a for names, a in joined.items()}
         else:
-            same.append(node)
-    return {tuple(names): angle for names, angle in found}
+            joined[node,] = angle
+    return joined
 
 
 # Pairs of variants with the same drawing ----------------------------------------------------------
@@ -194,10 +181,9 @@ def _passing(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Pairs:
         off = np.abs(asked.length_mm[:, i] - asked.length_mm[:, j])
         crossed = vectors[:, i] * np.conj(vectors[:, j])
         turned = np.abs(np.angle(crossed))
-        near = (off <= np.minimum(length[:, i], length[:, j])) & (
-            turned <= np.minimum(turn[:, i], turn[:, j])
-        )
-        return np.asarray(near.all(axis=0))
+        near_in_length = off <= np.minimum(length[:, i], length[:, j])
+        near_in_turn = turned <= np.minimum(turn[:, i], turn[:, j])
+        return np.asarray((near_in_length & near_in_turn).all(axis=0))
 
     reach = np.max(length + asked.length_mm * np.minimum(turn, 2.0), axis=1)
     spread = np.vstack([vectors.real, vectors.imag])
@@ -227,21 +213,15 @@ def _pairs(
     best = int(np.argmax(apart))
     key, limit = coordinates[best], reach[best]
     order = np.argsort(key, kind="stable")
-    found: list[Pairs] = []
-    total = 0
+    pairs: list[Pairs] = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp))]
     for step in range(1, len(order)):
         near = np.flatnonzero(key[order[step:]] - key[order[:-step]] <= limit)
-        if not len(near):
+        if not len(near) or sum(len(first) for first, _ in pairs) >= MOST_PAIRS:
             break
         i, j = order[near], order[near + step]
         accepted = judge(i, j)
-        found.append((np.minimum(i, j)[accepted], np.maximum(i, j)[accepted]))
-        total += int(accepted.sum())
-        if total >= MOST_PAIRS:
-            break
-    first = np.concatenate([pair[0] for pair in found]) if found else np.empty(0, dtype=np.intp)
-    second = np.concatenate([pair[1] for pair in found]) if found else np.empty(0, dtype=np.intp)
-    return first, second
+        pairs.append((np.minimum(i, j)[accepted], np.maximum(i, j)[accepted]))
+    return np.concatenate([first for first, _ in pairs]), np.concatenate([second for _, second in pairs])
 
 
 def groups_of(pairs: Pairs, count: int) -> list[list[int]]:
@@ -250,12 +230,11 @@ def groups_of(pairs: Pairs, count: int) -> list[list[int]]:
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415 - as above
 
     graph = coo_array((np.ones(len(pairs[0]), dtype=np.int8), pairs), shape=(count, count))
-    _, group = connected_components(graph, directed=False)
-    tied = np.unique(np.concatenate(pairs))
-    found: dict[int, list[int]] = {}
-    for one in tied.tolist():
-        found.setdefault(int(group[one]), []).append(one)
-    return list(found.values())
+    _, component = connected_components(graph, directed=False)
+    groups: dict[int, list[int]] = {}
+    for index in np.unique(np.concatenate(pairs)).tolist():
+        groups.setdefault(int(component[index]), []).append(index)
+    return list(groups.values())
 
 
 def tie_findings(plan: Plan, ties: Ties) -> Iterator[LintFinding]:
@@ -263,14 +242,12 @@ def tie_findings(plan: Plan, ties: Ties) -> Iterator[LintFinding]:
     variants = plan.variants
     groups = groups_of(ties.same, len(variants))
     if groups:
-        meant = np.zeros(len(variants), dtype=np.bool_)
-        meant[[one for group in groups for one in group]] = True
-        told = "; ".join(named([variants[one] for one in group]) for group in groups[:NAMED_GROUPS])
+        members = sorted(index for group in groups for index in group)
+        meant = tuple(variants[index] for index in members)
+        told = "; ".join(named([variants[index] for index in group]) for group in groups[:NAMED_GROUPS])
         more = f" and {len(groups) - NAMED_GROUPS} more groups" if len(groups) > NAMED_GROUPS else ""
         message = f"the same drawing within {SAME_MM:g} mm: {told}{more}"
-        yield LintFinding(
-            "warning", "ties", "assignment", "$.variant", message, chosen(variants, meant), names_them=True
-        )
+        yield LintFinding("warning", "ties", "assignment", "$.variant", message, meant, names_them=True)
     count = len(variants)
     further = np.setdiff1d(ties.passing[0] * count + ties.passing[1], ties.same[0] * count + ties.same[1])
     if len(further):
@@ -280,6 +257,6 @@ def tie_findings(plan: Plan, ties: Ties) -> Iterator[LintFinding]:
             f"{least}{len(further)} pair(s) of variants differ by less than the rubric's tolerance: a copied"
             f" drawing would get full marks, such as that of {variants[i]} for {variants[j]}"
         )
-        meant = np.zeros(count, dtype=np.bool_)
-        meant[np.concatenate(divmod(further, count))] = True
-        yield LintFinding("hint", "near_ties", "assignment", "$.variant", message, chosen(variants, meant))
+        members = np.unique(np.concatenate(divmod(further, count))).tolist()
+        meant = tuple(variants[index] for index in members)
+        yield LintFinding("hint", "near_ties", "assignment", "$.variant", message, meant)

@@ -4,18 +4,18 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
-import numpy as np
 import typer
 from rich.console import Console
 from rich.table import Table
 
 from grader.authoring.findings import named
-from grader.authoring.lint import Least, Lint, Row, lint, lint_document
-from grader.authoring.round_scales import WELL_READ_MM, Proposal, ratio_text
+from grader.authoring.lint import Lint, lint, lint_document
+from grader.authoring.round_scales import WELL_READ_MM, Proposal, ends_of, ratio_text
 from grader.cli.progress import new_table
+from grader.documents import LintLeast, LintVariant, LintWorst
 from grader.files import write_whole
 from grader.rubric import load_rubric
-from reference.assignment import load_assignment
+from reference.assignment import Variant, load_assignment
 from reference.canvas import Label
 from reference.canvas import svg as as_svg
 from reference.draw import FRAME, reference_drawing
@@ -33,9 +33,10 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
     assignment = load_assignment(name)
     found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
     if svg is not None and found.plan is not None and found.worst is not None:
-        told = f"{found.plan.variants[found.worst.index]}: {found.worst.why}"
+        worst = _variant(found.worst)
+        told = f"{worst}: {found.worst.why}"
         reason = Label((FRAME[0], FRAME[3] + 1.5 * REASON_MM), told, REASON_MM, colour=REASON_COLOUR)
-        drawing = reference_drawing(assignment, found.plan, found.worst.index)
+        drawing = reference_drawing(assignment, found.plan, found.plan.variants.index(worst))
         sheets = [(*sheet.shapes, reason) for sheet in drawing]
         write_whole(svg, as_svg(sheets))
     if as_json:
@@ -53,7 +54,7 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
     return found.needs_a_person
 
 
-def _variants_table(rows: Sequence[Row]) -> Table:
+def _variants_table(rows: Sequence[LintVariant]) -> Table:
     figures = (
         "transmis-\nsion sine",
         "crossing\ndegrees",
@@ -72,19 +73,19 @@ def _variants_table(rows: Sequence[Row]) -> Table:
             _worst_of([row.transmission for row in group], "{:.2f}"),
             _worst_of([row.crossing_deg for row in group], "{:.1f}"),
             _worst_of([row.shortest_mm for row in group], "{:.2f}"),
-            str(sum(row.short for row in group)),
+            str(sum(row.under_8_mm for row in group)),
             _room_of([row.room for row in group]),
         )
     return table
 
 
-def _ranges(rows: Sequence[Row]) -> list[list[Row]]:
+def _ranges(rows: Sequence[LintVariant]) -> list[list[LintVariant]]:
     """A row each; of many variants about thirty stretches, all positions of a number in one."""
     if len(rows) <= SHOWN_ROWS:
         return [[row] for row in rows]
-    has_both = rows[0].variant.n is not None and rows[0].variant.position is not None
+    has_both = rows[0].n is not None and rows[0].position is not None
     units = (
-        [list(unit) for _, unit in groupby(rows, key=lambda row: row.variant.n)]
+        [list(unit) for _, unit in groupby(rows, key=lambda row: row.n)]
         if has_both
         else [[row] for row in rows]
     )
@@ -94,11 +95,15 @@ def _ranges(rows: Sequence[Row]) -> list[list[Row]]:
     ]
 
 
-def _named_range(group: Sequence[Row]) -> str:
-    return str(group[0].variant) if len(group) == 1 else named([row.variant for row in group])
+def _named_range(group: Sequence[LintVariant]) -> str:
+    return str(_variant(group[0])) if len(group) == 1 else named(map(_variant, group))
 
 
-def _worst_of(figures: Sequence[Least | None], form: str) -> str:
+def _variant(row: LintVariant | LintWorst) -> Variant:
+    return Variant(row.n, row.position)
+
+
+def _worst_of(figures: Sequence[LintLeast | None], form: str) -> str:
     known = [figure for figure in figures if figure is not None]
     if not known:
         return "-"
@@ -106,7 +111,7 @@ def _worst_of(figures: Sequence[Least | None], form: str) -> str:
     return f"{form.format(least.value)} {least.at}"
 
 
-def _room_of(figures: Sequence[Least | None]) -> str:
+def _room_of(figures: Sequence[LintLeast | None]) -> str:
     """How the tightest figure fits; on which page, where it does not."""
     known = [figure for figure in figures if figure is not None]
     if not known:
@@ -128,7 +133,8 @@ def _scales_table(scales: Sequence[Proposal]) -> Table:
         "ka, (m/s^2)/mm": [_span(one.scales.ka) for one in scales],
         "fits, times": [f"{one.room:.2f}" for one in scales],
         "shortest asked, mm": [
-            "-" if one.shortest_mm is None else f"{one.shortest_mm:.2f} {one.shortest}" for one in scales
+            "-" if one.shortest_mm is None else f"{one.shortest_mm.value:.2f} {one.shortest_mm.at}"
+            for one in scales
         ],
         f"asked under {WELL_READ_MM:g} mm": [f"{one.under_8_mm} of {one.asked}" for one in scales],
         "shortest link, mm": [f"{one.link_mm:.1f}" for one in scales],
@@ -140,15 +146,11 @@ def _scales_table(scales: Sequence[Proposal]) -> Table:
 
 def _ratios(values: FloatArray) -> list[str]:
     """The finest and the coarsest scale of lengths, once where they are one."""
-    return list(dict.fromkeys(ratio_text(end) for end in _ends(values)))
-
-
-def _ends(values: FloatArray) -> tuple[float, float]:
-    return float(np.min(values)), float(np.max(values))
+    return list(dict.fromkeys(ratio_text(end) for end in ends_of(values)))
 
 
 def _span(values: FloatArray) -> str:
-    low, high = (f"{end:.0f}" if end >= 1e4 else f"{end:.4g}" for end in _ends(values))
+    low, high = (f"{end:.0f}" if end >= 1e4 else f"{end:.4g}" for end in ends_of(values))
     return low if low == high else f"{low}..{high}"
 
 
@@ -162,8 +164,7 @@ def _tell_findings(console: Console, result: Lint) -> None:
 
 def _tell_end(result: Lint, svg: Path | None) -> None:
     if result.worst is not None and result.plan is not None:
-        variant = result.plan.variants[result.worst.index]
-        typer.echo(f"hardest to draw: {variant}: {result.worst.why}")
+        typer.echo(f"hardest to draw: {_variant(result.worst)}: {result.worst.why}")
         if svg is not None:
             typer.echo(f"drawn in {svg}")
     elif svg is not None:

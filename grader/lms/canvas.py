@@ -100,6 +100,32 @@ class Gradebook(Form):
     name = "the gradebook"
     platform = "Canvas"
 
+    @classmethod
+    def opened(cls, data: bytes, file: str, item: str) -> Self:
+        """A gradebook as Canvas exports it, and the column of an assignment in it."""
+        table = parse(data, file, delimiter=None)
+        if len(table.rows) < 2:
+            raise _refused(file, ["it has no students"])
+        header = [table.value(0, column).strip() for column in range(len(table.rows[0]))]
+        about = {name: header.index(name) for name in _ABOUT if name in header}
+        faults = []
+        if "ID" not in about or "Section" not in about or not {"Student", "LastName"} & set(about):
+            faults.append(
+                f"row 1: not the columns Student, ID, ..., Section (found: {', '.join(header[:8])})"
+            )
+        faults += table.ragged()
+        points = next((row for row in range(1, min(len(table.rows), 4)) if _POINTS in table.value(row, 0)), 0)
+        if not points:
+            faults.append(f"there is no row '{_POINTS}' below the first")
+        if faults:
+            raise _refused(file, faults)
+        assignment = _assignment(header, max(about.values()), item.strip(), file)
+        stated = table.value(points, assignment).strip()
+        possible = cls.amount(stated) or 0.0
+        if possible <= 0.0:
+            raise _refused(file, [f"row {points + 1}: '{header[assignment]}' has '{stated}' points possible"])
+        return cls(table, {**about, "grade": assignment}, points, possible=possible)
+
     @staticmethod
     def amount(text: str) -> float | None:
         """A number as Canvas reads it: the last comma or dot is the decimal mark, the others group."""
@@ -153,31 +179,7 @@ def fill_gradebook(data: bytes, file: str, grades: Sequence[Grade], options: Opt
     """
     if options.maximum is not None:
         raise CallError("option_unused", "--maximum has no meaning beside --gradebook: it states its own")
-    book = _open(data, file, options.item)
-    return fill_in(book, lambda content: _open(content, file, options.item), grades, options, {})
-
-
-def _open(data: bytes, file: str, item: str) -> Gradebook:
-    table = parse(data, file, delimiter=None)
-    if len(table.rows) < 2:
-        raise _refused(file, ["it has no students"])
-    header = [table.value(0, column).strip() for column in range(len(table.rows[0]))]
-    about = {name: header.index(name) for name in _ABOUT if name in header}
-    faults = []
-    if "ID" not in about or "Section" not in about or not {"Student", "LastName"} & set(about):
-        faults.append(f"row 1: not the columns Student, ID, ..., Section (found: {', '.join(header[:8])})")
-    faults += table.ragged()
-    points = next((row for row in range(1, min(len(table.rows), 4)) if _POINTS in table.value(row, 0)), 0)
-    if not points:
-        faults.append(f"there is no row '{_POINTS}' below the first")
-    if faults:
-        raise _refused(file, faults)
-    assignment = _assignment(header, max(about.values()), item.strip(), file)
-    stated = table.value(points, assignment).strip()
-    possible = Gradebook.amount(stated) or 0.0
-    if possible <= 0.0:
-        raise _refused(file, [f"row {points + 1}: '{header[assignment]}' has '{stated}' points possible"])
-    return Gradebook(table, {**about, "grade": assignment}, points, possible=possible)
+    return fill_in(Gradebook.opened(data, file, options.item), file, grades, options, {})
 
 
 def _refused(file: str, faults: Sequence[str]) -> InputFileError:
@@ -229,19 +231,9 @@ def rubric(grades: Sequence[Grade], options: Options) -> Delivery:
         message = "Canvas keeps two decimals of a rubric's points; nothing was written"
         raise CallError("points", f"{message}\n{lines_of(rough)}")
     name = options.item.strip() or grades[0].assignment
+    ratings = ("true", "Full marks", "", "{}", "No marks", "", "0")
     rows = [
-        [
-            name,
-            each.name,
-            each.titles[0],
-            "true",
-            "Full marks",
-            "",
-            number(each.max_points),
-            "No marks",
-            "",
-            "0",
-        ]
+        (name, each.name, each.titles[0], *(cell.format(number(each.max_points)) for cell in ratings))
         for each in criteria
     ]
     return Delivery(csv_text(RUBRIC_HEADER, rows))

@@ -100,6 +100,8 @@ def check_points(criteria: Iterable[PlatformCriterion], points: Mapping[str, flo
 
 _COMMENTED = {"partial", "none", "review", "follow_through"}
 """The verdicts that are worth a comment."""
+Remark = tuple[str, str, str]
+"""Sign of the verdict, title of the criterion, sentence."""
 
 
 def comment(grade: Grade) -> str:
@@ -114,20 +116,20 @@ def comment(grade: Grade) -> str:
     return str(html)
 
 
-def _everything_is_right(grade: Grade) -> str:
-    return tongue(grade.person.lang).gettext("Everything is right.")
-
-
 def plain_comment(grade: Grade) -> str:
     """The same as plain text, a line for each remark."""
     lines = []
     for heading, remarks in _comments(grade):
         lines += [heading] if heading else []
-        lines += [f"{mark} {title}: {text}" for mark, title, text in remarks] or [_everything_is_right(grade)]
+        lines += [f"{sign} {title}: {text}" for sign, title, text in remarks] or [_everything_is_right(grade)]
     return "\n".join(lines)
 
 
-def _comments(grade: Grade) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
+def _everything_is_right(grade: Grade) -> str:
+    return tongue(grade.person.lang).gettext("Everything is right.")
+
+
+def _comments(grade: Grade) -> Iterator[tuple[str, list[Remark]]]:
     """For each report: a heading where there are several, and marks, titles and sentences."""
     position = tongue(grade.person.lang).gettext("Position")
     for report in grade.reports:
@@ -296,37 +298,29 @@ def platform_marks(
 CRITERION_COLUMNS = ("criterion", "id")
 
 
-@dataclass(frozen=True, slots=True)
-class Known:
-    """A criterion in a platform's answer."""
-
-    id: str
-    name: str
-    max_points: float | None = None
-
-
 def numbered(criteria: Sequence[Criterion], path: Path) -> list[PlatformCriterion]:
     """The platform's number of each criterion, from a table ``criterion,id`` or the platform's own JSON.
 
     Raises InputFileError where one is missing, stands there twice, or has other points there.
     """
-    known = _known(path)
+    known = _criteria_of(path)
+    names = ", ".join(f"'{name}'" for _, name, _ in known)
     faults: list[str] = []
     result: list[PlatformCriterion] = []
     for criterion in criteria:
-        same = [each for each in known if criterion.is_named(each.name)]
+        same = [(number, points) for number, name, points in known if criterion.is_named(name)]
         if len(same) != 1:
-            names = ", ".join(f"'{each.name}'" for each in known)
-            faults.append(
-                f"{criterion.name}: " + (f"there ({len(same)} times)" if same else f"not there ({names})")
-            )
+            why = f"there ({len(same)} times)" if same else f"not there ({names})"
+            faults.append(f"{criterion.name}: {why}")
             continue
-        points, most = same[0].max_points, criterion.max_points
+        (number, points), most = same[0], criterion.max_points
         if points is not None and abs(points - most) > CLOSE:
             faults.append(f"{criterion.name}: {points:g} points there, {most:g} in the rubric")
-        result.append(PlatformCriterion(criterion=criterion.id, id=same[0].id, max_points=most))
+        result.append(PlatformCriterion(criterion=criterion.id, id=number, max_points=most))
     numbers = {each.id for each in result}
-    faults += [f"'{each.name}': there, and not in the rubric" for each in known if each.id not in numbers]
+    faults += [
+        f"'{name}': there, and not in the rubric" for number, name, _ in known if number not in numbers
+    ]
     if len(numbers) < len(result):
         faults.append("two criteria have one number")
     if faults:
@@ -334,10 +328,15 @@ def numbered(criteria: Sequence[Criterion], path: Path) -> list[PlatformCriterio
     return result
 
 
-def _known(path: Path) -> list[Known]:
+PlatformEntry = tuple[str, str, float | None]
+"""A criterion in a platform's answer: its number, its name, and its points where they are given."""
+
+
+def _criteria_of(path: Path) -> list[PlatformEntry]:
+    """The criteria in a table ``criterion,id`` or in a platform's answer."""
     if path.suffix.lower() == ".csv":
         rows = read_table(path, CRITERION_COLUMNS)
-        return [Known(row.get("id", ""), row["criterion"]) for _, row in rows if row.get("id")]
+        return [(row["id"], row["criterion"], None) for _, row in rows if row.get("id")]
     known = list(criteria_in(read_answer(path)))
     if not known:
         raise InputFileError(
@@ -360,7 +359,7 @@ _LISTS = ("guide_criteria", "criteria", "data", "rubric")
 _NESTS = ("areas", "definitions", "guide", "rubric")
 
 
-def criteria_in(answer: object) -> Iterator[Known]:
+def criteria_in(answer: object) -> Iterator[PlatformEntry]:
     """Criteria in an answer: Moodle's of a marking guide, Canvas's of a rubric or of an assignment."""
     if isinstance(answer, list):
         for each in answer:
@@ -370,7 +369,7 @@ def criteria_in(answer: object) -> Iterator[Known]:
     name, number = answer.get("shortname", answer.get("description")), answer.get("id")
     if isinstance(name, str) and isinstance(number, str | int) and {"maxscore", "points"} & set(answer):
         points = answer.get("maxscore", answer.get("points"))
-        yield Known(str(number), name, float(points) if isinstance(points, int | float) else None)
+        yield str(number), name, float(points) if isinstance(points, int | float) else None
         return
     # A Canvas rubric has its criteria as `data` and again as `criteria`: the first that is there counts.
     lists = [answer[key] for key in _LISTS if isinstance(answer.get(key), list)]

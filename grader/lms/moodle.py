@@ -17,6 +17,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 from grader.lms.grades import Delivery, Grade, Options, Person, ready
 from grader.lms.marks import comment
@@ -74,6 +75,29 @@ class Worksheet(Form):
         " downloaded afresh"
     )
 
+    @classmethod
+    def opened(cls, data: bytes, file: str, item: str = "") -> Self:  # noqa: ARG003 - a worksheet is of one item
+        """A worksheet as downloaded; InputFileError with everything that Moodle would not take."""
+        table = parse(data, file)
+        if not table.rows:
+            raise InputFileError(
+                "worksheet", f"{file}: the worksheet is empty; download it from Moodle again"
+            )
+        columns, faults = _columns([table.value(0, column).strip() for column in range(len(table.rows[0]))])
+        faults += table.ragged()
+        sheet = cls(table, {**_unnamed(table, columns), **columns})
+        if not faults:
+            faults += _row_faults(sheet)
+        if faults:
+            raise InputFileError(
+                "worksheet",
+                f"{file}: Moodle would not take this worksheet; download it again, with Moodle in English,"
+                f" Romanian or Russian, and do not resave it\n{lines_of(faults)}",
+            )
+        if "maximum" not in columns:
+            sheet.notes.append("the worksheet does not state its maximum grade: taken to be the rubric's")
+        return sheet
+
     @staticmethod
     def amount(text: str) -> float | None:
         """A number that is not negative as Moodle writes it: 10.00, or 10,00 in many languages."""
@@ -126,31 +150,10 @@ def fill_worksheet(
     for name in ("item", "identity", "maximum"):
         if getattr(options, name):
             raise CallError("option_unused", f"--{name} has no meaning beside --worksheet: leave it out")
-    sheet = open_worksheet(data, file)
+    sheet = Worksheet.opened(data, file)
     if "feedback" not in sheet.columns:
         sheet.notes.append("the worksheet has no column for feedback comments: only grades are filled in")
-    return fill_in(sheet, lambda content: open_worksheet(content, file), grades, options, comments)
-
-
-def open_worksheet(data: bytes, file: str) -> Worksheet:
-    """A worksheet as downloaded; InputFileError with everything that Moodle would not take."""
-    table = parse(data, file)
-    if not table.rows:
-        raise InputFileError("worksheet", f"{file}: the worksheet is empty; download it from Moodle again")
-    columns, faults = _columns([table.value(0, column).strip() for column in range(len(table.rows[0]))])
-    faults += table.ragged()
-    sheet = Worksheet(table, {**_unnamed(table, columns), **columns})
-    if not faults:
-        faults += _row_faults(sheet)
-    if faults:
-        raise InputFileError(
-            "worksheet",
-            f"{file}: Moodle would not take this worksheet; download it again, with Moodle in English,"
-            f" Romanian or Russian, and do not resave it\n{lines_of(faults)}",
-        )
-    if "maximum" not in columns:
-        sheet.notes.append("the worksheet does not state its maximum grade: taken to be the rubric's")
-    return sheet
+    return fill_in(sheet, file, grades, options, comments)
 
 
 def _columns(header: list[str]) -> tuple[dict[str, int], list[str]]:
@@ -337,7 +340,7 @@ def _participants(
             )
         others = people.keys() - numbers.keys()
         return numbers, dict.fromkeys(others, "the table of ids has no participant"), []
-    sheet = open_worksheet(bytes_of(options.form, "form_missing"), options.form.name)
+    sheet = Worksheet.opened(bytes_of(options.form, "form_missing"), options.form.name)
     matches = sheet.match(grades, options)
     rows = {student: row for student, row in matches.rows.items() if student in people}
     locked = {student: why for student, row in rows.items() if (why := sheet.why_fixed(row))}

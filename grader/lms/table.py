@@ -6,10 +6,11 @@ import re
 import unicodedata
 from abc import ABC, abstractmethod
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
 from grader.files import OutputError, write_whole
@@ -26,11 +27,13 @@ NO_GRADE = {"", "-"}
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
-    """A table as CSV: UTF-8 without a mark, commas, decimal dots, CRLF; read back once.
+    """A table as CSV: UTF-8 without a mark, commas, decimal dots, CRLF.
 
     Texts that a spreadsheet would run as formulas get an apostrophe before.
+
+    Raises OutputError where the text does not read back as the same table.
     """
-    table = [[guarded(name) for name in header], *([written(cell) for cell in row] for row in rows)]
+    table = [[_cell_text(cell) for cell in row] for row in (header, *rows)]
     buffer = io.StringIO()
     csv.writer(buffer, lineterminator="\r\n").writerows(table)
     text = buffer.getvalue()
@@ -39,13 +42,16 @@ def csv_text(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     return text
 
 
-def written(cell: Cell) -> str:
+def _cell_text(cell: Cell) -> str:
     """A cell's text: numbers with a dot and without needless digits, texts guarded."""
-    if cell is None:
-        return ""
-    if isinstance(cell, float):
-        return number(cell)
-    return str(cell) if isinstance(cell, int) else guarded(cell)
+    match cell:
+        case None:
+            return ""
+        case float():
+            return number(cell)
+        case int():
+            return str(cell)
+    return guarded(cell)
 
 
 def guarded(text: str) -> str:
@@ -136,8 +142,14 @@ def with_ids(people: Mapping[str, Person], path: Path) -> dict[str, Person]:
     Raises InputFileError with every fault of the table.
     """
     rows = read_table(path, STUDENT_COLUMNS)
-    faults = list(_repeated(rows))
+    faults = []
+    line_of: dict[tuple[str, str], int] = {}
     joined = dict(people)
+    for line, row in rows:
+        for column, cell in row.items():
+            before = line_of.setdefault((column, cell.casefold()), line)
+            if cell and before != line:
+                faults.append(f"line {line}: the same {column} '{cell}' as in line {before}")
     for line, row in rows:
         participant = row.get("participant", "")
         if participant and not (participant.isascii() and participant.isdigit()):
@@ -160,15 +172,11 @@ def read_table(path: Path, columns: Sequence[str]) -> list[tuple[int, dict[str, 
 
     Raises InputFileError with the file's faults.
     """
-    try:
-        text = bytes_of(path, "ids").decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputFileError("ids", f"{path}: is not UTF-8 text; save it as CSV in UTF-8") from error
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter_of(text), strict=True)
-    try:
-        lines = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
-    except csv.Error as error:
-        raise InputFileError("ids", f"{path}, line {reader.line_num}: {error}") from error
+    table = parse(bytes_of(path, "ids"), str(path), delimiter=None)
+    lines = [
+        (row + 1, [table.value(row, column).strip() for column in range(len(cells))])
+        for row, cells in enumerate(table.rows)
+    ]
     lines = [(line, cells) for line, cells in lines if any(cells)]
     header, key = lines[0][1] if lines else [], columns[0]
     is_wrong = any(name not in columns or header.count(name) > 1 for name in header)
@@ -191,15 +199,6 @@ def bytes_of(path: Path, code: str) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise InputFileError(code, f"{path}: cannot be read ({error.strerror})") from error
-
-
-def _repeated(rows: Sequence[tuple[int, Mapping[str, str]]]) -> Iterator[str]:
-    first: dict[tuple[str, str], int] = {}
-    for line, row in rows:
-        for column, cell in row.items():
-            before = first.setdefault((column, cell.casefold()), line)
-            if cell and before != line:
-                yield f"line {line}: the same {column} '{cell}' as in line {before}"
 
 
 # Files changed in single cells, everything else the same to the byte ------------------------------
@@ -327,32 +326,32 @@ def match_rows(
     Arguments: `rows` has cells by row and column, `table` is the table's name in words.
     """
     cells = {row: {column: _folded(text) for column, text in texts.items()} for row, texts in rows.items()}
-    index: dict[tuple[str, str], list[int]] = defaultdict(list)
+    rows_with: dict[tuple[str, str], list[int]] = defaultdict(list)
     for row, texts in cells.items():
         for cell in texts.items():
-            index[cell].append(row)
+            rows_with[cell].append(row)
     keys = {
         student: [(column, _folded(text)) for column, text in evidence if text.strip()]
         for student, evidence in students.items()
     }
-    speaking = {key[0] for evidence in keys.values() for key in evidence if key in index}
+    speaking = {key[0] for evidence in keys.values() for key in evidence if key in rows_with}
     matches = Matches()
     claims: dict[int, dict[str, str]] = defaultdict(dict)
     for student, evidence in keys.items():
-        key = next((key for key in evidence if key in index), None)
-        if key is None:
+        stronger = list(takewhile(lambda key: key not in rows_with, evidence))
+        if len(stronger) == len(evidence):
             known = ", ".join(f"{column} '{text}'" for column, text in students[student] if text)
-            known = known or "anything known of the student"
-            matches.missing[student] = f"nobody in {table} has {known}"
+            matches.missing[student] = f"nobody in {table} has {known or 'anything known of the student'}"
             continue
-        row, *others = index[key]
+        key = evidence[len(stronger)]
+        row, *others = rows_with[key]
         contrary = [
             column
-            for column, text in evidence[: evidence.index(key)]
+            for column, text in stronger
             if column in speaking - {key[0]} and cells[row].get(column) not in (None, "", text)
         ]
         if others:
-            numbers = ", ".join(str(each + 1) for each in index[key])
+            numbers = ", ".join(str(each + 1) for each in (row, *others))
             matches.missing[student] = f"rows {numbers} of {table} all fit"
         elif contrary:
             matches.missing[student] = f"row {row + 1} of {table} has the {key[0]}, but another {contrary[0]}"
@@ -362,11 +361,9 @@ def match_rows(
         if len(claiming) > 1:
             why = f"row {row + 1} of {table} fits {' and '.join(claiming)} alike"
             matches.missing.update(dict.fromkeys(claiming, why))
-            continue
-        ((student, column),) = claiming.items()
-        matches.rows[student] = row
-        if column in NAMES:
-            matches.by_name.append(student)
+        else:
+            matches.rows.update(dict.fromkeys(claiming, row))
+            matches.by_name += [student for student, column in claiming.items() if column in NAMES]
     return matches
 
 
@@ -398,6 +395,11 @@ class Form(ABC):
     platform: ClassVar[str]
     replaced: ClassVar[str] = ""
     """What the platform does where grades that it holds already are changed."""
+
+    @classmethod
+    @abstractmethod
+    def opened(cls, data: bytes, file: str, item: str) -> Self:
+        """A file of the platform; raises InputFileError with its faults, CallError for an unknown item."""
 
     @staticmethod
     @abstractmethod
@@ -441,58 +443,62 @@ class Form(ABC):
             self.name,
         )
 
+    def put_grade(self, row: int, text: str) -> bool:
+        """Put a grade into its cell; whether another one stood there."""
+        before = self.value(row, "grade")
+        amount = self.amount(before)
+        if amount is not None and number(amount) == text:
+            return False
+        self.table.put(row, self.columns["grade"], text)
+        return before not in NO_GRADE
+
+    def put_comment(self, row: int, text: str) -> bool:
+        """Put a comment into its cell, where the table has such a column; whether another one stood there."""
+        if "feedback" not in self.columns:
+            return False
+        before = self.value(row, "feedback")
+        self.table.put(row, self.columns["feedback"], text)
+        return before not in {"", text}
+
 
 def fill_in(
-    form: Form, reopen: Callable[[bytes], Form], grades: Sequence[Grade], options: Options,
-    comments: Mapping[str, str],
-) -> Delivery:  # fmt: skip
+    form: Form, file: str, grades: Sequence[Grade], options: Options, comments: Mapping[str, str]
+) -> Delivery:
     """Fill in grades, and comments by student_id; only cells of those who have a grade change.
 
-    What was filled in is opened again with `reopen`, and must hold the grades that were meant.
-
-    Raises CallError where the form's maximum is not the rubric's and nobody asks for rescaling.
+    Raises CallError where the form's maximum is not the rubric's and nobody asks for rescaling,
+    OutputError where the changed file, opened again, does not hold the grades that were meant.
     """
     matches = form.match(grades, options)
     held = {row: cell for row in form.people if (cell := form.value(row, "grade")) not in NO_GRADE}
-    texts, unplaced = _put_grades(form, matches, grades, options)
-    students = {student: row for student, row in matches.rows.items() if row in texts}
-    changed = 0
-    for student, text in comments.items() if "feedback" in form.columns else ():
-        if (row := students.get(student)) is not None:
-            changed += form.value(row, "feedback") not in {"", text}
-            form.table.put(row, form.columns["feedback"], text)
-    if changed:
-        form.notes.append(f"{changed} comment(s) that {form.platform} holds already are replaced")
+    filled, unplaced, texts = list[str](), dict[str, str](), dict[int, str]()
+    grades_replaced = comments_replaced = 0
+    for grade in ready(grades):
+        student, row = grade.student_id, matches.rows.get(grade.student_id)
+        if why := matches.missing[student] if row is None else form.why_fixed(row):
+            unplaced[student] = why
+        if row is None or why:
+            continue
+        filled.append(student)
+        texts[row] = number(grade.out_of(form.maximum(row), rescale=options.rescale))
+        grades_replaced += form.put_grade(row, texts[row])
+        if student in comments:
+            comments_replaced += form.put_comment(row, comments[student])
     content = form.table.text().encode("utf-8")
-    again = reopen(content)
+    again = form.opened(content, file, options.item)
     if any(number(again.amount(again.value(row, "grade")) or 0.0) != text for row, text in texts.items()):
         raise not_as_meant(form.name)
-    waiting = [grade.student_id for grade in grades if grade.score is None]
-    stays = [f"{one} ({held[matches.rows[one]]})" for one in waiting if matches.rows.get(one) in held]
-    notes = [*form.notes, *matches.notes_on(students)]
+    notes = [*form.notes]
+    if grades_replaced:
+        note = f"{grades_replaced} grade(s) that {form.platform} holds already are changed{form.replaced}"
+        notes.append(note)
+    if comments_replaced:
+        notes.append(f"{comments_replaced} comment(s) that {form.platform} holds already are replaced")
+    notes += matches.notes_on(filled)
+    waiting = {
+        grade.student_id: matches.rows.get(grade.student_id) for grade in grades if grade.score is None
+    }
+    stays = [f"{student} ({held[row]})" for student, row in waiting.items() if row in held]
     if stays:
         notes.append(f"withheld, and a grade is there already, which stays: {in_a_row(stays)}")
     return Delivery(content, unplaced=unplaced, notes=tuple(notes))
-
-
-def _put_grades(
-    form: Form, matches: Matches, grades: Sequence[Grade], options: Options
-) -> tuple[dict[int, str], dict[str, str]]:
-    """Put grades into their cells: the grades by row, and why students have none."""
-    texts, unplaced, replaced = dict[int, str](), dict[str, str](), 0
-    for grade in ready(grades):
-        row = matches.rows.get(grade.student_id)
-        if why := matches.missing[grade.student_id] if row is None else form.why_fixed(row):
-            unplaced[grade.student_id] = why
-        if row is None or why:
-            continue
-        texts[row] = number(grade.out_of(form.maximum(row), rescale=options.rescale))
-        before = form.value(row, "grade")
-        amount = form.amount(before)
-        if amount is None or number(amount) != texts[row]:
-            replaced += before not in NO_GRADE
-            form.table.put(row, form.columns["grade"], texts[row])
-    if replaced:
-        note = f"{replaced} grade(s) that {form.platform} holds already are changed{form.replaced}"
-        form.notes.append(note)
-    return texts, unplaced

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from grader.authoring.new import rubric_for
 from grader.judging import Submission, judge, task_of
 from grader.measurements import Names, reading_of
 from reference.assignment import Assignment
 from reference.assignment_file import AssignmentFile
 from reference.authored import validate
+from tests.whole_rubric import rubric_for
 
 FIGURE_MM, LARGE_MM = 40.0, 60.0
 """Longest vector of a plan that fills half the width of a book's page; and of a student's own."""

@@ -9,13 +9,13 @@ import tomllib
 from functools import cache
 from pathlib import Path
 
-from grader.authoring.new import rubric_for
 from grader.rubric import RubricFile, rubric_of
 from reference.assignment import Assignment, load_assignment
 from reference.assignment_file import AssignmentFile
 from reference.authored import validate
 from reference.checking import check_mechanism
 from reference.errors import AuthoredFileError
+from tests.whole_rubric import rubric_for
 
 _SCALES = 'scales = { crank_mm = 50, kL = "crank_m / crank_mm", kv = "omega * kL", ka = "kv**2 / kL" }'
 _PAGES = """

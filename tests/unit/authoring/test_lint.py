@@ -1,5 +1,6 @@
 import ast
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -74,7 +75,7 @@ def test_variants_that_do_not_assemble_are_one_fault_and_the_others_still_looked
     faults = [one for one in found.findings if one.severity == "fault"]
     assert [one.code for one in faults] == ["does_not_assemble"]
     assert (faults[0].file, faults[0].path) == ("mechanism", "$.group[0]")
-    broken = [row.variant.n for row in found.rows if row.problem]
+    broken = [row.n for row in found.rows if row.problem]
     assert [variant.n for variant in faults[0].variants] == broken
     assert 75 in broken
     assert len(found.rows) == 80
@@ -113,12 +114,8 @@ def test_a_singular_position_is_told_with_the_group_that_it_hangs_on(tmp_path):
     # Of a slider both are one angle: between the rod's perpendicular and the guide.
     worst = min(row.crossing_deg.value for row in found.rows if row.crossing_deg)
     assert np.sin(np.radians(worst)) == pytest.approx(least, abs=SINE_TOLERANCE)
-    assert (
-        found.plan.variants[found.worst.index]
-        == min(
-            (row for row in found.rows if row.transmission), key=lambda row: row.transmission.value
-        ).variant
-    )
+    hardest = min((row for row in found.rows if row.transmission), key=lambda row: row.transmission.value)
+    assert (found.worst.n, found.worst.position) == (hardest.n, hardest.position)
 
 
 def test_the_same_drawing_for_two_students_is_a_tie(tmp_path):
@@ -233,10 +230,15 @@ def test_variants_are_named_shortly(variants, told):
 
 
 def within(tmp_path: Path, start: str, old: str, new: str, criterion: str) -> Path:
-    """A start, whose mechanism stands within its assignment, with one text replaced and a rubric."""
-    text = (library() / "starts" / f"{start}.assignment.toml").read_text(encoding="utf-8")
-    assert old in text
-    (tmp_path / f"{start}.assignment.toml").write_text(text.replace(old, new), encoding="utf-8")
+    """A start with its mechanism within its assignment, one text of it replaced, and a rubric."""
+    text, mechanism = (
+        (library() / "starts" / f"{start}.{kind}.toml").read_text(encoding="utf-8")
+        for kind in ("assignment", "mechanism")
+    )
+    assert old in mechanism
+    tables = re.sub(r"(?m)^(\[\[?)", r"\1mechanism.", mechanism.replace(old, new))
+    text = re.sub(r"(?m)^mechanism = .*\n", "", text) + f"\n[mechanism]\n{tables}"
+    (tmp_path / f"{start}.assignment.toml").write_text(text, encoding="utf-8")
     rubric = f'schema_version = 1\nid = "{start}"\ntitle = {{ en = "R" }}\n[[criterion]]\n{criterion}\n'
     (tmp_path / f"{start}.rubric.toml").write_text(
         rubric + 'id = "x"\ntitle = { en = "X" }\npoints = 1\n', "utf-8"

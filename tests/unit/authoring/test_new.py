@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from itertools import pairwise
 from types import UnionType
 from typing import get_args, get_origin
 
@@ -9,12 +10,11 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from grader.authoring.comments import KEYS, TABLES, commented, inline, quoted
 from grader.authoring.lint import lint
-from grader.authoring.new import joints_of, new_assignment, rubric_for, starts
+from grader.authoring.new import new_assignment, starts, starts_folder
 from grader.files import OutputError
-from grader.rubric import CriterionTable, RubricFile, load_rubric, rubric_of
-from reference.assignment import built_in, load_assignment
+from grader.rubric import RubricFile, WeightsTable, load_rubric, rubric_of
+from reference.assignment import built_in, library, load_assignment
 from reference.assignment_file import AssignmentFile
 from reference.authored import Text
 from reference.errors import CallError
@@ -23,34 +23,52 @@ from reference.plan import exact_plan
 SAME_NUMBER = 1e-12
 
 
-def models_in(model: type[BaseModel]) -> set[type[BaseModel]]:
+def tables_in(model: type[BaseModel]) -> set[type[BaseModel]]:
     """A model and all those within it."""
-    seen: set[type[BaseModel]] = set()
+    known: set[type[BaseModel]] = set()
     waiting: list[object] = [model]
     while waiting:
         kind = waiting.pop()
         if isinstance(kind, type) and get_origin(kind) is None and issubclass(kind, BaseModel):
-            if kind not in seen:
-                seen.add(kind)
+            if kind not in known:
+                known.add(kind)
                 waiting.extend(field.annotation for field in kind.model_fields.values())
         elif get_args(kind) or isinstance(kind, UnionType):
             waiting.extend(get_args(kind))
-    return seen
+    return known
 
 
-ALL_MODELS = {*models_in(AssignmentFile), *models_in(RubricFile)}
+FILES = [*library().glob("*.toml"), *starts_folder().glob("*.toml")]
+TABLES = {*tables_in(AssignmentFile), *tables_in(RubricFile)} - {Text, WeightsTable}
+"""Languages and the sections of a rubric explain themselves."""
 
 
-@pytest.mark.parametrize(
-    "model", sorted(ALL_MODELS, key=lambda one: one.__name__), ids=lambda one: one.__name__
-)
-def test_every_key_of_an_authored_file_is_explained(model):
-    assert set(model.model_fields) == set(KEYS[model.__name__])
+@pytest.mark.parametrize("table", sorted(TABLES, key=lambda one: one.__name__), ids=lambda one: one.__name__)
+def test_every_key_of_an_authored_file_is_shown_in_a_library_file(table):
+    texts = "\n".join(path.read_text(encoding="utf-8") for path in FILES)
+    for name, field in table.model_fields.items():
+        key = field.alias or name
+        shown = rf"(?m)(^|[{{\[,] ?|# ){key}( = |\])|^\[+(\w+\.)?{key}\]"
+        assert re.search(shown, texts), key
 
 
-def test_nothing_is_explained_that_is_not_there():
-    assert {model.__name__ for model in ALL_MODELS} == set(KEYS)
-    assert set(TABLES) <= set(KEYS)
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_each_key_of_a_library_file_is_explained_where_it_first_stands(path):
+    """At the end of its line or on the line above; words of the three languages explain themselves."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    known, table = {("", "")}, ""
+    for above, line in pairwise(["", *lines]):
+        is_heading = line.startswith("[")
+        table = line.strip("[]") if is_heading else table
+        key = "" if is_heading else line.partition(" = ")[0].removeprefix("# ")
+        is_key = is_heading or (re.fullmatch(r"[a-zA-Z]+(_\w+)?", key) and " = " in line)
+        if (
+            is_key
+            and table not in {"title", "task", "ground", "variant.values"}
+            and (table, key) not in known
+        ):
+            assert "  # " in line or above.startswith("#"), line
+            known.add((table, key))
 
 
 @pytest.mark.parametrize("start", starts())
@@ -160,15 +178,6 @@ def test_the_files_are_named_after_the_call(tmp_path, file, names):
     assert rubric_of(load_assignment(written.assignment)).max_score > 0
 
 
-def test_the_plates_two_ways_are_optional_in_a_rubric_made_from_the_construction():
-    pump = load_assignment("pump")
-    made = rubric_for("x", Text(en="X"), pump.mechanism(pump.variants()[:1]))
-    optional = {criterion.vector for criterion in made.criterion if criterion.optional} - {None}
-    assert optional == {"v_CA", "v_CB", "a_CA_n", "a_CA_t", "a_CB_n", "a_CB_t"}
-    points = {criterion.name: criterion.points for criterion in made.criterion}
-    assert points["v_D"] == points["a_D"] > points["v_B"] > points["a_B_t"] > points["omega_3"]
-
-
 def test_the_last_groups_joint_gives_the_most_points(tmp_path):
     for start, result in (("shaper", "D"), ("tangent", "B"), ("slider-crank", "B")):
         rubric = rubric_of(load_assignment(new_assignment(tmp_path / start, mechanism=start).assignment))
@@ -177,26 +186,74 @@ def test_the_last_groups_joint_gives_the_most_points(tmp_path):
         assert most == {f"v_{result}", f"a_{result}"}
 
 
-@pytest.mark.parametrize(
-    ("about", "joints"),
-    [("BA", ("B", "A")), ("B", ("B", "")), ("B3B", ("B3", "B")), ("A3", ("A3", "")), ("D5D", ("D5", "D"))],
-)
-def test_the_joints_of_a_vectors_name(about, joints):
-    assert joints_of(about, ("O1", "A", "A3", "B", "B3", "D", "D5")) == joints
+INLINE = """
+schema_version = 1
+id = 'own'  # mine
+rubric = "pump"
+[title]
+en = "T"
+[task]
+en = "T"
+# all of it here
+[mechanism]
+schema_version = 1
+id = "slider"
+length_unit = "cm"
+[mechanism.title]
+en = "M"
+[mechanism.ground]
+O1 = [0, 0]
+[mechanism.crank]
+link = "1"
+pivot = "O1"
+pin = "A"
+length = 20
+angle_deg = "10*n"
+omega = 1
+[[mechanism.group]]
+type = "RRP"
+node = "B"
+pin = "A"
+link = "2"
+length = 50
+guide = { through = [0, 0], angle_deg = 0 }
+side = "ahead"
+[variant]
+n = { from = 1, to = 3 }
+[scales]
+crank_mm = 50
+kL = "crank_m / crank_mm"
+kv = "omega * kL"
+ka = "omega**2 * kL"
+[[page]]
+kind = "all"
+figures = ["mechanism", "velocity_plan"]
+"""
 
 
-@pytest.mark.parametrize(
-    "text", ["plain", 'with "quotes"', "back\\slash", "line\nbreak", "tab\t", "Ελλ", "\x7f\x01"]
-)
-def test_any_text_survives_being_written(text):
-    assert tomllib.loads(f"key = {quoted(text)}")["key"] == text
-    assert tomllib.loads(f"key = {inline([text, True, 2, 0.5])}")["key"] == [text, True, 2, 0.5]
+def test_a_mechanism_within_an_assignment_gets_a_file_of_its_own(tmp_path):
+    (tmp_path / "old.assignment.toml").write_text(INLINE, encoding="utf-8")
+    written = new_assignment(tmp_path / "mine", like=str(tmp_path / "old.assignment.toml"))
+    source, own = load_assignment(tmp_path / "old.assignment.toml"), load_assignment(written.assignment)
+    assert own.file.mechanism == "mine"
+    assert own.mechanism_file.model_dump(exclude={"id"}) == source.mechanism_file.model_dump(exclude={"id"})
+    renamed = {"id", "mechanism", "rubric"}
+    assert own.file.model_dump(exclude=renamed) == source.file.model_dump(exclude=renamed)
+    assert 'id = "mine"  # mine' in written.assignment.read_text(encoding="utf-8")
 
 
-def test_a_comment_is_never_wider_than_a_page():
-    title = Text(en="word " * 60)
-    criterion = CriterionTable(id="v_A", title=title, points=1.0, vector="v_A")
-    rubric = RubricFile(schema_version=1, id="x", title=title, criterion=[criterion])
-    text = commented(rubric, "head " * 60)
-    assert max(len(line) for line in text.splitlines() if line.startswith("# ")) <= 100
-    assert RubricFile.model_validate(tomllib.loads(text)) == rubric
+def test_a_copy_of_a_copy_has_the_comments_and_one_head(tmp_path):
+    first = new_assignment(tmp_path / "first", like="pump")
+    second = new_assignment(tmp_path / "second", like=str(first.assignment))
+    for kind in ("assignment", "mechanism", "rubric"):
+        text = getattr(first, kind).read_text(encoding="utf-8").replace("like pump", "like first")
+        expected = re.sub(r"\bfirst([.\"])(?=mech|rub|assi|  #)", r"second\1", text)
+        assert getattr(second, kind).read_text(encoding="utf-8") == expected
+
+
+def test_a_file_whose_names_cannot_be_replaced_is_refused(tmp_path):
+    text = INLINE.replace("id = 'own'", '"id" = "own"', 1)
+    (tmp_path / "old.assignment.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(CallError, match="each on a line of its own"):
+        new_assignment(tmp_path / "mine", like=str(tmp_path / "old.assignment.toml"))
+    assert [path.name for path in tmp_path.iterdir()] == ["old.assignment.toml"]

@@ -185,7 +185,7 @@ def test_marks_semicolons_and_blank_lines_do_not_matter(tmp_path, text):
         ("student_id,id\ns01,1\nS01,2\n", "line 3: the same student_id 'S01' as in line 2"),
         ("student_id,id\ns01,1\ns02,1\n", "line 3: the same id '1' as in line 2"),
         ("student_id,participant\ns01,Participant 5\n", "'Participant 5' is no participant's number"),
-        ('student_id,id\n"s01,1\n', "line 2"),
+        ('student_id,id\n"s01,1\n', "row 2: a quote is opened and never closed"),
         (b"\xff\xfe", "not UTF-8"),
     ],
 )

@@ -185,7 +185,7 @@ def test_every_built_in_assignment_assembles_for_every_variant(name):
 
 
 def test_an_edited_copy_beside_its_mechanism_is_an_assignment(assignment):
-    path = assignment(mechanism=(("length = 30\n", "length = 29\n"),))
+    path = assignment(mechanism=(("length = 30 ", "length = 29 "),))
     edited = load_assignment(path)
     assert edited.mechanism([edited.variant(1)]).crank.length_m[0] == 0.29
 
@@ -242,7 +242,7 @@ def test_scales_that_draw_nothing_are_faults_of_the_file(assignment, old, new, w
 @pytest.mark.parametrize("length", ["1e-12", "1e300"])
 def test_lengths_beyond_any_mechanism_are_faults_of_the_file(assignment, length):
     with pytest.raises(AuthoredFileError, match=r"shorter than|larger than"):
-        load_assignment(assignment(mechanism=(("length = 30\n", f"length = {length}\n"),)))
+        load_assignment(assignment(mechanism=(("length = 30 ", f"length = {length} "),)))
 
 
 def damaged(tables: tuple[dict, dict], rng: random.Random) -> tuple[dict, dict]:
@@ -365,7 +365,7 @@ def test_whatever_stands_in_place_of_a_number_is_a_fault_with_its_path(assignmen
 def test_no_more_faults_are_told_than_a_person_reads(assignment):
     unknown = "".join(f"key{number} = 1\n" for number in range(2000))
     with pytest.raises(AuthoredFileError) as error:
-        load_assignment(assignment(('rubric = "pump"\n', f'rubric = "pump"\n{unknown}')))
+        load_assignment(assignment(("\n[title]", f"\n{unknown}\n[title]")))
     assert len(error.value.message) < 5000
     assert error.value.findings[-1].message == "and 1980 more faults"
 

@@ -1,0 +1,47 @@
+"""The handful of commands: `pip install -e ".[dev]" nox`, then `nox -s NAME` in that environment."""
+
+import nox
+
+nox.options.default_venv_backend = "none"
+nox.options.sessions = ["lint", "quick"]
+ONE_THREAD = {"OMP_NUM_THREADS": "1"}
+"""Tests run side by side: each library's own threads would only get in each other's way."""
+
+
+@nox.session
+def lint(session: nox.Session) -> None:
+    """Style, types, and the direction of imports."""
+    session.run("ruff", "check", ".")
+    session.run("ruff", "format", "--check", ".")
+    session.run("mypy")
+    session.run("lint-imports")
+
+
+@nox.session
+def quick(session: nox.Session) -> None:
+    """The quick tests; more arguments go to pytest: nox -s quick -- tests/unit/lms."""
+    session.run("pytest", "-q", "-n", "2", "-m", "not slow", *session.posargs, env=ONE_THREAD)
+
+
+@nox.session
+def tests(session: nox.Session) -> None:
+    """All tests."""
+    session.run("pytest", "-q", "-n", "2", *session.posargs, env=ONE_THREAD)
+
+
+@nox.session
+def translations(session: nox.Session) -> None:
+    """The texts of the code into the catalogues, and the catalogues compiled."""
+    catalogue, folder = "grader/locale/planmark.pot", "grader/locale"
+    plain = ("--no-wrap",)
+    words = ("-F", "grader/locale/babel.cfg", "-k", "N_", "--no-location", "--sort-output")
+    session.run("pybabel", "extract", *words, *plain, "-o", catalogue, ".")
+    update = ("-D", "planmark", "-i", catalogue, "-d", folder, "--no-fuzzy-matching", "--ignore-obsolete")
+    session.run("pybabel", "update", *update, *plain)
+    session.run("pybabel", "compile", "-D", "planmark", "-d", folder)
+
+
+@nox.session
+def bench(session: nox.Session) -> None:
+    """The benchmarks of solver and reading."""
+    session.run("python", "-m", "tests.bench", *session.posargs, env=ONE_THREAD)
