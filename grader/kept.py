@@ -58,7 +58,7 @@ RECORDS: Mapping[str, type] = {
 # What a stage depends on --------------------------------------------------------------------------
 
 SCAN_STAGE = (
-    "grader.intake", "grader.sheet", "grader.ink", "grader.letters", "grader.letters.lengths",
+    "grader.intake", "grader.sheet", "grader.ink", "grader.letters",
     "grader.picture",
 )  # fmt: skip
 """What `grader.pipeline.scan` calls."""

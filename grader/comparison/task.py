@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from grader.quantities import SCALE_NAMES
 from grader.rubric import RubricFile, ToleranceTable
 from reference.assignment import Assignment, Variant
 from reference.construction import Construction, evaluate
@@ -13,7 +14,6 @@ from reference.hand import Skill, Trace, trace
 from reference.mechanism import Crank, Dyad, Mechanism, Slider
 from reference.plan import exact_plan
 
-SCALE_NAMES = ("kL", "kv", "ka")
 UNITS: Mapping[str, str] = {
     "kL": "m/mm",
     "kv": "(m/s)/mm",
