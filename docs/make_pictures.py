@@ -6,11 +6,11 @@ from pathlib import Path
 
 import cv2
 
-from grader.batch import Batch, grade
+from grader.folder.batch import Batch, grade
 from grader.rubric import load_rubric
-from reference.assignment import load_assignment
-from reference.canvas import svg
-from reference.draw import reference_drawing
+from reference.authored.assignment import load_assignment
+from reference.drawing.canvas import svg
+from reference.drawing.sheets import reference_drawing
 from reference.plan import exact_plan
 
 HERE = Path(__file__).resolve().parent

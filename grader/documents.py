@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from reference.mistakes import Code
+from reference.construction.mistakes import Code
 
 SCHEMA_VERSION = 1
 

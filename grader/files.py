@@ -1,9 +1,10 @@
-"""Files written whole or not at all."""
+"""Files written whole or not at all, and the folder of bundled samples."""
 
 import contextlib
 import os
 import secrets
 from collections.abc import Mapping
+from importlib.resources import files
 from pathlib import Path
 
 from reference.errors import CallError, PlanmarkError
@@ -100,3 +101,12 @@ def create_whole(files: Mapping[Path, str]) -> None:
 def _taken(path: Path) -> CallError:
     told = "is there already and is left as it is; choose another name, or remove it first"
     return CallError("file_exists", f"{path}: {told}")
+
+
+def samples_folder() -> Path:
+    """The folder of samples. Raises CallError where an installation has none."""
+    installed = Path(str(files("grader"))) / "samples"
+    for folder in (installed, Path(__file__).resolve().parent.parent / "samples"):
+        if folder.is_dir():
+            return folder
+    raise CallError("samples_missing", "the samples are not there; install planmark again")

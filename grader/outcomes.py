@@ -40,7 +40,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from grader.documents import Verdict
-from reference.mistakes import Mistake
+from reference.construction.mistakes import Mistake
 
 Param = float | str
 

@@ -14,29 +14,32 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
-from grader.answer_sheet.sheets import Asked
-from grader.declaring import Declarations, Source, declarations
+from grader.comparison.evidence import Submission
+from grader.comparison.scales import Declarations, Source, declarations
+from grader.comparison.task import Task, task_of
 from grader.documents import ReportDocument
+from grader.feedback.redo_steps import with_mistakes_told
 from grader.feedback.sentences import Level, criterion_feedback
-from grader.feedback.telling import with_mistakes_told
-from grader.ink import find_ink
-from grader.intake import decode, is_blank
-from grader.judging import Submission, Task, judge, task_of
-from grader.letters import find_letters, written_lengths, written_scales
-from grader.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
+from grader.inputs.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
+from grader.inputs.scale_text import declared_scales, sure_texts
+from grader.marking.mark import judge
+from grader.marking.report import reading_document, report_of, unjudged_report
 from grader.outcomes import Judgement
-from grader.picture import backdrop, overlay
-from grader.quantities import declared_scales, sure_texts
-from grader.reading import read_figures
-from grader.reading_document import reading_document
+from grader.overlay.measured import measured_picture
+from grader.overlay.picture import backdrop, overlay
+from grader.overlay.scene import Picture
+from grader.printed.answer_sheet import Asked
+from grader.reading.read import read_figures
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
-from grader.reports import report_of, unjudged_report
 from grader.rubric import RubricFile
-from grader.scene import Picture
-from grader.scene_measured import measured_picture
-from grader.sheet import register, straighten
-from reference.assignment import Assignment, Variant
-from reference.construction import Construction
+from grader.scan.decode.pages import decode, is_blank
+from grader.scan.handwriting.fields import written_lengths, written_scales
+from grader.scan.handwriting.letters import find_letters
+from grader.scan.register.distortion import straighten
+from grader.scan.register.registration import register
+from grader.scan.strokes.ink import find_ink
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.graph import Construction
 from reference.errors import InputFileError, MechanismError
 
 # One page: pixels to strokes ----------------------------------------------------------------------

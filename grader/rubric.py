@@ -12,10 +12,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from reference.assignment import Assignment, locate
-from reference.authored import Authored, Identifier, Text, is_file, load
-from reference.construction import Construction
-from reference.derivation import construction_of
+from reference.authored.assignment import Assignment, locate
+from reference.authored.toml_file import Authored, Identifier, Text, is_file, load
+from reference.construction.derive import construction_of
+from reference.construction.graph import Construction
 from reference.errors import AuthoredFileError, CallError, Finding
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]

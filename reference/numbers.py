@@ -1,6 +1,6 @@
 """One arithmetic for three kinds of numbers: arrays, Python's own, and many digits.
 
-The kernels of `reference.groups` are written once, with these few functions for what operators do
+The kernels of `reference.kinematics.assur` are written once, with these few functions for what operators do
 not give. A root of a negative number is nan: the figure does not close there.
 """
 

@@ -1,6 +1,6 @@
 """The exact plan of a variant, or of many: named nodes and vectors, in SI and in millimetres on paper.
 
-Taken from the closed form of `reference.motion`, not from the construction: the two are
+Taken from the closed form of `reference.kinematics.motion`, not from the construction: the two are
 independent roads, and the tests hold them against each other.
 """
 
@@ -9,17 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.assignment import Assignment, Scales, Variant
-from reference.construction import Construction, Vector, evaluate
-from reference.derivation import construction_of
-from reference.draft import image_name
-from reference.elements import Normal, View
+from reference.authored.assignment import Assignment, Scales, Variant
+from reference.construction.derive import construction_of, image_name
+from reference.construction.elements import Normal, View
+from reference.construction.graph import Construction, Vector, evaluate, parameters_of
+from reference.construction.mistakes import Drawing
+from reference.construction.steps import Given, TwoLines
 from reference.geometry import ComplexArray, FloatArray, cross, dot
+from reference.kinematics.motion import Motion, move
 from reference.mechanism import Mechanism
-from reference.mistakes import Drawing
-from reference.motion import Motion, move
-from reference.parameters import parameters_of
-from reference.steps import Given, TwoLines
 
 ZERO_SHARE = 1e-9
 """A vector shorter than this share of its plan's size is a zero vector and has no direction."""

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from grader.answer_sheet.sheets import make_sheets
-from grader.roster import RosterRow
-from reference.assignment import Assignment, load_assignment
+from grader.inputs.roster import RosterRow
+from grader.printed.answer_sheet import make_sheets
+from reference.authored.assignment import Assignment, load_assignment
 from samples.simulation import (
     CAREFUL,
     PENS,

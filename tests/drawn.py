@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 from reference.plan import exact_plan
 
 _HEAD = """

@@ -8,12 +8,13 @@ from functools import cache
 
 import numpy as np
 
-from grader.comparison import Submission, Task, task_of
+from grader.comparison.evidence import Submission
+from grader.comparison.task import Task, task_of
 from grader.records import Figure, Reading, ReadNode, ReadVector
 from grader.rubric import rubric_of
-from reference.assignment import load_assignment
-from reference.construction import evaluate
-from reference.mistakes import Drawing, Mistake, commit
+from reference.authored.assignment import load_assignment
+from reference.construction.graph import evaluate
+from reference.construction.mistakes import Drawing, Mistake, commit
 from samples.simulation import Hand
 from samples.simulation.hand import slips
 

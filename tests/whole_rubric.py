@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from typing import Literal
 
 from grader.rubric import CriterionTable, HandTable, RubricFile, ToleranceTable
-from reference.authored import Text
-from reference.construction import Construction, Vector
-from reference.derivation import construction_of
+from reference.authored.toml_file import Text
+from reference.construction.derive import construction_of
+from reference.construction.graph import Construction, Vector
 from reference.mechanism import Mechanism, Plate
 
 POINTS = {"v": 2.0, "a": 2.0, "n": 2.0, "t": 1.0, "c": 2.0, "r": 1.0}

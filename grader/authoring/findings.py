@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.assignment import Assignment, Variant
+from reference.authored.assignment import Assignment, Variant
 
 Severity = Literal["fault", "warning", "hint"]
 """fault: some student cannot be set or marked; warning: something a teacher should change or accept;

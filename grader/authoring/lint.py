@@ -48,12 +48,10 @@ from grader.documents import (
     VariantDocument,
 )
 from grader.rubric import RubricFile, check_rubric
-from reference.assignment import Assignment, Variant
-from reference.assignment_file import TRADITIONS
-from reference.construction import Construction, ancestors
-from reference.derivation import construction_of
-from reference.draft import image_name
-from reference.formula import Formula
+from reference.authored.assignment import TRADITIONS, Assignment, Variant
+from reference.authored.formula import Formula
+from reference.construction.derive import construction_of, image_name
+from reference.construction.graph import Construction, ancestors
 from reference.geometry import FloatArray
 from reference.plan import Plan, exact_plan
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from grader.files import create_whole
 from grader.rubric import load_rubric
-from reference.assignment import SUFFIXES, Assignment, library, load_assignment, locate
+from reference.authored.assignment import SUFFIXES, Assignment, library, load_assignment, locate
 from reference.errors import CallError
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")

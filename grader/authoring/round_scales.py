@@ -11,13 +11,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.answer_sheet.fit import MARGIN_MM, template_for
 from grader.authoring.findings import NAMED, BoolArray, LintFinding, chosen
 from grader.documents import LintLeast
-from grader.layout import FRAME_MM, TEMPLATES, Template
+from grader.printed.layout import FRAME_MM, MARGIN_MM, TEMPLATES, Template, template_for
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box
 from grader.rubric import RubricFile
-from reference.assignment import Assignment, Scales, Variant
+from reference.authored.assignment import Assignment, Scales, Variant
 from reference.geometry import FloatArray
 from reference.plan import ZERO_SHARE, Plan
 

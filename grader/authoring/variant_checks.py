@@ -17,12 +17,11 @@ from grader.authoring.findings import (
 )
 from grader.authoring.round_scales import AskedVectors
 from grader.rubric import RubricFile
-from reference.assignment import Assignment, Variant
+from reference.authored.assignment import Assignment, Variant
 from reference.errors import MechanismError
 from reference.geometry import FloatArray
-from reference.motion import move_where_possible
+from reference.kinematics.motion import move_where_possible, reason_at
 from reference.plan import Plan, conditioning
-from reference.refusal import reason_at
 
 LEAST_TRANSMISSION = 0.25
 """|sin| of a transmission angle of about 15 degrees: below it, plans are hard to draw."""

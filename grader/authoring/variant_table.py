@@ -17,13 +17,22 @@ from typing import Literal
 import numpy as np
 
 from grader.authoring.round_scales import is_zero
-from grader.i18n import Tongue
-from reference.assignment import Assignment, Variant
-from reference.canvas import A3_MM, Area, Label, Shape, Stroke
-from reference.draw import ENGLISH, reference_drawing
+from grader.language import Tongue
+from reference.authored.assignment import Assignment, Variant
+from reference.drawing.canvas import (
+    A3_MM,
+    Area,
+    Label,
+    Shape,
+    Stroke,
+    Text,
+    pieces_of,
+    scale_pieces,
+    width_of,
+)
+from reference.drawing.sheets import ENGLISH, reference_drawing
 from reference.drawing.subject import Wording
 from reference.geometry import FloatArray
-from reference.lettering import Text, pieces_of, scale_pieces, width_of
 from reference.plan import Plan
 
 UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}

@@ -5,14 +5,48 @@ wrong; 3 a mechanism does not assemble or is singular; 5 a file cannot be writte
 """
 
 import sys
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from grader import __version__
 from reference.errors import CallError, PlanmarkError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def new_table(*headings: str, left: Collection[str] = ()) -> "Table":
+    """An empty table: names in the first column and those of `left`, numbers aligned right in the others."""
+    from rich.table import Table
+
+    table = Table(headings[0], box=None, header_style="bold")
+    for heading in headings[1:]:
+        table.add_column(heading, justify="left" if heading in left else "right")
+    return table
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str, int, int], None]]:
+    """A progress bar; what it gives is called with a kind of work, how much is done, and of how much."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description:>8}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        tasks: dict[str, TaskID] = {}
+
+        def tell(what: str, done: int, total: int) -> None:
+            if what not in tasks:
+                tasks[what] = bar.add_task(what, total=total)
+            bar.update(tasks[what], completed=done, total=total)
+
+        yield tell
+
 
 LONGEST = 500
 """Letters of a command's first sentence in the list of commands: no sentence is cut."""
@@ -85,7 +119,7 @@ LanguageOption = Annotated[str, typer.Option("--lang", help="Language of feedbac
 
 def check_language(lang: str) -> None:
     """Refuse a language that there is no feedback in."""
-    from grader.i18n import LANGUAGES
+    from grader.language import LANGUAGES
 
     if lang not in LANGUAGES:
         raise CallError("unknown_language", f"--lang {lang}: known are {', '.join(LANGUAGES)}")

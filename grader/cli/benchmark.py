@@ -18,15 +18,15 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from grader.cli.progress import new_table, progress
+from grader.cli.app import new_table, progress
+from grader.files import samples_folder
+from grader.inputs.roster import read_roster
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef, Reading
-from grader.roster import read_roster
 from grader.rubric import rubric_of
-from grader.samples_folder import samples_folder
-from reference.assignment import built_in, load_assignment
-from reference.construction import evaluate
-from reference.motion import move
+from reference.authored.assignment import built_in, load_assignment
+from reference.construction.graph import evaluate
+from reference.kinematics.motion import move
 from reference.plan import Plan, exact_plan
 
 SCHEMA_VERSION = 5

@@ -1,4 +1,4 @@
-"""The commands."""
+"""The commands and their options; each imports its work when it runs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -57,7 +57,7 @@ def plan(
 ) -> None:
     """The exact plan of a variant: a table, JSON, or a drawing true to scale; or those of all variants."""
     if every or csv is not None:
-        from grader.cli.classes import refuse_single, show_class
+        from grader.cli.plans import refuse_single, show_class
 
         single = {
             "--n": n,
@@ -87,7 +87,7 @@ def lint(
     ] = None,
 ) -> None:
     """Hold an assignment and its rubric against every variant: all findings at once."""
-    from grader.cli.linting import lint_assignment
+    from grader.cli.checking import lint_assignment
 
     raise typer.Exit(1 if lint_assignment(assignment, as_json=as_json, svg=svg) else 0)
 
@@ -110,7 +110,7 @@ def new(
 ) -> None:
     """Write a commented assignment to start from: three files that lint and plan take as they are."""
     from grader.authoring.new import new_assignment
-    from reference.assignment import load_assignment
+    from reference.authored.assignment import load_assignment
 
     written = new_assignment(file, like=like, mechanism=mechanism)
     first = load_assignment(written.assignment).variants()[0]
@@ -148,7 +148,7 @@ def cycle(
 
     In every position the driven link has the variant's own speed and acceleration.
     """
-    from grader.cli.cycling import show_cycle
+    from grader.cli.plans import show_cycle
 
     show_cycle(assignment, n, position, of=of or [], samples=samples, csv=csv, svg=svg, pdf=pdf, lang=lang)
 
@@ -158,9 +158,9 @@ def schema(name: Annotated[str, typer.Argument(help="report, results, reading, m
     """The JSON Schema of a document or authored file."""
     import json
 
-    from grader.cli import schemas
+    from grader.cli import checking
 
-    typer.echo(json.dumps(schemas.schema(name), indent=2, ensure_ascii=False))
+    typer.echo(json.dumps(checking.schema(name), indent=2, ensure_ascii=False))
 
 
 @app.command()
@@ -189,7 +189,7 @@ def grade(
 ) -> None:
     """Grade a folder of scans (JPEG, PNG, TIFF, PDF) and measurement files (CSV, JSON)."""
     from grader.cli.grading import grade_folder
-    from grader.workers import Limits
+    from grader.folder.workers import Limits
 
     open_ends = grade_folder(
         folder, assignment, out, roster=roster, pages_per_student=pages_per_student, jobs=jobs, lang=lang,
@@ -272,7 +272,7 @@ def calibrate(
     ] = None,
 ) -> None:
     """What printer and scanner do to millimetres, by scans of the page `sheet --calibration` prints."""
-    from grader.cli.calibrating import calibrate_scans
+    from grader.cli.sheets import calibrate_scans
 
     raise typer.Exit(1 if calibrate_scans(scans, svg, as_json=as_json) else 0)
 

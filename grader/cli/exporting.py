@@ -6,11 +6,11 @@ from pathlib import Path
 import typer
 
 from grader.cli.app import check_language
+from grader.inputs.roster import read_roster
 from grader.lms.export import export as deliver
 from grader.lms.export import read_results, usual_name
 from grader.lms.grades import Delivery, Options, Person
 from grader.lms.table import with_ids
-from grader.roster import read_roster
 from reference.errors import CallError
 
 

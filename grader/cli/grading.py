@@ -8,22 +8,20 @@ from pathlib import Path
 
 import typer
 
-from grader.batch import Batch, grade, needs_person
-from grader.cli.app import check_language
+from grader.cli.app import check_language, new_table, progress
 from grader.cli.checking import checked_level
-from grader.cli.progress import new_table, progress
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
-from grader.feedback.class_page import CAUSES, SIGNS
-from grader.feedback.statistics import waiting
-from grader.intake import count_pages
-from grader.moved import told_standing
+from grader.feedback.class_page import CAUSES, SIGNS, waiting
+from grader.files import samples_folder
+from grader.folder.batch import Batch, grade, needs_person
+from grader.folder.changes import told_standing
+from grader.folder.workers import Limits, Workers, result_of
+from grader.marking.report import reading_document
 from grader.pipeline import open_page, read_pages
-from grader.reading_document import reading_document
 from grader.records import PageRef, ScannedPage
 from grader.rubric import rubric_of
-from grader.samples_folder import samples_folder
-from grader.workers import Limits, Workers, result_of
-from reference.assignment import Assignment, Variant, load_assignment
+from grader.scan.decode.pages import count_pages
+from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, InputFileError
 
 

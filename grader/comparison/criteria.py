@@ -1,20 +1,390 @@
-"""All criteria of a rubric, marked in the order of construction so that earlier mistakes are known."""
+"""All criteria of a rubric, in the order of construction, so that earlier mistakes are known.
 
+`compare(task, submission)` is the whole of it. Each criterion is marked against the original data
+at the student's scales first, then against what follows from the student's own earlier values; the
+better counts. The mistake that later ones follow from costs once: where it was made, or, where no
+criterion asks for that, at the first criterion that shows it. Small errors that are each within
+their tolerance and add up in a later node are no mistake. Verdicts are `Outcome`s with structured
+reasons (`grader.outcomes`); nothing here speaks a human language.
+"""
+
+import cmath
+import math
+import statistics
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from grader.comparison import verdicts
-from grader.comparison.absent import absent
-from grader.comparison.evidence import Evidence, Submission, gather
-from grader.comparison.ledger import Ledger, open_ledger
-from grader.comparison.rates import rate
+from grader.comparison.charges import Against, Found, Ledger, open_ledger
+from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
+from grader.comparison.follow_through import NO_SPREAD
+from grader.comparison.own import Sketch
 from grader.comparison.scales import settle
-from grader.comparison.segments import segment
-from grader.comparison.sketches import Sketch
-from grader.comparison.task import Task, unit_of
-from grader.comparison.values import value_alone
-from grader.outcomes import Outcome, Quantity, Tolerance, UsedScale
-from grader.rubric import CriterionTable
+from grader.comparison.task import Segment, Task, unit_of
+from grader.comparison.verdicts import (
+    ALL_RIGHT,
+    FULL,
+    NONE,
+    Mark,
+    left_open,
+    mark_value,
+    mark_vector,
+    open_between,
+    the_better,
+    the_worse,
+    tolerances,
+    widened,
+)
+from grader.outcomes import Outcome, Quantity, Reason, Tolerance, UsedScale
+from grader.rubric import CriterionTable, ToleranceTable
+from reference.construction.elements import Normal
+from reference.construction.graph import AngularRate
+from reference.construction.steps import Given
+from reference.construction.uncertainty import Spread
+
+
+def absent(ledger: Ledger, criterion: CriterionTable, expected: Quantity) -> Outcome:
+    """The outcome of a criterion that there is nothing to hold against."""
+    unread = _why_unread(ledger, criterion)
+    reason = Reason("not_measured") if unread is None else Reason("unread", {"reason": unread})
+    if criterion.optional:
+        return verdicts.unjudged(criterion, "not_judged", (Reason("optional"), reason), expected=expected)
+    if criterion.link is not None and not ledger.evidence.has_sketch:
+        # Links are drawn, not measured: without a sketch that was read nothing is asked of them.
+        return verdicts.unjudged(criterion, "not_judged", (reason,), expected=expected)
+    least, length = ledger.task.rubric.tolerance_of(criterion).least_mm, expected.length_mm
+    if length is not None and length < least:
+        short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
+        return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
+    segment = ledger.task.segments.get(criterion.name)
+    if segment is not None:
+        # Later criteria may hang on what nobody has seen.
+        ledger.doubtful.add(segment.head)
+    verdict = ledger.task.rubric.missing if unread is None else "review"
+    return verdicts.unjudged(criterion, verdict, (reason,), expected=expected)
+
+
+def _why_unread(ledger: Ledger, criterion: CriterionTable) -> str | None:
+    """Why a vector or link was not read, None where no sheet could show it."""
+    segment, evidence = ledger.task.segments.get(criterion.name), ledger.evidence
+    if segment is None or not evidence.has_sheets:
+        return None
+    for name in (segment.name, segment.head, segment.tail):
+        if name in evidence.unread:
+            return evidence.unread[name]
+    return f"{segment.name} was not found on the sheets"
+
+
+def held_against_written(
+    mark: Mark,
+    drawn: DrawnVector,
+    written: tuple[float, float] | None,
+    tolerance: ToleranceTable,
+    least: float,
+) -> Mark:
+    """The mark, open where the two lengths contradict each other: a person must look.
+
+    Either the drawing is misread, or the cells, or the student has measured something else; nothing
+    here says which. A ruler errs by no more than the tolerance of a length.
+
+    Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
+    `least` the probability from which it counts.
+    """
+    if written is None or written[1] < least:
+        return mark
+    length_mm = written[0]
+    allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
+    if abs(drawn.length_mm - length_mm) <= allowed:
+        return mark
+    told: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
+    return open_between(NONE, FULL, mark, Reason("written_disagrees", told))
+
+
+SO_MANY = 3
+"""Values that are off by one factor were made with a wrong scale; fewer may be so by chance."""
+ALIKE = 0.02
+"""Relative: how near to each other their factors are, with rounding on the way."""
+HALF = 0.5
+"""The share of a criterion that a right drawing keeps where the rubric has no band of partial points."""
+
+
+def mark_of_value(
+    ledger: Ledger, criterion: CriterionTable, value: float, found: Found, drawn: DrawnVector
+) -> Mark | None:
+    """The mark on a computed value beside its drawing; None where it is right, or right by the drawing.
+
+    A wrong value costs only the value: what the rubric's nearest band takes. A wrong factor in all
+    values of a scale costs once.
+    """
+    one, table = ledger.task.segments[criterion.name], ledger.task.rubric.tolerance_of(criterion)
+    scale = ledger.used[one.scale]
+    rights = [abs(one.real), abs(found.expected) * scale, drawn.length_mm * scale]
+    factor = common_factor(ledger, one.scale)
+    if factor is not None and _is_charged(ledger, one.scale):
+        rights += [right * factor for right in rights]
+    limits = [table.length_at(right / scale) * scale for right in rights]
+    marks = [
+        mark_value(value, right, limit, limit, table, unit_of(one.name))
+        for right, limit in zip(rights, limits, strict=True)
+    ]
+    best = max(marks, key=lambda mark: mark.share)
+    if best.is_full:
+        return None
+    if factor is not None:
+        ledger.charged.add(_name(one.scale))
+    keeps = max(best.share, table.all_bands[0][1] if table.all_bands else HALF)
+    return Mark(keeps, keeps, keeps, best.reasons)
+
+
+def common_factor(ledger: Ledger, scale: str) -> float | None:
+    """The factor by which all values of a scale are off, where they are off by one."""
+    if scale not in ledger.factors:
+        ledger.factors[scale] = _common_factor(ledger, scale)
+    return ledger.factors[scale]
+
+
+def _common_factor(ledger: Ledger, scale: str) -> float | None:
+    task, evidence = ledger.task, ledger.evidence
+    found = []
+    for name, vector in task.construction.vectors.items():
+        if vector.scale != scale or name not in evidence.values:
+            continue
+        drawn = evidence.vector(name)
+        length = abs(task.drawn(name, ledger.used)) if drawn is None else drawn.length_mm
+        if length > task.rubric.tolerance_of(name).least_mm:
+            found.append(abs(evidence.values[name]) / (length * ledger.used[scale]))
+    if len(found) < SO_MANY:
+        return None
+    factor = statistics.median(found)
+    alike = [one for one in found if abs(one - factor) <= ALIKE * factor]
+    is_off = abs(factor - 1.0) > 2.0 * task.rubric.tolerance_of(scale).scale_relative
+    return factor if is_off and len(alike) >= max(SO_MANY, len(found) - 1) else None
+
+
+def _name(scale: str) -> str:
+    return f"values by {scale}"
+
+
+def _is_charged(ledger: Ledger, scale: str) -> bool:
+    return _name(scale) in ledger.charged
+
+
+def value_alone(ledger: Ledger, criterion: CriterionTable) -> Outcome:
+    """A vector of which only the computed value was handed in, or nothing."""
+    one, values = ledger.task.segments[criterion.name], ledger.evidence.values
+    scale = ledger.used[one.scale]
+    if one.name not in values:
+        exact = one.drawn(ledger.used)
+        return absent(ledger, criterion, verdicts.expected_quantity(one.name, exact, scale, 0.0))
+    value, unit = abs(values[one.name]), unit_of(one.name)
+
+    def allowed(expected: complex, reach: Spread) -> Tolerance:
+        plain = tolerances(ledger.task.rubric.tolerance_of(criterion), abs(expected), with_direction=False)
+        if reach is NO_SPREAD:
+            return Tolerance(value=(plain.length_mm or 0.0) * scale)
+        wider = widened(plain, abs(expected), reach, ledger.task.rubric.hand.at_most)
+        return Tolerance(value=(wider.length_mm or 0.0) * scale, widened=wider.widened)
+
+    def against(expected: complex, reach: Spread = NO_SPREAD, se: Spread = NO_SPREAD) -> Mark:
+        del se
+        limit, table = allowed(expected, reach).value or 0.0, ledger.task.rubric.tolerance_of(criterion)
+        plain = table.length_at(abs(expected)) * scale
+        return mark_value(value, abs(expected) * scale, limit, plain, table, unit)
+
+    follows = ledger.task.rubric.follows_through(criterion)
+    found = ledger.best(one, against, follows_through=follows)
+    if not found.mark.is_full and follows:
+        found = _by_factor(ledger, one.scale, found, against)
+    measured, right = Quantity(value=values[one.name], unit=unit), abs(found.expected) * scale
+    return verdicts.outcome(
+        criterion,
+        found.mark,
+        measured,
+        Quantity(value=right, unit=unit),
+        allowed(found.expected, found.reach),
+        followed=found.is_followed,
+    )
+
+
+def _by_factor(ledger: Ledger, scale: str, found: Found, against: Against) -> Found:
+    """A value that is off by the factor of all, after the first of them."""
+    factor, exact = common_factor(ledger, scale), found.expected
+    if factor is None:
+        return found
+    mark = against(exact * factor)
+    if not _is_charged(ledger, scale):
+        ledger.charged.add(_name(scale))
+        return found
+    if not mark.is_better(found.mark):
+        return found
+    told = Reason("follows", {"what": "scale", "of": scale})
+    return Found(the_better(mark, found.mark, told), exact * factor, is_followed=True)
+
+
+def segment(ledger: Ledger, criterion: CriterionTable, drawn: DrawnVector) -> Outcome:
+    """A vector that was drawn (or measured), or a link of the sketch."""
+    one, rubric = ledger.task.segments[criterion.name], ledger.task.rubric
+    follows = rubric.follows_through(criterion)
+    with_direction = criterion.direction and drawn.direction_rad is not None
+    found = ledger.best(one, _against(ledger, criterion, drawn), follows_through=follows)
+    mark = found.mark
+    is_read = drawn is ledger.evidence.drawn.get(one.name)
+    if is_read:
+        mark = ledger.opened(one, mark, follows_through=follows)
+    scale = ledger.used[one.scale]
+    value, wrong_value = drawn.length_mm * scale, None
+    if one.name in ledger.evidence.values:
+        value = ledger.evidence.values[one.name]
+        wrong_value = mark_of_value(ledger, criterion, abs(value), found, drawn)
+    is_arithmetic = wrong_value is not None and mark.share == FULL
+    if wrong_value is not None:
+        mark = the_worse(mark, wrong_value)
+    direction = drawn.direction_rad
+    on_sheet = None if direction is None else direction + drawn.turn_rad
+    return verdicts.outcome(
+        criterion,
+        mark,
+        verdicts.quantity(one.name, drawn.length_mm, on_sheet, value),
+        verdicts.expected_quantity(one.name, found.expected, scale, drawn.turn_rad),
+        _allowed(criterion, ledger, found, with_direction=with_direction),
+        confidence=drawn.confidence,
+        followed=found.is_followed,
+        mistake="arithmetic" if is_arithmetic else None,
+    )
+
+
+class _against:  # noqa: N801 - used as a function
+    """Marks a drawn vector against an expectation, as the rubric and the sheet's cells have it."""
+
+    def __init__(self, ledger: Ledger, criterion: CriterionTable, drawn: DrawnVector) -> None:
+        self.table, self.drawn = ledger.task.rubric.tolerance_of(criterion), drawn
+        self.least, self.at_most = ledger.task.rubric.least_confidence, ledger.task.rubric.hand.at_most
+        self.with_direction = criterion.direction and drawn.direction_rad is not None
+        is_read = drawn is ledger.evidence.drawn.get(criterion.name)
+        self.written = ledger.evidence.written.get(criterion.name) if is_read else None
+
+    def __call__(self, expected: complex, reach: Spread = NO_SPREAD, se: Spread = NO_SPREAD) -> Mark:
+        """The mark; `reach` is how far a careful hand may miss what is expected."""
+        table, drawn, size = self.table, self.drawn, abs(expected)
+        plain = tolerances(table, size, with_direction=self.with_direction)
+        if reach is NO_SPREAD:
+            found = mark_vector(drawn, expected, plain, table, se)
+        else:
+            found = mark_vector(drawn, expected, widened(plain, size, reach, self.at_most), table, se)
+            if not found.is_full:
+                by_hand = mark_vector(drawn, expected, widened(plain, size, reach), table, se)
+                found = left_open(found, ALL_RIGHT if _is_boundless(reach, size) else by_hand)
+        found = held_against_written(found, drawn, self.written, table, self.least)
+        return verdicts.with_confidence(found, drawn.confidence, self.least)
+
+
+BOUNDLESS_MM, BOUNDLESS_SHARE = 20.0, 0.5
+"""A reach of so much, and of such a share of the vector: there errors no longer grow in proportion, and a
+hand may miss by anything."""
+
+
+def _is_boundless(reach: Spread, size_mm: float) -> bool:
+    """Whether lines cross so badly that nothing tells how far a careful hand may miss."""
+    return max(reach.along, reach.across) > max(BOUNDLESS_MM, BOUNDLESS_SHARE * size_mm)
+
+
+def _allowed(criterion: CriterionTable, ledger: Ledger, found: Found, *, with_direction: bool) -> Tolerance:
+    """What full marks allow, for the report."""
+    size = abs(found.expected)
+    plain = tolerances(ledger.task.rubric.tolerance_of(criterion), size, with_direction=with_direction)
+    if found.reach is NO_SPREAD:
+        return plain
+    return widened(plain, size, found.reach, ledger.task.rubric.hand.at_most)
+
+
+def rate(ledger: Ledger, criterion: CriterionTable) -> Outcome:
+    """An angular quantity against the exact one, then against what the student's own vector gives."""
+    task, name, unit = ledger.task, criterion.name, unit_of(criterion.name)
+    right = task.rates[name]
+    if name not in ledger.evidence.values:
+        return absent(ledger, criterion, Quantity(value=right, unit=unit))
+    value, table = ledger.evidence.values[name], task.rubric.tolerance_of(criterion)
+    turned = task.construction.rates[name]
+    segment = task.segments[turned.vector]
+    scale = ledger.used[segment.scale]
+    per_mm = scale / task.lengths_m[name]
+    plain = table.length_at(abs(right) / per_mm) * per_mm
+    allowed = Tolerance(value=plain)
+    mark, followed = mark_value(value, right, plain, plain, table, unit), False
+    if not mark.is_full:
+        allowed = _widened(ledger, criterion, segment, per_mm)
+        mark = mark_value(value, right, allowed.value or 0.0, plain, table, unit)
+    ledger.remember(name, mark)
+    follows = task.rubric.follows_through(criterion)
+    own = from_rate(task, ledger.evidence, turned, scale) if follows and not mark.is_full else None
+    factor = common_factor(ledger, segment.scale)
+    if own is None and factor is not None and follows and not mark.is_full:
+        own = right
+    if own is not None:
+        # Values that are all off by one factor give an angular one off by it, too.
+        own = own if factor is None else min(own, own * factor, key=lambda one: abs(one - value))
+        limit = table.length_at(abs(own) / per_mm) * per_mm
+        candidate = ledger.allowed(
+            frozenset({segment.head}), mark_value(value, own, limit, limit, table, unit)
+        )
+        if candidate.is_better(mark):
+            told = Reason("follows", {"what": "vector", "of": turned.vector})
+            mark, right, followed = the_better(candidate, mark, told), own, True
+    measured, expected = Quantity(value=value, unit=unit), Quantity(value=right, unit=unit)
+    return verdicts.outcome(criterion, mark, measured, expected, allowed, followed=followed)
+
+
+def _widened(ledger: Ledger, criterion: CriterionTable, segment: Segment, per_mm: float) -> Tolerance:
+    """The tolerance with what a careful hand may miss of the vector that turns the link."""
+    exact = segment.drawn(ledger.used)
+    plain = tolerances(ledger.task.rubric.tolerance_of(criterion), abs(exact), with_direction=False)
+    reach = ledger.following.whole_reach(segment, exact)
+    wider = widened(plain, abs(exact), reach, ledger.task.rubric.hand.at_most)
+    return Tolerance(value=(wider.length_mm or 0.0) * per_mm, widened=wider.widened)
+
+
+# From the own vector ----------------------------------------------------------------------------
+
+
+def own_length(task: Task, evidence: Evidence, rate: AngularRate) -> float:
+    """The real length of a rate's link, m: on the student's own sketch where it must be measured there."""
+    tail, head = (evidence.nodes.get(joint) for joint in rate.link)
+    is_given = _is_given(task, rate)
+    if is_given or tail is None or head is None or task.yardstick is None or evidence.yardstick_mm is None:
+        return task.lengths_m[rate.name]
+    return abs(head - tail) * task.yardstick.length_m / evidence.yardstick_mm[0]
+
+
+def _is_given(task: Task, rate: AngularRate) -> bool:
+    """Whether a link's length is among the data; the distance of a slotted link's point is not."""
+    lengths = (step.length for step in task.construction.steps if isinstance(step, Given))
+    return not any(isinstance(one, Normal) and one.measured == rate.link for one in lengths)
+
+
+def from_rate(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -> float | None:
+    """The angular rate that the student's own vector gives; None without one, or a trivial one.
+
+    Arguments: `scale` is the vector's, real units per drawn millimetre. Where the own vector's direction
+    is not known, the sense is the right one's.
+    """
+    own = evidence.vector(rate.vector)
+    if own is None or own.length_mm < task.rubric.tolerance_of(rate.vector).least_mm:
+        return None
+    return _sense(task, evidence, rate) * own.length_mm * scale / own_length(task, evidence, rate)
+
+
+def _sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
+    """+1 where the own vector turns its link counter-clockwise: the link as drawn where it was read."""
+    own, along = evidence.vector(rate.vector), task.real[rate.vector]
+    sense = math.copysign(1.0, task.rates[rate.name])
+    if own is None or own.direction_rad is None or along == 0:
+        return sense
+    plan = task.construction.figure_of(task.construction.vectors[rate.vector].head)
+    joints = evidence.sketches.get(plan, evidence.nodes)
+    tail, head = (joints.get(joint) for joint in rate.link)
+    if tail is not None and head is not None:
+        return math.copysign(1.0, math.sin(own.direction_rad - cmath.phase(head - tail)))
+    return sense * math.copysign(1.0, math.cos(own.direction_rad - cmath.phase(along)))
 
 
 @dataclass(frozen=True, slots=True)

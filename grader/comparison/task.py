@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from grader.quantities import SCALE_NAMES
+from grader.inputs.scale_text import SCALE_NAMES
 from grader.rubric import RubricFile, ToleranceTable
-from reference.assignment import Assignment, Variant
-from reference.construction import Construction, evaluate
-from reference.elements import Parameters
-from reference.hand import Skill, Trace, trace
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.elements import Parameters
+from reference.construction.graph import Construction, evaluate
+from reference.construction.uncertainty import Skill, Trace, trace
 from reference.mechanism import Crank, Dyad, Mechanism, Slider
 from reference.plan import exact_plan
 

@@ -1,14 +1,267 @@
-"""From marks to outcomes: what a criterion's verdict is when some of it is open or missing."""
+"""One value against one expectation: residual, tolerance, verdict, and what the standard error leaves open."""
 
 import cmath
-from dataclasses import replace
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
-from grader.comparison.limits import FULL, NONE, Mark, open_between
-from grader.comparison.marking import degrees
+from grader.comparison.evidence import DrawnVector
 from grader.comparison.task import unit_of
 from grader.documents import Verdict
 from grader.outcomes import Outcome, Quantity, Reason, Tolerance
-from grader.rubric import CriterionTable
+from grader.rubric import CriterionTable, ToleranceTable
+from reference.construction.uncertainty import Spread
+
+FULL, NONE = 1.0, 0.0
+ROUNDING = 1e-9
+"""Relative: a deviation this little above its tolerance is on it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A deviation held against its tolerance.
+
+    Attributes
+    ----------
+    what : ``length``, ``direction``, ``value`` or ``scale``
+    off : deviation without its sign, in the unit of `tolerance`
+    plain : the tolerance without what it was widened by
+    se : standard error of the deviation
+    table : the rubric's: bands of partial marks, and how many standard errors a verdict must be away
+        from changing
+    reason : said where the mark is not full
+    share, worst, best : the mark on the deviation as it is, at the far and at the near end of its error
+    """
+
+    what: str
+    off: float
+    tolerance: float
+    plain: float
+    se: float
+    table: ToleranceTable
+    reason: Reason
+    share: float = field(init=False)
+    worst: float = field(init=False)
+    best: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        margin, share = self.table.certain_errors * self.se, self.share_at(self.off)
+        object.__setattr__(self, "share", share)
+        object.__setattr__(self, "worst", self.share_at(self.off + margin) if margin else share)
+        object.__setattr__(self, "best", self.share_at(max(self.off - margin, 0.0)) if margin else share)
+
+    def share_at(self, off: float) -> float:
+        """The share of the points at a deviation; bands are as wide as the plain tolerance says."""
+        slack = 1.0 + ROUNDING
+        if off <= self.tolerance * slack:
+            return FULL
+        for factor, share in self.table.all_bands:
+            if off <= (self.tolerance + (factor - 1.0) * self.plain) * slack:
+                return share
+        return NONE
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Several limits together: the worst of them counts.
+
+    Attributes
+    ----------
+    share : of the points, as measured
+    worst, best : the shares that the standard errors leave open
+    reasons : the losses, worst first; then remarks that cost nothing
+    """
+
+    share: float
+    worst: float
+    best: float
+    reasons: tuple[Reason, ...] = ()
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the standard errors leave only one verdict."""
+        return self.worst == self.best
+
+    @property
+    def is_full(self) -> bool:
+        """Whether it is full marks for certain."""
+        return self.worst == FULL
+
+    def is_better(self, other: "Mark") -> bool:
+        """Whether it leaves more than another, first for certain, then at best."""
+        return (self.worst, self.best) > (other.worst, other.best)
+
+
+ALL_RIGHT = Mark(FULL, FULL, FULL)
+
+
+def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> Mark:
+    """The mark that several limits give; full where there are none."""
+    if not limits:
+        return Mark(FULL, FULL, FULL, remarks)
+    by_loss = sorted(limits, key=lambda limit: limit.share)
+    losses = tuple(limit.reason for limit in by_loss if limit.share != FULL)
+    near = tuple(
+        Reason(
+            "near_limit",
+            {"what": limit.what, "off": limit.off, "tolerance": limit.tolerance, "se": limit.se},
+        )
+        for limit in by_loss
+        if limit.worst != limit.best
+    )
+    return Mark(
+        min(limit.share for limit in limits),
+        min(limit.worst for limit in limits),
+        min(limit.best for limit in limits),
+        (*losses, *near, *remarks),
+    )
+
+
+def open_between(low: float, high: float, found: Mark, *reasons: Reason) -> Mark:
+    """A mark that is open between two shares whatever was measured, with the reasons first."""
+    return Mark(found.share, low, high, (*reasons, *found.reasons))
+
+
+def left_open(found: Mark, by_hand: Mark) -> Mark:
+    """A mark that a careful hand's errors alone leave open; `by_hand` is it with all that they allow."""
+    if by_hand.best <= found.best:
+        return found
+    return open_between(found.worst, by_hand.best, found, Reason("hand_may_miss"))
+
+
+def the_better(found: Mark, other: Mark, *reasons: Reason) -> Mark:
+    """Two marks of which the better counts; the reasons are those of `other`, after `reasons`."""
+    return Mark(
+        max(found.share, other.share),
+        max(found.worst, other.worst),
+        max(found.best, other.best),
+        (*reasons, *other.reasons),
+    )
+
+
+def the_worse(found: Mark, other: Mark) -> Mark:
+    """Two marks of which the worse counts."""
+    return Mark(
+        min(found.share, other.share),
+        min(found.worst, other.worst),
+        min(found.best, other.best),
+        (*found.reasons, *other.reasons),
+    )
+
+
+REVERSED_WITHIN_DEG = 20.0
+"""A direction this near the opposite one is told as reversed, not as turned by so much."""
+
+
+def tolerances(tolerance: ToleranceTable, expected_mm: float, *, with_direction: bool) -> Tolerance:
+    """Both tolerances as the rubric states them."""
+    turn = tolerance.direction_at(expected_mm) if with_direction else None
+    return Tolerance(tolerance.length_at(expected_mm), turn)
+
+
+def widened(plain: Tolerance, expected_mm: float, reach: Spread, at_most: float = math.inf) -> Tolerance:
+    """The tolerance of a vector that a careful hand may miss by `reach`, millimetres, where that is more.
+
+    What the end is off across a vector makes it longer too, and a zero vector as long as it is off.
+
+    Arguments: `at_most` bounds it to so many times the plain one.
+    """
+    plain_mm, plain_deg = plain.length_mm or 0.0, plain.direction_deg
+    length_mm = math.hypot(expected_mm + reach.along, reach.across) - expected_mm
+    length_mm = max(plain_mm, min(length_mm, at_most * plain_mm))
+    direction = plain_deg
+    if plain_deg is not None:
+        turned = math.degrees(math.atan2(reach.across, expected_mm))
+        direction = max(plain_deg, min(turned, at_most * plain_deg))
+    is_wider = length_mm > plain_mm or direction != plain_deg
+    return Tolerance(length_mm, direction, widened=is_wider)
+
+
+def mark_vector(
+    drawn: DrawnVector, expected: complex, allowed: Tolerance, table: ToleranceTable, se: Spread
+) -> Mark:
+    """A vector as drawn against the expected one, both in millimetres.
+
+    Arguments: `allowed` has a direction where one is judged; `se` are standard errors of what is expected.
+    """
+    expected_mm = abs(expected)
+    off_mm = drawn.length_mm - expected_mm
+    se_mm = math.hypot(drawn.se_mm, se.along)
+    is_asked = allowed.direction_deg is not None and drawn.direction_rad is not None
+    is_judged = is_asked and drawn.length_mm >= table.least_mm
+    off_deg = se_deg = 0.0
+    if is_judged and drawn.direction_rad is not None:
+        off_deg = math.degrees(math.remainder(drawn.direction_rad - cmath.phase(expected), math.tau))
+        se_deg = (
+            math.hypot(drawn.se_deg, math.degrees(se.across / expected_mm)) if se.across else drawn.se_deg
+        )
+    length_mm, direction_deg = allowed.length_mm or 0.0, allowed.direction_deg or math.inf
+    margin = table.certain_errors
+    if (
+        abs(off_mm) + margin * se_mm <= length_mm
+        and is_judged
+        and abs(off_deg) + margin * se_deg <= direction_deg
+    ):
+        return ALL_RIGHT
+    plain = tolerances(table, expected_mm, with_direction=True)
+    reason = _length_reason(drawn, expected_mm, length_mm)
+    limits = [Limit("length", abs(off_mm), length_mm, plain.length_mm or 0.0, se_mm, table, reason)]
+    remarks: tuple[Reason, ...] = ()
+    if is_judged:
+        reason = _direction_reason(drawn, expected, off_deg, direction_deg)
+        plain_deg = plain.direction_deg or direction_deg
+        limits.append(Limit("direction", abs(off_deg), direction_deg, plain_deg, se_deg, table, reason))
+    elif drawn.direction_rad is not None and min(expected_mm, drawn.length_mm) < table.least_mm:
+        shorter = min(expected_mm, drawn.length_mm)
+        remarks = (Reason("too_short_to_judge", {"length_mm": shorter, "least_mm": table.least_mm}),)
+    return mark(limits, remarks)
+
+
+def _length_reason(drawn: DrawnVector, expected_mm: float, allowed_mm: float) -> Reason:
+    off = drawn.length_mm - expected_mm
+    told: dict[str, float | str] = {"measured_mm": drawn.length_mm, "tolerance_mm": allowed_mm}
+    if expected_mm <= 1e-9 * allowed_mm:
+        return Reason("should_be_zero", told)
+    told |= {"expected_mm": expected_mm, "off_mm": abs(off)}
+    return Reason("too_long" if off > 0.0 else "too_short", told)
+
+
+def _direction_reason(drawn: DrawnVector, expected: complex, off_deg: float, allowed_deg: float) -> Reason:
+    told: dict[str, float | str] = {
+        "measured_deg": degrees((drawn.direction_rad or 0.0) + drawn.turn_rad),
+        "expected_deg": degrees(cmath.phase(expected) + drawn.turn_rad),
+        "off_deg": abs(off_deg),
+        "tolerance_deg": allowed_deg,
+    }
+    if abs(off_deg) >= 180.0 - REVERSED_WITHIN_DEG:
+        return Reason("reversed", told)
+    return Reason("turned_left" if off_deg > 0.0 else "turned_right", told)
+
+
+def degrees(angle_rad: float) -> float:
+    """Degrees from 0 up to, not including, 360."""
+    return math.degrees(angle_rad) % 360.0 % 360.0
+
+
+def mark_value(
+    value: float, expected: float, allowed: float, plain: float, table: ToleranceTable, unit: str
+) -> Mark:
+    """A computed value against the expected one, SI; its sign counts where the expected one has any.
+
+    Arguments: `plain` is the tolerance without what it was widened by.
+    """
+    off = abs(value - expected)
+    if off <= allowed:
+        return ALL_RIGHT
+    told: dict[str, float | str] = {"measured": value, "expected": expected, "unit": unit}
+    if value * expected < 0.0:
+        reason = Reason("value_reversed", told)
+    else:
+        told |= {"off": off, "tolerance": allowed}
+        large = abs(value) > abs(expected)
+        reason = Reason("value_too_large" if large else "value_too_small", told)
+    return mark([Limit("value", off, allowed, plain, 0.0, table, reason)])
+
 
 RANKS: dict[Verdict, int] = {"none": 0, "partial": 1, "follow_through": 2, "full": 2}
 

@@ -16,12 +16,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
-from grader.cycle.quantities import UNITS, Kind, Quantity, Selection, Subject
-from grader.cycle.strokes import strokes_of, unbounded_ends
-from grader.i18n import N_, Tongue
-from reference.assignment import Assignment, Variant
+from grader.cycle.quantities import UNITS, Kind, Quantity, Selection, Subject, strokes_of, unbounded_ends
+from grader.language import N_, Tongue
+from reference.authored.assignment import Assignment, Variant
+from reference.drawing.canvas import pieces_of
 from reference.geometry import ComplexArray, FloatArray
-from reference.lettering import pieces_of
 from reference.mechanism import PointOnLine, SlotPoint
 
 MM = 1.0 / 25.4
@@ -68,7 +67,7 @@ REASONS = (
     N_("its guides are parallel"),
     N_("slot and guide are parallel"),
 )
-"""Why a group stops or is passed, as `reference.refusal` says it."""
+"""Why a group stops or is passed, as `reference.kinematics.motion` says it."""
 POSITIONS = 1441
 """Positions that are drawn, four for each degree of a turn: tips of speeds at dead points look sharp."""
 MARGIN = 0.035

@@ -8,7 +8,7 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from grader.i18n import N_
+from grader.language import N_
 
 ALONG_GUIDE = "guide"
 """The detail `line` of a mistake in a line that runs along a moving guide."""

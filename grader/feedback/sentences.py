@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Literal
 
 from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, words_of
-from grader.i18n import N_, Tongue, tongue
+from grader.language import N_, Tongue, tongue
 from grader.outcomes import NamedMistake, Outcome, Param, Reason
 
 Level = Literal["symbol", "hint", "full"]
@@ -157,7 +157,7 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
 
 RIVALS = N_("What was handed in does not tell this from something else:")
 """Said between a mistake and those that explain the same nearly as well,"""
-OR = N_("or:")
+OR_RIVAL = N_("or:")
 """each after this."""
 
 
@@ -176,7 +176,9 @@ def mistake_feedback(
     others = [one for one in dict.fromkeys(others) if one != told]
     if not others:
         return told
-    return " ".join((told, speaker.gettext(RIVALS), *(f"{speaker.gettext(OR)} {one}" for one in others)))
+    return " ".join(
+        (told, speaker.gettext(RIVALS), *(f"{speaker.gettext(OR_RIVAL)} {one}" for one in others))
+    )
 
 
 def one_mistake(

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from grader.documents import ReportDocument, ResultsDocument
-from grader.roster import why_no_id
+from grader.inputs.roster import why_no_id
 from reference.errors import CallError, InputFileError, lines_of
 
 Content = Mapping[str, bytes | Path]

@@ -11,10 +11,10 @@ from markupsafe import Markup
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from grader.documents import CriterionDocument, ReportDocument, Verdict
-from grader.i18n import Tongue, tongue
+from grader.language import Tongue, tongue
 from grader.lms.grades import Grade, Options, ready
 from grader.lms.table import bytes_of, not_as_meant, read_table
-from grader.scene import MARKS
+from grader.overlay.scene import MARKS
 from reference.errors import CallError, InputFileError, lines_of
 
 DECIMALS = 6

@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from grader.records import MECHANISM, Figure, FloatArray, IntArray, Letters, Reading, Swapped
-from reference.construction import Construction
+from reference.construction.graph import Construction
 from reference.geometry import ComplexArray
 
 REACH_MM = 8.0

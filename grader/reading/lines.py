@@ -10,16 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.records import (
-    HEAD_AHEAD,
-    HEAD_BACK,
-    TAIL_AHEAD,
-    TAIL_BACK,
-    FloatArray,
-    Ink,
-    IntArray,
-    Tips,
-)
+from grader.records import HEAD_AHEAD, HEAD_BACK, TAIL_AHEAD, TAIL_BACK, FloatArray, Ink, IntArray, Tips
 from reference.geometry import ComplexArray
 
 LEAST_MM = 1.2

@@ -6,16 +6,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.reading.belief import Ends
-from grader.reading.expected import Edge, Expected, Hand, Slack, expect, vectors_of
-from grader.reading.fitting import Fit, fit_nodes
-from grader.reading.hypotheses import REGULAR, Hypothesis, mistaken, regular, resized, tied
+from grader.reading.expected import (
+    REGULAR,
+    Edge,
+    Expected,
+    Hand,
+    Hypothesis,
+    Place,
+    Search,
+    Slack,
+    expect,
+    mistaken,
+    places,
+    regular,
+    resized,
+    tied,
+    vectors_of,
+)
 from grader.reading.lines import BoolArray, Lines
-from grader.reading.matching import BEAM, Explanation, Settled, explain_each
-from grader.reading.placing import Place, Search, places
-from reference.construction import ancestors
+from grader.reading.matching import BEAM, Ends, Explanation, Settled, explain_each
+from grader.reading.nodes import Fit, fit_nodes
+from reference.construction.graph import ancestors
+from reference.construction.mistakes import Drawing, affected
 from reference.geometry import ComplexArray
-from reference.mistakes import Drawing, affected
 
 HAND = Hand()
 PLAN_ENDS = Ends()
@@ -348,6 +361,3 @@ def _near(lines: Lines, placed: Sequence[Expected]) -> BoolArray:
         across = (middle.real > low.real) & (middle.real < high.real)
         near |= across & (middle.imag > low.imag) & (middle.imag < high.imag)
     return near
-
-
-__all__ = ["Plan", "best_plan", "regular_plans"]

@@ -5,21 +5,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grader.reading.belief import Ends
-from grader.reading.expected import Edge, Expected, Hand, Slack, expect, links_of
-from grader.reading.fitting import LINK_ENDS as LINKS_END
-from grader.reading.fitting import Fit, fit_nodes
+from grader.reading.expected import Edge, Expected, Hand, Place, Search, Slack, expect, links_of, places
 from grader.reading.lines import BoolArray, Lines
-from grader.reading.matching import Explanation, explain_each
-from grader.reading.placing import Place, Search, places
+from grader.reading.matching import Ends, Explanation, explain_each
+from grader.reading.nodes import LINK_ENDS as LINKS_END
+from grader.reading.nodes import Fit, fit_nodes
 from grader.records import FloatArray
-from reference.assignment import Assignment, Scales, Variant
-from reference.derivation import construction_of
-from reference.elements import FixedLine
+from reference.authored.assignment import Assignment, Scales, Variant
+from reference.construction.derive import construction_of
+from reference.construction.elements import FixedLine
+from reference.construction.graph import parameters_of
+from reference.construction.mistakes import Drawing, commit, single_mistakes
+from reference.construction.steps import ArcAndLine, OnGuide, Step, TwoLines
 from reference.geometry import ComplexArray
-from reference.mistakes import Drawing, commit, single_mistakes
-from reference.parameters import parameters_of
-from reference.steps import ArcAndLine, OnGuide, Step, TwoLines
 
 LEAST_LINK_MM = 6.0
 HARDLY = 0.4

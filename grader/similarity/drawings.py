@@ -23,14 +23,14 @@ from scipy.special import betainc, gammaincc
 
 from grader.records import MECHANISM, FloatArray, IntArray
 from grader.similarity.submission import USUAL, ComparedSubmission, Drawn, drawn_of, fitting, scales_used
-from reference.assignment import Assignment, Variant
-from reference.construction import Construction
-from reference.derivation import construction_of
-from reference.elements import View
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.derive import construction_of
+from reference.construction.elements import View
+from reference.construction.graph import Construction
+from reference.construction.steps import Coincide, Pivot, Pole, Step
+from reference.construction.uncertainty import SMALL, hand_errors
 from reference.geometry import ComplexArray
-from reference.hand import SMALL, hand_errors
 from reference.plan import exact_plan
-from reference.steps import Coincide, Pivot, Pole, Step
 
 USUAL_SHARE = 0.45
 LARGEST_SHARE = 0.7

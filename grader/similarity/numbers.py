@@ -16,10 +16,10 @@ from scipy.special import gammaln
 from grader.records import FloatArray
 from grader.similarity.drawings import LEAST_CLASS
 from grader.similarity.submission import USUAL, ComparedSubmission, scales_used
-from reference.assignment import Assignment, Variant
-from reference.construction import evaluate
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.graph import evaluate
+from reference.construction.uncertainty import SMALL, hand_errors
 from reference.geometry import ComplexArray
-from reference.hand import SMALL, hand_errors
 from reference.plan import exact_plan
 
 READ_OFF_MM = 0.15

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from grader.documents import ReportDocument
-from grader.measurements import Measurements
+from grader.inputs.measurements import Measurements
 from grader.records import FloatArray
-from reference.assignment import Assignment, Scales, Variant
+from reference.authored.assignment import Assignment, Scales, Variant
+from reference.construction.uncertainty import Skill
 from reference.geometry import ComplexArray
-from reference.hand import Skill
 from reference.plan import exact_plan
 
 Nodes = Mapping[str, Mapping[str, complex]]

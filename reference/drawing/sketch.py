@@ -1,18 +1,115 @@
-"""The mechanism sketch: links, joints, ground and guides, as symbols at the scale kL."""
+"""The mechanism sketch at the scale kL, and the vector polygons of the plans."""
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from reference.canvas import INK, Area, Label, Stroke
+from reference.construction.elements import Line, View
+from reference.construction.steps import Step, TwoLines
 from reference.drawing import symbols
-from reference.drawing.drive import drive_arrow, drive_letter
-from reference.drawing.labelling import Style, Wanted, letters
-from reference.drawing.links import Bar, bars, blocks, hinged_on, unit
-from reference.drawing.subject import Figure, Part, Subject
-from reference.drawing.symbols import LINK_MM, point
+from reference.drawing.canvas import CONSTRUCTION, INK, Area, Curve, Label, Shape, Stroke, pieces_of
+from reference.drawing.labels import Style, Wanted, lengths_inside, letters, segments_of
+from reference.drawing.subject import PLAN_COLOURS, Figure, Part, Subject
+from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, hinged_on, point, unit
 from reference.drawing.triangles import altitudes
-from reference.mechanism import DrivenSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
+from reference.geometry import FloatArray
+from reference.mechanism import Crank, DrivenSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
+
+RADIUS_MM, SWEEP, THRUST_MM = 9.0, 0.9, 10.0
+_DRIVE_LETTER_MM = 3.4
+CLEAR_MM = 0.8
+STARTS = (0.25, -0.25 - SWEEP, 1.5, -1.5 - SWEEP, 2.5)
+"""Where a turning arrow may start, from the crank on in its sense, the best first."""
+Turn = tuple[float, float, float]
+"""Radius, start and sweep."""
+
+
+def drive_arrow(subject: Subject, nodes: dict[str, complex]) -> Iterator[Shape]:
+    """The arrow, unless the driven link stands still."""
+    driver = subject.plan.mechanism.driver
+    if _stands(subject):
+        return
+    if isinstance(driver, DrivenSlider):
+        yield from symbols.arrow(*_thrust(subject, driver, nodes), THIN_MM, INK)
+    else:
+        yield from symbols.turning(nodes[driver.pivot], *_turn(subject, driver, nodes))
+
+
+def drive_letter(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted]:
+    """The angular velocity or the velocity that the arrow stands for."""
+    driver = subject.plan.mechanism.driver
+    if _stands(subject):
+        return
+    if isinstance(driver, DrivenSlider):
+        at = point(sum(_thrust(subject, driver, nodes)) / 2.0)
+        yield Wanted(driver.pin, at, subject.letter(f"v_{driver.pin}"), _DRIVE_LETTER_MM, INK, 0.6)
+    else:
+        radius, start, sweep = _turn(subject, driver, nodes)
+        outward = complex(np.exp(1j * (start + 0.5 * sweep)))
+        at = point(nodes[driver.pivot] + radius * outward)
+        yield Wanted(driver.pin, at, pieces_of(f"omega_{driver.link}"), _DRIVE_LETTER_MM, INK, 0.6, outward)
+
+
+def _rate(subject: Subject) -> float:
+    """The crank's angular velocity, or the driven slider's speed."""
+    driver = subject.plan.mechanism.driver
+    return subject.one(np.asarray(driver.speed if isinstance(driver, DrivenSlider) else driver.omega))
+
+
+def _stands(subject: Subject) -> bool:
+    return _rate(subject) == 0.0
+
+
+def _thrust(subject: Subject, driver: DrivenSlider, nodes: dict[str, complex]) -> tuple[complex, complex]:
+    """Beside the block, in the sense of its velocity, where it meets the fewest links."""
+    block = next(block for block in blocks(subject, nodes) if block.node == driver.pin)
+    along = block.along * float(np.sign(_rate(subject)))
+    above = 1j * block.along * (1 if block.along.real >= 0.0 else -1)
+    length, width = symbols.BLOCK_MM
+    starts = (
+        block.at + above * (width + up) + along * ahead
+        for up in (3.0, 7.0)
+        for ahead in (-length, 2.0, -THRUST_MM - 2.0)
+    )
+    links = _links(subject, nodes)
+    ways = [(start, start + THRUST_MM * along) for start in starts]
+    return min(ways, key=lambda way: _meets(Curve((point(way[0]), point(way[1]))), links))
+
+
+def _turn(subject: Subject, crank: Crank, nodes: dict[str, complex]) -> Turn:
+    """About the crank's pivot, in the sense in which it turns, where it meets the fewest links."""
+    centre = nodes[crank.pivot]
+    arm = nodes[crank.pin] - centre
+    sign, largest = float(np.sign(_rate(subject))), min(RADIUS_MM, 0.45 * abs(arm))
+    links = _links(subject, nodes)
+    turns = [
+        (radius, float(np.angle(arm)) + sign * start, sign * SWEEP)
+        for radius in (largest, 0.7 * largest)
+        for start in STARTS
+    ]
+
+    def met(turn: Turn) -> int:
+        radius, start, sweep = turn
+        return _meets(symbols.arc(centre, radius, start, sweep, THIN_MM), links)
+
+    return min(turns, key=met)
+
+
+def _links(subject: Subject, nodes: dict[str, complex]) -> FloatArray:
+    """The links as segments, millimetres, y down."""
+    return segments_of(Stroke(point(bar.ends[0]), point(bar.ends[1])) for bar in bars(subject, nodes))
+
+
+def _meets(curve: Curve, links: FloatArray) -> int:
+    """How many links a curve meets, or nearly so."""
+    corners = np.array(curve.points)
+    share = np.linspace(0.0, len(corners) - 1.0, 24)
+    places = np.stack(
+        [np.interp(share, np.arange(len(corners)), corners[:, axis]) for axis in (0, 1)], axis=1
+    )
+    boxes = np.hstack([places - CLEAR_MM, places + CLEAR_MM])
+    return int(np.any(lengths_inside(boxes, links) > 0.0, axis=0).sum())
+
 
 LETTER_MM, SMALL_LETTER_MM = 4.2, 3.2
 LINK_NUMBER_MM = 3.0
@@ -194,3 +291,50 @@ def _beside(parts: Sequence[Bar], nodes: dict[str, complex]) -> complex:
     start, end = max((bar.ends for bar in parts), key=lambda ends: abs(ends[1] - ends[0]))
     places = (start + share * (end - start) for share in NUMBER_SHARES)
     return max(places, key=lambda at: min(10.0, *(abs(at - place) for place in nodes.values())))
+
+
+_NODE_LETTER_MM, _SMALL_NODE_LETTER_MM = 4.2, 3.4
+OVERRUN_MM = 5.0
+"""A construction line goes on past its foot and past the node that it finds."""
+ABSOLUTE_MM, RELATIVE_MM = 0.5, 0.3
+"""Widths of vectors from the pole, and of all others."""
+
+
+def polygon(subject: Subject, figure: str) -> Figure:
+    """One plan of one variant."""
+    colour, nodes = PLAN_COLOURS[figure], subject.nodes(figure)
+    drawn = [*_lines(subject, figure, nodes), *_vectors(subject, figure, nodes)]
+    pole = subject.plan.construction.poles[figure]
+    drawn.append(Part(pole, symbols.marked_point(nodes[pole], colour)))
+    style = Style(_NODE_LETTER_MM, _SMALL_NODE_LETTER_MM, colour, symbols.POINT_RADIUS_MM)
+    named = letters(subject, nodes, [part.shape for part in drawn], style)
+    return captioned(subject, figure, (*drawn, *named), colour)
+
+
+def _lines(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator[Part]:
+    view = subject.view
+    for step in subject.plan.construction.figures[figure]:
+        for shape in construction_lines(step, view, nodes):
+            yield Part(step.node, shape)
+
+
+def construction_lines(step: Step, view: View, nodes: dict[str, complex]) -> Iterator[Shape]:
+    """The lines that a node is found by, thin, going on a little at both ends."""
+    lines = (step.first, step.second) if isinstance(step, TwoLines) else ()
+    drawn = [(line.through, complex(line.along.at(view))) for line in lines if isinstance(line, Line)]
+    for through, along in drawn:
+        foot, node = nodes[through], nodes[step.node]
+        sign = 1.0 if (np.conj(along) * (node - foot)).real >= 0.0 else -1.0
+        over = sign * OVERRUN_MM * along
+        yield Stroke(point(foot - over), point(node + over), HAIR_MM, CONSTRUCTION)
+
+
+def _vectors(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator[Part]:
+    """Each vector that is longer than nothing; of several along one line the longest undermost."""
+    pole, colour = subject.plan.construction.poles[figure], PLAN_COLOURS[figure]
+    for vector in subject.plan.construction.vectors_of(figure):
+        if subject.is_zero(vector.name):
+            continue
+        width = ABSOLUTE_MM if vector.tail == pole else RELATIVE_MM
+        for shape in symbols.arrow(nodes[vector.tail], nodes[vector.head], width, colour):
+            yield Part(vector.head, shape)

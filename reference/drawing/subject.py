@@ -5,11 +5,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from reference.assignment import Assignment, Variant
-from reference.canvas import Bounds, Shape, bounds
-from reference.elements import View
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.elements import View
+from reference.drawing.canvas import Bounds, Piece, Shape, Text, bounds, pieces_of, scale_pieces
 from reference.geometry import FloatArray
-from reference.lettering import Piece, Text, pieces_of, scale_pieces
 from reference.plan import ZERO_SHARE, Plan
 
 SCALE_OF = {"mechanism": "kL", "velocity_plan": "kv", "acceleration_plan": "ka"}

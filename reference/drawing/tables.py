@@ -5,10 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.canvas import INK, Bounds, Label, Shape, Stroke
 from reference.drawing import symbols
+from reference.drawing.canvas import (
+    INK,
+    Bounds,
+    Label,
+    Piece,
+    Shape,
+    Stroke,
+    Text,
+    pieces_of,
+    width_of,
+    wrapped,
+)
 from reference.drawing.subject import VECTOR_UNITS, Subject
-from reference.lettering import Piece, Text, pieces_of, width_of, wrapped
 
 COLUMN_MM = 96.0
 EDGE_MM = 3.0

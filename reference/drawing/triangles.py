@@ -11,18 +11,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reference.canvas import CONSTRUCTION, Curve, Stroke
-from reference.construction import Construction, Vector, evaluate
+from reference.construction.elements import Along, Component, Line, Normal
+from reference.construction.graph import Construction, Vector, evaluate
+from reference.construction.steps import Given, Step, TwoLines
 from reference.drawing import symbols
-from reference.drawing.labelling import Wanted
+from reference.drawing.canvas import CONSTRUCTION, Curve, Piece, Stroke, pieces_of
+from reference.drawing.labels import Wanted
 from reference.drawing.subject import PLAN_COLOURS, Part, Subject
 from reference.drawing.symbols import HAIR_MM, MEDIUM_MM, point
-from reference.elements import Along, Component, Line, Normal
 from reference.errors import CallError
 from reference.geometry import ComplexArray
-from reference.lettering import Piece, pieces_of
 from reference.plan import Plan
-from reference.steps import Given, Step, TwoLines
 
 FIGURE = "altitude"
 RATIO_TOLERANCE = 1e-6

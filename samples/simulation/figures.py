@@ -5,9 +5,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from reference.construction import Vector, evaluate
+from reference.construction.graph import Vector, evaluate
+from reference.construction.steps import Divide, Given, Similar, TwoArcs, TwoLines
 from reference.mechanism import Crank, Dyad, Plate
-from reference.steps import Divide, Given, Similar, TwoArcs, TwoLines
 from samples.simulation import symbols
 from samples.simulation.hand import MECHANISM, DrawnFigure, Nodes, Task
 from samples.simulation.links import blocks_of, coincident, fixed_guides, lines_of, links_of

@@ -10,14 +10,13 @@ from itertools import combinations
 
 import numpy as np
 
-from reference.assignment import Assignment, Scales, Variant
-from reference.construction import Construction, evaluate
-from reference.derivation import construction_of
+from reference.authored.assignment import Assignment, Scales, Variant
+from reference.construction.derive import construction_of
+from reference.construction.graph import Construction, evaluate, parameters_of
+from reference.construction.mistakes import CODES, RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
+from reference.construction.uncertainty import Act, Skill, acts
 from reference.geometry import FloatArray
-from reference.hand import Act, Skill, acts
 from reference.mechanism import Mechanism
-from reference.mistakes import CODES, RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
-from reference.parameters import parameters_of
 from samples.simulation.settings import Hand, Student
 from samples.simulation.strokes import Rng
 
@@ -207,7 +206,7 @@ def _other_variant(assignment: Assignment, chosen: Mistake) -> Mistake:
 
 
 def slips(construction: Construction, hand: Hand, rng: Rng) -> dict[Act, FloatArray]:
-    """One draw of a hand's errors for every step, as `reference.construction.evaluate` takes them."""
+    """One draw of a hand's errors for every step, as `reference.construction.graph.evaluate` takes them."""
     skill = Skill(hand.angle_deg, hand.place_mm, hand.mark_mm)
     errors: dict[Act, FloatArray] = {}
     for act in acts(construction):

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.elements import FixedLine, Line
+from reference.construction.elements import FixedLine, Line
+from reference.construction.steps import ArcAndLine, OnGuide, Step, TwoLines
 from reference.mechanism import (
     Crank,
     Dyad,
@@ -17,7 +18,6 @@ from reference.mechanism import (
     Yoke,
     moving_guides,
 )
-from reference.steps import ArcAndLine, OnGuide, Step, TwoLines
 from samples.simulation.hand import Task
 
 

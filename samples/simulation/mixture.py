@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from reference.assignment import Assignment, Variant
-from reference.mistakes import CODES
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.mistakes import CODES
 from samples.simulation.hand import possible_mistakes
 from samples.simulation.settings import (
     CAREFUL,

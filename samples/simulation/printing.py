@@ -3,7 +3,7 @@
 import numpy as np
 import pypdfium2
 
-from grader.layout import Layout
+from grader.printed.layout import Layout
 from samples.simulation.desk import PrintedSheet
 from samples.simulation.scanner import Background
 

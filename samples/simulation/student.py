@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.assignment import Assignment, Variant
+from reference.authored.assignment import Assignment, Variant
 from reference.mechanism import Crank
 from samples.simulation import truth
 from samples.simulation.desk import Desk, Printed

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from reference.mistakes import Mistake
+from reference.construction.mistakes import Mistake
 from samples.simulation.figures import at_origin, pole_text
 from samples.simulation.hand import MECHANISM, DrawnFigure, DrawnSheet, Task
 from samples.simulation.page import Frame

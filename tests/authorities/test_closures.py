@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from mpmath import mp, mpc
 
-from reference.assembly import build_mechanism
-from reference.authored import validate
-from reference.checking import check_mechanism
-from reference.mechanism_file import MechanismFile
-from reference.motion import move
+from reference.authored.assembly import build_mechanism
+from reference.authored.mechanism import MechanismFile, check_mechanism
+from reference.authored.toml_file import validate
+from reference.kinematics.motion import move
 
 DIGITS = 40
 NEWTON_STEPS = 10

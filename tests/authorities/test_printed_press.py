@@ -2,8 +2,8 @@
 
 import pytest
 
-from grader.comparison import Submission
-from grader.judging import judge
+from grader.comparison.evidence import Submission
+from grader.marking.mark import judge
 from grader.records import Figure, Reading, ReadVector
 from tests.hands import task_for
 

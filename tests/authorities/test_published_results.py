@@ -12,11 +12,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from reference.assembly import build_mechanism
-from reference.authored import validate
-from reference.checking import check_mechanism
-from reference.mechanism_file import MechanismFile
-from reference.motion import Motion, move
+from reference.authored.assembly import build_mechanism
+from reference.authored.mechanism import MechanismFile, check_mechanism
+from reference.authored.toml_file import validate
+from reference.kinematics.motion import Motion, move
 
 DOUBLE_PRECISION = 1e-12
 SEVENTEEN_DIGITS = [

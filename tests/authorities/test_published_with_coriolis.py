@@ -6,14 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference.assembly import build_mechanism
-from reference.authored import validate
-from reference.checking import check_mechanism
-from reference.construction import evaluate
-from reference.derivation import construction_of
-from reference.mechanism_file import MechanismFile
-from reference.motion import move
-from reference.parameters import parameters_of
+from reference.authored.assembly import build_mechanism
+from reference.authored.mechanism import MechanismFile, check_mechanism
+from reference.authored.toml_file import validate
+from reference.construction.derive import construction_of
+from reference.construction.graph import evaluate, parameters_of
+from reference.kinematics.motion import move
 
 CASES = json.loads((Path(__file__).parent / "published.json").read_text(encoding="utf-8"))
 

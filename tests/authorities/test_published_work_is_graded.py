@@ -12,11 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from grader.judging import Submission, judge, task_of
-from grader.measurements import Names, reading_of
-from reference.assignment import Assignment
-from reference.assignment_file import AssignmentFile
-from reference.authored import validate
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.inputs.measurements import Names, reading_of
+from grader.marking.mark import judge
+from reference.authored.assignment import Assignment, AssignmentFile
+from reference.authored.toml_file import validate
 from tests.whole_rubric import rubric_for
 
 FIGURE_MM, LARGE_MM = 40.0, 60.0

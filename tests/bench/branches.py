@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from reference.geometry import ComplexArray, FloatArray, cross, direction, dot
+from reference.kinematics.motion import move_where_possible
 from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, Slider, SlotPoint, SlottedLink
-from reference.motion import move_where_possible
 from tests.bench.arrays import one_of
 from tests.bench.peers import FSOLVE, Fsolve, NoAnswerError, Places, sketch
 

@@ -10,7 +10,8 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from grader.judging import Task, judge, task_of
+from grader.comparison.task import Task, task_of
+from grader.marking.mark import judge
 from grader.outcomes import Quantity
 from tests.bench.judging_assignments import ASSIGNMENTS
 from tests.bench.judging_handed_in import submission

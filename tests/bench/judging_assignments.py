@@ -10,10 +10,9 @@ from functools import cache
 from pathlib import Path
 
 from grader.rubric import RubricFile, rubric_of
-from reference.assignment import Assignment, load_assignment
-from reference.assignment_file import AssignmentFile
-from reference.authored import validate
-from reference.checking import check_mechanism
+from reference.authored.assignment import Assignment, AssignmentFile, load_assignment
+from reference.authored.mechanism import check_mechanism
+from reference.authored.toml_file import validate
 from reference.errors import AuthoredFileError
 from tests.whole_rubric import rubric_for
 

@@ -5,12 +5,14 @@ import tempfile
 import time
 from pathlib import Path
 
-from grader.batch import Batch, grade
-from grader.judging import Submission, judge, task_of
-from grader.measurements import names_of, read_measurements
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.folder.batch import Batch, grade
+from grader.inputs.measurements import names_of, read_measurements
+from grader.marking.mark import judge
 from grader.records import Reading
 from grader.rubric import RubricFile
-from reference.assignment import Assignment
+from reference.authored.assignment import Assignment
 from tests.bench.judging_assignments import assignment_named
 from tests.bench.judging_handed_in import submission
 from tests.bench.judging_students import Key, student

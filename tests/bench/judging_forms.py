@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.construction import Construction, evaluate
-from reference.elements import Scaled, View
-from reference.mistakes import Drawing, Mistake, commit
-from reference.steps import Given
+from reference.construction.elements import Scaled, View
+from reference.construction.graph import Construction, evaluate
+from reference.construction.mistakes import Drawing, Mistake, commit
+from reference.construction.steps import Given
 from tests.bench.judging_redrawn import SCALES
 from tests.bench.judging_students import Source, Work
 

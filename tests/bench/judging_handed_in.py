@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from grader.judging import Submission
+from grader.comparison.evidence import Submission
 from grader.records import (
     ACCELERATION_PLAN,
     MECHANISM,

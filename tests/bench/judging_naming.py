@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.outcomes import NamedMistake as Named
-from reference.construction import Construction
-from reference.mistakes import Mistake
+from reference.construction.graph import Construction
+from reference.construction.mistakes import Mistake
 from tests.bench.judging_redrawn import Asked, is_same, meant, vectors_of
 from tests.bench.judging_rules import CLEAR, Seen, off
 from tests.bench.judging_students import ON_SHEETS, Source, Work

@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grader.outcomes import NamedMistake as Named
-from reference.assignment import Assignment, Variant
-from reference.construction import evaluate
-from reference.mistakes import RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
-from reference.parameters import parameters_of
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.graph import evaluate, parameters_of
+from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, commit, single_mistakes
 from samples.simulation.hand import scalars
 
 SCALES = ("kL", "kv", "ka")

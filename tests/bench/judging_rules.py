@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from grader.judging import Submission
+from grader.comparison.evidence import Submission
 from grader.records import MECHANISM
 from grader.rubric import ToleranceTable
 

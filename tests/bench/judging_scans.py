@@ -9,7 +9,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from grader.judging import Submission, judge, task_of
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.marking.mark import judge
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef, Reading
 from samples.simulation import Settings, SimulatedSheet, any_settings, simulate

@@ -13,9 +13,9 @@ import numpy as np
 
 from grader.records import ACCELERATION_PLAN
 from grader.rubric import RubricFile
-from reference.assignment import Assignment, Variant
-from reference.construction import Construction
-from reference.mistakes import CODES
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.graph import Construction
+from reference.construction.mistakes import CODES
 from samples.simulation import CAREFUL, SLOPPY, TYPICAL, Hand
 from samples.simulation.hand import DrawnSheet, Task, draw, task_of
 from samples.simulation.settings import Student

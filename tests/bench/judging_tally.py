@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from grader.judging import Submission
+from grader.comparison.evidence import Submission
 from grader.outcomes import Judgement, NamedMistake
-from reference import mistakes as operators
+from reference.construction import mistakes as operators
 from tests.bench.judging_naming import Made, first_of, is_named, mistakes_due
 from tests.bench.judging_rules import Due, Seen
 from tests.bench.judging_students import SOURCES, Key, Source, Work

@@ -44,10 +44,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from grader.rubric import CriterionTable
-from reference.construction import Construction, Vector, ancestors, evaluate
+from reference.construction.graph import Construction, Vector, ancestors, evaluate
+from reference.construction.mistakes import Mistake
+from reference.construction.steps import ArcAndLine, Given, Pivot, TwoArcs
 from reference.geometry import ComplexArray
-from reference.mistakes import Mistake
-from reference.steps import ArcAndLine, Given, Pivot, TwoArcs
 from tests.bench.judging_forms import Forms, Held, cranks_of, ends_of, is_driven
 from tests.bench.judging_redrawn import SCALES
 from tests.bench.judging_rules import CLEAR, PLAIN, Due, Seen, off

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from grader.rubric import CriterionTable
-from reference.construction import AngularRate, evaluate
+from reference.construction.graph import AngularRate, evaluate
+from reference.construction.mistakes import Drawing
 from reference.geometry import cross
-from reference.mistakes import Drawing
 from tests.bench.judging_rules import CLEAR, PLAIN, SHORT, Due, Seen
 from tests.bench.judging_students import ON_SHEETS, SOURCES, Source, Work
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from grader.ink import find_ink
 from grader.records import GreyImage, Page, Sheet, Unread
+from grader.scan.strokes.ink import find_ink
 from reference.geometry import ComplexArray
 from samples.simulation.raster import render
 from samples.simulation.scanner import DrawnPaper, digitise

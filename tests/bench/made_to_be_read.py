@@ -25,14 +25,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from grader.answer_sheet.sheets import make_sheets
 from grader.authoring.lint import lint
+from grader.inputs.roster import RosterRow
 from grader.pipeline import open_page, read_pages
+from grader.printed.answer_sheet import make_sheets
 from grader.records import PageRef
-from grader.roster import RosterRow
 from grader.rubric import load_rubric
-from reference.assignment import Assignment, Variant, load_assignment
-from reference.formula import parse
+from reference.authored.assignment import Assignment, Variant, load_assignment
+from reference.authored.formula import parse
 from samples.simulation import any_settings, simulate
 from samples.simulation.desk import Desk
 from samples.simulation.lettering import write

@@ -11,7 +11,7 @@ from typing import Any
 
 from mpmath import mp, mpc, mpf
 
-from reference.construction import Vector
+from reference.construction.graph import Vector
 from reference.mechanism import (
     Crank,
     CrossSlider,

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.optimize import fsolve
 
 from reference.geometry import ComplexArray
+from reference.kinematics.motion import Motion
 from reference.mechanism import Dyad, FixedGuide, Mechanism, Plate, Slider
-from reference.motion import Motion
 
 FSOLVE = "scipy fsolve"
 OPENED = 0.05

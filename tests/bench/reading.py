@@ -13,7 +13,7 @@ import cv2
 
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef, ScannedPage
-from reference.derivation import construction_of
+from reference.construction.derive import construction_of
 from tests.bench.lines import LinesFigures, measure_lines
 from tests.bench.reading_foreign import BREAKDOWNS, ForeignRow, measure_foreign
 from tests.bench.reading_memory import peak_mb

@@ -14,7 +14,7 @@ from pathlib import Path
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef
 from grader.rubric import load_rubric
-from reference.assignment import Variant, load_assignment
+from reference.authored.assignment import Variant, load_assignment
 
 
 def peak_mb(assignment: str, variant: Variant, paths: Sequence[Path]) -> float | None:

@@ -6,10 +6,10 @@ from functools import cache
 
 import numpy as np
 
-from grader.answer_sheet.sheets import make_sheets
-from grader.roster import RosterRow
+from grader.inputs.roster import RosterRow
+from grader.printed.answer_sheet import make_sheets
 from grader.rubric import RubricFile, load_rubric
-from reference.assignment import Assignment, Variant, load_assignment
+from reference.authored.assignment import Assignment, Variant, load_assignment
 from samples.simulation import (
     CAREFUL,
     SLOPPY,

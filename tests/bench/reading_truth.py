@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Figure, ReadVector
-from reference.construction import Construction
+from reference.construction.graph import Construction
 
 RIGHT_MM, RIGHT_DEG = 0.3, 0.3
 MISREAD_MM = 1.0

@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
+from grader.inputs.roster import read_roster
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef
-from grader.roster import read_roster
 from grader.rubric import load_rubric
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 
 SHEETS = Path(__file__).resolve().parents[3] / "shared" / "sheets"
 PLANS = ("velocity_plan", "acceleration_plan")

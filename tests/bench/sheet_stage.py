@@ -21,10 +21,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from grader.intake import page_of
 from grader.records import Page, Sheet, Unread
-from grader.sheet import rectify, straighten
-from grader.sheet.lens import straight
+from grader.scan.decode.pages import page_of
+from grader.scan.register.distortion import straight, straighten
+from grader.scan.register.registration import rectify
 
 SHEETS = Path(__file__).resolve().parents[3] / "shared" / "sheets"
 TURNED_DEG = 45.0

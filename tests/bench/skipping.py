@@ -16,12 +16,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from grader import batch
-from grader.answer_sheet.sheets import Asked, make_sheets
-from grader.batch import Batch, grade
-from grader.roster import RosterRow
+from grader.folder import batch
+from grader.folder.batch import Batch, grade
+from grader.inputs.roster import RosterRow
+from grader.printed.answer_sheet import Asked, make_sheets
 from grader.rubric import load_rubric
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 from samples.simulation.printing import printed_sheets
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.cli.benchmark import construction_error
-from reference.assignment import Assignment, built_in, load_assignment
+from reference.authored.assignment import Assignment, built_in, load_assignment
 from reference.plan import Plan, exact_plan
 from tests.bench.branches import BranchRow, count_branches
 from tests.bench.oracle import ExactMotion

@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from reference.assembly import build_mechanism
-from reference.assignment import Assignment, load_assignment
-from reference.construction import evaluate
-from reference.derivation import construction_of
+from reference.authored.assembly import build_mechanism
+from reference.authored.assignment import Assignment, load_assignment
+from reference.construction.derive import construction_of
+from reference.construction.graph import evaluate, parameters_of
 from reference.geometry import FloatArray
+from reference.kinematics.motion import Motion, move
 from reference.mechanism import Mechanism
-from reference.motion import Motion, move
-from reference.parameters import parameters_of
 from reference.plan import exact_plan
 from tests.bench.oracle import ExactMotion
 from tests.bench.peers import FSOLVE, Answer, Fsolve, Places, answer_of, error_of, sketch

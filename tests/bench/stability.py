@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from reference.errors import MechanismError
+from reference.kinematics.motion import Motion, move, move_where_possible
 from reference.mechanism import Dyad, Group, Mechanism, Slider, SlottedLink
-from reference.motion import Motion, move, move_where_possible
 from tests.bench.arrays import stacked
 from tests.bench.oracle import ExactMotion
 from tests.bench.peers import FSOLVE, Answer, Fsolve, NoAnswerError, answer_of, error_of, sketch

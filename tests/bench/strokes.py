@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from grader.ink import find_ink
-from grader.intake import page_of
 from grader.records import Sheet
-from grader.sheet import rectify
+from grader.scan.decode.pages import page_of
+from grader.scan.register.registration import rectify
+from grader.scan.strokes.ink import find_ink
 
 SHEETS = Path(__file__).resolve().parents[3] / "shared" / "sheets"
 CLASSES_MM = ((2.0, 4.0), (4.0, 8.0), (8.0, 20.0), (20.0, 1000.0))

@@ -28,12 +28,12 @@ from typing import Any
 import cv2
 import numpy as np
 
+from grader.inputs.roster import read_roster
 from grader.pipeline import open_page, read_pages
 from grader.records import Figure, PageRef, Reading, ScannedPage
-from grader.roster import read_roster
 from grader.rubric import load_rubric
-from reference.assignment import Assignment, Variant, load_assignment
-from reference.derivation import construction_of
+from reference.authored.assignment import Assignment, Variant, load_assignment
+from reference.construction.derive import construction_of
 from tests.bench.reading_places import OnPaper
 from tests.bench.reading_scenes import SCENES, scene_named, works
 from tests.bench.reading_truth import (

@@ -9,11 +9,11 @@ import typer
 from pydantic import BaseModel
 
 from grader.cli.app import app
-from grader.cli.schemas import schema_names
+from grader.cli.checking import schema_names
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
-from reference import assignment_file, mechanism_file
+from reference.authored import assignment, mechanism
+from reference.construction.mistakes import CODES
 from reference.errors import PlanmarkError
-from reference.mistakes import CODES
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -112,17 +112,17 @@ def test_every_schema_is_named_where_its_document_is_described(name):
 
 
 TABLES = [
-    mechanism_file.MechanismFile,
-    mechanism_file.CrankTable,
-    mechanism_file.DyadTable,
-    mechanism_file.SliderTable,
-    mechanism_file.PlateTable,
-    mechanism_file.PointOnLineTable,
-    assignment_file.AssignmentFile,
-    assignment_file.VariantTable,
-    assignment_file.ScalesTable,
-    assignment_file.PageTable,
-    assignment_file.GivenTable,
+    mechanism.MechanismFile,
+    mechanism.CrankTable,
+    mechanism.DyadTable,
+    mechanism.SliderTable,
+    mechanism.PlateTable,
+    mechanism.PointOnLineTable,
+    assignment.AssignmentFile,
+    assignment.VariantTable,
+    assignment.ScalesTable,
+    assignment.PageTable,
+    assignment.GivenTable,
     RubricFile,
     CriterionTable,
     ToleranceTable,

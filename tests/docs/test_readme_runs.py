@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from reference.assignment import library, load_assignment
+from reference.authored.assignment import library, load_assignment
 from reference.plan import exact_plan
 
 ROOT = Path(__file__).resolve().parent.parent.parent

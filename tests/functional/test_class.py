@@ -7,8 +7,8 @@ import jsonschema
 import pypdfium2
 import pytest
 
-from grader.cli.schemas import schema
-from reference.assignment import library
+from grader.cli.checking import schema
+from reference.authored.assignment import library
 
 
 def test_all_variants_are_written_for_the_instructor(planmark, tmp_path):

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference.assignment import library, load_assignment
-from reference.motion import move
+from reference.authored.assignment import library, load_assignment
+from reference.kinematics.motion import move
 
 ROUNDING = 1e-12
 PRINTED = 5e-6

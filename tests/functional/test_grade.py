@@ -11,9 +11,9 @@ import numpy as np
 import pikepdf
 import pytest
 
-from grader.cli.schemas import schema
-from reference.assignment import built_in, load_assignment
-from reference.mistakes import Mistake
+from grader.cli.checking import schema
+from reference.authored.assignment import built_in, load_assignment
+from reference.construction.mistakes import Mistake
 from reference.plan import exact_plan
 from tests.hands import measured, task_for
 

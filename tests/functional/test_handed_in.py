@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from grader.cli import app
-from grader.samples_folder import samples_folder
+from grader.files import samples_folder
 
 GOOD = json.loads((samples_folder() / "pump" / "s08.json").read_text(encoding="utf-8"))
 N = GOOD["n"]

@@ -9,8 +9,8 @@ import typer
 from typer.testing import CliRunner
 
 from grader.cli.app import app
-from grader.cli.schemas import schema, schema_names
-from reference.assignment import library
+from grader.cli.checking import schema, schema_names
+from reference.authored.assignment import library
 
 
 def test_the_table_of_the_press_shows_the_five_printed_segments(planmark):

@@ -19,14 +19,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grader.intake import count_pages, is_blank, page_of
-from grader.measurements import names_of, read_measurements
+from grader.folder.workers import Limits, Workers
+from grader.inputs.measurements import names_of, read_measurements
+from grader.inputs.roster import read_roster
 from grader.records import Problem
-from grader.roster import read_roster
 from grader.rubric import load_rubric
-from grader.sheet import register
-from grader.workers import Limits, Workers
-from reference.assignment import load_assignment
+from grader.scan.decode.pages import count_pages, is_blank, page_of
+from grader.scan.register.registration import register
+from reference.authored.assignment import load_assignment
 from reference.errors import PlanmarkError
 from tests.fuzz.seeds import seeds
 

@@ -5,8 +5,8 @@ import json
 
 import pytest
 
+from grader.folder.workers import Limits, Workers
 from grader.records import Problem
-from grader.workers import Limits, Workers
 from tests import hostile
 from tests.fuzz.doors import DOORS, corpus, try_files
 from tests.fuzz.seeds import seeds

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.measurements import names_of, read_measurements, students_in
-from grader.roster import why_no_id
-from reference.assignment import load_assignment
+from grader.inputs.measurements import names_of, read_measurements, students_in
+from grader.inputs.roster import why_no_id
+from reference.authored.assignment import load_assignment
 from reference.errors import InputFileError
 
 NAMES = names_of(load_assignment("pump"))

@@ -5,8 +5,8 @@ import contextlib
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.matching import Draft, draft_csv
-from grader.roster import Roster, RosterRow, ScanRef, parse_roster, parse_scan, read_roster
+from grader.folder.draft_roster import Draft, draft_csv
+from grader.inputs.roster import Roster, RosterRow, ScanRef, parse_roster, parse_scan, read_roster
 from reference.errors import AuthoredFileError, Finding
 
 HEADER = st.lists(

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
+from reference.kinematics.motion import _on_arrays, move, move_where_possible
+from reference.kinematics.solving import one_variant, solve
 from reference.mechanism import Crank, Dyad, FixedGuide, Mechanism, Slider, SlottedLink
-from reference.motion import _on_arrays, move, move_where_possible
-from reference.solving import one_variant, solve
 from tests.laws.mechanisms import KINDS, after, array, random_mechanism
 
 TRUE_DIGITS = 60

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from mpmath import mp
 
-from reference.assembly import build_mechanism
-from reference.authored import validate
+from reference.authored.assembly import build_mechanism
+from reference.authored.mechanism import MechanismFile
+from reference.authored.toml_file import validate
+from reference.kinematics.motion import _on_arrays, move_where_possible
 from reference.mechanism import Plate, PointOnLine
-from reference.mechanism_file import MechanismFile
-from reference.motion import _on_arrays, move_where_possible
 from tests.laws.test_accuracy import error_of, true_rates
 
 NEAR = (1e-4, 1e-6, 1e-8, 1e-10)

@@ -4,12 +4,11 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from reference.assembly import build_mechanism
-from reference.authored import validate
-from reference.checking import check_mechanism
+from reference.authored.assembly import build_mechanism
+from reference.authored.mechanism import MechanismFile, check_mechanism
+from reference.authored.toml_file import validate
+from reference.kinematics.motion import move
 from reference.mechanism import Mechanism
-from reference.mechanism_file import MechanismFile
-from reference.motion import move
 from tests.laws.mechanisms import authored
 
 ROUNDING = 1e-9

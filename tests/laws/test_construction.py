@@ -4,13 +4,12 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.assignment import Scales
-from reference.construction import evaluate
-from reference.derivation import construction_of
-from reference.elements import View
+from reference.authored.assignment import Scales
+from reference.construction.derive import construction_of
+from reference.construction.elements import View
+from reference.construction.graph import evaluate, parameters_of
+from reference.kinematics.motion import move
 from reference.mechanism import Mechanism
-from reference.motion import move
-from reference.parameters import parameters_of
 from reference.plan import _nodes
 
 ROUNDING = 1e-9

@@ -6,21 +6,19 @@ import numpy as np
 from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 
-from grader.i18n import tongue
-from grader.plan_steps.explanation import explain
-from grader.plan_steps.pages import html_page
-from grader.plan_steps.words import wording_of
-from reference.assignment import Assignment
-from reference.assignment_file import AssignmentFile
-from reference.authored import validate
-from reference.canvas import Label
-from reference.checking import check_mechanism
-from reference.draw import reference_drawing
-from reference.drawing.labelling import lengths_inside, segments_of
+from grader.language import tongue
+from grader.solution.pages import html_page
+from grader.solution.sentences import wording_of
+from grader.solution.steps import explain
+from reference.authored.assignment import Assignment, AssignmentFile
+from reference.authored.mechanism import MechanismFile, check_mechanism
+from reference.authored.toml_file import validate
+from reference.drawing.canvas import Label
+from reference.drawing.labels import lengths_inside, segments_of
+from reference.drawing.sheets import reference_drawing
 from reference.drawing.subject import Subject
 from reference.errors import MechanismError
 from reference.mechanism import Mechanism
-from reference.mechanism_file import MechanismFile
 from reference.plan import exact_plan
 from tests.laws.mechanisms import authored
 

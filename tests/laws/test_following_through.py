@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from grader.comparison import compare
-from reference.mistakes import Drawing, affected, single_mistakes
+from grader.comparison.criteria import compare
+from reference.construction.mistakes import Drawing, affected, single_mistakes
 from samples.simulation import PERFECT, TYPICAL
 from tests.hands import SOURCES, drawn_by, drawn_nodes, handed_in, task_for
 

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.cli.schemas import schema
-from grader.comparison import Submission
-from grader.judging import judge
+from grader.cli.checking import schema
+from grader.comparison.evidence import Submission
+from grader.marking.mark import judge
+from grader.marking.report import report_of
 from grader.records import Figure, Reading, ReadVector
-from grader.reports import report_of
-from reference.mistakes import Mistake
+from reference.construction.mistakes import Mistake
 from tests.hands import changed, drawn_nodes, measured, sheet, task_for
 
 TASKS = (task_for("pump", 7), task_for("press", position=0), task_for("pump-collinear", 16))

@@ -7,16 +7,16 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.comparison import Submission, Task, task_of
-from grader.judging import judge
-from grader.measurements import names_of
+from grader.comparison.evidence import Submission
+from grader.comparison.task import Task, task_of
+from grader.inputs.measurements import names_of
+from grader.marking.mark import judge
 from grader.rubric import RubricFile
-from reference.assignment import Assignment, Variant
-from reference.assignment_file import AssignmentFile
-from reference.authored import validate
+from reference.authored.assignment import Assignment, AssignmentFile, Variant
+from reference.authored.toml_file import validate
+from reference.construction.mistakes import Drawing, Mistake, single_mistakes
+from reference.kinematics.motion import move
 from reference.mechanism import Mechanism
-from reference.mistakes import Drawing, Mistake, single_mistakes
-from reference.motion import move
 from tests.hands import drawn_nodes, measured, sheet
 from tests.laws.mechanisms import authored
 

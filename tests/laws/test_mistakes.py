@@ -4,11 +4,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.construction import evaluate
-from reference.derivation import construction_of
+from reference.construction.derive import construction_of
+from reference.construction.graph import evaluate, parameters_of
+from reference.construction.mistakes import Drawing, affected, commit, single_mistakes
 from reference.mechanism import Mechanism
-from reference.mistakes import Drawing, affected, commit, single_mistakes
-from reference.parameters import parameters_of
 
 MOVED = 1e-9
 """Of the drawing's size."""

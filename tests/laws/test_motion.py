@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference.geometry import cross, dot
+from reference.kinematics.motion import move
 from reference.mechanism import CrossSlider, FixedGuide, Mechanism, SlottedLink, Yoke, moving_guides
-from reference.motion import move
 from tests.laws.mechanisms import after, driven, points_of_links, rates_of, transformed
 
 ROUNDING = 1e-9

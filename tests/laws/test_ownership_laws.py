@@ -3,9 +3,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.ownership import assign_pages
+from grader.folder.owners import assign_pages
+from grader.inputs.roster import Roster, RosterRow, ScanRef
 from grader.records import Identity, PageRef
-from grader.roster import Roster, RosterRow, ScanRef
 
 STUDENTS = ("s1", "s2", "s_3", "s")
 FILES = ("s1.jpg", "s_3_2.jpg", "class.pdf", "other.pdf", "S2.png", "x.tif")

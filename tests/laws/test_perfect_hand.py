@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-from grader.comparison import Submission, task_of
-from grader.judging import judge
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.marking.mark import judge
 from grader.rubric import HandTable, rubric_of
-from reference.assignment import built_in, load_assignment
+from reference.authored.assignment import built_in, load_assignment
 from tests.hands import changed, measured, task_for
 
 WITHIN, BEYOND = 0.9, 1.1

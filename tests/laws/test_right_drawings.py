@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.comparison import compare, task_of
+from grader.comparison.criteria import compare
+from grader.comparison.task import task_of
 from grader.rubric import rubric_of
-from reference.assignment import built_in, load_assignment
+from reference.authored.assignment import built_in, load_assignment
 from reference.mechanism import Mechanism
 from samples.simulation import CAREFUL, TYPICAL
 from tests.hands import SOURCES, drawn_by, handed_in

@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.comparison import Submission, compare
+from grader.comparison.criteria import compare
+from grader.comparison.evidence import Submission
 from grader.feedback.sentences import criterion_feedback
-from grader.judging import judge
+from grader.marking.mark import judge, score
 from grader.outcomes import Outcome, Quantity, Tolerance
 from grader.records import Figure, Reading, ReadNode
 from grader.rubric import RubricFile, WeightsTable
-from grader.scoring import score
-from reference.mistakes import Mistake
+from reference.construction.mistakes import Mistake
 from tests.hands import sheet, task_for
 from tests.unit.comparison.rubrics import with_rubric
 

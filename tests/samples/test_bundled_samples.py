@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grader.intake import is_blank, page_of
-from grader.measurements import names_of, read_measurements
+from grader.inputs.measurements import names_of, read_measurements
+from grader.inputs.roster import read_roster
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef
-from grader.roster import read_roster
 from grader.rubric import load_rubric
-from reference.assignment import load_assignment
+from grader.scan.decode.pages import is_blank, page_of
+from reference.authored.assignment import load_assignment
 from tests.samples.counting import counted
 
 SAMPLES = Path(__file__).resolve().parents[2] / "samples"

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from grader.answer_sheet.sheets import make_sheets
+from grader.inputs.roster import RosterRow
 from grader.pipeline import open_page, read_pages
+from grader.printed.answer_sheet import make_sheets
 from grader.records import PageRef
-from grader.roster import RosterRow
 from grader.rubric import rubric_of
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 from samples.simulation import CAREFUL, Scan, Settings, simulate
 from samples.simulation.printing import printed_sheets
 from tests.samples.counting import counted

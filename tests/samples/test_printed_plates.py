@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grader.ink import find_ink
-from grader.intake import page_of
-from grader.letters import find_letters
 from grader.records import Sheet
+from grader.scan.decode.pages import page_of
+from grader.scan.handwriting.letters import find_letters
+from grader.scan.strokes.ink import find_ink
 
 PLATES = Path(__file__).resolve().parents[3] / "shared" / "real" / "eb1911"
 PX_PER_MM = 4.0

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 from samples.simulation import HARDSHIPS, PERFECT, Scan, Settings, any_settings, simulate, with_hardships
 from samples.simulation.hand import draw, task_of
 

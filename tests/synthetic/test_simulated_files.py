@@ -7,9 +7,9 @@ import pikepdf
 import pytest
 from PIL import Image
 
-from grader.answer_sheet.sheets import make_sheets
-from grader.roster import RosterRow
-from reference.assignment import load_assignment
+from grader.inputs.roster import RosterRow
+from grader.printed.answer_sheet import make_sheets
+from reference.authored.assignment import load_assignment
 from samples.simulation import Scan, Settings, Student, blank_back, simulate, write_pdf, write_truth
 from samples.simulation.printing import printed_sheets
 

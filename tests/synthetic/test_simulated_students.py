@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
-from reference.mistakes import CODES
+from reference.authored.assignment import load_assignment
+from reference.construction.mistakes import CODES
 from reference.plan import exact_plan
 from samples.simulation import (
     CLEAN_SCAN,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 from samples.simulation import CAREFUL, CLEAN_SCAN, PERFECT, PenStyle, Scan, Settings, simulate
 from samples.simulation.raster import render
 from samples.simulation.strokes import Pen, straight

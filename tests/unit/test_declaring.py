@@ -2,13 +2,13 @@
 
 import pytest
 
-from grader.comparison import task_of
-from grader.declaring import BEYOND_DOUBT, declarations
-from grader.declaring import LIKELY as LEAST
-from grader.quantities import SURE, sure_texts
+from grader.comparison.scales import BEYOND_DOUBT, declarations
+from grader.comparison.scales import LIKELY as LEAST
+from grader.comparison.task import task_of
+from grader.inputs.scale_text import SURE, sure_texts
 from grader.records import Reading, Written
 from grader.rubric import load_rubric
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 
 FIRM, LIKELY, FAIR, DOUBTFUL = (
     (BEYOND_DOUBT + 1.0) / 2.0,

@@ -6,8 +6,8 @@ import jsonschema
 import pytest
 from pydantic import ValidationError
 
-from grader.cli.schemas import schema, schema_names
-from grader.comparison import Submission
+from grader.cli.checking import schema, schema_names
+from grader.comparison.evidence import Submission
 from grader.documents import (
     SCHEMA_VERSION,
     MeasurementsDocument,
@@ -15,11 +15,11 @@ from grader.documents import (
     ResultsDocument,
     SheetDocument,
 )
-from grader.judging import judge
+from grader.marking.mark import judge
+from grader.marking.report import report_of, unjudged_report
 from grader.records import Problem
-from grader.reports import report_of, unjudged_report
+from reference.construction.mistakes import Mistake
 from reference.errors import CallError
-from reference.mistakes import Mistake
 from tests.hands import changed, measured, task_for
 
 PUMP = task_for("pump", 7)

@@ -2,10 +2,12 @@
 
 import pytest
 
-from grader.judging import Submission, judge, task_of
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.marking.mark import judge
 from grader.records import VELOCITY_PLAN, Reading, Swapped
 from grader.rubric import rubric_of
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 
 SEEN, DOUBTFUL = 0.97, 0.55
 

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from grader.measurements import MAX_BYTES, combined, names_of, read_measurements, students_in
-from reference.assignment import load_assignment
+from grader.inputs.measurements import MAX_BYTES, combined, names_of, read_measurements, students_in
+from reference.authored.assignment import load_assignment
 from reference.errors import InputFileError
 
 NAMES = names_of(load_assignment("pump"))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.quantities import ByRule, Declared, Refused, parse_scale
+from grader.inputs.scale_text import ByRule, Declared, Refused, parse_scale
 
 ROUNDING = 1e-12
 

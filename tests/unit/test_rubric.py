@@ -3,8 +3,8 @@
 import pytest
 
 from grader.rubric import ToleranceTable, check_rubric, load_rubric, rubric_of
-from reference.assignment import built_in, library, load_assignment
-from reference.derivation import construction_of
+from reference.authored.assignment import built_in, library, load_assignment
+from reference.construction.derive import construction_of
 from reference.errors import AuthoredFileError, CallError
 
 HEAD = 'schema_version = 1\nid = "r"\ntitle = { en = "r" }\n'

@@ -2,9 +2,9 @@
 
 import pytest
 
-from grader.comparison import Submission
-from grader.judging import judge
-from grader.selfcheck import Checked, is_all_right, self_check, told
+from grader.comparison.evidence import Submission
+from grader.marking.mark import judge
+from grader.marking.self_check import Checked, is_all_right, self_check, told
 from tests.hands import changed, measured, sheet, task_for, without
 
 PUMP = task_for("pump", 7)

@@ -11,7 +11,7 @@ from fontTools.ttLib import TTFont
 from PIL import Image, ImageDraw, ImageFont
 from skimage.morphology import skeletonize
 
-from grader.letters.alphabet import JUNK, SIGNS, TWINS
+from grader.scan.handwriting.model import JUNK, SIGNS, TWINS
 
 SIZE_PX = 96
 """Type size of the pictures: large against what is scanned, so that pens can be made thick and thin."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from grader.letters.features import normalised
+from grader.scan.handwriting.model import normalised
 from tests.training.letters.glyphs import Glyph
 
 _MOST_PX = 46.0

@@ -7,9 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from grader.letters.alphabet import COLUMN, JUNK
-from grader.letters.features import features
-from grader.letters.model import Model
+from grader.scan.handwriting.model import COLUMN, JUNK, Model, features
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "letters.md"
 _FIRST, _LAST = "<!-- written by letters/train.py -->\n", "<!-- end -->"

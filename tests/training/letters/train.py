@@ -4,7 +4,7 @@
 
 FOLDER holds the packages `@fontsource/NAME` of the families below and `mnist`, unpacked, each in a
 folder of its name; `npm pack @fontsource/NAME` gives them. scikit-learn, scikit-image and fonttools
-are needed. Writes `grader/data/letters.npz` and the table in `docs/letters.md`.
+are needed. Writes `grader/scan/handwriting/letters.npz` and the table in `docs/letters.md`.
 """
 
 import sys
@@ -13,9 +13,7 @@ from pathlib import Path
 import numpy as np
 from sklearn.neural_network import MLPClassifier
 
-from grader.letters.alphabet import JUNK, SIGNS
-from grader.letters.features import features
-from grader.letters.model import MODEL, Model
+from grader.scan.handwriting.model import JUNK, MODEL, SIGNS, Model, features
 from tests.training.letters.glyphs import Glyph, digits, glyphs_of
 from tests.training.letters.junk import junk
 from tests.training.letters.scans import CLEAR, HARD, Trouble, scanned

@@ -1,8 +1,8 @@
-"""Trains the network that finds the ends of vectors along strokes (`grader/ink/tips.py`).
+"""Trains the network that finds the ends of vectors along strokes (`grader/scan/strokes/ends.py`).
 
     pip install torch onnx
     python -m tests.training.tips.train drawings FOLDER --first 0 --last 300
-    python -m tests.training.tips.train network FOLDER --steps 8000 --out grader/ink/tips.onnx
+    python -m tests.training.tips.train network FOLDER --steps 8000 --out grader/scan/strokes/tips.onnx
 
 The drawings are simulated sheets of every built-in assignment, hand, pen and scanner.
 """
@@ -17,11 +17,11 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from grader.ink.tips import BEYOND_MM, CELL, HALF, KINDS, LEAST_MM, STEP_MM, strip_of
 from grader.pipeline import open_page
-from grader.pixels import flatten
 from grader.records import PageRef
-from reference.assignment import load_assignment
+from grader.scan.pixels import flatten
+from grader.scan.strokes.ends import BEYOND_MM, CELL, HALF, KINDS, LEAST_MM, STEP_MM, strip_of
+from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 
 ASSIGNMENTS = ("pump", "press", "engine", "shaper", "piston", "pump-230")

@@ -6,27 +6,35 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.answer_sheet.calibration import calibration_segments, make_calibration
-from grader.answer_sheet.fit import best_template, extents_mm, places_mm, poles_mm
-from grader.answer_sheet.sheets import cells_of, make_sheets, page_layouts
-from grader.answer_sheet.words import number, width_mm, wrap
-from grader.ink import find_ink
-from grader.layout import (
+from grader.inputs.roster import RosterRow
+from grader.printed.answer_sheet import (
+    calibration_segments,
+    cells_of,
+    make_calibration,
+    make_sheets,
+    page_layouts,
+)
+from grader.printed.layout import (
     FRAME_MM,
     MARKER_CORNERS,
     PAGE_MM,
     SCALE_BOXES,
     TEMPLATES,
     Layout,
+    best_template,
     comb_cells,
+    extents_mm,
     field_boxes,
+    places_mm,
+    poles_mm,
 )
+from grader.printed.pdf import number, width_mm, wrap
 from grader.records import Page, Sheet
-from grader.roster import RosterRow
-from grader.sheet import rectify
-from reference.assignment import built_in, load_assignment
+from grader.scan.register.registration import rectify
+from grader.scan.strokes.ink import find_ink
+from reference.authored.assignment import built_in, load_assignment
+from reference.drawing.canvas import pieces_of
 from reference.errors import AuthoredFileError
-from reference.lettering import pieces_of
 
 A3_POINTS = (420.0 / 25.4 * 72.0, 297.0 / 25.4 * 72.0)
 QUIET_MM = 2.0

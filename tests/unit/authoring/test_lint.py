@@ -10,9 +10,9 @@ import pytest
 
 from grader.authoring.findings import named
 from grader.authoring.lint import lint, lint_document
-from grader.cli.schemas import schema
+from grader.cli.checking import schema
 from grader.rubric import load_rubric
-from reference.assignment import Variant, built_in, library, load_assignment
+from reference.authored.assignment import Variant, built_in, library, load_assignment
 from reference.plan import exact_plan
 
 ROOT = Path(__file__).resolve().parents[3]

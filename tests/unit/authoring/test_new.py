@@ -14,9 +14,8 @@ from grader.authoring.lint import lint
 from grader.authoring.new import new_assignment, starts, starts_folder
 from grader.files import OutputError
 from grader.rubric import RubricFile, WeightsTable, load_rubric, rubric_of
-from reference.assignment import built_in, library, load_assignment
-from reference.assignment_file import AssignmentFile
-from reference.authored import Text
+from reference.authored.assignment import AssignmentFile, built_in, library, load_assignment
+from reference.authored.toml_file import Text
 from reference.errors import CallError
 from reference.plan import exact_plan
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grader.answer_sheet.fit import MARGIN_MM, best_template
 from grader.authoring.lint import lint
 from grader.authoring.round_scales import (
     LENGTH_STEPS,
@@ -20,9 +19,9 @@ from grader.authoring.round_scales import (
     round_up,
     suggestions,
 )
-from grader.layout import FRAME_MM
+from grader.printed.layout import FRAME_MM, MARGIN_MM, best_template
 from grader.rubric import load_rubric
-from reference.assignment import built_in, library, load_assignment
+from reference.authored.assignment import built_in, library, load_assignment
 from reference.plan import exact_plan
 
 ROUNDING = 1e-9

@@ -6,7 +6,7 @@ import pytest
 from grader.authoring.round_scales import asked_vectors
 from grader.authoring.variant_checks import MOST_PAIRS, SAME_MM, _pairs, groups_of, ties_of
 from grader.rubric import load_rubric
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 from reference.plan import exact_plan
 
 

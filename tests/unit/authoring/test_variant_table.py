@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from grader.authoring.variant_table import class_csv, class_pages, numbered, sections_of, table_pages
-from grader.i18n import tongue
-from grader.measurements import names_of
-from grader.plan_document import plan_document, plan_documents
-from reference.assignment import built_in, load_assignment
-from reference.canvas import A3_MM, Label, bounds
+from grader.inputs.measurements import names_of
+from grader.language import tongue
+from grader.solution.document import plan_document, plan_documents
+from reference.authored.assignment import built_in, load_assignment
+from reference.drawing.canvas import A3_MM, Label, bounds
 from reference.plan import exact_plan
 
 WRITTEN_DIGITS = 1e-9

@@ -2,12 +2,12 @@ import json
 
 import pytest
 
-from grader.batch import Batch, folders_of, grade, needs_person
 from grader.files import OutputError
-from grader.measurements import StudentSubmission
-from grader.plan_document import plan_document
+from grader.folder.batch import Batch, folders_of, grade, needs_person
+from grader.inputs.measurements import StudentSubmission
 from grader.rubric import load_rubric
-from reference.assignment import Variant, load_assignment
+from grader.solution.document import plan_document
+from reference.authored.assignment import Variant, load_assignment
 from reference.errors import AuthoredFileError, CallError
 from reference.plan import exact_plan
 from tests.inline import Inline

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 import grader
-from grader import batch as batch_module
-from grader import jobs as jobs_module
-from grader import kept as kept_module
 from grader import pipeline
-from grader.batch import Batch, InterruptedRunError, grade
-from grader.kept import (
+from grader.files import samples_folder
+from grader.folder import batch as batch_module
+from grader.folder import batch as jobs_module
+from grader.folder import cache as kept_module
+from grader.folder.batch import Batch, InterruptedRunError, grade
+from grader.folder.cache import (
     MARK_STAGE,
     READ_STAGE,
     SCAN_STAGE,
@@ -27,9 +28,8 @@ from grader.kept import (
     loaded,
     stage_digest,
 )
-from grader.moved import told_standing
-from grader.picture import backdrop
-from grader.plan_document import plan_document
+from grader.folder.changes import told_standing
+from grader.overlay.picture import backdrop
 from grader.records import (
     Figure,
     Page,
@@ -44,9 +44,9 @@ from grader.records import (
     Unread,
 )
 from grader.rubric import load_rubric
-from grader.samples_folder import samples_folder
-from grader.similarity import CELLS
-from reference.assignment import Variant, load_assignment
+from grader.similarity.groups import CELLS
+from grader.solution.document import plan_document
+from reference.authored.assignment import Variant, load_assignment
 from reference.plan import exact_plan
 from tests.inline import Inline
 
@@ -305,13 +305,13 @@ def sources(tmp_path_factory):
 @pytest.mark.parametrize(
     ("file", "stale"),
     [
-        ("grader/ink/tips.onnx", {"scan", "mark"}),
-        ("grader/data/letters.npz", {"scan", "mark"}),
-        ("grader/intake/jpeg.py", {"scan", "mark"}),
+        ("grader/scan/strokes/tips.onnx", {"scan", "mark"}),
+        ("grader/scan/handwriting/letters.npz", {"scan", "mark"}),
+        ("grader/scan/decode/pictures.py", {"scan", "mark"}),
         ("grader/records.py", {"scan", "read", "mark"}),
         ("grader/pipeline.py", {"scan", "read", "mark"}),
         ("grader/reading/plans.py", {"read", "mark"}),
-        ("grader/scoring/__init__.py", {"mark"}),
+        ("grader/marking/mark.py", {"mark"}),
         ("grader/feedback/templates/feedback.html", {"mark"}),
         ("grader/locale/ro/LC_MESSAGES/planmark.mo", {"mark"}),
         ("grader/cli/grading.py", set()),

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from grader.batch import Batch, grade
 from grader.cli.grading import tell_class
+from grader.folder.batch import Batch, grade
 from grader.rubric import load_rubric
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 from tests.inline import Inline
 from tests.unit.similarity.classes import changed, drawing, measured
 

@@ -16,7 +16,7 @@ from grader.cli.benchmark import (
     vector_results,
 )
 from grader.records import VELOCITY_PLAN, Figure, Reading, ReadVector
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 from reference.plan import exact_plan
 
 SHARE_OF_PLAN = 1e-12

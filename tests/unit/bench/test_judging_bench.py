@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from grader.authoring.lint import lint
-from grader.judging import judge, task_of
+from grader.comparison.task import task_of
+from grader.marking.mark import judge
 from grader.outcomes import NamedMistake as Named
 from grader.records import Reading
-from reference.mistakes import Mistake, commit
+from reference.construction.mistakes import Mistake, commit
 from samples.simulation.hand import draw
 from samples.simulation.hand import task_of as drawing_task
 from samples.simulation.settings import PERFECT, Student

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from mpmath import mp, mpc
 
-from reference.assembly import build_mechanism
-from reference.authored import validate
-from reference.construction import Vector, evaluate
-from reference.derivation import construction_of
+from reference.authored.assembly import build_mechanism
+from reference.authored.mechanism import MechanismFile
+from reference.authored.toml_file import validate
+from reference.construction.derive import construction_of
+from reference.construction.graph import Vector, evaluate, parameters_of
+from reference.kinematics.motion import move
 from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, MovingGuide, Slider
-from reference.mechanism_file import MechanismFile
-from reference.motion import move
-from reference.parameters import parameters_of
 from reference.plan import _measured
 from tests.bench.oracle import DIGITS, ExactMotion, _root
 from tests.bench.singular import KINDS

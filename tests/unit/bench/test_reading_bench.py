@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from grader.records import VELOCITY_PLAN, Figure, ReadVector, Sheet
-from reference.assignment import load_assignment
-from reference.derivation import construction_of
+from reference.authored.assignment import load_assignment
+from reference.construction.derive import construction_of
 from samples.simulation import Scan, simulate
 from samples.simulation.settings import PERFECT, Settings
 from tests.bench.honesty import NORMAL_SHARES, Spread, calibration, whitened

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
-from reference.motion import move
+from reference.authored.assignment import load_assignment
+from reference.kinematics.motion import move
 from tests.bench import branches
 from tests.bench.arrays import one_of, stacked
 from tests.bench.peers import Answer, Fsolve, NoAnswerError, error_of, plain_of, sketch

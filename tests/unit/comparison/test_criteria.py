@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.comparison import Submission, compare, task_of
+from grader.comparison.criteria import compare
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
 from grader.records import Figure, Reading, ReadNode, ReadVector, Unread
 from grader.rubric import Band, CriterionTable, ToleranceTable, load_rubric
-from reference.assignment import load_assignment
-from reference.mistakes import Mistake
+from reference.authored.assignment import load_assignment
+from reference.construction.mistakes import Mistake
 from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
 from tests.unit.comparison.rubrics import with_criterion, with_rubric, without_hand
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.comparison import Submission, compare
-from grader.comparison.rates import own_length
-from grader.judging import judge
-from grader.measurements import names_of
+from grader.comparison.criteria import compare, own_length
+from grader.comparison.evidence import Submission
+from grader.inputs.measurements import names_of
+from grader.marking.mark import judge
 from grader.records import Figure, Reading
-from reference.assignment import load_assignment
-from reference.construction import evaluate
-from reference.mistakes import Mistake
+from reference.authored.assignment import load_assignment
+from reference.construction.graph import evaluate
+from reference.construction.mistakes import Mistake
 from tests.hands import changed, drawn_nodes, measured, sheet, task_for
 
 SHAPER = task_for("shaper", 7)

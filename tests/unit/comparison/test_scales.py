@@ -2,9 +2,11 @@
 
 import pytest
 
-from grader.comparison import Submission, compare, task_of
+from grader.comparison.criteria import compare
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
 from grader.rubric import load_rubric
-from reference.assignment import library, load_assignment
+from reference.authored.assignment import library, load_assignment
 from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
 
 TASK = task_for("pump", 7)

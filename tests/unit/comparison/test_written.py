@@ -1,8 +1,8 @@
 import pytest
 
+from grader.comparison.criteria import held_against_written
 from grader.comparison.evidence import DrawnVector
-from grader.comparison.limits import Mark
-from grader.comparison.written import held_against_written
+from grader.comparison.verdicts import Mark
 from grader.feedback.sentences import FULL, HINTS
 from grader.rubric import ToleranceTable
 

@@ -10,13 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from grader.cycle.diagram import REASONS, STYLE, Setting, cycle_figure, marks_of, mathtext
-from grader.cycle.quantities import Subject
-from grader.cycle.strokes import extremes, strokes_of
-from grader.i18n import tongue
-from reference.assignment import load_assignment
-from reference.cycle import cycle
+from grader.cycle.quantities import Subject, extremes, strokes_of
+from grader.language import tongue
+from reference.authored.assignment import load_assignment
+from reference.kinematics.cycle import cycle
+from reference.kinematics.motion import WHAT_IS_IN_LINE
 from reference.mechanism import FixedGuide, Yoke
-from reference.refusal import WHAT_IS_IN_LINE
 
 ROUNDING = 1e-12
 

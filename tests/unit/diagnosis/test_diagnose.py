@@ -4,12 +4,13 @@ import random
 
 import pytest
 
-from grader.comparison import Submission, task_of
-from grader.judging import judge
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.marking.mark import judge
 from grader.rubric import rubric_of
-from reference.assignment import library, load_assignment
-from reference.construction import evaluate
-from reference.mistakes import Mistake
+from reference.authored.assignment import library, load_assignment
+from reference.construction.graph import evaluate
+from reference.construction.mistakes import Mistake
 from tests.hands import SOURCES, changed, handed_in, measured, rule_scales, sheet, task_for
 
 PUMP = task_for("pump", 7)

@@ -2,13 +2,13 @@
 
 import pytest
 
-from grader.comparison import Submission
+from grader.comparison.evidence import Submission
 from grader.feedback.mistakes import words_of
-from grader.feedback.pages import feedback_page
 from grader.feedback.sentences import criterion_feedback, mistake_feedback
-from grader.judging import judge
-from grader.reports import report_of
-from reference.mistakes import Drawing, Mistake, single_mistakes
+from grader.feedback.student_page import feedback_page
+from grader.marking.mark import judge
+from grader.marking.report import report_of
+from reference.construction.mistakes import Drawing, Mistake, single_mistakes
 from tests.hands import measured, sheet, task_for
 
 SHAPER = task_for("shaper", 7)

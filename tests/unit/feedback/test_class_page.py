@@ -14,7 +14,7 @@ from grader.documents import (
     StandingDocument,
 )
 from grader.feedback.class_page import folders_of, index_page, write_index
-from grader.i18n import LANGUAGES
+from grader.language import LANGUAGES
 from tests.unit.feedback.parsed import Page
 from tests.unit.feedback.works import HOSTILE, criterion, report, results
 

@@ -6,9 +6,9 @@ import pytest
 
 from grader.feedback.mistakes import PRECISE, PRECISE_ALONG_GUIDE
 from grader.feedback.sentences import mistake_feedback
-from grader.i18n import LANGUAGES
+from grader.language import LANGUAGES
 from grader.outcomes import NamedMistake
-from reference.mistakes import Mistake
+from reference.construction.mistakes import Mistake
 
 BY_O2B = Mistake("wrong_link", "d'", other=("O2", "B"))
 LINE = {"from": "n_DC", "link": "CD"}

@@ -6,9 +6,9 @@ import pytest
 
 from grader.documents import ProblemDocument, ReadingDocument, ReadSheets, SheetDocument
 from grader.feedback.class_page import index_page
-from grader.feedback.pages import About, feedback_page, write_feedback
-from grader.i18n import LANGUAGES
-from grader.scene import MARKS
+from grader.feedback.student_page import About, feedback_page, write_feedback
+from grader.language import LANGUAGES
+from grader.overlay.scene import MARKS
 from tests.unit.feedback.parsed import Page
 from tests.unit.feedback.works import HOSTILE, criterion, hostile_report, picture, report, results
 

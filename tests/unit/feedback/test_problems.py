@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from grader.documents import ProblemDocument, UnmatchedDocument
-from grader.feedback.problems import PROBLEMS, problem_sentence, unmatched_sentence
-from grader.i18n import tongue
+from grader.feedback.words import PROBLEMS, problem_sentence, unmatched_sentence
+from grader.language import tongue
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "errors.md"
 

@@ -3,8 +3,8 @@
 import pytest
 
 from grader.documents import QuantityDocument, ToleranceDocument
-from grader.feedback.pages import quantity_cells, scale_text, tolerance_cells
-from grader.i18n import tongue
+from grader.feedback.student_page import quantity_cells, scale_text, tolerance_cells
+from grader.language import tongue
 
 
 @pytest.mark.parametrize(("direction", "shown"), [(359.96, "0.0"), (359.94, "359.9"), (0.04, "0.0")])

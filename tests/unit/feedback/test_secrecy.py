@@ -5,16 +5,18 @@ import re
 import numpy as np
 import pytest
 
-from grader.feedback.pages import About, StudentPage, feedback_page
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.feedback.redo_steps import with_mistakes_told
 from grader.feedback.sentences import criterion_feedback
-from grader.feedback.telling import with_mistakes_told
-from grader.i18n import LANGUAGES, tongue
-from grader.judging import Submission, judge, task_of
+from grader.feedback.student_page import About, StudentPage, feedback_page
+from grader.language import LANGUAGES, tongue
+from grader.marking.mark import judge
+from grader.marking.report import report_of
+from grader.overlay.measured import measured_picture
 from grader.records import Figure, Reading, ReadVector
-from grader.reports import report_of
 from grader.rubric import rubric_of
-from grader.scene_measured import measured_picture
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 
 PUMP = load_assignment("pump")
 VARIANT = PUMP.variant(12)

@@ -7,9 +7,9 @@ import pytest
 from grader import outcomes
 from grader.feedback.mistakes import MISTAKES
 from grader.feedback.sentences import FULL, HINTS, criterion_feedback, mistake_feedback, reason_sentence
-from grader.i18n import LANGUAGES, tongue
+from grader.language import LANGUAGES, tongue
 from grader.outcomes import NamedMistake, Outcome, Quantity, Reason, Tolerance
-from reference.mistakes import CODES, Mistake
+from reference.construction.mistakes import CODES, Mistake
 
 TOO_LONG = Reason("too_long", {"measured_mm": 49.5, "expected_mm": 47.2, "off_mm": 2.3, "tolerance_mm": 1.0})
 VALUE = Reason(

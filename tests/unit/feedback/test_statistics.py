@@ -3,19 +3,19 @@
 import re
 
 from grader.documents import QuantityDocument, ScaleDocument
-from grader.feedback.class_page import distribution_svg
-from grader.feedback.statistics import (
+from grader.feedback.class_page import (
     commonest,
-    followed,
+    distribution_svg,
     hardest,
     histogram,
     open_shares,
+    share_followed,
     shares,
     spread,
     waiting,
     wrong_scales,
 )
-from grader.i18n import tongue
+from grader.language import tongue
 from tests.unit.feedback.works import criterion, report, results
 
 
@@ -83,7 +83,7 @@ def test_that_comes_first_which_one_look_decides_most_of():
 def test_follow_through_is_counted_by_points_students_and_criteria():
     one = report(criteria=[criterion("v_B", "follow_through", 5.0), criterion("v_D", "follow_through", 2.0)])
     two = report(criteria=[criterion("v_B", "follow_through", 5.0), criterion("v_D", "full", 5.0)])
-    found = followed(results(report(), one, two))
+    found = share_followed(results(report(), one, two))
     assert (found.points, found.reports) == (12.0, [1, 2])
     assert found.criteria == [("Vector v_B", 2), ("Vector v_D", 1)]
 

@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 from grader.documents import MistakeDocument, ToleranceDocument
-from grader.feedback.pages import About, StudentPage
-from grader.i18n import tongue
-from grader.scene import Arrow
+from grader.feedback.student_page import About, StudentPage
+from grader.language import tongue
+from grader.overlay.scene import Arrow
 from tests.unit.feedback.works import criterion, picture, report
 
 

@@ -15,7 +15,7 @@ from grader.documents import (
     ToleranceDocument,
     UnmatchedDocument,
 )
-from grader.scene import Arrow, Dot, Ghost, Picture, Scene
+from grader.overlay.scene import Arrow, Dot, Ghost, Picture, Scene
 
 HOSTILE = '<script>alert("x")</script>'
 

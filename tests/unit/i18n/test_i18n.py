@@ -2,7 +2,7 @@
 
 import pytest
 
-from grader.i18n import LANGUAGES, UNITS, tongue
+from grader.language import LANGUAGES, UNITS, tongue
 from reference.errors import CallError
 
 

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from grader.ink import find_ink
-from grader.intake import page_of
 from grader.records import HEAD_AHEAD, HEAD_BACK, Page, Sheet, Unread
-from grader.sheet import rectify
+from grader.scan.decode.pages import page_of
+from grader.scan.register.registration import rectify
+from grader.scan.strokes.ink import find_ink
 
 SHARED = Path(__file__).resolve().parents[4] / "shared"
 PX_PER_MM = 200 / 25.4
@@ -454,19 +454,19 @@ def test_a_negative_is_refused_by_its_darkness():
 
 
 def test_strokes_are_counted_before_any_is_fitted(monkeypatch):
-    monkeypatch.setattr("grader.ink.strokes._MOST_STROKES", 100)
+    monkeypatch.setattr("grader.scan.strokes.ink._MOST_STROKES", 100)
     paper = Paper()
     for row in range(10):
         paper.line((60, 30 + 5 * row), (100 + 7 * row, 60 + 6 * row))
     assert len(paper.ink().strokes) == 10
     for x, y in np.ndindex(12, 12):
         paper.line((180 + 15 * x, 30 + 15 * y), (190 + 15 * x, 34 + 15 * y))
-    monkeypatch.setattr("grader.ink.strokes.fit_centre", lambda *_: pytest.fail("strokes were fitted"))
+    monkeypatch.setattr("grader.scan.strokes.ink.fit_centre", lambda *_: pytest.fail("strokes were fitted"))
     assert "straight strokes" in refusal(paper)
 
 
 def test_squared_paper_all_of_whose_lines_are_strokes_is_within_the_bound(monkeypatch):
-    monkeypatch.setattr("grader.ink.without_squares", lambda contrast: contrast)
+    monkeypatch.setattr("grader.scan.strokes.ink.without_squares", lambda contrast: contrast)
     paper = Paper()
     for step in range(25, 400, 5):
         paper.line((step, 15), (step, 280), pen=0.2)

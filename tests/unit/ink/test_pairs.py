@@ -5,9 +5,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from grader.ink.centreline import Fitted, Pen, _neighbours, crossings
-from grader.ink.joining import PROBES, distances, near_pairs
-from grader.ink.strokes import _family_size, _linked, distinct
+from grader.scan.strokes.centreline import Fitted, Pen, _neighbours, crossings
+from grader.scan.strokes.ink import _family_size, _linked, distinct
+from grader.scan.strokes.regions import PROBES, distances, near_pairs
 
 UNIT = 12.0
 """Pixels in a millimetre, about 300 dpi."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from grader.ink.seeds import PX_PER_MM, squares_darkness, without_squares
+from grader.scan.strokes.seeds import PX_PER_MM, squares_darkness, without_squares
 
 SHAPE = (round(290 * PX_PER_MM), round(410 * PX_PER_MM))
 PRINTED, PENCIL = 30, 130

@@ -15,15 +15,16 @@ import pytest
 import tifffile
 from PIL import Image
 
-from grader import intake
-from grader.intake import InputFile, count_pages, is_blank, load, page_of, pages_of, png
-from grader.intake.fax import Coding, damaged_row
-from grader.intake.limits import MAX_FILE_BYTES
-from grader.kept import PageCache
+from grader.folder.cache import PageCache
+from grader.folder.inventory import survey_folder
 from grader.pipeline import open_page
 from grader.records import Page, PageRef
-from grader.sheet import register
-from grader.survey import survey_folder
+from grader.scan.decode import pages as intake
+from grader.scan.decode import pictures
+from grader.scan.decode.limits import MAX_FILE_BYTES, InputFile, load
+from grader.scan.decode.pages import count_pages, is_blank, page_of, pages_of
+from grader.scan.decode.tiff import Coding, damaged_row
+from grader.scan.register.registration import register
 from reference.errors import InputFileError
 from tests import hostile
 from tests.inline import Inline
@@ -174,7 +175,7 @@ def test_any_error_of_a_library_is_an_error_of_the_page(monkeypatch, error):
     def failing(*_):
         raise error
 
-    monkeypatch.setattr(png.cv2, "imdecode", failing)
+    monkeypatch.setattr(pictures.cv2, "imdecode", failing)
     assert code_of(hostile.stored(hostile.paper())) == "image_damaged"
 
 
@@ -183,7 +184,7 @@ def test_want_of_memory_is_no_fault_of_the_page(monkeypatch, error):
     def failing(*_):
         raise error
 
-    monkeypatch.setattr(png.cv2, "imdecode", failing)
+    monkeypatch.setattr(pictures.cv2, "imdecode", failing)
     with pytest.raises(MemoryError):
         page_of(handed_in(hostile.stored(hostile.paper())), 1)
 
@@ -256,7 +257,7 @@ def test_a_file_that_grows_while_it_is_read_is_not_taken_for_whole(tmp_path, mon
     path = tmp_path / "scan.png"
     path.write_bytes(bytes(100))
     shorter = os.stat_result((*path.stat()[:6], 50, *path.stat()[7:]))
-    monkeypatch.setattr(intake.limits.os, "fstat", lambda _: shorter)
+    monkeypatch.setattr(intake.grader.intake.limits.os, "fstat", lambda _: shorter)
     with pytest.raises(InputFileError) as caught:
         load(path)
     assert caught.value.code == "file_changed"

@@ -12,7 +12,7 @@ import pytest
 import tifffile
 from PIL import Image
 
-from grader.intake import count_pages, is_blank, pages_of
+from grader.scan.decode.pages import count_pages, is_blank, pages_of
 from reference.errors import InputFileError
 
 SHAPE = (300, 420)

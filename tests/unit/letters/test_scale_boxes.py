@@ -3,16 +3,14 @@
 import numpy as np
 import pytest
 
-from grader.answer_sheet.sheets import make_sheets
-from grader.letters import written_scales
-from grader.letters.boxes import read_scale
-from grader.letters.grammar import moves, start
-from grader.letters.line import lattice_of
-from grader.quantities import Refused, parse_scale
+from grader.inputs.roster import RosterRow
+from grader.inputs.scale_text import Refused, parse_scale
+from grader.printed.answer_sheet import make_sheets
 from grader.records import Page, Sheet, Written
-from grader.roster import RosterRow
-from grader.sheet import rectify
-from reference.assignment import load_assignment
+from grader.scan.handwriting.fields import moves, read_scale, start, written_scales
+from grader.scan.handwriting.model import lattice_of
+from grader.scan.register.registration import rectify
+from reference.authored.assignment import load_assignment
 from samples.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate
 from samples.simulation.printing import printed_sheets
 

@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
-from grader.ink import find_ink
-from grader.letters import find_letters
-from grader.letters.alphabet import COLUMN, JUNK, SIGNS, TWINS
-from grader.letters.features import normalised
-from grader.letters.model import recognise
 from grader.records import Page, Sheet
-from grader.sheet import rectify
-from reference.assignment import load_assignment
+from grader.scan.handwriting.letters import find_letters
+from grader.scan.handwriting.model import COLUMN, JUNK, SIGNS, TWINS, normalised, recognise
+from grader.scan.register.registration import rectify
+from grader.scan.strokes.ink import find_ink
+from reference.authored.assignment import load_assignment
 from samples.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate
 
 CLEAR_SHARE = 0.75

@@ -2,14 +2,12 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from grader.contact_sheet import contact_sheet, thumbnail
-from grader.matching import draft_csv, figure_similarity, suggest
+from grader.folder.draft_roster import contact_sheet, draft_csv, figure_similarity, suggest, thumbnail
+from grader.inputs.roster import parse_roster
 from grader.records import Identity, PageRef
-from grader.roster import parse_roster
-from reference.assignment import load_assignment
-from reference.construction import evaluate
-from reference.derivation import construction_of
-from reference.parameters import parameters_of
+from reference.authored.assignment import load_assignment
+from reference.construction.derive import construction_of
+from reference.construction.graph import evaluate, parameters_of
 
 PUMP = load_assignment("pump")
 ROSTER = parse_roster("student_id,name,n,kv,scans\ns1,Ana,1,0.2 (m/s)/mm,\ns2,Ion,10,,\ns3,Eva,20,,\n")

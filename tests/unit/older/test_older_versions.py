@@ -7,13 +7,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from grader.batch import Batch, grade
-from grader.cli.schemas import schema
+from grader.cli.checking import schema
 from grader.documents import ReportDocument, ResultsDocument
+from grader.folder.batch import Batch, grade
 from grader.lms.export import export, read_results
 from grader.lms.grades import Options
 from grader.rubric import rubric_of
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 from reference.errors import InputFileError
 
 HERE = Path(__file__).parent

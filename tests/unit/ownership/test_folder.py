@@ -1,4 +1,4 @@
-from grader.folder import is_tool_file, natural_key, submissions
+from grader.folder.inventory import is_tool_file, natural_key, submissions
 
 
 def test_the_roster_and_files_of_tools_are_no_submissions(tmp_path):

@@ -1,8 +1,8 @@
 import pytest
 
-from grader.ownership import How, assign_pages, student_of_name
+from grader.folder.owners import How, assign_pages, student_of_name
+from grader.inputs.roster import parse_roster
 from grader.records import Identity, PageRef
-from grader.roster import parse_roster
 
 THREE = parse_roster("student_id,name,n\ns1,A,1\ns2,B,2\ns_3,C,3\n")
 

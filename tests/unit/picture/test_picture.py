@@ -7,12 +7,11 @@ import cv2
 import numpy as np
 import pytest
 
-from grader.labels import labels_of
 from grader.outcomes import Outcome, Quantity, Tolerance
-from grader.picture import backdrop, overlay, paint
+from grader.overlay.picture import backdrop, overlay, paint
+from grader.overlay.scene import ARROW_WIDTH_MM, COLOURS, MARKS, Arrow, Ghost, Scene, labels_of, scene_of
 from grader.records import Figure, Page, Reading, ReadNode, ReadVector, Sheet
-from grader.scene import ARROW_WIDTH_MM, COLOURS, MARKS, Arrow, Ghost, Scene, scene_of
-from reference.construction import Vector
+from reference.construction.graph import Vector
 
 PAGE_MM = (420.0, 297.0)
 PX_PER_MM = 4.0

@@ -6,11 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from grader.judging import Submission, judge, task_of
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.marking.mark import judge
+from grader.overlay.measured import measured_picture
 from grader.records import Figure, Reading, ReadVector
 from grader.rubric import rubric_of
-from grader.scene_measured import measured_picture
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 
 PEN_WIDTH_MM = 0.3
 

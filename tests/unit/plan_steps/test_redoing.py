@@ -4,11 +4,11 @@ import re
 
 import pytest
 
-from grader.i18n import LANGUAGES, tongue
-from grader.plan_steps.redoing import redo
-from grader.plan_steps.words import wording_of
-from reference.assignment import load_assignment
-from reference.construction import ancestors
+from grader.feedback.redo_steps import redo
+from grader.language import LANGUAGES, tongue
+from grader.solution.sentences import wording_of
+from reference.authored.assignment import load_assignment
+from reference.construction.graph import ancestors
 from reference.drawing.subject import Subject
 from reference.plan import exact_plan
 

@@ -8,20 +8,16 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.i18n import LANGUAGES, tongue
-from grader.plan_pdf import pdf
-from grader.plan_steps.explanation import explain
-from grader.plan_steps.pages import chapters, html_page, pdf_pages
-from grader.plan_steps.sentences import sentence
-from grader.plan_steps.words import speaker_of, wording_of
-from reference.assignment import load_assignment
-from reference.canvas import Label, Ring
-from reference.draw import reference_drawing
-from reference.drawing.stages import BEFORE, NOW
+from grader.language import LANGUAGES, tongue
+from grader.solution.pages import chapters, html_page, pdf, pdf_pages
+from grader.solution.sentences import sentence, speaker_of, wording_of
+from grader.solution.steps import explain
+from reference.authored.assignment import load_assignment
+from reference.construction.steps import Given, Pole
+from reference.drawing.canvas import Label, Ring, as_pieces, pieces_of
+from reference.drawing.sheets import BEFORE, NOW, reference_drawing
 from reference.drawing.subject import Subject
-from reference.lettering import as_pieces, pieces_of
 from reference.plan import exact_plan
-from reference.steps import Given, Pole
 from tests.drawn import CASES, planned
 
 A3_POINTS, A4_POINTS = (1190.55, 841.89), (595.28, 841.89)

@@ -7,11 +7,10 @@ import numpy as np
 
 from grader.reading.expected import links_of
 from grader.records import MECHANISM, FloatArray, Ink, InkMap, Sheet, Strokes
-from reference.assignment import Assignment, Variant, load_assignment
-from reference.construction import evaluate
-from reference.derivation import construction_of
-from reference.mistakes import Drawing
-from reference.parameters import parameters_of
+from reference.authored.assignment import Assignment, Variant, load_assignment
+from reference.construction.derive import construction_of
+from reference.construction.graph import evaluate, parameters_of
+from reference.construction.mistakes import Drawing
 
 PLACES = {MECHANISM: 120 - 190j, "velocity_plan": 280 - 70j, "acceleration_plan": 330 - 200j}
 """Origins on the sheet, mm, y up (so y is negative)."""

@@ -5,8 +5,8 @@ import pytest
 
 from grader.reading.lettering import agreement, lettered, support
 from grader.records import VELOCITY_PLAN, Figure, Letters, Reading, ReadNode, ReadVector
-from reference.assignment import load_assignment
-from reference.derivation import construction_of
+from reference.authored.assignment import load_assignment
+from reference.construction.derive import construction_of
 
 SIGNS = {sign: column for column, sign in enumerate([*"oabcdnpπABCD'"])} | {"": 13}
 PLACES = {"o": 50 - 50j, "a": 90 - 60j, "b": 60 - 100j, "c": 100 - 110j, "d": 55 - 140j}

@@ -6,13 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.reading import confidence, fitting
-from grader.reading.belief import Beliefs, Ends, Taken, updated
-from grader.reading.confidence import Signs, sureness
+from grader.reading import nodes
 from grader.reading.expected import Edge, Expected, Hand, Slack, expect, links_of, vectors_of
-from grader.reading.fitting import fit_nodes
 from grader.reading.lines import Lines, lines_of
-from grader.reading.matching import Explanation, Settled, explain, explain_each
+from grader.reading.matching import Beliefs, Ends, Explanation, Settled, Taken, explain, explain_each, updated
+from grader.reading.nodes import Signs, fit_nodes, sureness
 from grader.records import VELOCITY_PLAN
 from tests.unit.reading.drawn import ink_of, task
 
@@ -177,7 +175,7 @@ def test_links_of_a_press_are_its_bars():
 
 
 def test_probability_within_half_a_millimetre_falls_with_the_error():
-    shares = [confidence.within(np.diag([s**2, s**2])) for s in (0.05, 0.2, 0.5, 2.0)]
+    shares = [nodes.within(np.diag([s**2, s**2])) for s in (0.05, 0.2, 0.5, 2.0)]
     assert shares == sorted(shares, reverse=True)
     assert shares[0] > 0.999
     assert shares[-1] < 0.1
@@ -200,5 +198,5 @@ def test_ends_that_reach_a_node_side_by_side_count_as_one():
         return row
 
     rows = np.array([outward(0, 10), outward(0, 14), outward(0, 18), outward(0, 100), outward(1, 10)])
-    ends = fitting._Ends(rows, np.zeros(5), np.zeros(5), np.zeros((5, 0)), np.zeros((5, 0)))
-    assert fitting._repeated(ends) == pytest.approx([2 / 3, 2 / 3, 2 / 3, 0.0, 0.0])
+    ends = nodes._Ends(rows, np.zeros(5), np.zeros(5), np.zeros((5, 0)), np.zeros((5, 0)))
+    assert nodes._repeated(ends) == pytest.approx([2 / 3, 2 / 3, 2 / 3, 0.0, 0.0])

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.reading import read_figures
+from grader.reading.read import read_figures
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Reading
-from reference.assignment import Assignment, Variant, built_in
-from reference.mistakes import Mistake, commit
+from reference.authored.assignment import Assignment, Variant, built_in
+from reference.construction.mistakes import Mistake, commit
 from tests.unit.reading.drawn import PLACES, Drawn, Pen, draw, ink_of, task
 
 SURE = 0.9

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
-from reference.construction import evaluate
+from reference.authored.assignment import load_assignment
+from reference.construction.graph import evaluate
 from reference.drawing.triangles import RATIO_TOLERANCE, altitude_nodes, triangles, with_triangles
 from reference.errors import CallError
 from reference.plan import exact_plan

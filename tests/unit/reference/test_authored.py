@@ -9,14 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference.assignment import Assignment, _check_formulas, built_in, library, load_assignment
-from reference.assignment_file import AssignmentFile
-from reference.authored import load, validate
-from reference.canvas import svg
-from reference.checking import check_mechanism
-from reference.draw import reference_drawing
+from reference.authored.assignment import (
+    Assignment,
+    AssignmentFile,
+    _check_formulas,
+    built_in,
+    library,
+    load_assignment,
+)
+from reference.authored.mechanism import MechanismFile, check_mechanism
+from reference.authored.toml_file import load, validate
+from reference.drawing.canvas import svg
+from reference.drawing.sheets import reference_drawing
 from reference.errors import AuthoredFileError, CallError, MechanismError, PlanmarkError
-from reference.mechanism_file import MechanismFile
 from reference.plan import exact_plan
 from tests import every_group
 

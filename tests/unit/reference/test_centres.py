@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
-from reference.centres import acceleration_poles, instantaneous_centres
-from reference.construction import evaluate
-from reference.elements import View
+from grader.solution.document import acceleration_poles, instantaneous_centres
+from reference.authored.assignment import load_assignment
+from reference.construction.elements import View
+from reference.construction.graph import evaluate
 from reference.plan import exact_plan
 
 ROUNDING = 1e-11

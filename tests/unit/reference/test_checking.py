@@ -2,14 +2,13 @@
 
 import pytest
 
-from reference.assembly import build_mechanism
-from reference.authored import validate
-from reference.checking import check_mechanism
+from reference.authored.assembly import build_mechanism
+from reference.authored.formula import FormulaError
+from reference.authored.mechanism import MechanismFile, check_mechanism
+from reference.authored.toml_file import validate
 from reference.errors import AuthoredFileError, MechanismError
-from reference.formula import FormulaError
+from reference.kinematics.motion import Motion, move
 from reference.mechanism import DrivenSlider, joints_of
-from reference.mechanism_file import MechanismFile
-from reference.motion import Motion, move
 from tests.every_group import mechanism_table
 
 MISSING = object()

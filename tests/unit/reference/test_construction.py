@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
-from reference.construction import ancestors, evaluate
-from reference.derivation import construction_of
+from reference.authored.assignment import load_assignment
+from reference.construction.derive import construction_of
+from reference.construction.graph import ancestors, evaluate
+from reference.construction.steps import Similar
 from reference.plan import exact_plan
-from reference.steps import Similar
 
 BUILT_IN = ["pump", "pump-230", "pump-collinear", "engine", "press", "shaper", "piston"]
 SHARE_OF_PLAN = 1e-12

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.assignment import load_assignment
-from reference.cycle import Cycle, cycle
+from reference.authored.assignment import load_assignment
 from reference.errors import CallError, MechanismError
 from reference.geometry import direction
+from reference.kinematics.cycle import Cycle, cycle
+from reference.kinematics.motion import move
 from reference.mechanism import (
     Crank,
     CrossSlider,
@@ -26,7 +27,6 @@ from reference.mechanism import (
     Yoke,
     moving_guides,
 )
-from reference.motion import move
 
 ROUNDING = 1e-12
 """Relative, of what closed forms give far from singular positions."""

@@ -5,9 +5,9 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
-from reference.canvas import A3_MM, svg
-from reference.draw import COLOURS, reference_drawing
+from reference.authored.assignment import load_assignment
+from reference.drawing.canvas import A3_MM, svg
+from reference.drawing.sheets import COLOURS, reference_drawing
 from reference.plan import exact_plan
 
 PRINTED_MM = 0.0015

@@ -4,11 +4,11 @@ import pickle
 
 import pytest
 
-from reference.assembly import build_mechanism
-from reference.authored import validate
+from reference.authored.assembly import build_mechanism
+from reference.authored.mechanism import MechanismFile
+from reference.authored.toml_file import validate
 from reference.errors import AuthoredFileError, CallError, Finding, MechanismError
-from reference.mechanism_file import MechanismFile
-from reference.motion import move
+from reference.kinematics.motion import move
 
 
 @pytest.mark.parametrize(

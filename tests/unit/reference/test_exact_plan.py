@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference.assignment import Assignment, load_assignment
+from reference.authored.assignment import Assignment, load_assignment
 from reference.plan import Plan, conditioning, exact_plan
 from tests.bench.oracle import ExactMotion
 

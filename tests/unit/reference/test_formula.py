@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.formula import MAX_DEPTH, MAX_LENGTH, FormulaError, parse
+from reference.authored.formula import MAX_DEPTH, MAX_LENGTH, FormulaError, parse
 
 PATIENCE_S = 0.5
 """A refused formula must not have been computed first."""

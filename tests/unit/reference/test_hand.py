@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from reference.construction import evaluate
-from reference.hand import SMALL, Own, Skill, acts, hand_errors, spread, trace
+from reference.construction.graph import evaluate
+from reference.construction.uncertainty import SMALL, Own, Skill, acts, hand_errors, spread, trace
 from tests.hands import task_for
 
 SKILL = Skill(angle_deg=0.3, place_mm=0.25, mark_mm=0.1)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from grader.answer_sheet.words import REGULAR, width_mm
-from reference.lettering import (
+from grader.printed.pdf import REGULAR, width_mm
+from reference.drawing.canvas import (
     DESCENT,
     pieces_of,
     rise_and_fall,

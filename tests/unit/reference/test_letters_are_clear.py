@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from PIL import ImageFont
 
-from grader.i18n import tongue
-from grader.plan_steps.words import wording_of
-from reference.canvas import svg
-from reference.draw import reference_drawing
+from grader.language import tongue
+from grader.solution.sentences import wording_of
+from reference.drawing.canvas import svg
+from reference.drawing.sheets import reference_drawing
 from tests.drawn import CASES, planned
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
+from reference.kinematics.motion import move, move_where_possible
 from reference.mechanism import with_arrays
-from reference.motion import move, move_where_possible
 from tests.laws.mechanisms import after, mechanisms
 
 QUANTITIES = ("position", "velocity", "acceleration", "omega", "epsilon", "transmission")
@@ -16,8 +16,8 @@ MOMENTS = np.linspace(0.0, 0.6, 150)
 
 @pytest.fixture
 def short_stretches(monkeypatch):
-    monkeypatch.setattr("reference.motion.MANY", 100)
-    monkeypatch.setattr("reference.motion.STRETCH", 64)
+    monkeypatch.setattr("reference.kinematics.motion.MANY", 100)
+    monkeypatch.setattr("reference.kinematics.motion.STRETCH", 64)
 
 
 def assert_equal(one, other):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
-from reference.construction import evaluate
-from reference.mistakes import CODES, RPM_FACTOR, Mistake, affected, commit, single_mistakes
+from reference.authored.assignment import load_assignment
+from reference.construction.graph import evaluate
+from reference.construction.mistakes import CODES, RPM_FACTOR, Mistake, affected, commit, single_mistakes
 from reference.plan import exact_plan
 
 MOVED_MM = 1e-6

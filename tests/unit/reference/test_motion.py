@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
+from reference.authored.assignment import load_assignment
 from reference.errors import MechanismError
+from reference.kinematics.motion import EPSILON, move, move_where_possible
 from reference.mechanism import (
     Crank,
     CrossSlider,
@@ -20,8 +21,6 @@ from reference.mechanism import (
     Yoke,
     moved,
 )
-from reference.motion import move, move_where_possible
-from reference.precision import EPSILON
 
 HALF_TURN = np.pi
 FAR_OFF = 1e-8

@@ -2,9 +2,9 @@
 
 import pytest
 
-from reference.assignment import load_assignment
-from reference.derivation import construction_of
-from reference.outline import bars, coincident
+from reference.authored.assignment import load_assignment
+from reference.construction.derive import construction_of
+from reference.construction.graph import bars, coincident
 
 
 def construction(name):

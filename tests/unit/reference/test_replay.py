@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
-from reference.construction import evaluate
-from reference.hand import Skill, acts
-from reference.mistakes import Drawing, Mistake, commit
+from reference.authored.assignment import load_assignment
+from reference.construction.graph import evaluate
+from reference.construction.mistakes import Drawing, Mistake, commit
+from reference.construction.uncertainty import Skill, acts
 from reference.plan import exact_plan
-from reference.replay import Root, Seen, Work, replay
+from reference.replay.explanations import Seen, Work
+from reference.replay.replay import Root, replay
 
 USUAL = Skill(angle_deg=0.3, place_mm=0.25, mark_mm=0.1)
 READ_MM2 = (0.02, 0.0, 0.02)

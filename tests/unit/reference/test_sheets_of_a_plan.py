@@ -7,17 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.assignment import load_assignment
-from reference.canvas import Area, Curve, Label, Stroke, moved
-from reference.draw import FRAME, figures_of, reference_drawing
+from reference.authored.assignment import load_assignment
 from reference.drawing import symbols
-from reference.drawing.labelling import Wanted, place_labels, segments_of
-from reference.drawing.layout import CELL_MM, LEAST_GAP_MM, lay_out
-from reference.drawing.links import bars
+from reference.drawing.canvas import Area, Curve, Label, Stroke, as_pieces, moved
+from reference.drawing.labels import Wanted, place_labels, segments_of
+from reference.drawing.sheets import CELL_MM, FRAME, LEAST_GAP_MM, figures_of, lay_out, reference_drawing
 from reference.drawing.sketch import support_direction
 from reference.drawing.subject import Subject, Wording
+from reference.drawing.symbols import bars
 from reference.drawing.tables import column, table_rows
-from reference.lettering import as_pieces
 from reference.plan import exact_plan
 from tests.drawn import CASES, planned
 

@@ -1,6 +1,6 @@
 import pytest
 
-from grader.roster import ScanRef, parse_roster, parse_scan, read_roster
+from grader.inputs.roster import ScanRef, parse_roster, parse_scan, read_roster
 from reference.errors import AuthoredFileError
 
 

@@ -2,10 +2,10 @@
 
 import pytest
 
+from grader.marking.mark import score
 from grader.outcomes import Outcome, Quantity, Tolerance
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
-from grader.scoring import score
-from reference.authored import Text
+from reference.authored.toml_file import Text
 
 
 def criterion(name, points, **more):

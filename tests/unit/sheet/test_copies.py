@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.intake import page_of
-from grader.sheet import rectify
-from reference.assignment import load_assignment
+from grader.scan.decode.pages import page_of
+from grader.scan.register.registration import rectify
+from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 
 PUMP = load_assignment("pump")

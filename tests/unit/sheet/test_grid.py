@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from grader.intake import page_of
-from grader.pixels import flatten
-from grader.sheet.longlines import long_lines, without_grid
+from grader.scan.decode.pages import page_of
+from grader.scan.pixels import flatten
+from grader.scan.register.lines import long_lines, without_grid
 
 REAL = Path(__file__).resolve().parents[4] / "shared" / "real" / "hdBPMN"
 

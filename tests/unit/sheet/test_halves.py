@@ -6,12 +6,12 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.answer_sheet.sheets import make_sheets
-from grader.intake import page_of
+from grader.inputs.roster import RosterRow
+from grader.printed.answer_sheet import make_sheets
 from grader.records import Page, Sheet
-from grader.roster import RosterRow
-from grader.sheet import rectify
-from reference.assignment import load_assignment
+from grader.scan.decode.pages import page_of
+from grader.scan.register.registration import rectify
+from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 
 PUMP = load_assignment("pump")

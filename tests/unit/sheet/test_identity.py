@@ -4,9 +4,9 @@ import segno
 from hypothesis import given
 from hypothesis import strategies as st
 
+from grader.printed.layout import code_of, identity_of
 from grader.records import Identity, Page
-from grader.sheet.identity import identify
-from grader.sheet_code import code_of, identity_of
+from grader.scan.register.markers import identify
 
 NAMES = st.from_regex(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}", fullmatch=True)
 NUMBERS = st.none() | st.integers(-(10**9) + 1, 10**9 - 1)

@@ -8,16 +8,15 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.answer_sheet.calibration import make_calibration
-from grader.answer_sheet.sheets import make_sheets
-from grader.intake import pages_of
-from grader.layout import MARKER_CORNERS, TEMPLATES
+from grader.inputs.roster import RosterRow
+from grader.printed.answer_sheet import make_calibration, make_sheets
+from grader.printed.layout import MARKER_CORNERS, TEMPLATES
 from grader.records import Identity, Page
-from grader.roster import RosterRow
-from grader.sheet import register as register_page
-from grader.sheet import straighten
-from grader.sheet.markers import register
-from reference.assignment import load_assignment
+from grader.scan.decode.pages import pages_of
+from grader.scan.register.distortion import straighten
+from grader.scan.register.markers import register
+from grader.scan.register.registration import register as register_page
+from reference.authored.assignment import load_assignment
 
 REAL = Path(__file__).resolve().parents[4] / "shared" / "real"
 CLEAN_MM, HARD_MM = 0.02, 0.08

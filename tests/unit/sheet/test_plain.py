@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 import pytest
 
-from grader.intake import page_of, pages_of
 from grader.records import Page
-from grader.sheet import rectify, straighten
-from grader.sheet.lens import straight, straightened
+from grader.scan.decode.pages import page_of, pages_of
+from grader.scan.register.distortion import straight, straighten, straightened
+from grader.scan.register.registration import rectify
 
 SHARED = Path(__file__).resolve().parents[4] / "shared"
 RULED_MM = 0.06

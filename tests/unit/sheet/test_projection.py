@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from grader.layout import MARKER_CORNERS, MARKER_MM
-from grader.sheet.fitting import Marked, fit_projection
+from grader.printed.layout import MARKER_CORNERS, MARKER_MM
+from grader.scan.register.fitting import Marked, fit_projection
 
 NOISE_MM = 0.02
 GRID_MM = np.stack(np.meshgrid(np.linspace(25, 400, 6), np.linspace(50, 260, 5)), axis=-1).reshape(-1, 2)

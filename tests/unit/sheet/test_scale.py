@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.intake import page_of
 from grader.records import Sheet
-from grader.sheet import rectify
-from reference.assignment import load_assignment
+from grader.scan.decode.pages import page_of
+from grader.scan.register.registration import rectify
+from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 
 PUMP = load_assignment("pump")

@@ -5,9 +5,9 @@ from functools import cache
 
 import numpy as np
 
-from grader.similarity import ComparedSubmission
-from reference.assignment import load_assignment
-from reference.derivation import construction_of
+from grader.similarity.submission import ComparedSubmission
+from reference.authored.assignment import load_assignment
+from reference.construction.derive import construction_of
 from samples.simulation import CAREFUL, SLOPPY, TYPICAL, Student
 from samples.simulation.hand import draw, task_of
 

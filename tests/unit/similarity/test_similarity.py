@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from grader.similarity import CELLS, find_similar, ink_map
 from grader.similarity.drawings import compare_drawings, log_chance
-from reference.assignment import built_in, load_assignment
+from grader.similarity.groups import CELLS, find_similar, ink_map
+from reference.authored.assignment import built_in, load_assignment
 from samples.simulation import PERFECT
 from tests.unit.similarity import classes
 from tests.unit.similarity.classes import any_drawing, changed, drawing, measured, scanned, scanned_class

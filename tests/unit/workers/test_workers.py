@@ -13,8 +13,8 @@ import psutil
 import pytest
 from pebble.pool.process import WORKERS_NAME
 
+from grader.folder.workers import Limits, Workers, result_of
 from grader.records import Problem
-from grader.workers import Limits, Workers, result_of
 from reference.errors import InputFileError
 from tests.unit.workers import calls
 

@@ -2,12 +2,12 @@ from dataclasses import replace
 
 import pytest
 
-from grader.measurements import Measurements
-from grader.ownership import How, Owned, Ownership, Unmatched
+from grader.folder.owners import How, Owned, Ownership, Unmatched
+from grader.folder.submissions import Unusable, submissions_of
+from grader.inputs.measurements import Measurements
+from grader.inputs.roster import Roster, RosterRow
 from grader.records import PageRef, Problem, Reading
-from grader.roster import Roster, RosterRow
-from grader.works import Unusable, submissions_of
-from reference.assignment import Variant, load_assignment
+from reference.authored.assignment import Variant, load_assignment
 
 PUMP = load_assignment("pump")
 PRESS = load_assignment("press")

@@ -1,0 +1,248 @@
+"""What earlier mistakes have cost, and what may follow through from them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+from grader.comparison.evidence import Evidence
+from grader.comparison.follow_through import NO_SPREAD, Expectation, Following, scaled
+from grader.comparison.own import Sketch
+from grader.comparison.scales import Scale, followed_scales, used_scales
+from grader.comparison.task import Segment, Task
+from grader.comparison.verdicts import FULL, NONE, Mark, the_better
+from grader.outcomes import Reason
+from grader.records import MECHANISM
+from reference.construction.steps import Given
+from reference.construction.uncertainty import Spread, spread
+
+
+class Against(Protocol):
+    """Marks a criterion against one expectation."""
+
+    def __call__(self, expected: complex, reach: Spread = NO_SPREAD, se: Spread = NO_SPREAD) -> Mark:
+        """The mark; `reach` is how far a careful hand may miss it, `se` its standard errors."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A mark with what it was held against."""
+
+    mark: Mark
+    expected: complex
+    reach: Spread = NO_SPREAD
+    is_followed: bool = False
+
+
+def open_ledger(
+    task: Task, evidence: Evidence, settled: Mapping[str, Scale], drawn_by: Sketch | None = None
+) -> "Ledger":
+    """The ledger of a submission before anything is marked.
+
+    Arguments: `drawn_by` is what the plans were drawn by instead, where that is known.
+    """
+    used, followed = used_scales(settled), followed_scales(settled)
+    following = Following(task, evidence, used, followed)
+    if drawn_by is not None:
+        following.sketch.append(drawn_by)
+    ledger = Ledger(task, evidence, settled, used, followed, following)
+    # What was drawn contradicts a scale that nobody declared, or that nobody understood.
+    ledger.doubtful.update(name for name, scale in settled.items() if scale.other and scale.used.assumed)
+    return ledger
+
+
+@dataclass(frozen=True, slots=True)
+class Ledger:
+    """What has been charged while criteria are marked in the order of construction.
+
+    What relies on a wrong node or scale may follow through only when that mistake has cost something:
+    `charged` holds those. `cleared` holds the nodes that were judged and are within their tolerance,
+    `by_length` those of them of which later lengths may show that they were laid off the wrong way,
+    `inherited` those that are right only as they follow from something charged, `doubtful` the nodes
+    and scales whose verdict is open.
+    """
+
+    task: Task
+    evidence: Evidence
+    settled: Mapping[str, Scale]
+    used: Mapping[str, float]
+    followed: Mapping[str, float]
+    following: Following
+    charged: set[str] = field(default_factory=set)
+    cleared: set[str] = field(default_factory=set)
+    by_length: set[str] = field(default_factory=set)
+    inherited: set[str] = field(default_factory=set)
+    doubtful: set[str] = field(default_factory=set)
+    shown: set[str] = field(default_factory=set)
+    """What the criterion being marked is the first to show: it is charged there, and followed after it."""
+    known_off: dict[str, bool] = field(default_factory=dict)
+    factors: dict[str, float | None] = field(default_factory=dict)
+    """By scale, the factor by which all values are off, where that was looked for."""
+
+    def best(self, segment: Segment, against: Against, *, follows_through: bool) -> Found:
+        """The mark on the original data, or a better one on what follows from own earlier values."""
+        self.charge_shown()
+        exact = segment.drawn(self.used)
+        found = Found(against(exact), exact)
+        if not found.mark.is_full:
+            reach = self.following.whole_reach(segment, exact)
+            found = Found(against(exact, reach), exact, reach)
+        if not found.mark.is_full and follows_through:
+            found = self.followed_through(segment, against, found)
+        self.charge_shown()
+        self.remember(segment.head, found.mark)
+        if self.is_by_length(segment):
+            self.by_length.add(segment.head)
+        if found.is_followed and found.mark.is_full:
+            self.inherited.add(segment.head)
+        return found
+
+    def charge_shown(self) -> None:
+        """What the last criterion was the first to show has cost something from now on."""
+        self.charged.update(self.shown)
+        self.shown.clear()
+
+    def followed_through(self, segment: Segment, against: Against, original: Found) -> Found:
+        """The best of what follows: from the scale drawn at, from own nodes, from anything else."""
+        found, following = original, self.following
+        at_scale = following.at_followed_scale(segment)
+        if at_scale is not None:
+            found = self.the_better(found, at_scale, against)
+        if not found.mark.is_full:
+            found = self.from_own_nodes(segment, against, found, original)
+        if not found.mark.is_full:
+            for one in following.expectations(segment):
+                if not following.is_trivial(segment, one.vector):
+                    found = self.the_better(found, one, against)
+        return found
+
+    def from_own_nodes(self, segment: Segment, against: Against, found: Found, original: Found) -> Found:
+        """The mark by the nodes that this step started from, where they are known."""
+        one = self.following.from_nodes(segment, self.used)
+        if not one.relies_on:
+            return found
+        if self.wrong(one.relies_on):
+            is_trivial = self.following.is_trivial(segment, one.vector)
+            return found if is_trivial else self.the_better(found, one, against)
+        # Every earlier step is within what a hand may miss: this step alone counts.
+        mark = against(one.vector, one.reach, one.se)
+        if not mark.is_better(found.mark):
+            return found
+        reasons = () if mark.is_full else original.mark.reasons
+        return replace(original, mark=Mark(mark.share, mark.worst, mark.best, reasons))
+
+    def the_better(self, found: Found, one: Expectation, against: Against) -> Found:
+        """What was found so far, or what follows where that leaves more."""
+        candidate = self.allowed(one.relies_on, against(one.vector, one.reach, one.se))
+        if not candidate.is_better(found.mark):
+            return found
+        return Found(
+            the_better(candidate, found.mark, *self.why(one)), one.vector, one.reach, is_followed=True
+        )
+
+    def opened(self, segment: Segment, mark: Mark, *, follows_through: bool) -> Mark:
+        """A loss on a sheet is open while what it may follow from was not read for certain."""
+        unknown = self.unknown_upstream(segment) if follows_through else ()
+        if mark.is_full or not unknown:
+            return mark
+        self.charged.discard(segment.head)
+        self.doubtful.add(segment.head)
+        told = f"{', '.join(unknown)}, on which it hangs, was not read for certain"
+        return Mark(mark.share, mark.worst, FULL, (*mark.reasons, Reason("unread", {"reason": told})))
+
+    def unknown_upstream(self, segment: Segment) -> tuple[str, ...]:
+        """The nodes that a vector's head is made from and that were not read, of figures that were."""
+        construction, nodes = self.task.construction, self.evidence.nodes
+        needs = [need for need in construction.step(segment.head).needs if need not in nodes]
+        if not needs:
+            return ()
+        read = {construction.figure_of(node) for node in nodes}
+        return tuple(dict.fromkeys(need for need in needs if construction.figure_of(need) in read))
+
+    # What is wrong --------------------------------------------------------------------------------
+
+    def is_off(self, node: str) -> bool:
+        """Whether an own node is further from its right place than a hand may miss it."""
+        if node not in self.known_off:
+            self.known_off[node] = self._is_off(node)
+        return self.known_off[node]
+
+    def _is_off(self, node: str) -> bool:
+        """Where it is beyond the plain tolerance, what a careful hand makes of it counts."""
+        task = self.task
+        own = self.own_place(node)
+        if own is None:
+            return False
+        exact = task.nodes(self.used)[node]
+        if task.construction.figure_of(node) == MECHANISM:
+            exact *= self.used["kL"] / self.followed["kL"]
+        off = own - exact
+        if abs(off) <= task.tolerance_at(node).length_at(abs(exact)):
+            return False
+        reach = scaled(spread(task.traced(self.used).nodes[node].moved, off), task.rubric.hand.sigmas)
+        return abs(off) > reach.along
+
+    def is_by_length(self, segment: Segment) -> bool:
+        """Whether only the length is known of a vector that is laid off: its sense may be wrong."""
+        drawn = self.evidence.vector(segment.name)
+        is_laid_off = isinstance(self.task.construction.step(segment.head), Given)
+        return is_laid_off and drawn is not None and drawn.direction_rad is None
+
+    def own_place(self, node: str) -> complex | None:
+        """An own node as read or measured, or as lengths lead to it."""
+        if node in self.evidence.nodes:
+            return self.evidence.nodes[node]
+        for nodes in self.following.own(self.used).values():
+            if node in nodes:
+                return nodes[node].at
+        return None
+
+    def wrong(self, relies_on: frozenset[str]) -> frozenset[str]:
+        """What is wrong of the nodes and scales relied on: off, and not judged to be within tolerance."""
+        blamed = relies_on & (self.charged | self.inherited)
+        open_ones = relies_on - blamed - (self.cleared - self.by_length)
+        nodes = self.following.names(self.following.own(self.used)) | self.evidence.nodes.keys()
+        return blamed | {name for name in open_ones if name not in nodes or self.is_off(name)}
+
+    def allowed(self, relies_on: frozenset[str], mark: Mark) -> Mark:
+        """Credit for following only where the earlier mistake has been charged; else it is charged here."""
+        wrong = self.wrong(relies_on)
+        has_doubtful_scale = bool(wrong & self.doubtful & self.settled.keys())
+        if not wrong or (wrong & (self.charged | self.inherited) and not has_doubtful_scale):
+            return mark
+        if wrong & self.doubtful:
+            return Mark(NONE, NONE, mark.best, mark.reasons)
+        if mark.is_full:
+            self.shown.update(wrong)
+        return Mark(NONE, NONE, NONE, mark.reasons)
+
+    def remember(self, name: str, mark: Mark) -> None:
+        """Whether a node or scale has cost something, or may have, or is right."""
+        if not mark.is_certain:
+            self.doubtful.add(name)
+        elif mark.share != FULL:
+            self.charged.add(name)
+        else:
+            self.cleared.add(name)
+
+    def leave_open(self, name: str) -> None:
+        """The verdict on a vector, angular quantity or scale is open after all."""
+        segment = self.task.segments.get(name)
+        node = name if segment is None else segment.head
+        self.shown.clear()
+        for judged in (self.charged, self.cleared, self.by_length, self.inherited):
+            judged.discard(node)
+        self.doubtful.add(node)
+
+    # Why ------------------------------------------------------------------------------------------
+
+    def why(self, one: Expectation) -> tuple[Reason, ...]:
+        """What an expectation follows from, and that its scale is not known where it is not."""
+        follows = Reason("follows", {"what": one.what, "of": one.of or self.named(one)})
+        assumed = self.settled[one.of].reasons if one.what == "scale" and one.of in self.doubtful else ()
+        return (*assumed, follows)
+
+    def named(self, one: Expectation) -> str:
+        """The last vector charged that an expectation relies on, or the mechanism."""
+        blamed = one.relies_on & (self.charged | self.doubtful)
+        names = [v.name for v in self.task.construction.vectors.values() if v.head in blamed]
+        return names[-1] if names else "mechanism"

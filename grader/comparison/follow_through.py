@@ -1,0 +1,310 @@
+"""What a student's own earlier values make of a later one.
+
+The same construction, evaluated with the student's nodes in place of the computed ones; from
+lengths alone where that is well defined: normal and Coriolis components from the student's own
+velocities (or computed angular velocity), images of a link's points that start from a common node, and
+the scale that the drawing follows.
+"""
+
+import cmath
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from grader.comparison.evidence import Evidence
+from grader.comparison.own import Nodes, Sketch, known, other_sketch, own_nodes
+from grader.comparison.task import Segment, Task
+from grader.inputs.scale_text import SCALE_NAMES
+from reference.construction.elements import Coriolis, Normal
+from reference.construction.graph import AngularRate
+from reference.construction.mistakes import Drawing, Mistake, commit
+from reference.construction.steps import Divide, Given, Similar
+from reference.construction.uncertainty import Spread, Trace, spread, trace
+from reference.geometry import ComplexArray
+
+NO_SPREAD = Spread(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """What follows rightly from the student's own values.
+
+    Attributes
+    ----------
+    vector : complex millimetres
+    what, of : ``nodes``, ``scale``, ``vector`` or ``value``, and its name, for the reason `follows`
+    relies_on : the nodes, scales and computed angular velocities of the student's that it follows from
+    reach : how far a careful hand may miss it, the rubric's number of standard deviations, millimetres
+    se : its standard errors, from the reading of what it follows from
+    """
+
+    vector: complex
+    what: str
+    of: str
+    relies_on: frozenset[str]
+    reach: Spread = NO_SPREAD
+    se: Spread = NO_SPREAD
+
+
+@dataclass(frozen=True, slots=True)
+class Following:
+    """What follows from one submission's own values, at the scales used and at those that it follows."""
+
+    task: Task
+    evidence: Evidence
+    used: Mapping[str, float]
+    followed: Mapping[str, float]
+    places: dict[tuple[object, ...], Nodes] = field(default_factory=dict)
+    traces: dict[tuple[object, ...], Trace] = field(default_factory=dict)
+    sketch: list[Sketch | None] = field(default_factory=list)
+    named_nodes: dict[int, frozenset[str]] = field(default_factory=dict)
+
+    @property
+    def wrong_scales(self) -> frozenset[str]:
+        """The scales that the drawing does not follow."""
+        return frozenset(scale for scale in SCALE_NAMES if self.followed[scale] != self.used[scale])
+
+    # From nodes -----------------------------------------------------------------------------------
+
+    def own(self, scales: Mapping[str, float], sketch: Sketch | None = None) -> Nodes:
+        """The student's own nodes, by figure; measured ones as they lie in plans drawn for a sketch."""
+        key = (*(scales[name] for name in SCALE_NAMES), "" if sketch is None else sketch.name)
+        if key not in self.places:
+            self.places[key] = own_nodes(
+                self.task, self.evidence, self.right(scales) if sketch is None else sketch
+            )
+        return self.places[key]
+
+    def names(self, own: Nodes) -> frozenset[str]:
+        """The names of all own nodes."""
+        if id(own) not in self.named_nodes:
+            self.named_nodes[id(own)] = known(own)
+        return self.named_nodes[id(own)]
+
+    def right(self, scales: Mapping[str, float]) -> Sketch:
+        """The right mechanism, its sketch at the scale that it follows."""
+        drawn = {**scales, "kL": self.followed["kL"]}
+        return Sketch("right", self.task.construction, self.task.at(drawn))
+
+    def traced(
+        self, scales: Mapping[str, float], sketch: Sketch | None = None, *, by_similarity: bool = False
+    ) -> Trace:
+        """The drawing traced from the student's own nodes; plates' images by similarity if that is asked."""
+        key = (*(scales[name] for name in SCALE_NAMES), "" if sketch is None else sketch.name, by_similarity)
+        if key not in self.traces:
+            own, drawn = self.own(scales, sketch), sketch or self.right(scales)
+            construction = self.task.by_similarity if by_similarity else drawn.construction
+            is_plain = not own and sketch is None
+            self.traces[key] = (
+                self.task.traced(scales)
+                if is_plain
+                else trace(construction, drawn.parameters, self.task.skill, own)
+            )
+        return self.traces[key]
+
+    def from_nodes(
+        self,
+        segment: Segment,
+        scales: Mapping[str, float],
+        sketch: Sketch | None = None,
+        *,
+        by_similarity: bool = False,
+    ) -> Expectation:
+        """The head constructed from the student's own nodes upstream; from none, as it should be."""
+        found, own = self.traced(scales, sketch, by_similarity=by_similarity), self.own(scales, sketch)
+        upstream = self.task.construction.upstream(segment.head) | self.task.construction.upstream(
+            segment.tail
+        )
+        relies_on = (self.names(own) & upstream) - {segment.head}
+        if not relies_on and sketch is None:
+            exact = segment.drawn(scales)
+            return Expectation(exact, "nodes", "", relies_on, self.whole_reach(segment, exact))
+        vector = found.vector(segment.tail, segment.head)
+        reach, se = self.spreads(found.moved(segment.tail, segment.head), found.hand, vector)
+        return Expectation(vector, "nodes", "", relies_on, reach, se)
+
+    def spreads(self, moved: ComplexArray, hand: int, along: complex) -> tuple[Spread, Spread]:
+        """How far a hand may miss, and the standard errors of reading.
+
+        Measuring by hand is the student's, and part of what a hand may miss; reading is the program's.
+        """
+        if not cmath.isfinite(along):
+            return NO_SPREAD, NO_SPREAD
+        sigmas = self.task.rubric.hand.sigmas
+        if self.evidence.has_sheets:
+            return scaled(spread(moved[:hand], along), sigmas), spread(moved[hand:], along)
+        return scaled(self.with_ruler(spread(moved, along), along), sigmas), NO_SPREAD
+
+    def with_ruler(self, found: Spread, along: complex) -> Spread:
+        """With the errors of measuring the vector itself, where it was measured by hand."""
+        hand = self.task.rubric.hand
+        turned = abs(along) * math.radians(hand.protractor_deg)
+        return Spread(math.hypot(found.along, hand.ruler_mm), math.hypot(found.across, turned))
+
+    # From lengths and values ----------------------------------------------------------------------
+
+    def at_followed_scale(self, segment: Segment) -> Expectation | None:
+        """The exact one at the scale that the drawing follows; None where that is the one used."""
+        wrong = self.wrong_scales
+        if segment.scale not in wrong:
+            return None
+        exact = segment.drawn(self.followed)
+        return Expectation(exact, "scale", segment.scale, wrong, self.whole_reach(segment, exact))
+
+    def expectations(self, segment: Segment) -> Iterator[Expectation]:
+        """What follows from a turned plan, other scales, a wrong sketch, and own lengths and values."""
+        wrong = self.wrong_scales
+        if segment.scale != "kL":
+            yield from self.turned_plan(segment)
+            if segment.head in self.task.construction.images:
+                # A plate's image comes by lines or by similarity: of a wrong base they make different ones.
+                yield self.from_nodes(segment, self.followed, by_similarity=True)
+            yield from self.from_vectors(segment, self.used)
+            sketch = self.other_sketch()
+            if sketch is not None and segment.head not in sketch.wrong:
+                one = self.from_nodes(segment, self.followed, sketch)
+                yield replace(one, relies_on=one.relies_on | wrong | sketch.wrong)
+            if wrong:
+                for one in (
+                    self.from_nodes(segment, self.followed),
+                    *self.from_vectors(segment, self.followed),
+                ):
+                    yield replace(one, relies_on=one.relies_on | wrong)
+
+    def other_sketch(self) -> Sketch | None:
+        """What the plans were drawn by instead, where that is told or no sketch was read."""
+        if not self.sketch:
+            self.sketch.append(other_sketch(self.task, self.evidence, (self.used, self.followed)))
+        return self.sketch[0]
+
+    def is_trivial(self, segment: Segment, expected: complex) -> bool:
+        """Near zero, without a solution, or far shorter than the right one: nothing is left to show."""
+        if not cmath.isfinite(expected):
+            return True
+        rubric = self.task.rubric
+        right = min(abs(segment.drawn(one)) for one in (self.used, self.followed))
+        least = min(rubric.tolerance_of(segment.name).least_mm, right / 2.0)
+        return abs(expected) < max(least, rubric.least_followed_share * right)
+
+    def turned_plan(self, segment: Segment) -> Iterator[Expectation]:
+        """The vector in a plan that is turned as a whole by quarter turns, as the crank's vector tells."""
+        task = self.task
+        crank = f"{segment.name[0]}_{task.pin}"
+        own = self.evidence.vector(crank)
+        if segment.name == crank or own is None or own.direction_rad is None or not task.real[crank]:
+            return
+        off = math.remainder(own.direction_rad - cmath.phase(task.real[crank]), math.tau)
+        quarters = round(off / (math.pi / 2.0))
+        tolerance = task.rubric.tolerance_of(crank)
+        slack = math.radians(tolerance.direction_deg * tolerance.farthest)
+        if quarters and abs(off - quarters * math.pi / 2.0) <= slack:
+            head = task.construction.vectors[crank].head
+            turned = segment.drawn(self.followed) * 1j**quarters
+            reach = self.whole_reach(segment, turned)
+            yield Expectation(turned, "vector", crank, frozenset({head}), reach)
+            figure = task.construction.figure_of(head)
+            right = self.right(self.followed)
+            mistake = Mistake("figure_rotated", figure, quarters=quarters % 4)
+            drawing = commit(mistake, Drawing(right.construction, right.parameters))
+            sketch = Sketch(f"{figure} {quarters}", drawing.construction, right.parameters)
+            one = self.from_nodes(segment, self.followed, sketch)
+            yield replace(one, what="vector", of=crank, relies_on=one.relies_on | {head})
+
+    def whole_reach(self, segment: Segment, along: complex) -> Spread:
+        """How far a hand may miss a vector from the start of the drawing."""
+        task, scales = self.task, (self.used["kv"], self.used["ka"])
+        key = ("reach", segment.name, abs(along), cmath.phase(along), *scales, self.evidence.has_sheets)
+        if key not in task.memory:
+            task.keep(key, self._whole_reach(segment, along))
+        return task.memory[key]  # type: ignore[return-value]
+
+    def _whole_reach(self, segment: Segment, along: complex) -> Spread:
+        moved = self.task.traced(self.used).moved(segment.tail, segment.head)
+        found = spread(moved * np.exp(1j * (cmath.phase(along) - cmath.phase(segment.real))), along)
+        if not self.evidence.has_sheets:
+            found = self.with_ruler(found, along)
+        return scaled(found, self.task.rubric.hand.sigmas)
+
+    def from_vectors(self, segment: Segment, scales: Mapping[str, float]) -> Iterator[Expectation]:
+        """A vector that hangs on one or two others alone, whose lengths are enough."""
+        task = self.task
+        match task.construction.step(segment.head):
+            case Given(length=Normal(tail=tail, head=head)):
+                yield from self.normal(segment, self.named(tail, head), scales)
+            case Given(length=Coriolis() as length):
+                yield from self.coriolis(segment, length, scales)
+            case Divide(base=base) | Similar(base=base) if segment.tail in base:
+                pole, other = base if segment.tail == base[0] else base[::-1]
+                source = self.named(pole, other)
+                own = None if source is None else self.evidence.vector(source)
+                if source is not None and own is not None and task.real[source]:
+                    along = own.direction_rad
+                    phase = cmath.phase(task.real[source]) if along is None else along
+                    found = cmath.rect(own.length_mm, phase) * (segment.real / task.real[source])
+                    yield Expectation(found, "vector", source, frozenset({other}))
+
+    def normal(
+        self, segment: Segment, source: str | None, scales: Mapping[str, float]
+    ) -> Iterator[Expectation]:
+        """v^2 / l from the own velocity; omega^2 l from the own computed angular velocity."""
+        task = self.task
+        if source is None or not task.real[source]:
+            return
+        right = segment.drawn(scales)
+        own = self.evidence.vector(source)
+        if own is not None:
+            share = own.length_mm * scales["kv"] / abs(task.real[source])
+            head = task.construction.vectors[source].head
+            yield Expectation(right * share**2, "vector", source, frozenset({head}))
+        rate = next((one for one in task.construction.rates.values() if one.vector == source), None)
+        if rate is not None and (turned := self.own_turn(rate)) is not None:
+            yield Expectation(right * turned**2, "value", rate.name, frozenset({rate.name}))
+
+    def coriolis(
+        self, segment: Segment, length: Coriolis, scales: Mapping[str, float]
+    ) -> Iterator[Expectation]:
+        """2 omega v from the own sliding velocity and what turns the guide: velocity, or computed omega.
+
+        Each counts as the share that it has of the right one, with its sense.
+        """
+        vectors, right = self.task.construction.vectors, segment.drawn(scales)
+        slide = self.named(*length.slide)
+        rate = self.task.construction.rates.get(f"omega_{vectors[segment.name].turning}")
+        sources = [one for one in (slide, rate.vector if rate else None) if one is not None]
+        shares = {one: share for one in sources if (share := self.own_share(one, scales)) is not None}
+        if shares:
+            farthest = max(shares, key=lambda one: abs(shares[one] - 1.0))
+            relies_on = frozenset(vectors[one].head for one in shares)
+            yield Expectation(right * math.prod(shares.values()), "vector", farthest, relies_on)
+        if rate is not None and (turned := self.own_turn(rate)) is not None:
+            slid = {one: share for one, share in shares.items() if one == slide}
+            relies_on = frozenset({rate.name, *(vectors[one].head for one in slid)})
+            yield Expectation(right * turned * math.prod(slid.values()), "value", rate.name, relies_on)
+
+    def own_share(self, name: str, scales: Mapping[str, float]) -> float | None:
+        """The student's own velocity as a share of the right one, negative where it is reversed."""
+        own, right = self.evidence.vector(name), self.task.real[name]
+        if own is None or not right:
+            return None
+        share = own.length_mm * scales["kv"] / abs(right)
+        if own.direction_rad is None:
+            return share
+        return math.copysign(share, math.cos(own.direction_rad - cmath.phase(right)))
+
+    def own_turn(self, rate: AngularRate) -> float | None:
+        """The student's own computed angular velocity as a share of the right one."""
+        own, right = self.evidence.values.get(rate.name), self.task.rates[rate.name]
+        return None if own is None or not right else own / right
+
+    def named(self, tail: str, head: str) -> str | None:
+        """The vector from one node to another, either way round; None where it has no name."""
+        ends = {tail, head}
+        vectors = self.task.construction.vectors.values()
+        return next((v.name for v in vectors if {v.tail, v.head} == ends), None)
+
+
+def scaled(found: Spread, by: float) -> Spread:
+    """So many standard deviations."""
+    return Spread(by * found.along, by * found.across)

@@ -1,0 +1,172 @@
+"""What was done and what to redo: a judgement's mistakes in the student's words.
+
+The construction's own steps from a wrong node on. Names stand as in reports, `a_BA_n`, so that pages set
+them with their indices. Without numbers the sentences say which line goes where, and by what formula a
+length is found, but give no answer away.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from grader.documents import MistakeDocument, ReportDocument, RivalDocument
+from grader.feedback.sentences import Level, one_mistake
+from grader.language import N_, Tongue, tongue
+from grader.outcomes import Judgement, NamedMistake
+from grader.solution import sentences
+from grader.solution.sentences import Speaker, speaker_of, wording_of
+from grader.solution.steps import computed
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.elements import Along, Coriolis, Normal
+from reference.construction.steps import Coincide, Divide, Given, Similar, Step, TwoLines
+from reference.drawing.subject import Subject
+from reference.plan import exact_plan
+
+LAY_OFF_UNTOLD = N_("From %(start)s lay off %(segment)s, %(direction)s; it ends in %(node)s.")
+SIMILAR_UNTOLD = N_(
+    "On %(base)s draw the triangle similar to %(model)s, its letters following in the same sense. "
+    "Its third corner is %(node)s."
+)
+DIVIDE_UNTOLD = N_("Take %(node)s on the line through %(p)s and %(q)s as the link's points divide it.")
+MOST_STEPS = 8
+"""Of one figure that are told in full: what follows is told by its names."""
+THEN = N_("Then draw again what follows from it: %(nodes)s.")
+
+
+@dataclass(frozen=True, slots=True)
+class PlainSpeaker(Speaker):
+    """Says names as they stand in reports."""
+
+    def name(self, *names: str) -> Markup:
+        """A node, a vector, or several nodes side by side."""
+        return Markup("").join(self.subject.shown(name) for name in names)
+
+    def scale(self, scale: str) -> Markup:
+        """A scale's name."""
+        return Markup.escape(self.subject.shown(scale))
+
+    def rate(self, name: str) -> Markup:
+        """An angular velocity or acceleration."""
+        return Markup.escape(self.subject.shown(name))
+
+
+def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> list[str]:
+    """The steps from a node on: those of its figure in full, later figures' nodes by name.
+
+    Empty for what is no node of the construction. Without numbers, steps of the mechanism are left out:
+    they are nothing but given lengths.
+    """
+    construction = subject.plan.construction
+    order = [step.node for step in construction.steps]
+    if node not in order:
+        return []
+    found = speaker_of(subject, tongue)
+    speaker = PlainSpeaker(found.subject, found.tongue, found.view)
+    touched = _touched(construction.steps, node)
+    figure = construction.figure_of(node)
+    own = [step for step in touched if construction.figure_of(step.node) == figure]
+    told = [_told(speaker, step, with_numbers=with_numbers) for step in own[:MOST_STEPS]]
+    later = [step.node for step in (*own[MOST_STEPS:], *(step for step in touched if step not in own))]
+    if later:
+        told.append(speaker.say(THEN, nodes=speaker.names(tuple(later))))
+    return [line.unescape() for line in told if line]
+
+
+def _touched(steps: tuple[Step, ...], node: str) -> list[Step]:
+    """The step of a node and all that hang on it, in their order."""
+    nodes, touched = {node}, []
+    for step in steps:
+        if step.node in nodes or nodes & set(step.needs):
+            nodes.add(step.node)
+            touched.append(step)
+    return touched
+
+
+def _told(speaker: Speaker, step: Step, *, with_numbers: bool) -> Markup:
+    if not with_numbers:
+        return Markup(". ").join(_untold(speaker, step))
+    computing = Markup("; ").join(computed(speaker, step))
+    drawing = sentences.sentence(speaker, step)
+    return Markup("{}. {}").format(computing, drawing) if computing else drawing
+
+
+def _untold(speaker: Speaker, step: Step) -> Iterator[Markup]:
+    """A step without a number: its formula, then what is drawn."""
+    match step:
+        case TwoLines() | Coincide():
+            yield sentences.sentence(speaker, step)
+        case Given(along=Along()) | Given(length=Coriolis()):
+            yield from _formula(speaker, step)
+            segment, direction = (step.start, step.node), sentences.direction_of(speaker, step)
+            yield speaker.say(
+                LAY_OFF_UNTOLD, start=step.start, node=step.node, segment=segment, direction=direction
+            )
+        case Similar(base=base, model=model):
+            yield speaker.say(SIMILAR_UNTOLD, base=base, model=model, node=step.node)
+        case Divide(base=(p, q)):
+            yield speaker.say(DIVIDE_UNTOLD, node=step.node, p=p, q=q)
+
+
+def _formula(speaker: Speaker, step: Given) -> Iterator[Markup]:
+    """How the component is computed, in names alone."""
+    name = speaker.vector(step.start, step.node)
+    if isinstance(step.length, Normal):
+        speed = speaker.vector(step.length.tail, step.length.head)
+        yield Markup("{} = {}² / {}").format(name, speed, speaker.link_of(step.node))
+    if isinstance(step.length, Coriolis):
+        rate = speaker.rate(f"omega_{speaker.carrier_of(step.node)}")
+        yield Markup("{} = 2 · {} · {}").format(name, rate, speaker.vector(*step.length.slide))
+
+
+def with_mistakes_told(
+    report: ReportDocument,
+    judgement: Judgement,
+    assignment: Assignment,
+    variant: Variant,
+    lang: str,
+    level: Level = "full",
+) -> ReportDocument:
+    """The report with its mistakes told: `feedback` and, step by step, what to `redo`.
+
+    Arguments: `report` is that of the `judgement`, its mistakes in the same order. At level `symbol`
+    nothing is told, at `hint` no number.
+    """
+    if not judgement.mistakes or level == "symbol":
+        return report
+    speaker, names = tongue(lang), assignment.file.names
+    subject = _subject(judgement, assignment, variant, speaker)
+    told = [
+        document.model_copy(
+            update={
+                "feedback": one_mistake(mistake, speaker, level, names),
+                "rivals": _rivals(document, mistake, speaker, level, names),
+                "redo": _redo(subject, mistake, speaker, level),
+            }
+        )
+        for document, mistake in zip(report.mistakes, judgement.mistakes, strict=True)
+    ]
+    return report.model_copy(update={"mistakes": told})
+
+
+def _rivals(
+    document: MistakeDocument, mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str]
+) -> list[RivalDocument]:
+    return [
+        rival.model_copy(update={"feedback": one_mistake(one, speaker, level, names)})
+        for rival, one in zip(document.rivals, mistake.rivals, strict=True)
+    ]
+
+
+def _subject(judgement: Judgement, assignment: Assignment, variant: Variant, speaker: Tongue) -> Subject:
+    """The right plan at the scales that the student drew at."""
+    used = {name: scale.used for name, scale in judgement.scales.items()}
+    plan = exact_plan(assignment, [variant], assignment.scales([variant], **used))
+    return Subject(assignment, plan, 0, wording_of(speaker))
+
+
+def _redo(subject: Subject, mistake: NamedMistake, speaker: Tongue, level: Level) -> list[str]:
+    """The steps from the mistake on; none where there is no single step that it was made at."""
+    vectors = subject.plan.construction.vectors
+    node = vectors[mistake.at].head if mistake.at in vectors else mistake.at
+    return redo(subject, speaker, node, with_numbers=level == "full")

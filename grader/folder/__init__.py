@@ -1,0 +1,1 @@
+"""A class in a folder: pages, owners, submissions, cache, workers."""

@@ -1,0 +1,409 @@
+"""A folder of submissions: inventory, owners, marking in parallel, results. One bad file stops nothing."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from grader.documents import AlikeDocument, ReportDocument, ResultsDocument, UnmatchedDocument
+from grader.feedback.class_page import write_index
+from grader.feedback.sentences import Level
+from grader.feedback.student_page import About, write_feedback
+from grader.files import make_folder, write_whole
+from grader.folder.cache import (
+    MARK_STAGE,
+    READ_STAGE,
+    SCAN_STAGE,
+    PageCache,
+    digest_of,
+    keep_reading,
+    kept_maps,
+    kept_reading,
+    stage_digest,
+)
+from grader.folder.changes import Inputs, earlier, inputs_of, moved, note_inputs, noted_inputs
+from grader.folder.inventory import FileContent, Progress, submissions, survey_folder
+from grader.folder.owners import Unmatched, assign_pages
+from grader.folder.submissions import Unusable, submissions_of
+from grader.folder.workers import ENDED, Limits, Pool, Workers
+from grader.inputs.measurements import StudentSubmission, names_of
+from grader.inputs.roster import Roster, read_roster
+from grader.lms.table import write_summary
+from grader.marking.report import unjudged_report
+from grader.pipeline import mark, read_submission
+from grader.printed.answer_sheet import asked_of
+from grader.records import Problem, ScannedPage
+from grader.rubric import RubricFile
+from grader.similarity.groups import find_similar
+from grader.similarity.submission import compared_submission
+from reference.authored.assignment import Assignment, Variant
+from reference.errors import CallError, PlanmarkError
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One submission to mark.
+
+    Attributes
+    ----------
+    folder : below the results: the student's, with several positions one for each
+    reading_key : a digest of everything that the reading of its pages depends on
+    key : a digest of everything that its report depends on
+    """
+
+    submission: StudentSubmission
+    folder: str
+    reading_key: str
+    key: str
+
+    @property
+    def name(self) -> str:
+        """Of what is kept of it."""
+        return self.folder.replace("/", "#")
+
+
+def folders_of(submissions: Iterable[StudentSubmission]) -> list[str]:
+    """Each submission's folder below the results: the student's, with several positions one for each."""
+    submissions = list(submissions)
+    count = Counter(submission.student_id for submission in submissions)
+    return [
+        submission.student_id
+        if count[submission.student_id] == 1
+        else f"{submission.student_id}/{_position(submission)}"
+        for submission in submissions
+    ]
+
+
+def _position(submission: StudentSubmission) -> str:
+    position = None if submission.variant is None else submission.variant.position
+    return "unknown" if position is None else str(position)
+
+
+def inputs_of_run(
+    assignment: Assignment, rubric: RubricFile, jobs: Sequence[Job], contents: Sequence[FileContent]
+) -> Inputs:
+    """What this run's marks come from, for the next run to tell what has changed."""
+    files = (assignment.file.model_dump_json(), assignment.mechanism_file.model_dump_json())
+    authored = {
+        "assignment": repr(files),
+        "rubric": rubric.model_dump_json(),
+        "program": stage_digest(MARK_STAGE),
+    }
+    digests = {page.file: page.digest for content in contents for page in content.pages}
+    return inputs_of(authored, [job.submission for job in jobs], [job.folder for job in jobs], digests)
+
+
+def similar_of_run(
+    assignment: Assignment, jobs: Sequence[Job], reports: Sequence[ReportDocument], readings: Path
+) -> list[AlikeDocument]:
+    """The similar sheets among those that were marked."""
+    marked = [
+        (job, compared_submission(report, job.submission.variant, job.submission.measured))
+        for job, report in zip(jobs, reports, strict=True)
+        if job.submission.variant is not None and report.criteria
+    ]
+    maps = [kept_maps(readings, job.name) for job, _ in marked]
+    return find_similar(assignment, [one for _, one in marked], maps)
+
+
+KEPT_FOLDER = ".planmark"
+_PASSING = "file_changed"
+"""A problem that the next run need not have: nothing that has it is cached."""
+
+
+class InterruptedRunError(PlanmarkError):
+    """A run was interrupted; what it marked is there."""
+
+    exit_status = 130
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """What to grade, and how.
+
+    Attributes
+    ----------
+    folder, out : where the submissions are, and where results go
+    roster : path of the roster, or None (a `roster.csv` in the folder is taken)
+    pages_per_student : pages of each student in one class file, blank ones not counted
+    jobs, limits : worker processes, and what a file or a sheet may take in one
+    lang, level : of feedback, where the roster does not say
+    with_ghosts : whether pictures show expected vectors beside wrong ones, at level `full`
+    """
+
+    assignment: Assignment
+    rubric: RubricFile
+    folder: Path
+    out: Path
+    roster: Path | None = None
+    pages_per_student: int | None = None
+    jobs: int = 1
+    limits: Limits = field(default_factory=Limits)
+    lang: str = "en"
+    level: Level = "full"
+    with_ghosts: bool = True
+
+
+def grade(batch: Batch, progress: Progress, workers: Pool | None = None) -> ResultsDocument:
+    """Grade all that was handed in, and write the reports, pages and results.
+
+    Arguments: `workers` are made as the batch says where they are not given.
+
+    Raises CallError for a folder that is not there or holds nothing, AuthoredFileError for a roster
+    with faults, OutputError where results cannot be written, InterruptedRunError for an interrupt.
+    """
+    roster = _roster(batch)
+    files = _files(batch)
+    if not files and roster is None:
+        raise _nothing(batch)
+    make_folder(batch.out)
+    if workers is not None:
+        return _graded(batch, roster, files, progress, workers)
+    with Workers(batch.jobs, batch.limits, __name__) as pool:
+        return _graded(batch, roster, files, progress, pool)
+
+
+def _graded(
+    batch: Batch, roster: Roster | None, files: Sequence[Path], progress: Progress, workers: Pool
+) -> ResultsDocument:
+    notes = batch.out / KEPT_FOLDER
+    names, cache = names_of(batch.assignment), _page_cache(batch)
+    contents = survey_folder(files, batch.folder, names, workers, progress, cache)
+    students, unmatched = _submissions(batch, roster, contents)
+    if not students and not unmatched:
+        raise _nothing(batch)
+    before = earlier(batch.out / "results.json", batch.assignment.id)
+    jobs = _jobs(batch, cache, students)
+    reports = _marked(batch, cache, jobs, progress, workers)
+    inputs = inputs_of_run(batch.assignment, batch.rubric, jobs, contents)
+    results = ResultsDocument(
+        assignment=batch.assignment.id,
+        reports=reports,
+        unmatched=unmatched,
+        moved=moved(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
+        alike=similar_of_run(batch.assignment, jobs, reports, notes / "readings"),
+    )
+    _write_results(batch, results, students)
+    note_inputs(notes, inputs)
+    return results
+
+
+def _nothing(batch: Batch) -> CallError:
+    return CallError("nothing_to_grade", f"{batch.folder}: there is nothing to grade in this folder")
+
+
+def needs_person(results: ResultsDocument) -> bool:
+    """Whether anything is left for a person."""
+    return bool(results.unmatched) or any(report.status != "graded" for report in results.reports)
+
+
+# What there is ------------------------------------------------------------------------------------
+
+
+def _roster(batch: Batch) -> Roster | None:
+    path = batch.roster or batch.folder / "roster.csv"
+    return read_roster(path) if batch.roster is not None or path.is_file() else None
+
+
+def _files(batch: Batch) -> list[Path]:
+    if not batch.folder.is_dir():
+        raise CallError("folder_missing", f"{batch.folder}: there is no such folder")
+    return submissions(batch.folder, batch.roster, passed_over=(batch.out,))
+
+
+def _submissions(
+    batch: Batch, roster: Roster | None, contents: Sequence[FileContent]
+) -> tuple[list[StudentSubmission], list[UnmatchedDocument]]:
+    """Every student's submission, and what is nobody's."""
+    measured = [row for content in contents for row in content.measurements]
+    ownership = assign_pages(
+        [page for content in contents for page in content.pages],
+        roster,
+        batch.assignment.id,
+        pages_per_student=batch.pages_per_student,
+        student_ids=[row.student_id for row in measured if row.student_id],
+    )
+    refused = [(content.refused, content.students) for content in contents if content.refused is not None]
+    unusable = [Unusable((Problem(file.code, file.message, file.file),), who) for file, who in refused]
+    students, strangers = submissions_of(
+        batch.assignment, roster, ownership, measured, batch.lang, refused=unusable
+    )
+    unmatched = [_unmatched(page) for page in ownership.unmatched]
+    missing = [
+        UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
+        for problem in ownership.problems
+    ]
+    return students, [*(file for file, _ in refused), *unmatched, *strangers, *missing]
+
+
+def _unmatched(page: Unmatched) -> UnmatchedDocument:
+    broken = page.source.problem
+    message = page.problem.message if broken is None else f"{page.problem.message}; {broken.message}"
+    return UnmatchedDocument(
+        file=page.source.file, page=page.source.page, code=page.problem.code, message=message
+    )
+
+
+# Marking ------------------------------------------------------------------------------------------
+
+
+def _page_cache(batch: Batch) -> PageCache:
+    asked = asked_of(batch.assignment, batch.rubric)
+    key = digest_of((stage_digest(SCAN_STAGE), asked.figures))
+    return PageCache(batch.out / KEPT_FOLDER / "pages", asked, key, digest_of([asked.cells]))
+
+
+def _jobs(batch: Batch, cache: PageCache, students: Sequence[StudentSubmission]) -> list[Job]:
+    """The submissions with digests of what they depend on."""
+    assignment = (batch.assignment.file.model_dump_json(), batch.assignment.mechanism_file.model_dump_json())
+    read = digest_of((stage_digest(READ_STAGE), cache.key, *assignment, cache.asked.vectors))
+    settings = (batch.rubric.model_dump_json(), batch.level, batch.with_ghosts)
+    marked = digest_of((stage_digest(MARK_STAGE), *assignment, *settings))
+    return [
+        _job(submission, folder, (read, marked))
+        for submission, folder in zip(students, folders_of(students), strict=True)
+    ]
+
+
+def _job(submission: StudentSubmission, folder: str, depends: tuple[str, str]) -> Job:
+    """A submission's job; `depends` are digests of what all readings, and all marks, depend on."""
+    read, marked = depends
+    pages = [(page.file, page.page, page.digest, page.problem) for page in submission.pages]
+    reading_key = digest_of((read, submission.variant, sorted(submission.declared.items()), pages))
+    key = digest_of((marked, reading_key, replace(submission, pages=())))
+    return Job(submission, folder, reading_key, key)
+
+
+def _marked(
+    batch: Batch, cache: PageCache, jobs: Sequence[Job], progress: Progress, workers: Pool
+) -> list[ReportDocument]:
+    """Reports in the order of the jobs; each with its files written."""
+    reports = {index: known for index, job in enumerate(jobs) if (known := _known(batch, job)) is not None}
+    progress("marking", len(reports), len(jobs))
+    waiting = [(index, job) for index, job in enumerate(jobs) if index not in reports]
+    try:
+        for index, report in _marked_anew(batch, cache, waiting, workers):
+            reports[index] = report
+            progress("marking", len(reports), len(jobs))
+    except KeyboardInterrupt as error:
+        done = f"{len(reports)} of {len(jobs)} submissions are marked and kept in {batch.out}"
+        raise InterruptedRunError("interrupted", f"interrupted; {done}; the same command goes on") from error
+    return [reports[index] for index in range(len(jobs))]
+
+
+def _marked_anew(
+    batch: Batch, cache: PageCache, jobs: Sequence[tuple[int, Job]], workers: Pool
+) -> Iterator[tuple[int, ReportDocument]]:
+    """Reports as they come, with the jobs' numbers.
+
+    A job that ended its worker is marked without the pages that do so alone.
+    """
+    ended: list[tuple[int, Job, Problem]] = []
+    sheets = [len(job.submission.pages) for _, job in jobs]
+    for number, result in workers.run(_mark_one, [(batch, cache, job) for _, job in jobs], sheets):
+        index, job = jobs[number]
+        if not isinstance(result, Problem):
+            yield index, result
+        elif result.code in ENDED and job.submission.pages:
+            ended.append((index, job, result))
+        else:
+            yield index, _failed(batch, job, result)
+    again = [(batch, cache, _without(job, problem, batch, cache, workers)) for _, job, problem in ended]
+    for number, result in workers.run(_mark_one, again):
+        index, job, problem = ended[number]
+        yield index, _failed(batch, job, problem) if isinstance(result, Problem) else result
+
+
+def _without(job: Job, problem: Problem, batch: Batch, cache: PageCache, workers: Pool) -> Job:
+    """The job with the problem at those of its pages that end a worker alone."""
+    pages = job.submission.pages
+    calls = [(batch, cache, replace(job.submission, pages=(page,), measured=None)) for page in pages]
+    alone = dict(workers.run(_read_only, calls)) if len(pages) > 1 else {0: problem}
+    marked = tuple(
+        replace(page, problem=replace(result, file=page.file)) if isinstance(result, Problem) else page
+        for page, result in ((page, alone[index]) for index, page in enumerate(pages))
+    )
+    return _job(replace(job.submission, pages=marked), job.folder, (job.reading_key, job.key))
+
+
+def _read_only(batch: Batch, cache: PageCache, submission: StudentSubmission) -> None:
+    _read(batch, cache, submission)
+
+
+def _read(batch: Batch, cache: PageCache, submission: StudentSubmission) -> list[ScannedPage]:
+    """A submission's pages as scanned, with what was drawn on them."""
+    pages = [cache.page(ref) for ref in submission.pages]
+    return read_submission(submission, pages, batch.assignment, cache.asked)
+
+
+def _mark_one(batch: Batch, cache: PageCache, job: Job) -> ReportDocument:
+    """Mark one submission and write its files; its key last, so that it stands for all of them."""
+    submission, where = job.submission, batch.out / job.folder
+    pages = _pages_read(batch, cache, job)
+    report, pictures = mark(
+        submission, pages, batch.assignment, batch.rubric, batch.level, with_ghosts=batch.with_ghosts
+    )
+    write_feedback(report, pictures, where, submission.lang, batch.level, _about(batch, submission))
+    write_whole(where / "report.json", report.model_dump_json(indent=2))
+    if not any(problem.code == _PASSING for problem in report.problems):
+        write_whole(_key_file(batch, job), job.key)
+    return report
+
+
+def _pages_read(batch: Batch, cache: PageCache, job: Job) -> list[ScannedPage]:
+    """The pages as read by an earlier run, else now."""
+    folder = batch.out / KEPT_FOLDER / "readings"
+    known = kept_reading(folder, job.name, job.reading_key, cache)
+    if known is not None:
+        return known
+    pages = _read(batch, cache, job.submission)
+    if pages and not any(problem.code == _PASSING for page in pages for problem in page.problems):
+        keep_reading(folder, job.name, job.reading_key, pages, cache)
+    return pages
+
+
+def _about(batch: Batch, submission: StudentSubmission) -> About:
+    """How the feedback calls the assignment, the student and the names in it."""
+    title = batch.assignment.file.title.in_language(submission.lang)
+    return About(title, submission.name, batch.assignment.file.names)
+
+
+def _failed(batch: Batch, job: Job, problem: Problem) -> ReportDocument:
+    submission, where = job.submission, batch.out / job.folder
+    report = unjudged_report(
+        batch.assignment, batch.rubric, submission.variant or Variant(), submission.student_id, "unreadable",
+        problems=(*submission.problems, problem),
+    )  # fmt: skip
+    write_feedback(report, [], where, submission.lang, batch.level, _about(batch, submission))
+    write_whole(where / "report.json", report.model_dump_json(indent=2))
+    return report
+
+
+def _write_results(batch: Batch, results: ResultsDocument, students: Sequence[StudentSubmission]) -> None:
+    write_summary(results, batch.out / "summary.csv")
+    names = {submission.student_id: submission.name for submission in students}
+    title = batch.assignment.file.title.in_language(batch.lang)
+    write_index(results, batch.out, batch.lang, title=title, student_names=names)
+    write_whole(batch.out / "results.json", results.model_dump_json(indent=2))
+
+
+# What need not be done again ----------------------------------------------------------------------
+
+
+def _key_file(batch: Batch, job: Job) -> Path:
+    return batch.out / KEPT_FOLDER / f"{job.name}.key"
+
+
+def _known(batch: Batch, job: Job) -> ReportDocument | None:
+    """The report of an earlier run over the same inputs, with all its files still there."""
+    where = batch.out / job.folder
+    try:
+        if _key_file(batch, job).read_text(encoding="utf-8") != job.key:
+            return None
+        if not (where / "feedback.html").is_file():
+            return None
+        return ReportDocument.model_validate_json((where / "report.json").read_bytes())
+    except (OSError, UnicodeDecodeError, ValidationError):
+        return None

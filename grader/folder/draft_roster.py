@@ -1,0 +1,421 @@
+"""A draft of the roster's `scans` where nothing says whose page is whose, for a person to check.
+
+What is known for certain (QR code, the roster's own `scans`, file names) is taken over; the rest is
+suggested by what the drawing looks like (crank angle, directions of links and plans: the student's
+own variant) and by the roster's order, and marked to be checked. Nothing is assigned here: the draft
+counts only once a person hands it in as the roster. A contact sheet shows all pages small.
+
+A variant's figure is laid on the strokes by an anchor, one of its longest lines: each stroke of about its
+direction and length proposes a pose and a scale. What the figure's lines then match is its similarity.
+Students who made mistakes match their own variant less well.
+"""
+
+import base64
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from html import escape
+
+import numpy as np
+import simplejpeg
+
+from grader.folder.owners import How, Owned, assign_pages
+from grader.inputs.roster import COLUMNS, DRAFT_COLUMNS, SCALES, Roster, RosterRow
+from grader.language import N_, Tongue, tongue
+from grader.records import FloatArray, GreyImage, PageRef, Problem
+from grader.scan.pixels import shrink
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.derive import construction_of
+from reference.construction.graph import Construction, bars, evaluate, parameters_of
+from reference.errors import CallError
+
+SURE, CHECK = "yes", "check"
+_LIKE_MM = 150.0
+"""Length of lines matched, less half of those missed, from which a suggestion is made."""
+_CLEAR = 0.75
+"""The next best variant must match this share of it, or less, to be told apart."""
+_NAMED = 6
+
+_ANCHOR_OFF_RAD = np.radians(2.5)
+_SCALES = (0.4, 1.6)
+"""Drawn size over the one that the assignment proposes."""
+_LEAST_ANCHOR_MM = 15.0
+_LEAST_LINE_MM = 8.0
+"""Shorter lines are found anywhere."""
+_OFF_MM = 0.6
+"""Of a line's ends, across: a usual hand."""
+_COVERED = 0.6
+_AMISS = 0.5
+"""What a line without a stroke takes off, as a share of what one with a stroke adds."""
+_ANCHORS = 4
+_TRIED = 24
+"""Strokes tried as the anchor, those nearest in direction."""
+
+Look = Callable[[PageRef], FloatArray | None]
+"""The strokes (n, 2, 2) of a page in sheet millimetres, y down; None where there are none to be had."""
+
+
+@dataclass(frozen=True, slots=True)
+class Suggestion:
+    """A page and the row it may belong to.
+
+    Attributes
+    ----------
+    row : None where nothing suggests one
+    why : the evidence, a sentence
+    sure : a source that decides says so, not similarity
+    among : rows between which similarity leaves the choice
+    """
+
+    source: PageRef
+    row: RosterRow | None
+    why: str
+    sure: bool
+    among: tuple[RosterRow, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """Suggestions for every page that is not blank, and what a person should know."""
+
+    suggestions: tuple[Suggestion, ...]
+    problems: tuple[Problem, ...] = field(default=())
+
+
+def suggest(
+    pages: Sequence[PageRef],
+    roster: Roster,
+    assignment: Assignment,
+    *,
+    look: Look | None = None,
+    pages_per_student: int | None = None,
+) -> Draft:
+    """Who each page may belong to.
+
+    Arguments
+    ---------
+    look : gives the strokes of a page whose owner is not certain, to see whose variant they look like
+    pages_per_student : how many pages each student has, if the file is in the roster's order
+    """
+    known = assign_pages(pages, roster, assignment.id, pages_per_student=pages_per_student)
+    settled = {owned.source: _certain(owned, roster) for owned in known.owned}
+    reasons = {loose.source: loose.problem for loose in known.unmatched}
+    if pages_per_student is None:
+        settled |= _by_likely_order(pages, roster, assignment, settled)
+    variants = _variants(roster, assignment)
+    found: list[Suggestion] = []
+    for page in pages:
+        first = settled.get(page)
+        if first is None and page not in reasons:
+            continue
+        contested = page in reasons and reasons[page].code in {"owner_disagree", "owner_other_assignment"}
+        if (first is None or not first.sure) and not contested and look is not None and variants:
+            first = _by_similarity(page, look(page), assignment, variants, first) or first
+        found.append(first or Suggestion(page, None, _reason(reasons[page], page), sure=False))
+    return Draft(tuple(_in_order(found, roster)), known.problems)
+
+
+def _certain(owned: Owned, roster: Roster) -> Suggestion:
+    row = next(
+        (row for row in roster.rows_of(owned.student_id) if row.position in (None, owned.position)), None
+    )
+    sure = owned.how[0] in {How.CODE, How.SCANS, How.NAME}
+    return Suggestion(owned.source, row, ", ".join(how.value for how in owned.how), sure)
+
+
+def _variants(roster: Roster, assignment: Assignment) -> dict[Variant, list[RosterRow]]:
+    """The rows of each variant; rows whose variant is unknown have none."""
+    found: dict[Variant, list[RosterRow]] = {}
+    for row in roster.rows:
+        try:
+            found.setdefault(assignment.variant(row.n, row.position), []).append(row)
+        except CallError:
+            continue
+    return found
+
+
+def _by_similarity(
+    page: PageRef,
+    strokes: FloatArray | None,
+    assignment: Assignment,
+    variants: Mapping[Variant, list[RosterRow]],
+    before: Suggestion | None,
+) -> Suggestion | None:
+    """The row whose variant is drawn, where it stands out from those of all others."""
+    if strokes is None or len(variants) < 2:
+        return None
+    matched = figure_similarity(strokes, assignment, list(variants))
+    if matched.max() < _LIKE_MM:
+        return None
+    near = [
+        variant for variant, score in zip(variants, matched, strict=True) if score > _CLEAR * matched.max()
+    ]
+    rows = [row for variant in near for row in variants[variant]]
+    names = ", ".join(_who(row) for row in rows[:_NAMED]) + (", ..." if len(rows) > _NAMED else "")
+    why = f"the drawing looks like the variant of {names}"
+    if before is None or before.row is None:
+        return Suggestion(page, rows[0] if len(rows) == 1 else None, why, sure=False, among=tuple(rows))
+    if before.row in rows:
+        return replace(before, why=f"{before.why}; {why}")
+    # What is drawn speaks louder than an order that one missing sheet shifts.
+    row = rows[0] if len(rows) == 1 else None
+    return Suggestion(page, row, f"{why}; by {before.why}: {_who(before.row)}", sure=False)
+
+
+def _by_likely_order(
+    pages: Sequence[PageRef],
+    roster: Roster,
+    assignment: Assignment,
+    settled: Mapping[PageRef, Suggestion],
+) -> dict[PageRef, Suggestion]:
+    """The roster's order, where the pages of one class file come out even and no code speaks against it."""
+    drawn = sum(page.pages > 1 and not page.blank for page in pages)
+    each, rest = divmod(drawn, max(len(roster.rows), 1))
+    if not each or rest:
+        return {}
+    dealt = assign_pages(pages, roster, assignment.id, pages_per_student=each)
+    if any(loose.problem.code in {"owner_disagree", "order_refused"} for loose in dealt.unmatched):
+        return {}
+    return {owned.source: _certain(owned, roster) for owned in dealt.owned if owned.source not in settled}
+
+
+def _in_order(found: list[Suggestion], roster: Roster) -> list[Suggestion]:
+    """Choices left open settled by the roster's order, where all pages that have a row follow it."""
+    place = {id(row): index for index, row in enumerate(roster.rows)}
+    reached = 0
+    settled: list[Suggestion] = []
+    for suggestion in found:
+        row = suggestion.row
+        if row is None and suggestion.among:
+            row = next((row for row in suggestion.among if place[id(row)] >= reached), None)
+            if row is not None:
+                why = f"{suggestion.why}; by the roster's order {_who(row)}"
+                suggestion = replace(suggestion, row=row, why=why)  # noqa: PLW2901
+        if row is not None:
+            if place[id(row)] < reached:
+                return found
+            reached = place[id(row)]
+        settled.append(suggestion)
+    return settled
+
+
+def _reason(problem: Problem, page: PageRef) -> str:
+    return problem.message.removeprefix(f"{page}: ")
+
+
+def _who(row: RosterRow) -> str:
+    return row.student_id if row.position is None else f"{row.student_id} (position {row.position})"
+
+
+def draft_csv(roster: Roster, draft: Draft) -> str:
+    """The roster with `scans` suggested, and the columns `why` and `sure` (`yes` or `check`).
+
+    Pages that nobody is suggested for stand on the contact sheet alone: a line without a student
+    would be no roster.
+    """
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*COLUMNS, *DRAFT_COLUMNS])
+    for row in roster.rows:
+        mine = [suggestion for suggestion in draft.suggestions if suggestion.row is row]
+        writer.writerow([*_cells(row), *_judged(row, mine)])
+    return text.getvalue()
+
+
+def _cells(row: RosterRow) -> list[str]:
+    """The roster's own columns as they were, but for `scans`."""
+    whole = ["" if value is None else str(value) for value in (row.n, row.position)]
+    return [
+        row.student_id,
+        row.name,
+        *whole,
+        row.email or "",
+        *(row.scales.get(name, "") for name in SCALES),
+        row.lang or "",
+    ]
+
+
+def _judged(row: RosterRow, mine: list[Suggestion]) -> list[str]:
+    """`scans`, `why` and `sure` of a row."""
+    pages = list(dict.fromkeys([*map(str, row.scans), *(str(suggestion.source) for suggestion in mine)]))
+    whole = {ref.file for ref in row.scans if ref.page is None}
+    pages = [page for page in pages if page in whole or page.rpartition("#")[0] not in whole]
+    why = "; ".join(dict.fromkeys(suggestion.why for suggestion in mine)) or "no page was found"
+    sure = SURE if mine and all(suggestion.sure for suggestion in mine) else CHECK
+    return [";".join(pages), why, sure]
+
+
+# Similarity of strokes and figures ------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Outline:
+    """The lines of one figure, in drawn mm at the proposed scales, y up; arrays over variants.
+
+    Attributes
+    ----------
+    tails, heads : (lines, variants)
+    """
+
+    tails: FloatArray
+    heads: FloatArray
+
+
+def figure_similarity(ends_mm: FloatArray, assignment: Assignment, variants: Sequence[Variant]) -> FloatArray:
+    """How well a sheet's strokes match each variant's figures.
+
+    Arguments: `ends_mm` (n, 2, 2) strokes in sheet millimetres, y down. Returns (variants,), the
+    length of lines that lie on strokes less half of that of lines that do not, mm, summed over the
+    figures: what a dead point's few lines match counts less than a whole plan.
+    """
+    strokes = ends_mm[..., 0] - 1j * ends_mm[..., 1]
+    strokes = strokes[np.abs(strokes[:, 1] - strokes[:, 0]) >= _LEAST_LINE_MM]
+    outlines = _outlines(assignment, list(variants))
+    if not len(strokes) or not len(variants):
+        return np.zeros(len(variants))
+    matched = [
+        [_most_matched(outline, index, strokes) for outline in outlines] for index in range(len(variants))
+    ]
+    return np.asarray(np.sum(matched, axis=1))
+
+
+def _outlines(assignment: Assignment, variants: list[Variant]) -> list[_Outline]:
+    mechanism, scales = assignment.mechanism(variants), assignment.scales(variants)
+    construction = construction_of(
+        mechanism, plate_by_similarity=assignment.file.plate_images == "similarity"
+    )
+    nodes = evaluate(construction, parameters_of(mechanism, scales.kL, scales.kv, scales.ka))
+    shape = (len(variants),)
+    outlines = []
+    for pairs in _pairs(construction):
+        ends = [[np.broadcast_to(nodes[name], shape) for name in pair] for pair in pairs]
+        outlines.append(_Outline(np.array([pair[0] for pair in ends]), np.array([pair[1] for pair in ends])))
+    return outlines
+
+
+def _pairs(construction: Construction) -> list[list[tuple[str, str]]]:
+    """The lines of each figure by their ends."""
+    plans = [
+        [(vector.tail, vector.head) for vector in construction.vectors_of(plan)]
+        for plan in construction.poles
+    ]
+    return [list(bars(construction)), *plans]
+
+
+def _most_matched(outline: _Outline, variant: int, strokes: FloatArray) -> float:
+    """What the figure's lines match in the best of all places that its anchors propose; 0 at least."""
+    tails, heads = outline.tails[:, variant], outline.heads[:, variant]
+    size = np.abs(heads - tails)
+    if not np.isfinite(size).all():
+        return 0.0
+    judged = size >= _LEAST_LINE_MM
+    best = 0.0
+    for anchor in np.argsort(-size)[:_ANCHORS]:
+        placed = _proposed(heads[anchor] - tails[anchor], strokes)
+        if size[anchor] < _LEAST_LINE_MM or not len(placed):
+            continue
+        begin, scale = placed[:, :1], placed[:, 1:].real
+        # One row per place, one column per line.
+        tail = begin + scale * (tails[judged] - tails[anchor])
+        head = begin + scale * (heads[judged] - tails[anchor])
+        good = _on_strokes(tail, head, strokes)
+        net = (good - _AMISS * (1.0 - good)) @ size[judged]
+        best = max(best, float(net.max()))
+    return best
+
+
+def _proposed(anchor: complex, strokes: FloatArray) -> FloatArray:
+    """(places, 2) where the anchor begins, and its scale, for strokes of about its direction and length."""
+    run = strokes[:, 1] - strokes[:, 0]
+    off = np.abs(np.angle((run / anchor) ** 2)) / 2.0
+    scale = np.abs(run) / abs(anchor)
+    fit = (
+        (off < _ANCHOR_OFF_RAD)
+        & (scale > _SCALES[0])
+        & (scale < _SCALES[1])
+        & (np.abs(run) >= _LEAST_ANCHOR_MM)
+    )
+    chosen = np.flatnonzero(fit)
+    chosen = chosen[np.argsort(off[chosen])][:_TRIED]
+    forward = (run[chosen] / anchor).real > 0
+    begin = np.where(forward, strokes[chosen, 0], strokes[chosen, 1])
+    return np.stack([begin, scale[chosen].astype(np.complex128)], axis=1)
+
+
+def _on_strokes(tail: FloatArray, head: FloatArray, strokes: FloatArray) -> FloatArray:
+    """(places, lines) how well the best stroke lies under each line, 0..1."""
+    start, run = strokes[:, 0], strokes[:, 1] - strokes[:, 0]
+    length = np.abs(run)
+    along = run / length
+    # Both ends of a line in each stroke's own axes: along it, and across.
+    p = (tail[..., None] - start) * np.conj(along)
+    q = (head[..., None] - start) * np.conj(along)
+    across = np.maximum(np.abs(p.imag), np.abs(q.imag))
+    low, high = np.minimum(p.real, q.real), np.maximum(p.real, q.real)
+    covered = np.minimum(high, length) - np.maximum(low, 0.0)
+    good = np.exp(-0.5 * (across / (2.0 * _OFF_MM)) ** 2)
+    return np.asarray(np.where(covered >= _COVERED * (high - low), good, 0.0).max(axis=-1))
+
+
+_THUMBNAIL_PX = 640
+_QUALITY = 60
+
+_STYLE = """
+body{font:15px/1.35 system-ui,sans-serif;margin:1.5rem;color:#222;background:#fafafa}
+main{display:grid;grid-template-columns:repeat(auto-fill,minmax(22rem,1fr));gap:1rem}
+figure{margin:0;padding:.6rem;background:#fff;border:1px solid #ccc;border-left:.5rem solid #c47f00}
+figure.sure{border-left-color:#2a7d2a}
+img{width:100%;height:auto;display:block}
+figcaption b{font-size:1.1em}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Thumbnail:
+    """A page's small picture, JPEG."""
+
+    jpeg: bytes
+
+
+def thumbnail(grey: GreyImage, quarter_turns: int = 0) -> Thumbnail:
+    """The page reduced, turned counter-clockwise by quarters."""
+    small = np.rot90(shrink(grey, min(1.0, _THUMBNAIL_PX / max(grey.shape))), quarter_turns)
+    image = np.ascontiguousarray(small)[:, :, None]
+    return Thumbnail(simplejpeg.encode_jpeg(image, quality=_QUALITY, colorspace="GRAY"))
+
+
+def contact_sheet(entries: Sequence[tuple[Suggestion, Thumbnail]], lang: str = "en") -> str:
+    """A self-contained HTML page: every page's picture, its file, the student suggested, and why."""
+    words = tongue(lang)
+    title = escape(words.gettext(N_("Whose page is whose")))
+    advice = escape(
+        words.gettext(
+            N_("Check the pages with an orange edge, correct the draft, and hand it in as the roster.")
+        )
+    )
+    figures = "\n".join(_figure(suggestion, picture, words) for suggestion, picture in entries)
+    return (
+        f'<!doctype html>\n<html lang="{words.lang}"><head><meta charset="utf-8"><title>{title}</title>'
+        f"<style>{_STYLE}</style></head>\n<body><h1>{title}</h1><p>{advice}</p>\n<main>\n{figures}\n</main></body></html>\n"
+    )
+
+
+def _figure(suggestion: Suggestion, picture: Thumbnail, words: Tongue) -> str:
+    image = base64.b64encode(picture.jpeg).decode("ascii")
+    row = suggestion.row
+    if row is None:
+        who = words.gettext(N_("nobody is suggested"))
+    else:
+        variant = [
+            f"{label} = {value}"
+            for label, value in (("n", row.n), (words.gettext(N_("position")), row.position))
+            if value is not None
+        ]
+        who = ", ".join([row.student_id, row.name, *variant])
+    kind = "sure" if suggestion.sure else "check"
+    source = escape(str(suggestion.source))
+    return (
+        f'<figure class="{kind}"><img alt="{source}" src="data:image/jpeg;base64,{image}">'
+        f"<figcaption><b>{escape(who)}</b><br>{source}<br><small>{escape(suggestion.why)}</small></figcaption></figure>"
+    )

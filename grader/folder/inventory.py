@@ -1,0 +1,169 @@
+"""Page inventory: what a folder holds, before anything is marked.
+
+Files, pages, blank backs, QR codes, measurements; everything but the roster and the files of tools. Each
+file is opened and each page is decoded in a worker: a page that ends its worker is that page's problem
+alone. What an earlier run found in a file of the same content is not looked for again.
+"""
+
+import os
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from grader.documents import UnmatchedDocument
+from grader.folder.cache import PageCache
+from grader.folder.workers import Pool
+from grader.inputs.measurements import Measurements, Names, read_measurements, students_in
+from grader.records import PageRef, Problem
+from grader.scan.decode.limits import load
+from grader.scan.decode.pages import count_pages
+from reference.errors import InputFileError
+
+_TOOL_NAMES = frozenset(
+    {"thumbs.db", "desktop.ini", "layout.json", "results.json", "summary.csv", "index.html", "truth.jsonl"}
+)
+_TOOL_STARTS = (".", "~$", "__MACOSX")
+_TOOL_ENDS = (".part", ".tmp", ".bak", ".crdownload", "~")
+_FILE_TYPES = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".csv", ".json"})
+_DIGITS = re.compile(r"(\d+)")
+
+
+def is_tool_file(name: str) -> bool:
+    """Whether a file's name is one that editors, systems or planmark itself leave behind."""
+    lower = name.lower()
+    return lower in _TOOL_NAMES or name.startswith(_TOOL_STARTS) or lower.endswith(_TOOL_ENDS)
+
+
+def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[Path] = ()) -> list[Path]:
+    """The files handed in, at any depth, in natural order (s2 before s10).
+
+    Arguments
+    ---------
+    roster : the roster's path, which is no submission wherever it lies; a `roster.csv` at the
+        folder's top is none either
+    passed_over : files and folders that are none, such as the folder of results
+
+    A folder that cannot be opened is one, and an empty folder named as a file: somebody must be told.
+    Links that lead out of the folder are passed over: a submission is a file, not a way to others.
+    """
+    top = folder.resolve()
+    none = {path.resolve() for path in (*passed_over, *([roster] if roster else []), folder / "roster.csv")}
+    found: list[Path] = []
+    shut: list[Path] = []
+    for where, folders, files in os.walk(folder, onerror=lambda error: shut.append(Path(error.filename))):
+        folders[:] = [
+            name for name in folders if not is_tool_file(name) and (Path(where) / name).resolve() not in none
+        ]
+        for name in files:
+            path = Path(where) / name
+            real = path.resolve()
+            if not is_tool_file(name) and real not in none and real.is_relative_to(top):
+                found.append(path)
+        found += [Path(where) / name for name in folders if _named_as_file(Path(where) / name)]
+    return sorted(found + shut, key=lambda path: natural_key(path.relative_to(folder).as_posix()))
+
+
+def told_name(path: Path, folder: Path) -> str:
+    """A file's path in the folder as people are told it; bytes that are no text are told by number.
+
+    Archives from systems with other alphabets unpack to such names.
+    """
+    return path.relative_to(folder).as_posix().encode("utf-8", "backslashreplace").decode()
+
+
+def _named_as_file(folder: Path) -> bool:
+    """Whether a folder without anything in it is named as scans and measurements are."""
+    try:
+        return folder.suffix.lower() in _FILE_TYPES and next(folder.iterdir(), None) is None
+    except OSError:
+        return False
+
+
+def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
+    """Sorts digits as numbers, letters without regard to case."""
+    parts = (part for part in _DIGITS.split(name.lower()) if part)
+    return tuple((0, int(part)) if part.isascii() and part.isdigit() else (1, part) for part in parts)
+
+
+MEASUREMENT_TYPES = {".csv", ".json"}
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how many are done, and of how many."""
+
+
+@dataclass(frozen=True, slots=True)
+class FileContent:
+    """What was found in one file.
+
+    Attributes
+    ----------
+    pages : also those that cannot be decoded, so that their owner is told
+    measurements : of a measurement file
+    refused : a measurement file that cannot be used at all
+    students : whom such a file names in itself
+    """
+
+    pages: tuple[PageRef, ...] = ()
+    measurements: tuple[Measurements, ...] = ()
+    refused: UnmatchedDocument | None = None
+    students: tuple[str, ...] = ()
+
+
+def survey_folder(
+    files: Sequence[Path], folder: Path, names: Names, workers: Pool, progress: Progress, cache: PageCache
+) -> list[FileContent]:
+    """What each of a folder's files holds; never raises for a bad file.
+
+    Arguments: `cache` takes the pages as scanned; pages that are not there any more are dropped from it.
+    """
+    contents = [FileContent()] * len(files)
+    calls = [(path, told_name(path, folder), names) for path in files]
+    for done, (index, result) in enumerate(workers.run(open_file, calls), start=1):
+        contents[index] = _failed(calls[index][1], result) if isinstance(result, Problem) else result
+        progress("opening", done, len(calls))
+    waiting = [
+        (index, page) for index, content in enumerate(contents) for page in content.pages if not page.problem
+    ]
+    pages = {
+        index: [page for page in content.pages if page.problem] for index, content in enumerate(contents)
+    }
+    scans = workers.run(identify_page, [(cache, page) for _, page in waiting])
+    for done, (number, page) in enumerate(scans, start=1):
+        index, ref = waiting[number]
+        pages[index].append(
+            replace(ref, problem=replace(page, file=ref.file)) if isinstance(page, Problem) else page
+        )
+        progress("looking", done, len(waiting))
+    contents = [
+        replace(content, pages=tuple(sorted(pages[index], key=lambda page: page.page)))
+        for index, content in enumerate(contents)
+    ]
+    cache.drop_others(page for content in contents for page in content.pages)
+    return contents
+
+
+def open_file(path: Path, name: str, names: Names) -> FileContent:
+    """A measurement file's content, or a file's pages, counted. Raises InputFileError."""
+    if path.suffix.lower() in MEASUREMENT_TYPES:
+        try:
+            return FileContent(measurements=read_measurements(path, names, name))
+        except InputFileError as error:
+            refused = UnmatchedDocument(file=name, code=error.code, message=error.message)
+            return FileContent(refused=refused, students=students_in(path))
+    file = load(path)
+    count = count_pages(file)
+    return FileContent(
+        tuple(PageRef(name, page, count, digest=file.digest, path=path) for page in range(1, count + 1))
+    )
+
+
+def identify_page(cache: PageCache, page: PageRef) -> PageRef:
+    """A page with what is on it: blank, or whose by its QR code."""
+    return cache.identified(page)
+
+
+def _failed(name: str, problem: Problem) -> FileContent:
+    """What is known of a file that could not be opened: it is there, and why."""
+    if Path(name).suffix.lower() in MEASUREMENT_TYPES:
+        return FileContent(refused=UnmatchedDocument(file=name, code=problem.code, message=problem.message))
+    return FileContent((PageRef(name, problem=replace(problem, file=name)),))

@@ -1,0 +1,374 @@
+"""Whose page is whose: every page goes to one student and position, or to "unmatched", never lost.
+
+Sources, the first that speaks decides: the page's QR code; the roster's `scans`; the roster's order
+over one class file (`--pages-per-student`); the file's name. All that speak must agree: a page on
+which two disagree is unmatched, with both told. Codes of the problems:
+
+| code | meaning |
+|---|---|
+| owner_unknown | nothing says whose the page is |
+| owner_disagree | two sources name different students, positions or numbers |
+| owner_ambiguous | the student is known, but not which of the student's positions |
+| owner_not_listed | the QR code names somebody who is not on the roster |
+| owner_other_assignment | the QR code belongs to another assignment |
+| order_refused | the roster's order cannot be trusted over this class file |
+| scan_missing | the roster names a file, or a page, that is not there |
+"""
+
+import difflib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import PurePath
+from typing import TypeVar
+
+from grader.inputs.roster import Roster, RosterRow, ScanRef, why_no_id
+from grader.records import Identity, PageRef, Problem
+
+Row = TypeVar("Row")
+
+
+@dataclass(frozen=True, slots=True)
+class OrderRefused:
+    """Why the order says nothing. False in a condition."""
+
+    reason: str
+
+    def __bool__(self) -> bool:
+        return False
+
+
+def deal(
+    blank: Sequence[bool], rows: Sequence[Row], waiting: Sequence[Row], each: int
+) -> dict[int, Row] | OrderRefused:
+    """The row of each page, by the page's place in the file from 0; blank pages are dealt to nobody.
+
+    Arguments
+    ---------
+    blank : for each page of the file
+    rows : the roster's rows in order
+    waiting : those of them that have no pages elsewhere; dealt to where all `rows` do not come out even
+    each : pages per row
+    """
+    if each < 1:
+        raise ValueError(f"pages per student must be 1 or more, not {each}")
+    ways = (_drawn(blank), list(range(len(blank))), _fronts(blank))
+    for candidates in (rows, waiting):
+        for places in ways:
+            if candidates and len(places) == each * len(candidates):
+                dealt = zip(places, (row for row in candidates for _ in range(each)), strict=True)
+                return {place: row for place, row in dealt if not blank[place]}
+    drawn = len(_drawn(blank))
+    return OrderRefused(
+        f"{drawn} pages that are not blank cannot be {each} for each of {len(rows)} lines of the roster;"
+        " name the pages in the roster's scans, `planmark match` makes a draft"
+    )
+
+
+def _drawn(blank: Sequence[bool]) -> list[int]:
+    """Places of the pages that are not blank."""
+    return [place for place, empty in enumerate(blank) if not empty]
+
+
+def _fronts(blank: Sequence[bool]) -> list[int]:
+    """Places of the fronts of a duplex scan whose backs are all blank; none for anything else."""
+    return list(range(0, len(blank), 2)) if len(blank) % 2 == 0 and all(blank[1::2]) else []
+
+
+class How(Enum):
+    """What says whose a page is, in the order in which they decide."""
+
+    CODE = "QR code"
+    SCANS = "roster's scans"
+    ORDER = "roster's order"
+    NAME = "file name"
+
+
+@dataclass(frozen=True, slots=True)
+class Owned:
+    """A page that has its owner."""
+
+    source: PageRef
+    student_id: str
+    n: int | None
+    position: int | None
+    how: tuple[How, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Unmatched:
+    """A page without an owner, why, and the students whose it may be."""
+
+    source: PageRef
+    problem: Problem
+    students: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Ownership:
+    """What becomes of every page.
+
+    Attributes
+    ----------
+    owned, unmatched, blank : each page is in exactly one of them, in the order given
+    problems : what concerns no single page: files that the roster names and that are not there
+    """
+
+    owned: tuple[Owned, ...]
+    unmatched: tuple[Unmatched, ...]
+    blank: tuple[PageRef, ...]
+    problems: tuple[Problem, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Claim:
+    """What one source says of a page: the rows it may belong to, and how to tell it."""
+
+    how: How
+    rows: tuple[RosterRow, ...]
+    told: str
+
+
+def assign_pages(
+    pages: Sequence[PageRef],
+    roster: Roster | None,
+    assignment_id: str,
+    *,
+    pages_per_student: int | None = None,
+    student_ids: Iterable[str] = (),
+) -> Ownership:
+    """Give every page its owner.
+
+    Arguments
+    ---------
+    roster : None where there is none; students are then those whom codes, file names and
+        `student_ids` (of measurement files, for example) name
+    pages_per_student : pages that each student has in the one class file, blank ones not counted
+    """
+    listed = roster if roster is not None else _improvised(pages, student_ids)
+    certain = [_certain_claims(page, listed) for page in pages]
+    order, refusals = _order_claims(pages, listed, certain, pages_per_student)
+    owned: list[Owned] = []
+    unmatched: list[Unmatched] = []
+    blank: list[PageRef] = []
+    for index, page in enumerate(pages):
+        if page.blank and page.identity is None:
+            blank.append(page)
+            continue
+        claims = [*certain[index], *([order[index]] if index in order else [])]
+        settled = _settle(page, claims, listed, assignment_id, refusals.get(page.file))
+        if isinstance(settled, Owned):
+            owned.append(settled)
+        else:
+            students = dict.fromkeys(row.student_id for claim in claims for row in claim.rows)
+            unmatched.append(Unmatched(page, settled, tuple(students)))
+    return Ownership(tuple(owned), tuple(unmatched), tuple(blank), tuple(_missing_scans(pages, listed)))
+
+
+def student_of_name(file: str, student_ids: Iterable[str]) -> str | None:
+    """The student whom a file's name tells: its stem, or its longest part before a ``_``, is an id."""
+    known = set(student_ids)
+    part = PurePath(file).stem
+    while part:
+        if part in known:
+            return part
+        part = part.rpartition("_")[0]
+    return None
+
+
+def _improvised(pages: Sequence[PageRef], student_ids: Iterable[str]) -> Roster:
+    """A roster from what the pages say, for a folder that has none.
+
+    Nobody is on it under an id that could not name a folder of its own.
+    """
+    rows: dict[tuple[str, int | None], RosterRow] = {}
+    spelled: dict[str, str] = {}
+
+    def add(row: RosterRow) -> None:
+        other = spelled.setdefault(row.student_id.lower(), row.student_id)
+        if other == row.student_id and why_no_id(row.student_id) is None:
+            rows[row.student_id, row.position] = row
+
+    for page in pages:
+        if page.identity is not None:
+            identity = page.identity
+            add(RosterRow(identity.student_id, n=identity.n, position=identity.position))
+    known = {student for student, _ in rows}
+    for student in student_ids:
+        if student not in known:
+            add(RosterRow(student))
+    stems = {PurePath(page.file).stem for page in pages if page.identity is None and not page.blank}
+    for stem in sorted(stems, key=lambda stem: (len(stem), stem)):
+        # A second sheet's s07_2 belongs to s07 where there is one.
+        if student_of_name(f"{stem}.x", spelled.values()) is None:
+            add(RosterRow(stem))
+    return Roster("", tuple(rows.values()))
+
+
+def _certain_claims(page: PageRef, roster: Roster) -> list[_Claim]:
+    """What the code, the roster's scans and the file's name say."""
+    claims: list[_Claim] = []
+    if page.identity is not None:
+        claims.append(_code_claim(page.identity, roster))
+    rows = tuple(row for row in roster.rows if any(ref.covers(page.file, page.page) for ref in row.scans))
+    if rows:
+        lines = " and ".join(_who(row) for row in rows)
+        claims.append(_Claim(How.SCANS, rows, f"the roster's scans: {lines}"))
+    student = student_of_name(page.file, roster.student_ids)
+    if student is not None:
+        claims.append(_Claim(How.NAME, roster.rows_of(student), f"the file's name: {student}"))
+    return claims
+
+
+def _code_claim(identity: Identity, roster: Roster) -> _Claim:
+    rows = tuple(
+        row
+        for row in roster.rows_of(identity.student_id)
+        if identity.position is None or row.position in (None, identity.position)
+    )
+    numbers = (("n", identity.n), ("position", identity.position))
+    details = [f"{name} {value}" for name, value in numbers if value is not None]
+    return _Claim(How.CODE, rows, "the QR code: " + ", ".join([identity.student_id, *details]))
+
+
+def _order_claims(
+    pages: Sequence[PageRef], roster: Roster, certain: Sequence[Sequence[_Claim]], each: int | None
+) -> tuple[dict[int, _Claim], dict[str, str]]:
+    """What the roster's order says of the one class file's pages, by index; or why not, by file."""
+    if each is None:
+        return {}, {}
+    named = {
+        page.file
+        for page, claims in zip(pages, certain, strict=True)
+        if any(c.how is How.NAME for c in claims)
+    }
+    files = list(dict.fromkeys(page.file for page in pages if page.pages > 1 and page.file not in named))
+    if len(files) != 1:
+        reason = f"one class file is expected, there are {len(files)}: {', '.join(files)}"
+        return {}, dict.fromkeys(files, reason)
+    file = files[0]
+    indices = [
+        index
+        for index, page in enumerate(pages)
+        if page.file == file and not any(claim.how is How.SCANS for claim in certain[index])
+    ]
+    rows = [row for row in roster.rows if all(ref.file != file for ref in row.scans)]
+    elsewhere = _rows_elsewhere(pages, certain, file)
+    dealt = deal(
+        [pages[index].blank for index in indices],
+        rows,
+        [row for row in rows if row.line not in elsewhere],
+        each,
+    )
+    if isinstance(dealt, OrderRefused):
+        return {}, {file: dealt.reason}
+    claims_by_index = {
+        indices[place]: _Claim(How.ORDER, (row,), f"the roster's order: {_who(row)}")
+        for place, row in dealt.items()
+    }
+    for index, claim in claims_by_index.items():
+        for other in certain[index]:
+            if not pages[index].blank and not _common([claim, other]):
+                reason = f"it is disproved on page {pages[index].page}: {other.told}; {claim.told}"
+                # Pages with no other source may be shifted just as well; those that agree may stay.
+                kept = {i: c for i, c in claims_by_index.items() if certain[i]}
+                return kept, {file: reason}
+    return claims_by_index, {}
+
+
+def _rows_elsewhere(pages: Sequence[PageRef], certain: Sequence[Sequence[_Claim]], file: str) -> set[int]:
+    """Lines of the rows that have pages in other files."""
+    return {
+        row.line
+        for page, claims in zip(pages, certain, strict=True)
+        if page.file != file and not page.blank
+        for claim in claims
+        for row in claim.rows
+    }
+
+
+def _common(claims: Sequence[_Claim]) -> tuple[RosterRow, ...]:
+    """The rows that all claims allow, in the first one's order."""
+    first, *others = claims
+    allowed = [{(row.student_id, row.position) for row in claim.rows} for claim in others]
+    return tuple(row for row in first.rows if all((row.student_id, row.position) in rows for rows in allowed))
+
+
+def _settle(
+    page: PageRef, claims: list[_Claim], roster: Roster, assignment_id: str, refusal: str | None
+) -> Owned | Problem:
+    """The owner on whom all claims agree, or the problem."""
+    claims = sorted(claims, key=lambda claim: list(How).index(claim.how))
+    identity = page.identity
+
+    def problem(code: str, message: str) -> Problem:
+        return Problem(code, f"{page}: {message}", page.file)
+
+    if identity is not None and identity.assignment != assignment_id:
+        return problem(
+            "owner_other_assignment", f"its QR code belongs to {identity.assignment}, not to {assignment_id}"
+        )
+    if not claims:
+        if refusal is not None:
+            return problem("order_refused", f"the roster's order cannot be used: {refusal}")
+        why = why_no_id(PurePath(page.file).stem)
+        refused = f"; its name is no student's id: {why}" if why and not roster.file else ""
+        return problem("owner_unknown", f"nothing says whose it is{_near(page.file, roster)}{refused}")
+    common = _common(claims)
+    if not common:
+        if identity is not None and not claims[0].rows and len(claims) == 1:
+            return problem("owner_not_listed", f"{claims[0].told}, not on the roster so")
+        return problem("owner_disagree", "; ".join(claim.told for claim in claims))
+    if len(common) > 1:
+        places = ", ".join(str(row.position) for row in common)
+        return problem(
+            "owner_ambiguous", f"{common[0].student_id} has the positions {places}; nothing says which"
+        )
+    return _owned(page, common[0], claims, problem)
+
+
+def _owned(
+    page: PageRef, row: RosterRow, claims: list[_Claim], problem: Callable[[str, str], Problem]
+) -> Owned | Problem:
+    """The row's page, unless the code's number is another."""
+    identity = page.identity
+    n, position = row.n, row.position
+    if identity is not None:
+        if None not in (identity.n, n) and identity.n != n:
+            return problem("owner_disagree", f"{claims[0].told}; the roster: {row.student_id}, n {n}")
+        n = identity.n if n is None else n
+        position = identity.position if position is None else position
+    return Owned(page, row.student_id, n, position, tuple(claim.how for claim in claims))
+
+
+def _who(row: RosterRow) -> str:
+    return row.student_id if row.position is None else f"{row.student_id}, position {row.position}"
+
+
+def _near(file: str, roster: Roster) -> str:
+    """A hint for a name that is almost an id; never more than a hint."""
+    stem = PurePath(file).stem
+    by_lower = {student.lower(): student for student in roster.student_ids}
+    found = student_of_name(f"{stem.lower()}.x", by_lower)
+    near = [found] if found else difflib.get_close_matches(stem.lower(), by_lower, n=1, cutoff=0.8)
+    return f" (is {by_lower[near[0]]} meant?)" if near else ""
+
+
+def _missing_scans(pages: Sequence[PageRef], roster: Roster) -> Iterable[Problem]:
+    there: Mapping[str, int] = {page.file: page.pages for page in pages}
+    for row in roster.rows:
+        for ref in row.scans:
+            reason = _why_missing(ref, there)
+            if reason:
+                told = f"line {row.line}: {_who(row)} has {ref} among the scans, {reason}"
+                yield Problem("scan_missing", told, roster.file)
+
+
+def _why_missing(ref: ScanRef, there: Mapping[str, int]) -> str | None:
+    if ref.file not in there:
+        near = [name for name in there if name.lower() == ref.file.lower()]
+        near = near or difflib.get_close_matches(ref.file, there, n=1, cutoff=0.8)
+        return "which is not in the folder" + (f" (is {near[0]} meant?)" if near else "")
+    if ref.page is not None and ref.page > there[ref.file]:
+        return f"which has {there[ref.file]} page(s)"
+    return None

@@ -1,0 +1,259 @@
+"""From pages with owners, measurements and the roster to each student's submission.
+
+What cannot be used, and what two students may have handed in, stands in the reports of both: nobody
+is missing where a file of theirs lies in the folder. Codes of the problems of measurements, beside
+those of `grader.folder.owners`:
+
+| code | meaning |
+|---|---|
+| measurements_unmatched | of nobody on the roster, or of nobody who is named |
+| position_disagrees | the student is on the roster, with other positions |
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import PurePath
+
+from grader.documents import UnmatchedDocument
+from grader.folder.owners import How, Owned, Ownership, student_of_name
+from grader.inputs.measurements import Measurements, StudentSubmission, combined
+from grader.inputs.roster import Roster, RosterRow, why_no_id
+from grader.records import Problem
+from reference.authored.assignment import Assignment, Variant
+from reference.errors import CallError
+
+Key = tuple[str, int | None]
+"""student_id and position."""
+_DIGITS = re.compile(r"[0-9]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Unusable:
+    """A file, page or line that cannot be used, and the students whose it may be.
+
+    Attributes
+    ----------
+    position : of those students, None where it is not known or they have it not
+    """
+
+    problems: tuple[Problem, ...]
+    students: tuple[str, ...] = ()
+    position: int | None = None
+
+
+@dataclass(slots=True)
+class _Gathered:
+    """What was handed in by one student for one position."""
+
+    row: RosterRow | None = None
+    owned: list[Owned] = field(default_factory=list)
+    measured: list[Measurements] = field(default_factory=list)
+    unusable: list[Problem] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Submissions:
+    """Everybody's, by student and position, in the order in which they were added."""
+
+    roster: Roster | None
+    by_key: dict[Key, _Gathered] = field(default_factory=dict)
+    keys: dict[str, list[Key]] = field(default_factory=dict)
+    spelled: dict[str, str] = field(default_factory=dict)
+    """Ids by their letters in lower case: folders whose names differ in case only may be one."""
+    said: dict[str, set[str]] = field(default_factory=dict)
+    """The students whom each measurement file names in itself."""
+    named: dict[str, str | None] = field(default_factory=dict)
+    """The student whom each file's name tells."""
+
+    def at(self, key: Key) -> _Gathered:
+        """One student's for one position, new where there is none yet."""
+        if key not in self.by_key:
+            self.by_key[key] = _Gathered()
+            self.keys.setdefault(key[0], []).append(key)
+            self.spelled.setdefault(key[0].lower(), key[0])
+        return self.by_key[key]
+
+    def take(self, entered: Measurements) -> Unusable | None:
+        """Add measurements to their owner's; or what keeps them from being used."""
+        student, named = entered.student_id, self.student_of_file(entered.source)
+        if student is not None and named not in {None, student}:
+            message = f"{entered.place}: the file's name says {named}, what is in it {student}"
+            problem = Problem(
+                "owner_disagree", f"{message}; it is used for neither: correct one of the two", entered.source
+            )
+            return Unusable((problem,), (str(named), student), entered.position)
+        student = named if student is None and entered.line is None else student
+        if student is None:
+            why = "; ".join(problem.message for problem in entered.problems)
+            return Unusable((_unmatched(entered, why or "nothing says whose measurements these are"),))
+        if not entered.is_usable:
+            return Unusable(entered.problems, (student,), entered.position)
+        key = self.key_of(student, entered)
+        if isinstance(key, Unusable):
+            return key
+        self.at(key).measured.append(entered)
+        return None
+
+    def student_of_file(self, file: str) -> str | None:
+        """The student whom a measurement file's name tells; none of a class's file.
+
+        Without a roster that is also the whole stem of a JSON file that names nobody, or somebody
+        whose id is made as the stem is.
+        """
+        said = self.said.get(file, set())
+        if file not in self.named:
+            ids = set(self.keys).union(*(() if self.roster is not None else self.said.values()))
+            self.named[file] = student_of_name(file, ids) if len(said) <= 1 else None
+            stem = PurePath(file).stem
+            is_json = file.lower().endswith(".json") and self.roster is None and why_no_id(stem) is None
+            if self.named[file] is None and is_json:
+                made = {_DIGITS.sub("0", student) for student in said}
+                self.named[file] = stem if made <= {_DIGITS.sub("0", stem)} else None
+        return self.named[file]
+
+    def key_of(self, student: str, entered: Measurements) -> Key | Unusable:
+        """The student and position that measurements belong to, or why there is none."""
+        keys = self.keys.get(student, [])
+        exact = (student, entered.position)
+        if entered.position is None and len(keys) == 1:
+            return keys[0]
+        if exact in self.by_key:
+            return exact
+        if self.roster is None:
+            other = self.spelled.get(student.lower(), student)
+            if other == student:
+                return exact
+            why = f"{_line(entered)}{student} differs in case only from {other}: the two would share a folder"
+            return Unusable((_unmatched(entered, why),))
+        if (student, None) in self.by_key:
+            return student, None
+        if not keys:
+            return Unusable((_unmatched(entered, f"{_line(entered)}{student} is not on the roster"),))
+        places = ", ".join(str(position) for _, position in keys)
+        if entered.position is None:
+            message = f"{entered.place}: {student} has the positions {places}; nothing says which"
+            return Unusable((Problem("owner_ambiguous", message, entered.source),), (student,))
+        message = f"{entered.place}: {student} in position {entered.position}, the roster has {places}"
+        return Unusable((Problem("position_disagrees", message, entered.source),), (student,))
+
+    def report(self, unusable: Unusable) -> None:
+        """Note it with everybody whose it may be; with a roster, with those on it alone."""
+        for student in unusable.students:
+            keys = self.keys.get(student, [])
+            exact = [key for key in keys if key[1] == unusable.position]
+            if not keys and self.roster is None and self.spelled.get(student.lower(), student) == student:
+                keys = [(student, unusable.position)]
+            for key in exact or keys:
+                self.at(key).unusable.extend(unusable.problems)
+
+
+def submissions_of(
+    assignment: Assignment,
+    roster: Roster | None,
+    ownership: Ownership,
+    measured: Sequence[Measurements],
+    lang: str,
+    *,
+    refused: Sequence[Unusable] = (),
+) -> tuple[list[StudentSubmission], list[UnmatchedDocument]]:
+    """Each student's submission (with a roster: of everybody on it), and measurements that are nobody's.
+
+    Arguments
+    ---------
+    lang : where the roster does not say
+    refused : measurement files that cannot be used, with the students whom they name in themselves
+    """
+    submissions = _Submissions(roster)
+    for row in () if roster is None else roster.rows:
+        submissions.at((row.student_id, row.position)).row = row
+    for owned in (*ownership.owned, *_blank_only(ownership, roster)):
+        submissions.at((owned.student_id, owned.position)).owned.append(owned)
+    for entered in measured:
+        said = submissions.said.setdefault(entered.source, set())
+        said.update([] if entered.student_id is None else [entered.student_id])
+    unusable = [refusal for refusal in map(submissions.take, measured) if refusal is not None]
+    pages = [Unusable((page.problem,), page.students) for page in ownership.unmatched]
+    for refusal in (*unusable, *(_by_name(submissions, file) for file in refused), *pages):
+        submissions.report(refusal)
+    students = [_submission(assignment, key, gathered, lang) for key, gathered in submissions.by_key.items()]
+    strangers = [
+        UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
+        for refusal in unusable
+        for problem in refusal.problems
+    ]
+    return students, strangers
+
+
+def _by_name(submissions: _Submissions, refused: Unusable) -> Unusable:
+    """A file that cannot be used, with the student whom its name tells among those whose it may be."""
+    file = refused.problems[0].file or ""
+    submissions.said[file] = set(refused.students)
+    named = submissions.student_of_file(file)
+    students = [named] if named is not None and named not in refused.students else []
+    return replace(refused, students=(*students, *refused.students))
+
+
+def _line(entered: Measurements) -> str:
+    return "" if entered.line is None else f"line {entered.line}, student_id: "
+
+
+def _unmatched(entered: Measurements, why: str) -> Problem:
+    return Problem("measurements_unmatched", f"{entered.source}: {why}", entered.source)
+
+
+def _blank_only(ownership: Ownership, roster: Roster | None) -> list[Owned]:
+    """Blank pages whose file's name tells a student who has no other page: to be told, not passed over."""
+    having = {owned.student_id for owned in ownership.owned}
+    found: dict[str, Owned] = {}
+    for source in ownership.blank:
+        stem = PurePath(source.file).stem
+        improvised = [stem] if why_no_id(stem) is None else []
+        student = student_of_name(source.file, improvised if roster is None else roster.student_ids)
+        if student is not None and student not in having:
+            rows = () if roster is None else roster.rows_of(student)
+            position = rows[0].position if len(rows) == 1 else None
+            found.setdefault(source.file, Owned(source, student, None, position, (How.NAME,)))
+    return list(found.values())
+
+
+def _submission(assignment: Assignment, key: Key, gathered: _Gathered, lang: str) -> StudentSubmission:
+    student_id, position = key
+    row = gathered.row or RosterRow(student_id)
+    problems = list(gathered.unusable)
+    numbers = [row.n, *(owned.n for owned in gathered.owned), *(entered.n for entered in gathered.measured)]
+    positions = [position, *(entered.position for entered in gathered.measured)]
+    n = _agreed("n", numbers, problems)
+    agreed_position = _agreed("position", positions, problems)
+    variant = _variant(assignment, n, agreed_position, problems)
+    return StudentSubmission(
+        student_id=student_id,
+        variant=variant,
+        pages=tuple(owned.source for owned in gathered.owned),
+        declared=row.scales,
+        measured=combined(gathered.measured) if gathered.measured else None,
+        lang=row.lang or lang,
+        name=row.name,
+        problems=tuple(problems),
+        has_unusable=bool(gathered.unusable),
+    )
+
+
+def _agreed(name: str, values: Iterable[int | None], problems: list[Problem]) -> int | None:
+    """The number that all sources give; where they differ, None and a problem: it is not guessed."""
+    known = list(dict.fromkeys(value for value in values if value is not None))
+    if len(known) > 1:
+        told = " and ".join(str(value) for value in known)
+        problems.append(Problem(f"{name}_disagrees", f"the sources give different {name}: {told}"))
+        return None
+    return known[0] if known else None
+
+
+def _variant(
+    assignment: Assignment, n: int | None, position: int | None, problems: list[Problem]
+) -> Variant | None:
+    try:
+        return assignment.variant(n, position)
+    except CallError as error:
+        problems.append(Problem(error.code, error.message))
+        return None

@@ -1,0 +1,416 @@
+"""Scales as students declare them: text with a unit, parsed, never guessed.
+
+Understood are quantities (``0.006 m/mm``, ``0,036 (м/с)/мм``, ``0.036 m/s·mm`` for "per mm"),
+ratios for lengths (``1:5``, ``5 cm/cm``), correspondences (``1 mm = 0.05 m/s``), the assignment's
+kind of rule (``kv = omega kL``), and chains of them (``ka = ω2kL = 16,59 (m/s2)/mm``: the last
+part that says a value counts). The result is real SI units per millimetre on paper.
+
+A declared scale that cannot be understood is a value, `Refused`, with the reason and what could be
+written instead.
+"""
+
+import re
+import unicodedata
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from grader.records import Written
+from reference.authored.assignment import Assignment, Scales, Variant
+from reference.mechanism import Crank
+
+SCALE_NAMES = ("kL", "kv", "ka")
+SURE = 0.9
+"""Probability from which a text read in a printed box is taken for what was written."""
+MAX_LENGTH = 120
+LEAST_PER_MM, MOST_PER_MM = 1e-9, 1e9
+"""No drawing has a scale beyond these, SI per millimetre."""
+MAX_EXPONENT = 6
+MAX_DEPTH = 6
+PAPER_MM_PER_M = 1000.0
+
+TIME_POWER: Mapping[str, int] = {"kL": 0, "kv": -1, "ka": -2}
+"""A scale is real over paper: the metres cancel, powers of the second stay."""
+EXAMPLES: Mapping[str, str] = {
+    "kL": "'1:5', '5 cm/cm' or '0.005 m/mm'",
+    "kv": "'0.036 (m/s)/mm' or 'kv = omega kL'",
+    "ka": "'0.108 (m/s^2)/mm' or 'ka = omega^2 kL'",
+}
+UNITS: Mapping[str, tuple[float, int, int]] = {
+    "m": (1.0, 1, 0),
+    "dm": (0.1, 1, 0),
+    "cm": (0.01, 1, 0),
+    "mm": (0.001, 1, 0),
+    "km": (1000.0, 1, 0),
+    "s": (1.0, 0, 1),
+    "sec": (1.0, 0, 1),
+    "min": (60.0, 0, 1),
+}
+"""SI factor, power of the metre, power of the second."""
+CYRILLIC: Mapping[str, str] = {
+    "м": "m",
+    "дм": "dm",
+    "см": "cm",
+    "мм": "mm",
+    "км": "km",
+    "с": "s",
+    "сек": "sec",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """A scale declared as a value: real SI units per millimetre on paper."""
+
+    per_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class ByRule:
+    """A scale declared as a product of powers of ``omega`` (of the crank) and other scales."""
+
+    powers: Mapping[str, int]
+
+    def per_mm(self, known: Mapping[str, float]) -> float:
+        """The value, from omega (rad/s) and the other scales per millimetre."""
+        value = 1.0
+        for name, power in self.powers.items():
+            value *= abs(known[name]) ** power
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """A declared scale that is not accepted, and why. False in a condition."""
+
+    why: str
+
+    def __bool__(self) -> bool:
+        return False
+
+
+ParsedScale = Declared | ByRule | Refused
+
+
+class _NotUnderstoodError(ValueError):
+    """A part of the text that is no quantity."""
+
+
+def parse_scale(name: str, text: str | float, *, bare_unit: str | None = None) -> ParsedScale:
+    """What a declared scale means.
+
+    Arguments
+    ---------
+    name : ``kL``, ``kv`` or ``ka``
+    text : as declared; a number counts as a text without a unit
+    bare_unit : the unit of a bare number where the assignment says one, such as ``(m/s)/mm``
+    """
+    cleaned = _clean(str(text))
+    if not cleaned:
+        return Refused(f"nothing is written; write {EXAMPLES[name]}")
+    if len(cleaned) > MAX_LENGTH:
+        return Refused(f"more than {MAX_LENGTH} characters; write {EXAMPLES[name]}")
+    parts = [part.strip(" ;") for part in cleaned.split("=")]
+    if any(not part for part in parts):
+        return Refused(f"'{text}' has nothing beside an equals sign; write {EXAMPLES[name]}")
+    try:
+        return _parse_chain(name, parts, bare_unit)
+    except _NotUnderstoodError as error:
+        return Refused(f"{error}; write {EXAMPLES[name]}")
+    except OverflowError:
+        return Refused(f"'{text}' is too large a number; write {EXAMPLES[name]}")
+
+
+def _parse_chain(name: str, parts: list[str], bare_unit: str | None) -> ParsedScale:
+    last = parts[-1]
+    if len(parts) == 1:
+        last = _without_label(name, last)
+    powers = _powers(last, name)
+    if powers is not None:
+        return ByRule(powers)
+    if re.search(r"omega|ω", last):
+        raise _NotUnderstoodError(f"'{last}' is no rule for {name}")
+    if ":" in last:
+        return Declared(_ratio(name, last))
+    found = _quantities(last)
+    if bare_unit is not None and found[0].is_bare:
+        found = _quantities(f"{last} {_clean(bare_unit)}")
+    fitting = {q.value for q in found if q.fits(name)}
+    if len(fitting) == 1:
+        return Declared(_positive(fitting.pop() / PAPER_MM_PER_M, last))
+    if len(parts) > 1:
+        paired = _correspondence(name, parts[-2], found)
+        if paired is not None:
+            return Declared(_positive(paired / PAPER_MM_PER_M, last))
+    raise _NotUnderstoodError(_misfit(name, last, found[0]))
+
+
+def _positive(value: float, text: str) -> float:
+    if not value > 0.0:
+        raise _NotUnderstoodError(f"'{text}': a scale is a positive number")
+    if not LEAST_PER_MM <= value <= MOST_PER_MM:
+        raise _NotUnderstoodError(f"'{text}' is no scale that anything could be drawn at")
+    return value
+
+
+def _misfit(name: str, text: str, found: "_Quantity") -> str:
+    if found.is_bare:
+        return f"'{text}' has no unit, and a unit is never guessed"
+    what = {"kL": "a length", "kv": "a velocity", "ka": "an acceleration"}[name]
+    return f"'{text}' is not {what} per length on paper"
+
+
+# Cleaning -----------------------------------------------------------------------------------------
+
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
+_SUPERSCRIPT_RUN = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺]+")
+_SIGNS = str.maketrans({
+    "·": "*", "⋅": "*", "∙": "*", "•": "*", "×": "*", "∗": "*", "÷": "/", "∕": "/", "⁄": "/",
+    "−": "-", "–": "-", "≈": "=", "≙": "=", "≃": "=", "∶": ":", "[": "(", "]": ")", "µ": "μ",
+})  # fmt: skip
+_WORD = re.compile(r"[а-яё]+", re.IGNORECASE)
+
+
+def _clean(text: str) -> str:
+    """One spelling: powers as ``^2``, products ``*``, decimal points, Latin units."""
+    text = text.translate(_SIGNS)
+    text = _SUPERSCRIPT_RUN.sub(lambda run: "^" + run[0].translate(_SUPERSCRIPTS), text)
+    text = unicodedata.normalize("NFKC", text).translate(_SIGNS).replace("**", "^")
+    text = re.sub(r"(?<=\d),(?=\d)", ".", text)
+    text = _WORD.sub(lambda word: CYRILLIC.get(word[0], word[0]), text)
+    return " ".join(text.split()).strip(" .;")
+
+
+_NAMES: Mapping[str, str] = {
+    "kL": r"(?:k|mu|μ)[_ ]?[lL]",
+    "kv": r"(?:k|mu|μ)[_ ]?[vV]",
+    "ka": r"(?:k|mu|μ)[_ ]?[aA]",
+    "omega": r"(?:omega|ω|w)(?:_?1)?",
+}
+_RATIO_WORDS = r"(?:M|М|m|sc|scale|scara|scară|масштаб)"
+
+
+def _without_label(name: str, text: str) -> str:
+    """Without a leading ``kv`` (its equals sign forgotten) or ``M`` before a ratio."""
+    text = re.sub(rf"^{_NAMES[name]}\s+(?=[\d.])", "", text)
+    return re.sub(rf"^{_RATIO_WORDS}\.?\s*(?=[\d.]+\s*:)", "", text)
+
+
+# Rules --------------------------------------------------------------------------------------------
+
+_FACTOR = re.compile(
+    rf"\s*(?P<op>[*/])?\s*(?:(?P<omega>{_NAMES['omega']})|(?P<kL>{_NAMES['kL']})|(?P<kv>{_NAMES['kv']}))"
+    r"(?:\s*\^\s*(?P<power>[1-4])|(?P<bare_power>[2-4]))?(?![\d.])"
+)
+
+
+def _powers(text: str, name: str) -> dict[str, int] | None:
+    """The powers of a rule such as ``omega^2 kL`` or ``kv^2/kL``; None where it is no rule for `name`.
+
+    ``ω2`` can mean the square, or link 2: it is the square where only that has the right unit.
+    """
+    powers: dict[str, int] = {}
+    place = 0
+    while place < len(text):
+        factor = _FACTOR.match(text, place)
+        if factor is None or (factor["op"] and place == 0):
+            return None
+        sign = -1 if factor["op"] == "/" else 1
+        key = next(key for key in ("omega", "kL", "kv") if factor[key])
+        power = int(factor["power"] or factor["bare_power"] or 1)
+        powers[key] = powers.get(key, 0) + sign * power
+        place = factor.end()
+    time = -powers.get("omega", 0) - powers.get("kv", 0)
+    scales = powers.get("kL", 0) + powers.get("kv", 0)
+    if name in powers or time != TIME_POWER[name] or scales != 1:
+        return None
+    return powers
+
+
+# Quantities ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Quantity:
+    """A value in SI with the powers of its units; `is_bare` when no unit stood in the text."""
+
+    value: float
+    metres: int = 0
+    seconds: int = 0
+    is_bare: bool = True
+
+    def times(self, other: "_Quantity", sign: int) -> "_Quantity":
+        if sign < 0 and other.value == 0.0:
+            raise _NotUnderstoodError("a division by zero")
+        return _Quantity(
+            self.value * other.value**sign,
+            self.metres + sign * other.metres,
+            self.seconds + sign * other.seconds,
+            self.is_bare and other.is_bare,
+        )
+
+    def fits(self, name: str) -> bool:
+        return not self.is_bare and self.metres == 0 and self.seconds == TIME_POWER[name]
+
+
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)|(?P<unit>[^\W\d_]+)|(?P<sign>[*/()^+-]))"
+)
+
+
+def _is_number(word: str) -> bool:
+    return word[:1].isdigit() or word[:1] == "."
+
+
+def _tokens(text: str) -> Iterator[str]:
+    place = 0
+    text = text.rstrip()
+    while place < len(text):
+        token = _TOKEN.match(text, place)
+        if token is None:
+            raise _NotUnderstoodError(f"'{text[place:].strip()[0]}' is not understood in '{text}'")
+        yield token[0].strip()
+        place = token.end()
+
+
+class _Reader:
+    """Recursive descent over the tokens.
+
+    `rest_is_divisor`: after a slash, everything is in the denominator, as people mean who write
+    ``m/s·mm``.
+    """
+
+    def __init__(self, text: str, *, rest_is_divisor: bool) -> None:
+        self.text, self.rest_is_divisor = text, rest_is_divisor
+        self.tokens = [*_tokens(text), ""]
+        self.place = 0
+
+    def read(self) -> _Quantity:
+        found = self.product(depth=0)
+        if self.tokens[self.place]:
+            raise _NotUnderstoodError(f"'{self.tokens[self.place]}' is not understood in '{self.text}'")
+        return found
+
+    def product(self, depth: int) -> _Quantity:
+        found = self.power(depth)
+        divided = False
+        while (word := self.tokens[self.place]) not in {"", ")", "+", "-", "^"}:
+            sign = -1 if divided and self.rest_is_divisor else 1
+            if word in "*/":
+                self.place += 1
+                if word == "/":
+                    sign, divided = -1, True
+            elif _is_number(word) and _is_number(self.tokens[self.place - 1]):
+                raise _NotUnderstoodError(f"'{self.text}' has two numbers side by side")
+            found = found.times(self.power(depth), sign)
+        return found
+
+    def power(self, depth: int) -> _Quantity:
+        is_unit = self.tokens[self.place].isalpha()
+        base = self.atom(depth)
+        exponent = self.exponent(is_unit=is_unit)
+        if exponent == 1:
+            return base
+        if base.value == 0.0:
+            raise _NotUnderstoodError(f"'{self.text}': zero has no power here")
+        return _Quantity(base.value**exponent, base.metres * exponent, base.seconds * exponent, base.is_bare)
+
+    def atom(self, depth: int) -> _Quantity:
+        word = self.tokens[self.place]
+        self.place += 1
+        if word == "(" and depth < MAX_DEPTH:
+            inside = self.product(depth + 1)
+            if self.tokens[self.place] != ")":
+                raise _NotUnderstoodError(f"'{self.text}' has a bracket that is not closed")
+            self.place += 1
+            return inside
+        if _is_number(word):
+            return _Quantity(float(word))
+        if word in UNITS:
+            factor, metres, seconds = UNITS[word]
+            return _Quantity(factor, metres, seconds, is_bare=False)
+        raise _NotUnderstoodError(f"'{word or 'the end'}' is not understood in '{self.text}'")
+
+    def exponent(self, *, is_unit: bool) -> int:
+        """``^2``, ``^-1``, ``^(-1)``; after a unit also ``s2`` and ``s-1``."""
+        raised = self.tokens[self.place] == "^"
+        if raised:
+            self.place += 1
+        bracket = raised and self.tokens[self.place] == "("
+        self.place += bracket
+        sign = self.tokens[self.place] if self.tokens[self.place] in {"-", "+"} else ""
+        digits = self.tokens[self.place + bool(sign)]
+        small = digits.isdigit() and 1 <= int(digits) <= MAX_EXPONENT
+        if not (small and (raised or is_unit)):
+            if raised or sign:
+                raise _NotUnderstoodError(f"'{self.text}' has a power that is not understood")
+            return 1
+        self.place += 1 + bool(sign)
+        if bracket and self.tokens[self.place] != ")":
+            raise _NotUnderstoodError(f"'{self.text}' has a bracket that is not closed")
+        self.place += bracket
+        return -int(digits) if sign == "-" else int(digits)
+
+
+def _quantities(text: str) -> list[_Quantity]:
+    """What the text says: read strictly, then with everything after a slash as the denominator."""
+    return [_Reader(text, rest_is_divisor=later).read() for later in (False, True)]
+
+
+def _ratio(name: str, text: str) -> float:
+    """Paper to real, ``1:5`` or ``1 cm : 5 cm``, per millimetre."""
+    sides = [side.strip() for side in text.split(":")]
+    if len(sides) != 2 or not all(sides):
+        raise _NotUnderstoodError(f"'{text}' is not a ratio of two numbers")
+    paper, real = (_quantities(side)[0] for side in sides)
+    if paper.is_bare and real.is_bare:
+        if name != "kL":
+            raise _NotUnderstoodError(f"'{text}' is a ratio of lengths")
+        if paper.value <= 0.0:
+            raise _NotUnderstoodError(f"'{text}': a scale is a positive number")
+        return _positive(real.value / paper.value / PAPER_MM_PER_M, text)
+    is_one = re.fullmatch(r"1(?:\.0*)?\s*[^\W\d]+", sides[0]) is not None
+    found = _correspondence(name, sides[0], [real]) if is_one else None
+    if found is None:
+        # "0.3 m : 60 mm" may be meant as a division: never guessed.
+        raise _NotUnderstoodError(f"'{text}' does not begin with one unit on paper, such as 1 mm")
+    return _positive(found / PAPER_MM_PER_M, text)
+
+
+def _correspondence(name: str, paper_text: str, real: list[_Quantity]) -> float | None:
+    """``10 mm = 0.05 m``: real over paper, or None where it is no such pair."""
+    try:
+        paper = _quantities(paper_text)[0]
+    except _NotUnderstoodError:
+        return None
+    if (paper.metres, paper.seconds) != (1, 0) or paper.value <= 0.0:
+        return None
+    found = {q.times(paper, -1).value for q in real if q.times(paper, -1).fits(name)}
+    return found.pop() if len(found) == 1 else None
+
+
+# Scales that count before anything is marked --------------------------------------------------------
+
+
+def sure_texts(readings: Sequence[Mapping[str, Written]]) -> dict[str, str]:
+    """What is surely read in the boxes of some pages, by scale; before anything else was read there."""
+    found: dict[str, str] = {}
+    for name in SCALE_NAMES:
+        boxes = [written[name] for written in readings if name in written]
+        if boxes and all(box.confidence >= SURE for box in boxes):
+            found[name] = max(boxes, key=lambda box: box.confidence).text
+    return found
+
+
+def declared_scales(assignment: Assignment, variant: Variant, texts: Mapping[str, str]) -> Scales:
+    """The scales that texts declare, where they can be understood; the others by the assignment's rule."""
+    known: dict[str, float] = {}
+    units: Mapping[str, str] = dict(assignment.file.scales.bare_units.items())
+    driver = assignment.mechanism([variant]).driver
+    omega = {"omega": abs(float(driver.omega[0]))} if isinstance(driver, Crank) else {}
+    for name, text in texts.items():
+        match parse_scale(name, text, bare_unit=units.get(name)):
+            case Declared(per_mm=value):
+                known[name] = value
+            case ByRule() as rule if rule.powers.keys() <= {**omega, **known}.keys():
+                known[name] = rule.per_mm({**omega, **known})
+    return assignment.scales([variant], **known)

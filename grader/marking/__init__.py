@@ -1,0 +1,1 @@
+"""From a comparison to points, named mistakes and a report."""

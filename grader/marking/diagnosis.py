@@ -1,0 +1,397 @@
+"""Which mistakes explain what is off: the drawing replayed with and without them.
+
+`reference.replay.replay` gives explanations of the drawing, each with the mistakes that it supposes; the
+simplest one that fits is told. First the drawing is replayed step by step. Only where that leaves
+something off are mistakes of the whole drawing tried as well (another variant's data, a plan turned as
+a whole, letters swapped) and mistakes at steps of which nothing was seen. How sure a mistake is, is its
+share among all explanations; what cannot be told apart from it is named as its rival. Drafting errors
+are measured on the drawing itself: a drawing that is right is never accused.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
+
+from grader.outcomes import NamedMistake
+from grader.records import MECHANISM
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.elements import Along, Line
+from reference.construction.graph import Construction, parameters_of
+from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
+from reference.construction.steps import Step, TwoLines
+from reference.construction.uncertainty import Skill
+from reference.replay.explanations import RARITY, Work
+from reference.replay.replay import Account, Root, replay
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A drawing to explain.
+
+    Attributes
+    ----------
+    drawing : how it should have been drawn, at the scales declared
+    work : what was drawn
+    lost : the vectors that lost points, or may lose some, with their criteria
+    assignment, variant : whose plan it should be
+    skill : of a usual hand
+    followed : scales that the drawing follows although others were declared
+    assumed : scales that nobody declared
+    scale_criteria : the criterion of each scale that lost
+    """
+
+    drawing: Drawing
+    work: Work
+    lost: Mapping[str, str]
+    assignment: Assignment
+    variant: Variant
+    skill: Skill
+    followed: Mapping[str, float] = field(default_factory=dict)
+    assumed: frozenset[str] = frozenset()
+    scale_criteria: Mapping[str, str] = field(default_factory=dict)
+
+
+SURE_TOGETHER = 0.8
+"""A mistake and its rivals are told together when one of them it is, this surely."""
+LEAST_RIVAL = 0.1
+"""A rival less likely than this is not named."""
+MOST_RIVALS = 3
+SUSPICIOUS, GROSS = 2.0, 5.0
+"""Standard deviations of this hand: what is off by less than the latter at a step is no mistake to be
+named. (Where it is not off at all, the mistake showed elsewhere.)"""
+OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
+RPM_WITHIN = 0.03
+"""Relative: a scale off by 30/pi (squared for accelerations) this nearly was made from rev/min."""
+SCALES = frozenset({"kL", "kv", "ka"})
+
+Key = tuple[str, str]
+
+
+def told(accounts: Sequence[Account], case: Case, least: float) -> tuple[NamedMistake, ...]:
+    """The mistakes of the likeliest account that are sure enough, in the order of construction."""
+    if not accounts:
+        return ()
+    best = accounts[0]
+    shares = _Shares(accounts)
+    explained = _explained(best, case)
+    found = []
+    for mistake in _in_order(best.made, case.drawing.construction):
+        share = shares.of(_key(mistake))
+        rivals = shares.rivals(_key(mistake), {_key(one) for one in best.made})
+        together = share + sum(shares.instead(_key(mistake), _key(one)) for one in rivals)
+        if _is_slight(mistake, best):
+            continue
+        if share < least and (together < SURE_TOGETHER or not rivals):
+            continue
+        others = tuple(_record(one, case, (), shares.instead(_key(mistake), _key(one))) for one in rivals)
+        if explained[mistake]:
+            found.append(_record(mistake, case, tuple(explained[mistake]), share, others))
+    return tuple(found)
+
+
+def _key(mistake: Mistake) -> Key:
+    return mistake.code, mistake.at
+
+
+def _is_slight(mistake: Mistake, account: Account) -> bool:
+    """Whether the step that it was made at is not far off: nothing that a hand could not do."""
+    if mistake.code in OF_THE_WHOLE:
+        return False
+    return SUSPICIOUS < account.right.get(mistake.at, 0.0) < GROSS
+
+
+class _Shares:
+    """What share of the probability accounts with a mistake have."""
+
+    def __init__(self, accounts: Sequence[Account]) -> None:
+        least = accounts[0].cost
+        weights = [math.exp((least - account.cost) / 2.0) for account in accounts]
+        whole = sum(weights)
+        self._accounts = [
+            ({_key(one): one for one in account.made}, weight / whole)
+            for account, weight in zip(accounts, weights, strict=True)
+        ]
+
+    def of(self, key: Key) -> float:
+        """Of a mistake."""
+        return sum(weight for made, weight in self._accounts if key in made)
+
+    def instead(self, key: Key, other: Key) -> float:
+        """Of another mistake without the first."""
+        return sum(weight for made, weight in self._accounts if other in made and key not in made)
+
+    def rivals(self, key: Key, best: set[Key]) -> list[Mistake]:
+        """The mistakes that stand in a mistake's place elsewhere, the likeliest first."""
+        others = {name: one for made, _ in self._accounts if key not in made for name, one in made.items()}
+        likely = [name for name in others if name not in best and self.instead(key, name) >= LEAST_RIVAL]
+        likely.sort(key=lambda name: -self.instead(key, name))
+        return [others[name] for name in likely[:MOST_RIVALS]]
+
+
+def _in_order(made: Sequence[Mistake], construction: Construction) -> list[Mistake]:
+    """Mistakes of the whole first, then step by step."""
+    order = [step.node for step in construction.steps]
+    return sorted(made, key=lambda one: order.index(one.at) if one.at in order else -1)
+
+
+def _explained(account: Account, case: Case) -> dict[Mistake, list[str]]:
+    """Which of the criteria lost each mistake explains: the nearest one before it in the construction."""
+    construction = case.drawing.construction
+    made = _in_order(account.made, construction)
+    explains: dict[Mistake, list[str]] = {
+        mistake: [name for scale, name in case.scale_criteria.items() if _is_about(mistake, scale)]
+        for mistake in made
+    }
+    reach = {mistake: affected(mistake, construction) for mistake in made}
+    for name, criterion in case.lost.items():
+        vector = construction.vectors[name]
+        if vector.head in account.unexplained:
+            continue
+        touching = [
+            one for one in made if _touches(one, vector.scale, {vector.tail, vector.head}, reach[one])
+        ]
+        own = [one for one in touching if one.at == vector.head]
+        for mistake in (own or touching)[-1:]:
+            explains[mistake].append(criterion)
+    return explains
+
+
+def _touches(mistake: Mistake, scale: str, ends: set[str], reach: frozenset[str]) -> bool:
+    if mistake.at in SCALES:
+        return mistake.at in {scale, "kL"}
+    if mistake.code == "labels_swapped":
+        return bool(ends & set(mistake.other))
+    return bool(ends & reach)
+
+
+def _is_about(mistake: Mistake, scale: str) -> bool:
+    return mistake.at == scale or mistake.code == "other_variant"
+
+
+# The record ---------------------------------------------------------------------------------------
+
+
+def _record(
+    mistake: Mistake,
+    case: Case,
+    explains: tuple[str, ...],
+    confidence: float,
+    rivals: tuple[NamedMistake, ...] = (),
+) -> NamedMistake:
+    if mistake.code == "scale_wrong":
+        mistake = replace(mistake, code=_code_of_scale(mistake.at, mistake.factor))
+    is_line = mistake.code in LINE_MISTAKES
+    line = _line_of(case.drawing.construction.step(mistake.at), mistake.slot) if is_line else {}
+    return NamedMistake(mistake, explains, min(confidence, 1.0), line, rivals)
+
+
+LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
+
+
+def _line_of(step: Step, slot: int) -> dict[str, str]:
+    """Which line of a step it is: where it starts, the link that gives its direction, if a guide does."""
+    line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None
+    if not isinstance(line, Line):
+        return {}
+    told = {"from": line.through}
+    if line.along.quarters % 2 == 0:
+        # Perpendiculars are of turning links, all else is along what something slides on.
+        told["line"] = "guide"
+    if isinstance(line.along, Along):
+        told["link"] = line.along.tail + line.along.head
+    return told
+
+
+def _code_of_scale(name: str, factor: float) -> str:
+    powers = {"kv": 1, "ka": 2}
+    rpm = RPM_FACTOR ** powers.get(name, 0)
+    return "rpm_not_converted" if name in powers and abs(factor / rpm - 1.0) <= RPM_WITHIN else "scale_wrong"
+
+
+LEAST_CONFIDENCE = 0.6
+"""An explanation less certain than this is not told."""
+FURTHER_SCALE = 4.0
+"""What it costs to suppose a further wrong scale: it often comes from the first."""
+CERTAIN = 0.9
+"""From this confidence on what follows from a mistake that nothing else shows is credited."""
+NO_STEPS = frozenset({"scale_wrong", "labels_swapped"})
+"""Mistakes that change no step: what follows from them is told by the scales and by the letters."""
+BEYOND_DOUBT = 20.0
+"""A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
+LEAST_WRONG = 0.06
+"""A scale off by a smaller share than this is nobody's mistake by name: a hand may draw so."""
+USUAL = 1.0
+HANDS = (0.6, USUAL, 1.6, 2.5, 4.0)
+"""The hands supposed, as multiples of a usual one's standard deviations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What explains a drawing.
+
+    Attributes
+    ----------
+    mistakes : those that explain what was lost, in the order of construction; none where nothing does
+    drawn : the drawing with those mistakes in it that are certain, and
+    wrong : the nodes at which it is wrong, or the mechanism; none where it is the right one
+    """
+
+    mistakes: tuple[NamedMistake, ...] = ()
+    drawn: Drawing | None = None
+    wrong: frozenset[str] = frozenset()
+
+
+def diagnose(case: Case) -> Diagnosis:
+    """The mistakes of the simplest account that fits, where a right drawing would not be believed."""
+    if not case.lost and not case.followed:
+        return Diagnosis()
+    roots = [Root(), *_other_scales(case)]
+    accounts = replay(case.drawing, case.work, roots, case.skill, cares=HANDS)
+    innocent = _innocent(accounts)
+    if accounts and not _is_clear(accounts, case):
+        accounts = _looked_into(case, roots, accounts)
+    if not accounts or innocent - accounts[0].cost < BEYOND_DOUBT:
+        return Diagnosis()
+    mistakes = told(accounts, case, LEAST_CONFIDENCE)
+    sure = {(one.code, one.at) for one in mistakes if one.confidence >= CERTAIN}
+    certain = [one for one in accounts[0].made if one.code not in NO_STEPS and (one.code, one.at) in sure]
+    joints = {step.node for step in case.drawing.construction.figures[MECHANISM]}
+    wrong = {MECHANISM if one.at in joints or one.code == "other_variant" else one.at for one in certain}
+    return Diagnosis(mistakes, _with(certain, case.drawing), frozenset(wrong))
+
+
+def _with(mistakes: Sequence[Mistake], drawing: Drawing) -> Drawing:
+    """A drawing with mistakes in it, at its own scales."""
+    for one in mistakes:
+        if one.code == "other_variant":
+            drawing = Drawing(drawing.construction, {**drawing.parameters, **one.parameters})
+        else:
+            drawing = commit(one, drawing)
+    return drawing
+
+
+def _looked_into(case: Case, roots: Sequence[Root], accounts: Sequence[Account]) -> list[Account]:
+    """The accounts with mistakes of the whole drawing among them, and with guesses at what was not seen.
+
+    A careless hand is also taken for a usual one that has made some mistake. What one mistake explains,
+    places and all, is not sought in the whole drawing.
+    """
+    best = accounts[0]
+    if not _is_explained(best) or not all(one.has_direction for one in case.work.seen):
+        roots = [*roots, *_of_the_whole(case)]
+    cares = sorted({best.care, min(best.care, USUAL)})
+    found = replay(case.drawing, case.work, roots, case.skill, cares=cares, blind=True) or [*accounts]
+    for swap in _swaps(case.drawing, found[0]):
+        root, work = Root((swap,), cost=RARITY[swap.code]), _renamed(case.work, swap.other)
+        found += replay(case.drawing, work, [root], case.skill, cares=cares)
+    return sorted(found, key=lambda account: account.cost)
+
+
+def _is_explained(account: Account) -> bool:
+    """Whether a usual hand and one mistake at most explain everything."""
+    return not account.unexplained and len(account.made) <= 1 and account.care <= USUAL
+
+
+def _innocent(accounts: Sequence[Account]) -> float:
+    """What the account costs in which everything was made rightly; infinite where it is beyond belief."""
+    return min((account.cost for account in accounts if account.is_innocent), default=math.inf)
+
+
+def _is_clear(accounts: Sequence[Account], case: Case) -> bool:
+    """Whether a usual hand made everything rightly, or one mistake at a step whose beginnings were seen.
+
+    What goes wrong in a mechanism that nobody saw shows in more than one step.
+    """
+    best, construction = accounts[0], case.drawing.construction
+    if not _is_explained(best):
+        return False
+    if not best.made:
+        return True
+    places = {one.node for one in case.work.seen if one.has_direction} | {*construction.poles.values()}
+    joints = {step.node for step in construction.figures[MECHANISM]}
+    step = next((one for one in construction.steps if one.node == best.made[0].at), None)
+    return step is not None and places.issuperset({step.node, *step.needs} - joints)
+
+
+# Mistakes of the whole drawing --------------------------------------------------------------------
+
+
+def _other_scales(case: Case) -> Iterator[Root]:
+    """The drawing at the scales that it follows, where others were declared.
+
+    A plan may be drawn to another scale throughout, or start from a crank's vector that is, while what is
+    computed from it is computed at the scale declared.
+    """
+    factors = {
+        name: float(case.drawing.parameters[name]) / followed for name, followed in case.followed.items()
+    }
+    made = tuple(
+        Mistake("scale_wrong", name, factor=factor)
+        for name, factor in factors.items()
+        if abs(math.log(factor)) > LEAST_WRONG
+    )
+    if not made:
+        return
+    scales = {name: np.asarray(followed) for name, followed in case.followed.items()}
+    starts = {
+        name: value * factor
+        for name, value in case.drawing.parameters.items()
+        for scale, factor in factors.items()
+        if name.startswith(f"{scale[1]}_")
+    }
+    for parameters in (scales, starts):
+        yield Root(made, parameters, cost=RARITY["scale_wrong"] + FURTHER_SCALE * (len(made) - 1))
+
+
+def _of_the_whole(case: Case) -> Iterator[Root]:
+    """A plan turned as a whole; another variant's data."""
+    for plan in case.drawing.construction.poles:
+        for quarters in (1, 2, 3):
+            turned = Mistake("figure_rotated", plan, quarters=quarters)
+            yield Root((turned,), turned={plan: 1j**quarters}, cost=RARITY["figure_rotated"])
+    yield from _other_variants(case)
+
+
+def _other_variants(case: Case) -> Iterator[Root]:
+    """Another student's data, all else right."""
+    variants = case.assignment.variants()
+    scales = case.assignment.scales(variants, kL=float(case.drawing.parameters["kL"]))
+    together = parameters_of(case.assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
+    table = {
+        name: np.broadcast_to(value, (len(variants),))
+        for name, value in together.items()
+        if name not in SCALES - case.assumed and np.ndim(value) and np.ptp(value) > 0.0
+    }
+    for index, variant in enumerate(variants):
+        if variant != case.variant and table:
+            parameters = {name: np.asarray(value[index]) for name, value in table.items()}
+            other = Mistake(
+                "other_variant", "mechanism", n=variant.n, position=variant.position, parameters=parameters
+            )
+            yield Root((other,), parameters, cost=RARITY["other_variant"])
+
+
+def _swaps(drawing: Drawing, account: Account) -> Iterator[Mistake]:
+    """Two images of a plan with each other's letters, both of which are off by the likeliest account."""
+    construction = drawing.construction
+    off = {*account.unexplained, *(mistake.at for mistake in account.made)}
+    for figure, pole in construction.poles.items():
+        images = sorted(
+            v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
+        )
+        for pair in combinations(images, 2):
+            if off >= set(pair):
+                yield Mistake("labels_swapped", pair[0], other=pair)
+
+
+def _renamed(work: Work, pair: tuple[str, ...]) -> Work:
+    """What was drawn, under the right names where two letters were swapped."""
+    other = {pair[0]: pair[1], pair[1]: pair[0]}
+    seen = (
+        replace(one, node=other.get(one.node, one.node), tail=other.get(one.tail or "", one.tail))
+        for one in work.seen
+    )
+    return replace(work, seen=tuple(seen))

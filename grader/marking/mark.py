@@ -1,0 +1,289 @@
+"""Judging one submission: comparison, diagnosis and points, in their order."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grader.comparison.criteria import Comparison, compare
+from grader.comparison.evidence import Evidence, Submission
+from grader.comparison.own import Sketch
+from grader.comparison.task import Task
+from grader.documents import Verdict
+from grader.marking.diagnosis import LEAST_CONFIDENCE, Case, diagnose
+from grader.outcomes import Judgement, NamedMistake, Outcome, Score
+from grader.rubric import CriterionTable, RubricFile
+from reference.construction.elements import Coriolis, Normal, Parameters
+from reference.construction.mistakes import Drawing, Mistake
+from reference.construction.steps import Given
+from reference.construction.uncertainty import trace
+from reference.geometry import ComplexArray
+from reference.replay.explanations import Seen, Spread, Work
+
+DECIMALS = 6
+"""Points are told to so many decimals; more is the computer's rounding."""
+
+
+def share_of(rubric: RubricFile, criterion: CriterionTable, verdict: Verdict) -> float:
+    """The share of a criterion's points that a verdict gives: of a partial one, that of the nearest band."""
+    bands = rubric.tolerance_of(criterion).all_bands
+    shares: Mapping[str, float] = {
+        "full": 1.0,
+        "follow_through": 1.0,
+        "partial": bands[0][1] if bands else 0.0,
+        "none": 0.0,
+    }
+    return shares[verdict]
+
+
+def score(rubric: RubricFile, outcomes: Sequence[Outcome]) -> Score:
+    """The points of all criteria and their total.
+
+    What was not judged counts neither for nor against: a section that has a weight keeps it as long as
+    any of it was judged, and the total is scaled to the rubric's. While anything is under review there
+    is no total, only what it lies between. Where nothing at all was judged, the score is open between
+    nothing and everything.
+    """
+    criteria, worth = {one.id: one for one in rubric.criterion}, rubric.points
+    weighted = {section for section in rubric.sections if getattr(rubric.weights, section) is not None}
+    points: dict[str, float | None] = {}
+    totals: dict[str, _Total] = {}
+    for outcome in outcomes:
+        criterion = criteria[outcome.criterion]
+        section = criterion.section if criterion.section in weighted else ""
+        total = totals.setdefault(section, _Total(is_weighted=bool(section)))
+        total.whole += worth[criterion.id]
+        points[criterion.id] = None
+        if outcome.verdict != "not_judged":
+            given = total.add(worth[criterion.id], *_shares(rubric, criterion, outcome))
+            points[criterion.id] = None if outcome.verdict == "review" else given
+    maximum = rubric.max_score
+    judged = sum(total.in_full for total in totals.values())
+    if judged == 0.0:
+        return Score(points, None, 0.0, maximum, maximum)
+    low, high = (
+        round(sum(ends) * maximum / judged, DECIMALS)
+        for ends in zip(*(total.ends for total in totals.values()), strict=True)
+    )
+    is_open = any(outcome.verdict == "review" for outcome in outcomes)
+    return Score(points, None if is_open else low, low, high, maximum)
+
+
+def _shares(rubric: RubricFile, criterion: CriterionTable, outcome: Outcome) -> tuple[float, float]:
+    """The shares of a criterion's points that its verdict leaves, at worst and at best."""
+    if outcome.shares:
+        return outcome.shares[0], outcome.shares[-1]
+    worst, best = (share_of(rubric, criterion, end) for end in outcome.possible)
+    return worst, best
+
+
+@dataclass(slots=True)
+class _Total:
+    """The points of a section with a weight of its own, or of all that have none."""
+
+    low: float = 0.0
+    high: float = 0.0
+    judged: float = 0.0
+    whole: float = 0.0
+    is_weighted: bool = False
+
+    def add(self, worth: float, worst: float, best: float) -> float:
+        """Count one criterion; its points at worst."""
+        self.low, self.high = self.low + worst * worth, self.high + best * worth
+        self.judged += worth
+        return round(worst * worth, DECIMALS)
+
+    @property
+    def scale(self) -> float:
+        """What its points are multiplied by for what was not judged of it."""
+        return self.whole / self.judged if self.is_weighted and self.judged else 1.0
+
+    @property
+    def in_full(self) -> float:
+        """What it could give."""
+        return self.judged * self.scale
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """What it gives at worst and at best."""
+        return self.low * self.scale, self.high * self.scale
+
+
+CHARGED = frozenset({"none", "partial"})
+LOST = CHARGED | {"follow_through", "review"}
+"""Verdicts whose cause is looked for: also where a person has still to decide."""
+LEAST_MISS_MM = 0.15
+"""However well a hand draws, and however well its drawing is read."""
+NOTHING: ComplexArray = np.zeros(0, np.complex128)
+
+
+def case_of(task: Task, comparison: Comparison) -> Case:
+    """The drawing to explain, at the scales used, with what contradicts them."""
+    scales, followed, vectors = comparison.scales, comparison.followed, task.construction.vectors
+    used = {
+        name: np.asarray(followed[name] if scale.assumed else scale.used) for name, scale in scales.items()
+    }
+    parameters = {**task.parameters, **used}
+    lost = [one for one in comparison.outcomes if one.verdict in LOST]
+    return Case(
+        drawing=Drawing(task.construction, parameters),
+        work=Work(tuple(_seen(task, comparison, parameters)), comparison.evidence.sketches),
+        lost={one.name: one.criterion for one in lost if one.name in vectors},
+        assignment=task.assignment,
+        variant=task.variant,
+        skill=task.skill,
+        followed={
+            name: other
+            for name, other in followed.items()
+            if other != scales[name].used and not scales[name].assumed
+        },
+        assumed=frozenset(name for name, scale in scales.items() if scale.assumed),
+        scale_criteria={
+            one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED
+        },
+    )
+
+
+def _seen(task: Task, comparison: Comparison, parameters: Parameters) -> list[Seen]:
+    """The student's own nodes, and the vectors that lead to none of them."""
+    evidence, construction = comparison.evidence, task.construction
+    given = {*construction.poles.values(), *task.ground}
+    seen = [
+        Seen(name, None, place, _missed_by(task, evidence, name))
+        for name, place in evidence.nodes.items()
+        if name not in given
+    ]
+    traced = None
+    for name, vector in construction.vectors.items():
+        drawn = evidence.vector(name)
+        if drawn is None or drawn.confidence < task.rubric.least_confidence or vector.head in evidence.nodes:
+            continue
+        value, read_mm = drawn.as_complex, math.hypot(LEAST_MISS_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
+        if value is not None:
+            seen.append(Seen(vector.head, vector.tail, value, _spread(NOTHING, read_mm)))
+            continue
+        # What leads to a length is not seen: all earlier errors are in it.
+        traced = traced or trace(construction, parameters, task.skill)
+        spread = _spread(traced.moved(vector.tail, vector.head), read_mm)
+        seen.append(Seen(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
+    return seen
+
+
+def _missed_by(task: Task, evidence: Evidence, node: str) -> Spread:
+    """How far a node may be missed by being read, or by the measurements that lead to it."""
+    vectors = [one for one in task.construction.vectors.values() if one.head == node]
+    hand = task.rubric.hand
+    rows: list[ComplexArray] = [NOTHING]
+    each_mm = LEAST_MISS_MM if evidence.has_sheets else hand.ruler_mm
+    for vector in vectors[:1]:
+        drawn = evidence.vector(vector.name)
+        along = None if drawn is None else drawn.as_complex
+        if along and not evidence.has_sheets:
+            # Both ends of a step are measured.
+            turned = 1j * along * math.radians(hand.protractor_deg)
+            rows.append(
+                math.sqrt(2.0) * np.array([hand.ruler_mm * along / abs(along), turned], np.complex128)
+            )
+        if along:
+            share = _computed_within(task, evidence, node, math.sqrt(2.0) * each_mm)
+            rows.append(np.array([along * share], np.complex128))
+    return _spread(np.concatenate(rows), LEAST_MISS_MM)
+
+
+def _computed_within(task: Task, evidence: Evidence, node: str, each_mm: float) -> float:
+    """The relative error of a component that is computed from velocities as they were read or measured."""
+    sources: tuple[tuple[str, str, float], ...]
+    match task.construction.step(node):
+        case Given(length=Normal(tail=tail, head=head)):
+            sources = ((tail, head, 2.0),)
+        case Given(length=Coriolis(slide=slide, turn=turn)):
+            sources = ((*slide, 1.0), (*turn, 1.0))
+        case _:
+            return 0.0
+    ends = {
+        name: place for one in sources for name in one[:2] if (place := evidence.nodes.get(name)) is not None
+    }
+    errors = [
+        power * each_mm / max(abs(ends[head] - ends[tail]), each_mm)
+        for tail, head, power in sources
+        if tail in ends and head in ends
+    ]
+    return math.hypot(*errors)
+
+
+def _spread(moved: ComplexArray, least_mm: float) -> Spread:
+    """What independent errors make of an end together: variance along x, covariance, variance along y."""
+    x, y = moved.real, moved.imag
+    return float(x @ x) + least_mm**2, float(x @ y), float(y @ y) + least_mm**2
+
+
+def judge(task: Task, submission: Submission) -> Judgement:
+    """Verdicts, mistakes and points of one submission for one variant."""
+    comparison = compare(task, submission)
+    diagnosis = diagnose(case_of(task, comparison))
+    is_turned = bool(diagnosis.wrong & task.construction.poles.keys())
+    if diagnosis.drawn and diagnosis.wrong and (is_turned or not comparison.evidence.has_sheets):
+        # Where no sheet shows what was drawn, or a plan is turned, diagnosis tells what follows from what.
+        drawn = diagnosis.drawn
+        drawn_by = Sketch("told", drawn.construction, drawn.parameters, diagnosis.wrong)
+        comparison = compare(task, submission, drawn_by)
+    mistakes = diagnosis.mistakes
+    mistakes = (*mistakes, *_swaps_seen(task, submission, mistakes), *_not_drawn(task, comparison))
+    outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
+    return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
+
+
+def _swaps_seen(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:
+    """Letters seen at each other's node on a sheet: lines tell nothing of them, so diagnosis cannot."""
+    vectors = task.construction.vectors
+    told = {one.mistake.other for one in known if one.code == "labels_swapped"}
+    found = []
+    for swap in (swap for reading in submission.readings for swap in reading.swapped):
+        pair = swap.first, swap.second
+        if swap.confidence < LEAST_CONFIDENCE or {pair, pair[::-1]} & told:
+            continue
+        told.add(pair)
+        explains = tuple(
+            one.id
+            for one in task.rubric.criterion
+            if one.name in vectors and {vectors[one.name].tail, vectors[one.name].head} & set(pair)
+        )
+        mistake = Mistake("labels_swapped", swap.first, other=pair)
+        found.append(NamedMistake(mistake, explains, swap.confidence))
+    return found
+
+
+def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
+    """Vectors that are asked for, long enough, and not on the sheet although both their ends were read.
+
+    What was not measured says nothing: nobody need measure everything.
+    """
+    evidence, construction = comparison.evidence, task.construction
+    known = {*evidence.nodes, *construction.poles.values()} if evidence.has_sheets else set()
+    found = []
+    for one in comparison.outcomes:
+        vector = construction.vectors.get(one.name)
+        if vector is None or one.verdict not in {"none", "review"} or evidence.vector(one.name) is not None:
+            continue
+        is_left_out = {vector.tail, vector.head} <= known
+        if is_left_out and (one.expected.length_mm or 0.0) >= LEAST_LEFT_OUT_MM:
+            mistake = Mistake("vector_missing", one.name)
+            found.append(NamedMistake(mistake, (one.criterion,), LEFT_OUT))
+    return found
+
+
+LEAST_LEFT_OUT_MM = 5.0
+"""A shorter one may hide in its ends' marks."""
+LEFT_OUT = 0.9
+"""How sure it is: of 368 vectors drawn between two ends read for certain, none was overlooked."""
+
+
+def _with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
+    """The outcome with the mistake that explains its loss."""
+    if outcome.verdict not in {"none", "partial"}:
+        return outcome
+    found = next((one for one in mistakes if outcome.criterion in one.explains), None)
+    if found is None or outcome.mistake is not None:
+        return outcome
+    return replace(outcome, mistake=found.code, cause=found)

@@ -1,0 +1,171 @@
+"""The report of a submission: what was judged, as the published schema has it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+
+from grader.comparison.task import Task
+from grader.documents import ReadingDocument, ReportDocument, Status
+from grader.inputs.scale_text import SCALE_NAMES
+from grader.outcomes import Judgement, NamedMistake, Outcome
+from grader.records import Figure, Problem, ScannedPage, Sheet
+from grader.rubric import RubricFile
+from reference.authored.assignment import Assignment, Variant
+
+STAGES = ("decode", "sheet", "ink", "reading")
+
+
+def reading_document(page: ScannedPage, student_id: str | None) -> ReadingDocument:
+    """The document of one page."""
+    timing = {stage: page.timing_ms.get(stage, 0.0) for stage in STAGES}
+    of_sheet = () if page.sheet is None else page.sheet.problems
+    return ReadingDocument.model_validate(
+        {
+            "source": page.ref.file,
+            "page": page.ref.page,
+            "student_id": student_id,
+            "sheet": None if page.sheet is None else _sheet(page.sheet),
+            "figures": {name: _figure(figure) for name, figure in page.reading.figures.items()},
+            "unread": page.reading.unread,
+            "problems": (*of_sheet, *page.problems, *page.reading.problems),
+            "timing_ms": {**timing, "total": sum(timing.values())},
+        }
+    )
+
+
+def _sheet(sheet: Sheet) -> dict[str, object]:
+    stored = sheet.mm_to_px if sheet.lens is None else sheet.lens.stored
+    fields = {name: getattr(sheet, name) for name in ("method", "px_per_mm", "rotation_deg", "residual_mm")}
+    return {**fields, "mm_to_px": stored.tolist()}
+
+
+def _figure(figure: Figure) -> dict[str, object]:
+    nodes = {
+        name: {
+            "x_mm": node.at.real,
+            "y_mm": -node.at.imag,
+            "se_mm": node.se_mm,
+            "confidence": node.confidence,
+        }
+        for name, node in figure.nodes.items()
+    }
+    return {"nodes": nodes, "vectors": figure.vectors}
+
+
+def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
+    task: Task,
+    judgement: Judgement,
+    student_id: str,
+    *,
+    language: str = "en",
+    sentences: Mapping[str, str] | None = None,
+    problems: Sequence[Problem] = (),
+    sheets: Sequence[ReadingDocument] = (),
+    sources: Mapping[str, str] | None = None,
+) -> ReportDocument:
+    """The report of a judged submission.
+
+    Arguments
+    ---------
+    sentences : the feedback's, by criterion id, in the student's language
+    sources : where each scale was declared
+    """
+    titles = {one.id: one.title.in_language(language) for one in task.rubric.criterion}
+    maxima = task.rubric.points
+    refused = [
+        Problem("scale_refused", f"{name}: {scale.refused}")
+        for name, scale in judgement.scales.items()
+        if scale.refused
+    ]
+    return ReportDocument.model_validate(
+        {
+            **_head(task.assignment, task.variant, student_id),
+            "status": "needs_review" if judgement.needs_review else "graded",
+            "score": judgement.score.total,
+            "score_range": (judgement.score.low, judgement.score.high),
+            "max_score": judgement.score.maximum,
+            "criteria": [
+                {
+                    **_criterion(outcome),
+                    "title": titles[outcome.criterion],
+                    "points": judgement.score.points[outcome.criterion],
+                    "max_points": maxima[outcome.criterion],
+                    "feedback": (sentences or {}).get(outcome.criterion, ""),
+                }
+                for outcome in judgement.outcomes
+            ],
+            "mistakes": [
+                {
+                    **_mistake(mistake),
+                    "explains": mistake.explains,
+                    "rivals": [*map(_mistake, mistake.rivals)],
+                }
+                for mistake in judgement.mistakes
+            ],
+            "scales": {
+                name: {**asdict(scale), "source": (sources or {}).get(name)}
+                for name, scale in judgement.scales.items()
+            },
+            "problems": [*problems, *refused],
+            "reading": {"sheets": sheets},
+        }
+    )
+
+
+def unjudged_report(  # noqa: PLR0913 - as above
+    assignment: Assignment,
+    rubric: RubricFile,
+    variant: Variant,
+    student_id: str,
+    status: Status,
+    *,
+    problems: Sequence[Problem] = (),
+    sheets: Sequence[ReadingDocument] = (),
+) -> ReportDocument:
+    """The report of a submission that is missing or unreadable: no score, the reasons in `problems`."""
+    return ReportDocument.model_validate(
+        {
+            **_head(assignment, variant, student_id),
+            "status": status,
+            "score": None,
+            "score_range": None,
+            "max_score": rubric.max_score,
+            "problems": problems,
+            "reading": {"sheets": sheets},
+        }
+    )
+
+
+def _head(assignment: Assignment, variant: Variant, student_id: str) -> dict[str, object]:
+    return {
+        "student_id": student_id,
+        "assignment": assignment.id,
+        "variant": {} if variant.n is None else {"n": variant.n},
+        "position": variant.position,
+    }
+
+
+def _criterion(outcome: Outcome) -> dict[str, object]:
+    """What the outcome itself says."""
+    is_scale = outcome.name in SCALE_NAMES
+    is_vector = not is_scale and "_" in outcome.name
+    return {
+        "id": outcome.criterion,
+        "vector": outcome.name if is_vector else None,
+        "link": outcome.name if not is_scale and not is_vector else None,
+        "verdict": outcome.verdict,
+        "measured": outcome.measured,
+        "expected": outcome.expected,
+        "tolerance": outcome.tolerance,
+        "confidence": outcome.confidence,
+        "mistake": outcome.mistake,
+        "reasons": [reason.code for reason in outcome.reasons],
+    }
+
+
+def _mistake(mistake: NamedMistake) -> dict[str, object]:
+    """What a mistake and a rival have in common."""
+    detail = ", ".join(
+        f"{key} = {value:.6g}" if isinstance(value, float) else f"{key} = {value}"
+        for key, value in mistake.detail.items()
+    )
+    return {"code": mistake.code, "at": mistake.at, "confidence": mistake.confidence, "detail": detail}

@@ -1,0 +1,102 @@
+"""A student's check of the own measurements: right, or off and in which way, and no answer given away.
+
+Three levels: ``symbol`` says right or off; ``hint`` also in which way (too long, turned left); ``full``,
+for instructors, has the numbers and the most likely mistake. What a level must not tell is not in
+the result at all.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from grader.comparison.evidence import Submission
+from grader.comparison.task import Task
+from grader.marking.mark import judge
+from grader.outcomes import Judgement, NamedMistake, Outcome, Quantity, Reason, Tolerance
+
+Level = Literal["symbol", "hint", "full"]
+LEVELS: tuple[Level, ...] = ("symbol", "hint", "full")
+Result = Literal["right", "off", "open"]
+
+TELLING = frozenset({"what", "of"})
+"""Parameters of reasons that name things and hold no numbers: these a hint may have."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """One value checked.
+
+    Attributes
+    ----------
+    criterion, name : as in the rubric
+    result : right, off, or open where it cannot be told
+    reasons : why, in the order of weight; without numbers at level ``hint``, empty at ``symbol``
+    measured, expected, tolerance, mistake : the evidence, at level ``full`` only
+    """
+
+    criterion: str
+    name: str
+    result: Result
+    reasons: tuple[Reason, ...] = ()
+    measured: Quantity | None = None
+    expected: Quantity | None = None
+    tolerance: Tolerance | None = None
+    mistake: str | None = None
+
+
+def self_check(task: Task, submission: Submission, level: Level = "hint") -> tuple[Checked, ...]:
+    """Check everything that was handed in, in the rubric's order; what was not is passed over."""
+    return told(judge(task, submission), level)
+
+
+def told(judgement: Judgement, level: Level) -> tuple[Checked, ...]:
+    """What a judgement may tell at a level."""
+    return tuple(_checked(one, level) for one in judgement.outcomes if _is_handed_in(one))
+
+
+def likely_mistakes(judgement: Judgement, level: Level) -> tuple[NamedMistake, ...]:
+    """The mistakes that explain what is off, at level `full`."""
+    return judgement.mistakes if level == "full" else ()
+
+
+def is_all_right(checked: tuple[Checked, ...]) -> bool:
+    """Whether nothing is off or open."""
+    return all(one.result == "right" for one in checked)
+
+
+def _is_handed_in(outcome: Outcome) -> bool:
+    absent = {"not_measured", "optional", "unread", "scale_assumed"}
+    return outcome.verdict not in {"not_judged", "review", "none"} or not (
+        absent & {reason.code for reason in outcome.reasons[:1]}
+    )
+
+
+def _checked(outcome: Outcome, level: Level) -> Checked:
+    result = _result(outcome)
+    if level == "symbol":
+        return Checked(outcome.criterion, outcome.name, result)
+    if level == "hint":
+        hints = tuple(_without_numbers(reason) for reason in outcome.reasons)
+        return Checked(outcome.criterion, outcome.name, result, hints)
+    return Checked(
+        outcome.criterion,
+        outcome.name,
+        result,
+        outcome.reasons,
+        outcome.measured,
+        outcome.expected,
+        outcome.tolerance,
+        outcome.mistake,
+    )
+
+
+def _result(outcome: Outcome) -> Result:
+    if outcome.verdict in {"full", "follow_through"}:
+        return "right"
+    return "off" if outcome.verdict in {"partial", "none"} else "open"
+
+
+def _without_numbers(reason: Reason) -> Reason:
+    """A reason without what would give the answer away; a refused scale is told in full."""
+    if reason.code in {"scale_refused", "unread"}:
+        return reason
+    return Reason(reason.code, {key: value for key, value in reason.params.items() if key in TELLING})

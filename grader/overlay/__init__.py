@@ -1,0 +1,1 @@
+"""Pictures of a drawing with what was read on it."""

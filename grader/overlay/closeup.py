@@ -1,0 +1,220 @@
+"""Close-ups of a sheet as SVG: the whole, each plan, what a mistake concerns."""
+
+import base64
+import math
+from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
+
+from markupsafe import Markup
+
+from grader.overlay.scene import Arrow, Ghost, Layer, Picture, Scene, between, is_in, layers_of
+from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Box
+from reference.drawing.canvas import FONTS, elements
+
+CLOSE_UP_MARGIN_MM = 12.0
+LEAST_CLOSE_UP_MM = 60.0
+CLOSE_UP_BELOW = 0.55
+"""A plan smaller than this share of the sheet is worth a close-up."""
+WIDE_TO_HIGH = (1.3, 1.9)
+"""Aspects of close-ups that sit well on a page."""
+DETAIL_MARGIN_MM = 8.0
+LEAST_DETAIL_MM = 36.0
+LONG_MM, OFF_BY_LITTLE = 30.0, 0.25
+"""Of vectors this long that are off by less than this share, only the ends are looked at."""
+SAME_PLACE_MM = 0.05
+CUTS = 64
+MOST_DETAIL_SHARE = 0.8
+"""A detail as large as this share of the sheet shows nothing that the whole does not."""
+WHOLE_SIZE_PER_MM = 0.0041
+CLOSE_UP_SIZE_PER_MM = 0.0105
+DETAIL_SIZE_PER_MM = 0.0145
+"""Size of marks and letters by the width shown: close-ups stand two in a row, details up to three."""
+LEAST_SIZE, LARGEST_SIZE = 0.3, 3.0
+WRONG = frozenset({"none", "partial"})
+
+_NO_NAMES: Mapping[str, str] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """One look at a page.
+
+    Attributes
+    ----------
+    kind : ``sheet``, ``velocity_plan``, ``acceleration_plan`` or ``detail``
+    picture : index of the page among the submission's pictures, from 0
+    box : what of the page is seen
+    names : the vectors that are named in it
+    """
+
+    kind: str
+    picture: int
+    box: Box
+    layers: tuple[Layer, ...]
+    names: tuple[str, ...]
+
+
+def looks_at(picture: Picture, index: int, names: Mapping[str, str] = _NO_NAMES) -> list[Look]:
+    """The whole sheet, then each plan that is small on it close up; `names` as students know them."""
+    scene = picture.scene
+    close_ups = {
+        figure: box
+        for figure in (VELOCITY_PLAN, ACCELERATION_PLAN)
+        if (box := _close_up(_part(scene, figure))) is not None
+    }
+    if not picture.scan:
+        # Nothing else is on the page than the plans themselves.
+        figures = dict.fromkeys(arrow.figure for arrow in scene.arrows)
+        boxes = {
+            figure: _box(_arrows_of(scene, figure), scene, CLOSE_UP_MARGIN_MM, LEAST_CLOSE_UP_MM)
+            for figure in figures
+        }
+        return [_plan(scene, index, figure, box, names) for figure, box in boxes.items()]
+    whole = (0.0, 0.0, *scene.page_mm)
+    named = [arrow for arrow in scene.arrows if arrow.figure not in close_ups and arrow.is_named]
+    layers = _marks(scene, whole, WHOLE_SIZE_PER_MM, named, names)
+    return [
+        Look("sheet", index, whole, layers, tuple(arrow.name for arrow in named)),
+        *(_plan(scene, index, figure, box, names) for figure, box in close_ups.items()),
+    ]
+
+
+def _plan(scene: Scene, index: int, figure: str, box: Box, names: Mapping[str, str]) -> Look:
+    part = _part(scene, figure)
+    layers = _marks(part, box, CLOSE_UP_SIZE_PER_MM, part.arrows, names)
+    return Look(figure, index, box, layers, tuple(arrow.name for arrow in part.arrows))
+
+
+def detail(
+    pictures: Collection[Picture], concerned: AbstractSet[str], names: Mapping[str, str] = _NO_NAMES
+) -> Look | None:
+    """A look at some vectors and what was expected of them; None where none of them is drawn.
+
+    Long vectors that are off by little are looked at where the first of them ends.
+    """
+    for index, picture in enumerate(pictures):
+        arrows = [arrow for arrow in picture.scene.arrows if arrow.name in concerned]
+        if not arrows:
+            continue
+        figure = arrows[0].figure
+        part = replace(
+            _part(picture.scene, figure),
+            arrows=tuple(arrow for arrow in arrows if arrow.figure == figure),
+            ghosts=tuple(
+                ghost for ghost in picture.scene.ghosts if ghost.name in concerned and ghost.figure == figure
+            ),
+        )
+        box = _tips_of(part) or _box([*part.arrows, *part.ghosts], part, DETAIL_MARGIN_MM, LEAST_DETAIL_MM)
+        if picture.scan and box[2] > MOST_DETAIL_SHARE * part.page_mm[0]:
+            return None
+        others = [arrow for arrow in _arrows_of(picture.scene, figure) if arrow not in part.arrows]
+        named = [cut for arrow in part.arrows if (cut := _within(arrow, box)) is not None]
+        layers = _marks(part, box, DETAIL_SIZE_PER_MM, named, names, others)
+        return Look("detail", index, box, layers, tuple(arrow.name for arrow in named))
+    return None
+
+
+def _tips_of(part: Scene) -> Box | None:
+    """A box around the end of the first vector and where it should be, None where all of it tells more."""
+    first = part.arrows[0]
+    ends = [arrow for arrow in part.arrows if math.dist(arrow.tip, first.tip) < SAME_PLACE_MM]
+    aims = [ghost for ghost in part.ghosts if ghost.name in {arrow.name for arrow in ends}]
+    longest = max(arrow.length for arrow in ends)
+    off = max((math.dist(ghost.tip, first.tip) for ghost in aims), default=0.0)
+    if not aims or longest < LONG_MM or off > OFF_BY_LITTLE * longest:
+        return None
+    points = [Ghost("", "", first.tip, ghost.tip) for ghost in aims]
+    return _box(points, part, 2 * DETAIL_MARGIN_MM, LEAST_DETAIL_MM)
+
+
+def _within(arrow: Arrow, box: Box) -> Arrow | None:
+    """The part of an arrow that is in a box, to be named there; None where all of it is elsewhere."""
+    steps = [between(arrow.tail, arrow.tip, share / CUTS) for share in range(CUTS + 1)]
+    inside = [step for step in steps if is_in(step, box)]
+    return replace(arrow, tail=inside[0], tip=inside[-1]) if inside else None
+
+
+def _arrows_of(scene: Scene, figure: str) -> list[Arrow]:
+    return [arrow for arrow in scene.arrows if arrow.figure == figure]
+
+
+def _part(scene: Scene, figure: str) -> Scene:
+    """A figure of a scene; what waits for a person has its ghost in close-ups of it alone."""
+    return replace(
+        scene,
+        arrows=tuple(_arrows_of(scene, figure)),
+        ghosts=tuple(ghost for ghost in scene.ghosts if ghost.figure == figure and ghost.verdict in WRONG),
+        dots=tuple(dot for dot in scene.dots if dot.figure in {"", figure}),
+    )
+
+
+# Where to look ------------------------------------------------------------------------------------
+
+
+def _close_up(part: Scene) -> Box | None:
+    """A box around a plan, None where it would show hardly more than the whole sheet."""
+    if not part.arrows:
+        return None
+    box = _box([*part.arrows, *part.ghosts], part, CLOSE_UP_MARGIN_MM, LEAST_CLOSE_UP_MM)
+    wide, high = part.page_mm
+    if box[2] > CLOSE_UP_BELOW * wide or box[3] > CLOSE_UP_BELOW * high * 1.3:
+        return None
+    return box
+
+
+def _box(things: Collection[Arrow | Ghost], scene: Scene, margin_mm: float, least_mm: float) -> Box:
+    """A box around arrows and ghosts, of a shape that sits well on a page, inside the sheet."""
+    xs = [x for one in things for x in (one.tail[0], one.tip[0])]
+    ys = [y for one in things for y in (one.tail[1], one.tip[1])]
+    wide, high = scene.page_mm
+    width = max(max(xs) - min(xs) + 2 * margin_mm, least_mm)
+    height = max(max(ys) - min(ys) + 2 * margin_mm, width / WIDE_TO_HIGH[1])
+    width = max(width, height * WIDE_TO_HIGH[0])
+    x = min(max((min(xs) + max(xs) - width) / 2, 0.0), max(wide - width, 0.0))
+    y = min(max((min(ys) + max(ys) - height) / 2, 0.0), max(high - height, 0.0))
+    return (x, y, width, height)
+
+
+def _marks(
+    scene: Scene,
+    box: Box,
+    size_per_mm: float,
+    named: Collection[Arrow],
+    names: Mapping[str, str],
+    faint: Collection[Arrow] = (),
+) -> tuple[Layer, ...]:
+    """The marks in a box, as large as suits its width on the page."""
+    size = min(max(size_per_mm * box[2], LEAST_SIZE), LARGEST_SIZE)
+    return layers_of(scene, box, named, names, size=size, faint=faint)
+
+
+# As elements of a page ----------------------------------------------------------------------------
+
+
+def scan_element(picture: Picture, index: int) -> Markup:
+    """The scan itself, to be shown by its name in every look at the page; empty where there is none."""
+    if not picture.scan:
+        return Markup("")
+    width, height = picture.scene.page_mm
+    kind = "png" if picture.scan.startswith(b"\x89PNG") else "jpeg"
+    return Markup(
+        '<image id="scan-{}" width="{}" height="{}" preserveAspectRatio="none"'
+        ' href="data:image/{};base64,{}"/>'
+    ).format(index, width, height, kind, base64.b64encode(picture.scan).decode("ascii"))
+
+
+def svg(look: Look, picture: Picture, told: str) -> Markup:
+    """A look; `told` says in words what is seen. The scan is taken from the page's `scan_element`."""
+    image = Markup('<use href="#scan-{}"/>').format(look.picture) if picture.scan else Markup("")
+    return Markup(
+        '<svg class="sheet" viewBox="{:.1f} {:.1f} {:.1f} {:.1f}" role="img" aria-label="{}"'
+        ' font-family="{}">{}<g class="marks">{}</g></svg>'
+    ).format(*look.box, told, FONTS, image, Markup("").join(_elements(look)))
+
+
+def _elements(look: Look) -> Iterator[Markup]:
+    for layer in look.layers:
+        shapes = Markup("".join(elements(layer.shapes)))  # noqa: S704 - written by the canvas
+        opaque = layer.opacity == 1.0
+        yield shapes if opaque else Markup('<g opacity="{:g}">{}</g>').format(layer.opacity, shapes)

@@ -1,0 +1,157 @@
+"""Plans as a student measured them: drawn from the entered lengths and directions, without a scan.
+
+Each vector starts where the others lead to, from the pole on; so what does not close is seen. A length
+without a direction can only be drawn along the expected direction, where that may be shown.
+"""
+
+import cmath
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from grader.outcomes import Outcome
+from grader.overlay.scene import LEAST_ARROW_MM, XY, Arrow, Dot, Ghost, Picture, Scene
+from grader.records import Reading
+from reference.construction.graph import Construction, Vector
+
+MARGIN_MM = 14.0
+GAP_MM = 22.0
+OFF = frozenset({"none", "partial", "review"})
+
+
+def measured_picture(
+    source: str,
+    reading: Reading,
+    construction: Construction,
+    outcomes: Mapping[str, Outcome],
+    *,
+    show_expected: bool,
+) -> Picture | None:
+    """The plans as measured; None where too little was entered to draw them.
+
+    Arguments
+    ---------
+    reading : the entered lengths and directions
+    outcomes : by vector name
+    show_expected : whether expected vectors may be seen: as ghosts, and as directions not entered
+    """
+    drawn = {}
+    for figure, pole in construction.poles.items():
+        if figure in reading.figures:
+            plan = _plan(figure, pole, reading, construction, outcomes, show_expected=show_expected)
+            if plan.arrows:
+                drawn[figure] = plan
+    if not drawn:
+        return None
+    return Picture(source, 1, b"", b"", 0, 0, _side_by_side(list(drawn.values())))
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """One plan about its pole, millimetres, y down."""
+
+    arrows: tuple[Arrow, ...]
+    ghosts: tuple[Ghost, ...]
+    dots: tuple[Dot, ...]
+
+    @property
+    def points(self) -> list[XY]:
+        ends: list[Arrow | Ghost] = [*self.arrows, *self.ghosts]
+        return [point for one in ends for point in (one.tail, one.tip)]
+
+
+def _plan(
+    figure: str,
+    pole: str,
+    reading: Reading,
+    construction: Construction,
+    outcomes: Mapping[str, Outcome],
+    *,
+    show_expected: bool,
+) -> _Plan:
+    entered = reading.figures[figure].vectors
+    expected = {name: _expected(outcomes.get(name)) for name in entered} if show_expected else {}
+    steps: dict[str, complex] = {}
+    for name, one in entered.items():
+        if one.length_mm is None:
+            continue
+        direction = one.direction_deg
+        along = expected.get(name)
+        if one.length_mm < LEAST_ARROW_MM:
+            steps[name] = 0j
+        elif direction is not None:
+            steps[name] = cmath.rect(one.length_mm, math.radians(direction))
+        elif along:
+            steps[name] = one.length_mm * along / abs(along)
+    vectors = [vector for vector in construction.vectors_of(figure) if vector.name in steps]
+    nodes = _nodes(pole, vectors, steps)
+    arrows = tuple(_arrows(figure, vectors, steps, nodes, outcomes))
+    ghosts = tuple(
+        Ghost(one.name, figure, one.tail, (one.tail[0] + found.real, one.tail[1] - found.imag), one.verdict)
+        for one in arrows
+        if one.verdict in OFF and (found := expected.get(one.name)) is not None
+    )
+    dots = tuple(
+        Dot(name, _xy(place), doubtful=False, lettered=True, figure=figure) for name, place in nodes.items()
+    )
+    return _Plan(arrows, ghosts, dots)
+
+
+def _expected(outcome: Outcome | None) -> complex | None:
+    if outcome is None or outcome.expected.length_mm is None or outcome.expected.direction_deg is None:
+        return None
+    return cmath.rect(outcome.expected.length_mm, math.radians(outcome.expected.direction_deg))
+
+
+def _nodes(pole: str, vectors: list[Vector], steps: Mapping[str, complex]) -> dict[str, complex]:
+    """Where the vectors lead to, from the pole on."""
+    nodes = {pole: 0j}
+    found = True
+    while found:
+        found = False
+        for vector in vectors:
+            if vector.tail in nodes and vector.head not in nodes:
+                nodes[vector.head] = nodes[vector.tail] + steps[vector.name]
+                found = True
+    return nodes
+
+
+def _arrows(
+    figure: str,
+    vectors: list[Vector],
+    steps: Mapping[str, complex],
+    nodes: Mapping[str, complex],
+    outcomes: Mapping[str, Outcome],
+) -> Iterator[Arrow]:
+    for vector in vectors:
+        if vector.tail in nodes:
+            tail, outcome = nodes[vector.tail], outcomes.get(vector.name)
+            verdict = "not_judged" if outcome is None else outcome.verdict
+            tip = _xy(tail + steps[vector.name])
+            yield Arrow(vector.name, figure, _xy(tail), tip, verdict, doubtful=verdict == "review")
+
+
+def _xy(at: complex) -> XY:
+    return (at.real, -at.imag)
+
+
+def _side_by_side(plans: list[_Plan]) -> Scene:
+    """The plans beside each other on a page just large enough."""
+    left, height = MARGIN_MM, 0.0
+    arrows: list[Arrow] = []
+    ghosts: list[Ghost] = []
+    dots: list[Dot] = []
+    for plan in plans:
+        xs, ys = zip(*plan.points, strict=True)
+        by = (left - min(xs), MARGIN_MM - min(ys))
+        arrows += [replace(a, tail=_by(a.tail, by), tip=_by(a.tip, by)) for a in plan.arrows]
+        ghosts += [replace(g, tail=_by(g.tail, by), tip=_by(g.tip, by)) for g in plan.ghosts]
+        dots += [replace(d, at=_by(d.at, by)) for d in plan.dots]
+        left += max(xs) - min(xs) + GAP_MM
+        height = max(height, max(ys) - min(ys))
+    page = (left - GAP_MM + MARGIN_MM, height + 2 * MARGIN_MM)
+    return Scene(page, tuple(arrows), tuple(ghosts), tuple(dots))
+
+
+def _by(at: XY, by: XY) -> XY:
+    return (at[0] + by[0], at[1] + by[1])

@@ -1,0 +1,243 @@
+"""Overlay pictures: what was read, drawn on the upright scan; and the cleaned scan by itself.
+
+Pixels of the output: sheet point (x, y) mm lies at (x s - 0.5, y s - 0.5) from the centre of the
+top left pixel, s = width / paper's width.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from importlib.resources import files
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from grader.outcomes import Outcome
+from grader.overlay.scene import XY, Picture, Scene, between, layers_of, scene_of
+from grader.records import Backdrop, FloatArray, GreyImage, Page, Reading, Sheet
+from reference.construction.graph import Vector
+from reference.drawing.canvas import Area, Curve, Label, Ring, Shape, Stroke, set_pieces
+
+ColourImage = NDArray[np.uint8]
+Colour = tuple[int, int, int]
+
+WIDTH_PX = 2000
+INK_STRENGTH = 1.25
+"""Pencil is shown darker than it is, so that it can be followed under the overlay,"""
+DARKEST = 0.8
+"""and ink lighter, so that the overlay stands out."""
+PAPER_FROM = 0.90
+"""Share of the local paper's brightness from which everything is shown white."""
+_TONES = np.array(
+    [
+        255.0 - 255.0 * min(INK_STRENGTH * (1.0 - min(share / 255.0 / PAPER_FROM, 1.0)), DARKEST)
+        for share in range(256)
+    ],
+    dtype=np.uint8,
+)
+"""What is shown for each share of the paper's brightness, 0..255."""
+PNG_COMPRESSION = 1
+_FEW_TONES = np.array([17 * round(tone / 17) for tone in range(256)], dtype=np.uint8)
+"""Sixteen tones: pencil and ink look the same, and a PNG is half a JPEG."""
+_FLAT_PNG = [
+    cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE,
+]  # fmt: skip
+"""Of pictures that are white for the most part."""
+FRACTION_BITS = 4
+JPEG_QUALITY = 78
+
+
+def backdrop(page: Page, sheet: Sheet | None, *, width_px: int = WIDTH_PX) -> Backdrop:
+    """The scan to draw on; `sheet` is None where the page could not be registered."""
+    if sheet is None:
+        scan = _clean(_turned(page, width_px))
+        height, width = scan.shape
+        return Backdrop(page.source, page.page, scan, (420.0, 420.0 * height / width), registered=False)
+    scan = _clean(_upright(page.grey, sheet, width_px))
+    return Backdrop(page.source, page.page, scan, sheet.page_mm, registered=True)
+
+
+def overlay(
+    behind: Backdrop,
+    reading: Reading | None,
+    vectors: Mapping[str, Vector],
+    outcomes: Mapping[str, Outcome],
+    links: Mapping[str, tuple[str, str]] | None = None,
+    *,
+    show_expected: bool = False,
+) -> Picture:
+    """A page with what was read on it.
+
+    Arguments
+    ---------
+    reading : None where the page could not be read: the scan alone is shown
+    vectors : the construction's vectors, which say from what node to what node each goes
+    outcomes : by vector name; read vectors without an outcome are shown as not judged
+    links : the joints of the mechanism's links by name; those with an outcome are shown
+    show_expected : whether wrong vectors have the expected one ghosted in
+    """
+    scan = behind.scan
+    height, width = scan.shape
+    scene = Scene(behind.page_mm)
+    if behind.registered and reading is not None:
+        scene = scene_of(
+            behind.page_mm, reading, vectors, outcomes, show_expected=show_expected, links=links or {}
+        )
+    plain = _grey(cv2.LUT(scan, _FEW_TONES))
+    png = _encode(".png", paint(plain, scene), _FLAT_PNG)
+    return Picture(behind.source, behind.page, png, _smaller(scan, plain), width, height, scene)
+
+
+def _smaller(scan: GreyImage, plain: GreyImage) -> bytes:
+    """A cleaned scan as a small file: pencil on white paper needs few tones, a photo's shades many."""
+    jpeg = _encode(".jpg", scan, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return min(jpeg, _encode(".png", plain, _FLAT_PNG), key=len)
+
+
+def _encode(kind: str, image: NDArray[np.uint8], options: list[int]) -> bytes:
+    encoded, data = cv2.imencode(kind, image, options)
+    if not encoded:
+        raise ValueError(f"expected an image that can be stored as {kind}, got shape {image.shape}")
+    return bytes(data.tobytes())
+
+
+# The scan -----------------------------------------------------------------------------------------
+
+
+def _turned(page: Page, width_px: int) -> GreyImage:
+    """The page turned as its file asks, at most so wide."""
+    grey = np.rot90(page.grey, page.turn_deg // 90)
+    scale = min(1.0, width_px / grey.shape[1])
+    size = (max(1, round(grey.shape[1] * scale)), max(1, round(grey.shape[0] * scale)))
+    return _grey(cv2.resize(np.ascontiguousarray(grey), size, interpolation=cv2.INTER_AREA))
+
+
+def _upright(grey: GreyImage, sheet: Sheet, width_px: int) -> GreyImage:
+    """The sheet upright, the paper's width across `width_px`."""
+    scale = width_px / sheet.page_mm[0]
+    size = (width_px, max(1, round(sheet.page_mm[1] * scale)))
+    shrink = max(1, int(sheet.px_per_mm / scale))
+    if shrink > 1:
+        # Averaging before the warp: a warp alone would skip pixels, and with them thin lines.
+        smaller = (max(1, grey.shape[1] // shrink), max(1, grey.shape[0] // shrink))
+        grey = _grey(cv2.resize(grey, smaller, interpolation=cv2.INTER_AREA))
+    to_mm = np.array([[1 / scale, 0, 0.5 / scale], [0, 1 / scale, 0.5 / scale], [0, 0, 1]])
+    # The centre of pixel i of the shrunken image lies at shrink * i + (shrink - 1) / 2 of the stored one.
+    offset = (shrink - 1) / 2
+    shrunk = np.array([[1 / shrink, 0, -offset / shrink], [0, 1 / shrink, -offset / shrink], [0, 0, 1]])
+    output_to_stored: FloatArray = shrunk @ sheet.mm_to_px @ to_mm
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return _grey(
+        cv2.warpPerspective(
+            grey, output_to_stored, size, flags=flags, borderMode=cv2.BORDER_CONSTANT, borderValue=(255.0,)
+        )
+    )
+
+
+def _clean(grey: GreyImage) -> GreyImage:
+    """Shadows evened out, paper white, strokes of one strength."""
+    height, width = grey.shape
+    small = cv2.resize(grey, (max(1, width // 8), max(1, height // 8)), interpolation=cv2.INTER_AREA)
+    paper = cv2.GaussianBlur(cv2.dilate(small, np.ones((7, 7), np.uint8)), (0, 0), 5)
+    level = cv2.resize(paper, (width, height), interpolation=cv2.INTER_LINEAR)
+    return _grey(cv2.LUT(cv2.divide(grey, level, scale=255.0), _TONES))
+
+
+def _grey(image: NDArray[np.generic]) -> GreyImage:
+    return np.asarray(image, dtype=np.uint8)
+
+
+# The painter --------------------------------------------------------------------------------------
+
+
+def paint(scan: GreyImage, scene: Scene) -> ColourImage:
+    """The scene drawn on a scan that shows exactly its page; (h, w, 3) uint8, blue green red."""
+    image: ColourImage = np.asarray(cv2.cvtColor(scan, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+    px_per_mm = scan.shape[1] / scene.page_mm[0]
+    # What waits for a person may well be right: its ghost is for a closer look.
+    ghosts = tuple(ghost for ghost in scene.ghosts if ghost.verdict != "review")
+    named = [arrow for arrow in scene.arrows if arrow.is_named]
+    for layer in layers_of(replace(scene, ghosts=ghosts), (0.0, 0.0, *scene.page_mm), named, {}):
+        over = image if layer.opacity == 1.0 else image.copy()
+        for shape in layer.shapes:
+            _paint_shape(over, shape, px_per_mm)
+        if over is not image:
+            cv2.addWeighted(over, layer.opacity, image, 1.0 - layer.opacity, 0.0, dst=image)
+    return image
+
+
+def _paint_shape(image: ColourImage, shape: Shape, px_per_mm: float) -> None:
+    """One shape with sub-pixel ends; the image is changed."""
+    smooth = (cv2.LINE_AA, FRACTION_BITS)
+
+    def thick(width_mm: float) -> int:
+        return max(1, round(width_mm * px_per_mm))
+
+    match shape:
+        case Stroke(start=start, end=end, width=width, colour=colour, dash=dash):
+            for piece in _dashes(start, end, dash):
+                first, last = _fixed_point(piece, px_per_mm).tolist()
+                cv2.line(image, first, last, _bgr(colour), thick(width), *smooth)
+        case Ring(centre=centre, radius=radius, width=width, colour=colour, fill=fill):
+            (at,), reach = _fixed_point((centre,), px_per_mm).tolist(), radius * px_per_mm * 2**FRACTION_BITS
+            if fill != "none":
+                cv2.circle(image, at, round(reach), _bgr(fill), cv2.FILLED, *smooth)
+            if width > 0.0:
+                cv2.circle(image, at, round(reach), _bgr(colour), thick(width), *smooth)
+        case Area(points=points, fill=fill):
+            cv2.fillPoly(image, [_fixed_point(points, px_per_mm)], _bgr(fill), *smooth)
+        case Curve(points=points, width=width, colour=colour):
+            corners, is_closed = _fixed_point(points, px_per_mm), False
+            cv2.polylines(image, [corners], is_closed, _bgr(colour), thick(width), *smooth)
+        case Label():
+            _write(image, shape, px_per_mm)
+
+
+def _write(image: ColourImage, label: Label, px_per_mm: float) -> None:
+    """A text; the image is changed."""
+    for piece in set_pieces(label.text, label.size):
+        x = (label.left + piece.right) * px_per_mm - 0.5
+        y = (label.at[1] - piece.above) * px_per_mm - 0.5
+        font = _font(round(piece.size * px_per_mm, 1))
+        left, top, right, bottom = font.getbbox(piece.text, anchor="ls")
+        rows = slice(max(0, math.floor(y + top)), max(0, math.ceil(y + bottom) + 1))
+        columns = slice(max(0, math.floor(x + left)), max(0, math.ceil(x + right) + 1))
+        picture = Image.fromarray(image[rows, columns])
+        pen = ImageDraw.Draw(picture)
+        at = (x - columns.start, y - rows.start)
+        pen.text(at, piece.text, _bgr(label.colour), font, anchor="ls")
+        image[rows, columns] = np.asarray(picture)
+
+
+@cache
+def _font(size_px: float) -> ImageFont.FreeTypeFont:
+    file = files("grader") / "data" / "fonts" / "DejaVuSansCondensed-Bold.ttf"
+    return ImageFont.truetype(str(file), size_px)
+
+
+def _bgr(colour: str) -> Colour:
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return (blue, green, red)
+
+
+def _fixed_point(points: Sequence[XY], px_per_mm: float) -> NDArray[np.int32]:
+    """(n, 2) pixels times 2**FRACTION_BITS, as cv2 takes them."""
+    pixels = (np.array(points) * px_per_mm - 0.5) * 2**FRACTION_BITS
+    return np.asarray(np.rint(pixels), dtype=np.int32)
+
+
+def _dashes(start: XY, end: XY, dash: tuple[float, ...]) -> Iterator[tuple[XY, XY]]:
+    """The pieces of a line, of equal length, the first and last at its ends; cv2 has no dashed lines."""
+    length = math.dist(start, end)
+    if not dash or length < dash[0]:
+        yield start, end
+        return
+    on, off = dash
+    count = max(1, round((length + off) / (on + off)))
+    pitch = (length + off) / count
+    for index in range(count):
+        first, last = index * pitch, (index + 1) * pitch - off
+        yield between(start, end, first / length), between(start, end, last / length)

@@ -1,1 +1,0 @@
-"""The construction of a plan step by step, in words and pictures, in the student's language."""

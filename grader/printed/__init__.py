@@ -1,0 +1,1 @@
+"""What planmark prints: answer sheets, their markers, zones and cells."""

@@ -1,0 +1,531 @@
+"""Printable answer sheets of a class, and the calibration page."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import segno
+from reportlab.lib.units import mm
+
+from grader.inputs.roster import RosterRow
+from grader.language import N_, Tongue, tongue
+from grader.printed.layout import (
+    CALIBRATION,
+    CODE_MM,
+    EASY_FIELDS,
+    SCALE_BOXES,
+    WHOLE_CELLS,
+    Fit,
+    Layout,
+    PageLayout,
+    Template,
+    best_template,
+    code_of,
+    comb_cells,
+    combs_of,
+    construction_for,
+    field_boxes,
+    marker_places,
+    poles_mm,
+)
+from grader.printed.pdf import (
+    BOLD,
+    GREY,
+    REGULAR,
+    Drawing,
+    decimal_mark,
+    fitted,
+    number,
+    pieces_width_mm,
+    runs,
+    unprintable,
+    width_mm,
+    wrap,
+)
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity, Problem
+from grader.rubric import RubricFile
+from reference.authored.assignment import Assignment, PageTable, Variant
+from reference.construction.derive import construction_of
+from reference.drawing.canvas import Piece, pieces_of
+from reference.errors import AuthoredFileError, CallError, Finding
+
+FIGURES = {
+    MECHANISM: N_("Mechanism"),
+    VELOCITY_PLAN: N_("Velocity plan"),
+    ACCELERATION_PLAN: N_("Acceleration plan"),
+}
+KINDS = {
+    "all": N_("Mechanism, velocities and accelerations"),
+    "velocity": N_("Velocities"),
+    "acceleration": N_("Accelerations"),
+}
+UNITS = (N_("rev/min"), N_("cm"), N_("°"))
+"""Units of given data beyond those of `grader.language`."""
+
+_STUDENT_MM: Box = (39.0, 12.5, 103.0, 36.0)
+_TASK_MM: Box = (159.0, 12.5, 113.0, 36.0)
+_ADVICE = (
+    N_("Draw with a dark, sharp pencil or pen, inside the zones; a plan best from the grey cross."),
+    N_("Draw lines through the joints, arrowheads up to 4 mm long, letters 3 mm clear of lines."),
+)
+_ADVICE_MM: Box = (39.0, 37.8, 103.0, 11.7)
+_CLEAR = N_("Leave the black squares and the code free of ink.")
+_CLEAR_MM: Box = (289.0, 43.0, 118.0, 6.0)
+_MEASURED = N_(
+    "Lengths measured on the drawing, in millimetres with one decimal: one digit in each cell, nothing else"
+)
+_MEASURED_AT_MM = (39.0, 265.2)
+_TICK_MM = 5.0
+"""Long enough to be seen, too short to be taken for a stroke."""
+_POLE_MM = (2.0, 4.5)
+"""Ends of the arms of the cross for a pole: open in the middle, where lines are to begin."""
+_FAINT, _FAINT_PEN_MM = 0.9, 0.25
+"""Lighter than any pencil: people see it, and no stroke is found in it on a scan."""
+_CELL_GREY = 0.6
+"""Light enough that the digits' ink stands out."""
+_RULER_MM = (24.0, 291.0, 100.0)
+"""Left end, height and length of the line that must measure 100 mm."""
+_PT = 1.0 / mm
+"""Millimetres in a point."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageText:
+    """What is the student's own on a page.
+
+    Attributes
+    ----------
+    sheet, sheets : this page's number among the student's, from 1, and how many there are
+    poles : where a plan is best begun, x, y in sheet mm by figure
+    """
+
+    identity: Identity
+    name: str
+    sheet: int
+    sheets: int
+    poles: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class PageForm:
+    """What is alike on a page for every student.
+
+    Attributes
+    ----------
+    template : the page's
+    fields : boxes to write in, by scale or vector
+    poles : the names of the plans' poles, by figure
+    """
+
+    template: Template
+    fields: dict[str, Box]
+    poles: dict[str, str]
+
+
+def draw_page(
+    drawing: Drawing,
+    assignment: Assignment,
+    text: PageText,
+    form: PageForm,
+    tongue: Tongue,
+) -> None:
+    """Draw a page and end it."""
+    drawing.frame()
+    drawing.markers(form.template)
+    _code(drawing, text.identity)
+    _student(drawing, assignment, text, tongue)
+    _task(drawing, assignment, text.identity, tongue)
+    _advice(drawing, tongue)
+    for figure, zone in form.template.zones.items():
+        _zone(drawing, zone, tongue.gettext(FIGURES[figure]))
+    for figure, at in text.poles.items():
+        pole = form.poles[figure]
+        _pole(drawing, at, assignment.file.names.get(pole, pole))
+    _fields(drawing, assignment, form.fields, tongue)
+    draw_ruler(drawing, tongue)
+    drawing.next_page()
+
+
+def _code(drawing: Drawing, identity: Identity) -> None:
+    x, y, side, _ = CODE_MM
+    modules = [list(map(bool, row)) for row in segno.make(code_of(identity), error="m", micro=False).matrix]
+    quiet = 4
+    module = side / (len(modules) + 2 * quiet)
+    drawing.cells((x + quiet * module, y + quiet * module), module, runs(modules), 0.0)
+
+
+def _student(drawing: Drawing, assignment: Assignment, text: PageText, tongue: Tongue) -> None:
+    x, y, wide, _ = _STUDENT_MM
+    identity = text.identity
+    title = [assignment.file.title.in_language(tongue.lang)]
+    drawing.paragraphs((x, y + 3.5, wide, 9.0), title, (10.0, 9.0, 8.0), BOLD)
+    variant = [
+        f"{label} = {value}"
+        for label, value in (("n", identity.n), (tongue.gettext(N_("position")), identity.position))
+        if value is not None
+    ]
+    sheet = tongue.gettext(N_("sheet {number} of {count}")).format(number=text.sheet, count=text.sheets)
+    name = wrap(text.name, BOLD, 12.0, wide)[:1] or [""]
+    drawing.text((x, y + 13.5), name[0], 12.0, BOLD)
+    whose = [",  ".join([identity.student_id, *variant])]
+    drawing.paragraphs((x, y + 18.8, wide, 4.6), whose, (10.0, 8.0, 6.5))
+    drawing.text((x, y + 23.6), f"{tongue.gettext(KINDS[identity.kind])}, {sheet}", 9.0)
+
+
+def _task(drawing: Drawing, assignment: Assignment, identity: Identity, tongue: Tongue) -> None:
+    """The task in words at the largest size that leaves room for the data below it."""
+    x, y, wide, high = _TASK_MM
+    task = assignment.file.task.in_language(tongue.lang)
+    data = _given(assignment, Variant(identity.n, identity.position), tongue)
+    for size in (8.5, 8.0, 7.5, 7.0, 6.5, 6.0):
+        step = 1.3 * size * _PT
+        rows = _flow(data, size, wide)
+        if len(wrap(task, REGULAR, size, wide)) * step + len(rows) * step <= high:
+            break
+    _, lines = fitted([task], REGULAR, (size,), (wide, high - len(rows) * step))
+    base = y + size * _PT
+    for line in lines:
+        drawing.text((x, base), line, size)
+        base += step
+    base += min(1.0, y + high - base)
+    for row in rows:
+        at = x
+        for datum in row:
+            at = drawing.pieces((at, base), datum, size, BOLD) + _SPACE_MM
+        base += step
+
+
+_SPACE_MM = 3.0
+
+
+def _given(assignment: Assignment, variant: Variant, tongue: Tongue) -> list[tuple[Piece, ...]]:
+    """The given data, each as label = value unit."""
+    values = assignment.values([variant])
+    data = []
+    for datum in assignment.file.given:
+        value = number(float(np.ravel(datum.value(values))[0]), tongue.lang)
+        unit = tongue.unit(datum.unit)
+        gap = "" if unit in {"", "°"} else "\N{NO-BREAK SPACE}"
+        data.append((*pieces_of(datum.label), Piece(f" = {value}{gap}{unit}")))
+    return data
+
+
+def _flow(data: list[tuple[Piece, ...]], size_pt: float, wide_mm: float) -> list[list[tuple[Piece, ...]]]:
+    """Data side by side in as many rows as they need."""
+    rows: list[list[tuple[Piece, ...]]] = []
+    used = wide_mm + 1.0
+    for datum in data:
+        wide = pieces_width_mm(datum, BOLD, size_pt)
+        if used + wide > wide_mm:
+            rows.append([])
+            used = 0.0
+        rows[-1].append(datum)
+        used += wide + _SPACE_MM
+    return rows
+
+
+def _advice(drawing: Drawing, tongue: Tongue) -> None:
+    """What makes a drawing easy to read, and what the registration of the scan needs."""
+    for texts, box in ((_ADVICE, _ADVICE_MM), ((_CLEAR,), _CLEAR_MM)):
+        words = [tongue.gettext(text) for text in texts]
+        drawing.paragraphs(box, words, (7.5, 7.0, 6.5, 6.0, 5.5), lines_down=1)
+
+
+def _zone(drawing: Drawing, zone: Box, title: str) -> None:
+    """Ticks just outside the zone's corners: no ink of ours where strokes are looked for."""
+    x, y, w, h = zone
+    for cx, across in ((x - 0.6, 1.0), (x + w + 0.6, -1.0)):
+        for cy, down in ((y - 0.6, 1.0), (y + h + 0.6, -1.0)):
+            drawing.line((cx, cy, cx + across * _TICK_MM, cy), 0.2, GREY)
+            drawing.line((cx, cy, cx, cy + down * _TICK_MM), 0.2, GREY)
+    drawing.text((x + _TICK_MM + 1.5, y - 0.5), title, 6.5, REGULAR, GREY)
+
+
+def _pole(drawing: Drawing, at: tuple[float, float], name: str) -> None:
+    """A faint cross, open in the middle, with the pole's letter."""
+    x, y = at
+    near, far = _POLE_MM
+    for dx, dy in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
+        drawing.line((x + near * dx, y + near * dy, x + far * dx, y + far * dy), _FAINT_PEN_MM, _FAINT)
+    drawing.text((x - 5.0, y + 5.5), name, 8.0, REGULAR, _FAINT)
+
+
+def _fields(drawing: Drawing, assignment: Assignment, fields: dict[str, Box], tongue: Tongue) -> None:
+    names = assignment.file.names
+    for name, box in fields.items():
+        x, y, _, h = box
+        shown = names.get(name, name)
+        label = _scale_label(shown) if name in SCALE_BOXES else pieces_of(shown)
+        size = 10.0 if name in SCALE_BOXES else 8.0
+        wide = pieces_width_mm(label, REGULAR, size)
+        drawing.pieces((x - wide - 0.8, y + 0.68 * h), label, size)
+        if name in SCALE_BOXES:
+            drawing.box(box, 0.25)
+        else:
+            _comb(drawing, box, tongue)
+    if fields.keys() - SCALE_BOXES.keys():
+        drawing.text(_MEASURED_AT_MM, tongue.gettext(_MEASURED), 6.5, REGULAR, GREY)
+
+
+def _comb(drawing: Drawing, box: Box, tongue: Tongue) -> None:
+    """A cell for each digit, light so that digits stand out, and the decimal mark."""
+    cells = comb_cells(box)
+    for cell in cells:
+        drawing.box(cell, 0.18, _CELL_GREY)
+    x, y, wide, high = cells[WHOLE_CELLS - 1]
+    middle = (x + wide + cells[WHOLE_CELLS][0]) / 2.0
+    mark = decimal_mark(tongue.lang)
+    drawing.text((middle - width_mm(mark, BOLD, 11.0) / 2.0, y + high - 1.0), mark, 11.0, BOLD)
+
+
+def _scale_label(name: str) -> tuple[Piece, ...]:
+    """The letter k with L, v or a below it."""
+    return (Piece(name[:1]), Piece(name[1:], -1), Piece(" =")) if len(name) > 1 else (Piece(f"{name} ="),)
+
+
+def draw_ruler(drawing: Drawing, tongue: Tongue) -> None:
+    """A line of exactly 100 mm below the frame, to see at a glance whether the printer shrank the page."""
+    x, y, long = _RULER_MM
+    drawing.line((x, y, x + long, y), 0.2, GREY)
+    for end in (x, x + long):
+        drawing.line((end, y - 1.2, end, y + 1.2), 0.2, GREY)
+    words = tongue.gettext(N_("This line must measure 100 mm: print at 100 %, without fitting to the page."))
+    drawing.text((x + long + 3.0, y + 0.8), words, 6.5, REGULAR, GREY)
+
+
+_SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
+
+
+@dataclass(frozen=True, slots=True)
+class Sheets:
+    """A printable document.
+
+    Attributes
+    ----------
+    pdf : the file's bytes
+    layout : what `layout.json` says
+    problems : what the instructor should know: figures that are too large for their zones
+    """
+
+    pdf: bytes
+    layout: Layout
+    problems: tuple[Problem, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _PagePlan:
+    """One page of the assignment: its template and boxes, the same for every student."""
+
+    table: PageTable
+    form: PageForm
+
+
+def make_sheets(
+    assignment: Assignment,
+    rows: Sequence[RosterRow],
+    lang: str = "en",
+    *,
+    roster: str = "roster.csv",
+    asked: Collection[str] | None = None,
+) -> Sheets:
+    """Answer sheets for every row of a roster: a page per page of the assignment, in the rows' order.
+
+    Arguments
+    ---------
+    rows : their `lang`, where given, goes before `lang`
+    roster : the file's name, for messages
+    asked : the vectors that have a box for the measured length, all by default
+
+    Raises AuthoredFileError with every row whose n or position does not suit the assignment.
+    """
+    variants = _variants(assignment, rows, roster)
+    plans, problems = _plans(assignment, asked)
+    poles = [poles_mm(assignment, plan.form.template, variants) for plan in plans]
+    drawing = Drawing.begin(assignment.file.title.in_language(lang))
+    for index, (row, variant) in enumerate(zip(rows, variants, strict=True)):
+        for number, plan in enumerate(plans, start=1):
+            identity = Identity(assignment.id, row.student_id, variant.n, variant.position, plan.table.kind)
+            own = {figure: places[index] for figure, places in poles[number - 1].items()}
+            text = PageText(identity, row.name, number, len(plans), own)
+            draw_page(drawing, assignment, text, plan.form, tongue(row.lang or lang))
+    layout = Layout(pages=[_layout(plan) for plan in plans])
+    return Sheets(drawing.finish(), layout, (*problems, *_unprintable(rows, roster)))
+
+
+def _unprintable(rows: Sequence[RosterRow], roster: str) -> Iterator[Problem]:
+    for row in rows:
+        letters = unprintable(row.name)
+        if letters:
+            message = f"line {row.line}: the font has no {letters}; {row.student_id}'s name has boxes instead"
+            yield Problem("sheet_letters", message, roster)
+
+
+def page_layouts(assignment: Assignment, asked: Collection[str] | None = None) -> Layout:
+    """The layout of an assignment's pages, without printing any; `asked` as for `make_sheets`."""
+    return Layout(pages=[_layout(plan) for plan in _plans(assignment, asked)[0]])
+
+
+def _variants(assignment: Assignment, rows: Sequence[RosterRow], roster: str) -> list[Variant]:
+    findings: list[Finding] = []
+    variants: list[Variant] = []
+    for row in rows:
+        try:
+            variants.append(assignment.variant(row.n, row.position))
+        except CallError as error:
+            findings.append(Finding(f"line {row.line}, {row.student_id}", error.message))
+    if findings:
+        raise AuthoredFileError(roster, tuple(findings))
+    return variants
+
+
+def _plans(
+    assignment: Assignment, asked: Collection[str] | None
+) -> tuple[list[_PagePlan], tuple[Problem, ...]]:
+    plans: list[_PagePlan] = []
+    problems: list[Problem] = []
+    for table in assignment.file.page:
+        figures = list(dict.fromkeys(table.figures))
+        fit = best_template(assignment, figures)
+        construction = construction_for(assignment, figures)
+        names = [vector.name for figure in figures for vector in construction.vectors_of(figure)]
+        boxes = _boxes(names, asked)
+        if names and not boxes and (asked is None or set(names) & set(asked)):
+            message = f"page {table.kind}: {len(names)} lengths are too many for boxes; none are printed"
+            problems.append(Problem("sheet_boxes", message, str(assignment.path)))
+        problems.extend(_too_small(assignment, table, fit))
+        scales = {_SCALE_OF[figure]: SCALE_BOXES[_SCALE_OF[figure]] for figure in figures}
+        plans.append(_PagePlan(table, PageForm(fit.template, scales | boxes, dict(construction.poles))))
+    return plans, tuple(problems)
+
+
+def cells_of(
+    assignment: Assignment, figures: Sequence[str], asked: Collection[str] | None = None
+) -> dict[str, tuple[Box, ...]]:
+    """The cells for measured lengths on a page with these figures, in the order of its zones; by vector."""
+    table = next((page for page in assignment.file.page if set(page.figures) == set(figures)), None)
+    if table is None:
+        return {}
+    construction = construction_for(assignment, table.figures)
+    ordered = dict.fromkeys(table.figures)
+    return combs_of(_boxes([v.name for figure in ordered for v in construction.vectors_of(figure)], asked))
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a rubric asks to be read on pages; everything where it asks for no vector.
+
+    Attributes
+    ----------
+    figures : those that it asks anything of, and the sketch
+    vectors : all vectors of these figures
+    cells : the printed boxes for measured lengths, by vector, for each page of the answer sheet
+    """
+
+    figures: frozenset[str] = frozenset()
+    vectors: tuple[str, ...] = ()
+    cells: Mapping[frozenset[str], Mapping[str, tuple[Box, ...]]] = field(default_factory=dict)
+
+
+def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
+    """What a rubric asks to be read."""
+    construction = construction_of(
+        assignment.mechanism(assignment.variants()[:1]),
+        accelerations=rubric.needs_accelerations,
+        plate_by_similarity=assignment.file.plate_images == "similarity",
+    )
+    known = [construction.vectors[name] for name in rubric.vectors if name in construction.vectors]
+    plans = dict.fromkeys(construction.figure_of(vector.head) for vector in known)
+    return Asked(
+        frozenset({MECHANISM, *plans} if plans else ()),
+        tuple(vector.name for plan in plans for vector in construction.vectors_of(plan)),
+        {
+            frozenset(page.figures): cells_of(assignment, page.figures, rubric.vectors)
+            for page in assignment.file.page
+        },
+    )
+
+
+def _boxes(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:
+    """The boxes for the lengths asked for.
+
+    A vector's box is where it would be if all had one: a rubric that asks for others tomorrow finds
+    those printed today in their places. Only where all would be too small are those asked for alone
+    counted.
+    """
+    if asked is None:
+        return field_boxes(tuple(names))
+    wanted = [name for name in names if name in asked]
+    boxes = field_boxes(tuple(names if len(names) <= EASY_FIELDS else wanted))
+    return {name: boxes[name] for name in wanted if name in boxes}
+
+
+def _too_small(assignment: Assignment, table: PageTable, fit: Fit) -> list[Problem]:
+    problems: list[Problem] = []
+    for figure, share in fit.room.items():
+        if share >= 1.0:
+            continue
+        wide, high = fit.need_mm[figure]
+        _, _, zone_wide, zone_high = fit.template.zones[figure]
+        message = (
+            f"page {table.kind}: {figure} needs up to {wide:.0f} x {high:.0f} mm at the assignment's scales,"
+            f" its zone has {zone_wide:.0f} x {zone_high:.0f} mm; it fits at {100 * share:.0f} % of that size"
+        )
+        problems.append(Problem("sheet_zone_small", message, str(assignment.path)))
+    return problems
+
+
+def _layout(plan: _PagePlan) -> PageLayout:
+    zones: dict[str, Box | dict[str, Box]] = {**plan.form.template.zones, "fields": plan.form.fields}
+    return PageLayout(
+        kind=plan.table.kind,
+        markers=marker_places(plan.form.template),
+        zones=zones,
+        cells=combs_of(plan.form.fields),
+    )
+
+
+_PEN_MM = 0.3
+_CALIBRATION_ADVICE = N_(
+    "Calibration page of planmark. Print it on A3 at 100 %, scan it as the drawings will be scanned, and let"
+    " planmark read it: the segments are known, so their errors are the printer's and the scanner's."
+)
+_LENGTHS_MM = (5.0, 10.0, 20.0, 40.0, 80.0)
+_ANGLES_DEG = tuple(range(0, 180, 15))
+
+
+def calibration_segments() -> FloatArray:
+    """(n, 2, 2) ends of the printed segments in mm, y down: stars of directions, ladders of lengths.
+
+    A star has twelve diameters of 60 mm, 15 degrees apart, with its middle left free; a ladder has
+    horizontal or vertical segments of 5 to 80 mm.
+    """
+    segments: list[tuple[complex, complex]] = []
+    for centre in (85.0 + 100.0j, 215.0 + 100.0j, 345.0 + 100.0j):
+        for angle in _ANGLES_DEG:
+            along = np.exp(-1j * np.radians(angle))
+            segments.append((centre + 12.0 * along, centre + 40.0 * along))
+            segments.append((centre - 12.0 * along, centre - 40.0 * along))
+    for row, length in enumerate(_LENGTHS_MM):
+        y = 165.0 + 18.0 * row
+        segments.extend((x + 1j * y, x + length + 1j * y) for x in (40.0, 140.0, 240.0))
+    for column, length in enumerate(_LENGTHS_MM):
+        x = 335.0 + 14.0 * column
+        segments.append((x + 160.0j, x + 1j * (160.0 + length)))
+    return np.array([[(end.real, end.imag) for end in ends] for ends in segments])
+
+
+def make_calibration(lang: str = "en") -> Sheets:
+    """The page that `planmark sheet --calibration` prints."""
+    words = tongue(lang)
+    drawing = Drawing.begin(words.gettext(N_("Calibration page")))
+    drawing.frame()
+    drawing.markers(CALIBRATION)
+    drawing.paragraphs(
+        (39.0, 16.0, 103.0, 36.0), [words.gettext(_CALIBRATION_ADVICE)], (9.0, 8.0, 7.0), pitch=1.3
+    )
+    for (x0, y0), (x1, y1) in calibration_segments().tolist():
+        drawing.line((x0, y0, x1, y1), _PEN_MM)
+    draw_ruler(drawing, words)
+    drawing.next_page()
+    page = PageLayout(kind="calibration", markers=marker_places(CALIBRATION), zones={"fields": {}})
+    return Sheets(drawing.finish(), Layout(pages=[page]))

@@ -1,0 +1,355 @@
+"""Where everything stands on a printed answer sheet: markers, zones, boxes, cells, the QR code's text.
+
+The zones are as large as the assignment's figures need over all its variants. Millimetres from the
+sheet's top left corner, x right, y down.
+"""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.derive import construction_of
+from reference.construction.graph import Construction, evaluate, parameters_of
+from reference.drawing.canvas import A3_MM
+from reference.geometry import ComplexArray
+
+VERSION = "planmark1"
+KINDS = ("all", "velocity", "acceleration")
+MAX_LENGTH = 200
+_NAME = r"[A-Za-z0-9._-]{1,64}"
+_NUMBER = r"(?:-?[0-9]{1,9})?"
+_CODE = re.compile(
+    rf"{VERSION}\|(?P<assignment>{_NAME})\|(?P<student>{_NAME})\|n=(?P<n>{_NUMBER})\|p=(?P<position>{_NUMBER})"
+    rf"\|(?P<kind>{'|'.join(KINDS)})"
+)
+
+
+def code_of(identity: Identity) -> str:
+    """The text of the code. Raises ValueError for an identity that could not be read back."""
+    n = "" if identity.n is None else identity.n
+    position = "" if identity.position is None else identity.position
+    code = f"{VERSION}|{identity.assignment}|{identity.student_id}|n={n}|p={position}|{identity.kind}"
+    if identity_of(code) != identity:
+        raise ValueError(f"an identity with names of A-Z a-z 0-9 . _ - is expected, not {identity}")
+    return code
+
+
+def identity_of(code: str) -> Identity | None:
+    """The identity in a code's text, None for anything that is no code of a printed page."""
+    match = _CODE.fullmatch(code) if len(code) <= MAX_LENGTH else None
+    if match is None or set(match["student"]) == {"."}:
+        return None
+    n, position = (int(match[name]) if match[name] else None for name in ("n", "position"))
+    return Identity(match["assignment"], match["student"], n, position, match["kind"])
+
+
+PAGE_MM = A3_MM
+FRAME_MM: Box = (20.0, 10.0, 390.0, 277.0)
+"""ISO 5457: 20 mm at the left for filing, 10 mm elsewhere."""
+DRAWING_MM: Box = (23.0, 51.0, 384.0, 212.0)
+"""Between the head and the foot of the sheet; the zones divide it."""
+
+MARKER_MM = 12.0
+MARKERS_PER_TEMPLATE = 8
+_MARKER_X_MM = (24.0, 144.0, 274.0, 394.0)
+_MARKER_Y_MM = (14.0, 271.0)
+
+CODE_MM: Box = (363.0, 13.0, 28.0, 28.0)
+"""Where the QR code is printed, quiet zone included."""
+SCALE_BOXES: dict[str, Box] = {
+    name: (306.0, 13.0 + 9.5 * row, 53.0, 8.0) for row, name in enumerate(("kL", "kv", "ka"))
+}
+_ZONE_GAP_MM = 4.0
+"""Ink of one zone does not reach the next."""
+_FIELD_COLUMNS = ((39.0, 103.0), (159.0, 113.0), (289.0, 103.0))
+"""Left edge and width of the three stretches between the foot's markers."""
+_FIELD_TOP_MM, _FIELD_HEIGHT_MM = 265.7, 20.2
+_FIELD_TIERS = ((1, 3), (2, 3), (3, 3), (3, 4), (4, 4))
+"""Rows, and boxes side by side in a stretch."""
+_FIELD_GAP_MM, _FIELD_MOST_MM = 0.9, 7.5
+EASY_FIELDS, MAX_FIELDS = 27, 48
+"""Up to how many boxes a cell is large enough for anybody's digits, and to be written in at all."""
+WHOLE_CELLS, TENTH_CELLS = 3, 1
+"""Of a measured length: hundreds, tens and ones of millimetres, then tenths after the printed mark."""
+_CELL_GAP_MM, _MARK_GAP_MM = 0.6, 2.2
+_CELL_MOST_MM = 5.2
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """One way to divide the drawing area.
+
+    Attributes
+    ----------
+    number : 0.. ; its markers have the ids 8 number .. 8 number + 7
+    zones : boxes by figure
+    """
+
+    number: int
+    zones: dict[str, Box]
+
+    @property
+    def figures(self) -> frozenset[str]:
+        """The figures that have a zone."""
+        return frozenset(self.zones)
+
+    @property
+    def marker_ids(self) -> range:
+        """Ids of its markers, in the order of `MARKER_CORNERS`."""
+        first = self.number * MARKERS_PER_TEMPLATE
+        return range(first, first + MARKERS_PER_TEMPLATE)
+
+
+def _marker_corners() -> FloatArray:
+    """(8, 4, 2) corners from the top left, clockwise on the sheet: the upper row, then the lower."""
+    lefts = np.array([(x, y) for y in _MARKER_Y_MM for x in _MARKER_X_MM])
+    square = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]) * MARKER_MM
+    return np.asarray(lefts[:, None, :] + square[None, :, :])
+
+
+MARKER_CORNERS = _marker_corners()
+
+
+def _cut(box: Box, shares: Iterable[float], *, across: bool) -> list[Box]:
+    """Divide a box into columns (`across`) or rows by shares that sum up to 1, a gap between."""
+    x, y, w, h = box
+    parts = list(shares)
+    free = (w if across else h) - _ZONE_GAP_MM * (len(parts) - 1)
+    ends = list(accumulate(free * part + _ZONE_GAP_MM for part in parts))
+    starts = [0.0, *ends[:-1]]
+    sizes = [round(free * part, 3) for part in parts]
+    if across:
+        return [(round(x + start, 3), y, size, h) for start, size in zip(starts, sizes, strict=True)]
+    return [(x, round(y + start, 3), w, size) for start, size in zip(starts, sizes, strict=True)]
+
+
+def _zones(figures: tuple[str, ...], box: Box, shares: tuple[float, ...], across: bool) -> dict[str, Box]:
+    return dict(zip(figures, _cut(box, shares, across=across), strict=True))
+
+
+def _divisions() -> list[dict[str, Box]]:
+    """Every division there is. Its place in this list is printed on paper: append, never reorder."""
+    m, v, a = MECHANISM, VELOCITY_PLAN, ACCELERATION_PLAN
+    columns, rows = True, False
+    divisions = [_zones((figure,), DRAWING_MM, (1.0,), columns) for figure in (m, v, a)]
+    for plan in (v, a):
+        shares = ((share, 1.0 - share) for share in (0.28, 0.4, 0.5, 0.6, 0.72))
+        divisions.extend(_zones((m, plan), DRAWING_MM, share, columns) for share in shares)
+        divisions.append(_zones((m, plan), DRAWING_MM, (0.5, 0.5), rows))
+    divisions.extend(_zones((v, a), DRAWING_MM, (share, 1.0 - share), columns) for share in (0.4, 0.5))
+    divisions.append(_zones((m, v, a), DRAWING_MM, (1 / 3, 1 / 3, 1 / 3), columns))
+    divisions.append(_zones((m, v, a), DRAWING_MM, (0.4, 0.25, 0.35), columns))
+    for share in (0.35, 0.45, 0.55):
+        left, right = _cut(DRAWING_MM, (share, 1.0 - share), across=True)
+        divisions.extend(_zones((m, v), left, (top, 1.0 - top), rows) | {a: right} for top in (0.4, 0.55))
+        divisions.append({m: left} | _zones((v, a), right, (0.45, 0.55), rows))
+    return divisions
+
+
+TEMPLATES = tuple(Template(number, zones) for number, zones in enumerate(_divisions()))
+CALIBRATION = Template(30, {})
+"""The page that measures printer and scanner; 31 templates of 8 ids fill the dictionary of 250."""
+
+
+def template_of(marker_id: int) -> Template | None:
+    """The template that a marker belongs to, None for an id that is not in use."""
+    number = marker_id // MARKERS_PER_TEMPLATE
+    if number == CALIBRATION.number:
+        return CALIBRATION
+    return TEMPLATES[number] if 0 <= number < len(TEMPLATES) else None
+
+
+def field_boxes(names: tuple[str, ...]) -> dict[str, Box]:
+    """Boxes for measured lengths in the sheet's foot, as large as their number allows.
+
+    The label is printed left of the box, within the same cell. Beyond `MAX_FIELDS` names none is given.
+    """
+    if len(names) > MAX_FIELDS:
+        return {}
+    rows, per_stretch = next(
+        (rows, per_stretch)
+        for rows, per_stretch in _FIELD_TIERS
+        if rows * per_stretch * len(_FIELD_COLUMNS) >= len(names)
+    )
+    pitch = _FIELD_HEIGHT_MM / rows
+    height = min(pitch - _FIELD_GAP_MM, _FIELD_MOST_MM)
+    cells: list[Box] = []
+    for row in range(rows):
+        y = round(_FIELD_TOP_MM + row * pitch + (pitch - height) / 2.0, 3)
+        for left, width in _FIELD_COLUMNS:
+            share = width / per_stretch
+            most = (WHOLE_CELLS + TENTH_CELLS) * (_CELL_MOST_MM + _CELL_GAP_MM) + _MARK_GAP_MM
+            wide = min(most, 0.7 * share)
+            cells.extend(
+                (round(left + (k + 1) * share - wide - 0.5, 3), y, round(wide, 3), round(height, 3))
+                for k in range(per_stretch)
+            )
+    return dict(zip(names, cells, strict=False))
+
+
+def comb_cells(box: Box) -> tuple[Box, ...]:
+    """The cells of a box for a measured length, a digit each, from the left; the last is the tenths'."""
+    x, y, wide, high = box
+    count = WHOLE_CELLS + TENTH_CELLS
+    cell = (wide - _MARK_GAP_MM - (count - 1 - TENTH_CELLS) * _CELL_GAP_MM) / count
+    steps = [k * (cell + _CELL_GAP_MM) for k in range(WHOLE_CELLS)]
+    steps += [
+        wide - (TENTH_CELLS - k) * cell - (TENTH_CELLS - 1 - k) * _CELL_GAP_MM for k in range(TENTH_CELLS)
+    ]
+    return tuple((round(x + step, 3), y, round(cell, 3), high) for step in steps)
+
+
+def combs_of(fields: Mapping[str, Box]) -> dict[str, tuple[Box, ...]]:
+    """The cells of every box for a measured length among a page's boxes; scales are written freely."""
+    return {name: comb_cells(box) for name, box in fields.items() if name not in SCALE_BOXES}
+
+
+class _Document(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class MarkerPlace(_Document):
+    """A printed marker: its id and its corners from the top left, clockwise."""
+
+    id: int
+    corners_mm: list[tuple[float, float]]
+
+
+class PageLayout(_Document):
+    """Where everything is on the pages of one kind. `zones` holds the figures' boxes and `fields`.
+
+    `cells` holds, for each box of `fields` that a measured length is written in (millimetres), its
+    cells from the left: three digits, then the tenths.
+    """
+
+    kind: Literal["all", "velocity", "acceleration", "calibration"]
+    markers: list[MarkerPlace]
+    zones: dict[str, Box | dict[str, Box]]
+    cells: dict[str, tuple[Box, ...]] = {}
+
+
+class Layout(_Document):
+    """`layout.json`: millimetres from the upright sheet's top left corner, x right, y down."""
+
+    schema_version: Literal[1] = 1
+    marker_dictionary: Literal["DICT_4X4_250"] = "DICT_4X4_250"
+    page_mm: tuple[float, float] = PAGE_MM
+    pages: list[PageLayout]
+
+
+def marker_places(template: Template) -> list[MarkerPlace]:
+    """The markers of a template as they stand in `layout.json`."""
+    return [
+        MarkerPlace(id=number, corners_mm=[(float(x), float(y)) for x, y in corners])
+        for number, corners in zip(template.marker_ids, MARKER_CORNERS, strict=True)
+    ]
+
+
+MARGIN_MM = 12.0
+"""Around a figure: letters, arrowheads, hatching of the guides."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A template for a page and how well it holds the figures.
+
+    Attributes
+    ----------
+    template : the best of all
+    room : zone over need by figure, the lesser of width and height; below 1 it is too small in some variant
+    need_mm : widest and highest of any variant by figure, margins included
+    """
+
+    template: Template
+    room: dict[str, float]
+    need_mm: dict[str, tuple[float, float]]
+
+
+def construction_for(assignment: Assignment, figures: Sequence[str]) -> Construction:
+    """The construction of an assignment, without accelerations where no figure needs them."""
+    return construction_of(
+        assignment.mechanism(assignment.variants()),
+        accelerations=ACCELERATION_PLAN in figures,
+        plate_by_similarity=assignment.file.plate_images == "similarity",
+    )
+
+
+def places_mm(
+    assignment: Assignment, figures: Sequence[str], variants: list[Variant]
+) -> dict[str, ComplexArray]:
+    """Where the nodes of each figure are about its pole, at the assignment's own scales.
+
+    (nodes, variants) complex millimetres by figure, y up; a sketch's about its own origin.
+    """
+    scales = assignment.scales(variants)
+    construction = construction_for(assignment, figures)
+    parameters = parameters_of(assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
+    nodes = evaluate(construction, parameters)
+    return {
+        figure: np.stack(
+            [np.broadcast_to(nodes[step.node], (len(variants),)) for step in construction.figures[figure]]
+        )
+        for figure in figures
+    }
+
+
+def extents_mm(
+    assignment: Assignment, figures: Sequence[str], variants: list[Variant]
+) -> dict[str, tuple[float, float]]:
+    """Largest width and height of each figure over variants, at the assignment's own scales."""
+    return {
+        figure: (float(np.ptp(places.real, axis=0).max()), float(np.ptp(places.imag, axis=0).max()))
+        for figure, places in places_mm(assignment, figures, variants).items()
+    }
+
+
+def poles_mm(
+    assignment: Assignment, template: Template, variants: list[Variant]
+) -> dict[str, list[tuple[float, float]]]:
+    """Where the poles of a template's plans are best put, sheet millimetres for each variant.
+
+    A plan begun there is in the middle of its zone. None of a plan that is larger than its zone, at
+    least in one variant: the student will choose another scale.
+    """
+    plans = [figure for figure in template.zones if figure != MECHANISM]
+    poles = {}
+    for figure, places in places_mm(assignment, plans, variants).items():
+        x, y, wide, high = template.zones[figure]
+        low = places.real.min(axis=0) + 1j * places.imag.min(axis=0)
+        top = places.real.max(axis=0) + 1j * places.imag.max(axis=0)
+        room = complex(wide - 2 * MARGIN_MM, high - 2 * MARGIN_MM)
+        if np.all((top - low).real <= room.real) and np.all((top - low).imag <= room.imag):
+            pole = complex(x + wide / 2.0, -y - high / 2.0) - (low + top) / 2.0
+            poles[figure] = [(float(at.real), float(-at.imag)) for at in pole]
+    return poles
+
+
+def best_template(assignment: Assignment, figures: Sequence[str]) -> Fit:
+    """The division with the most room for the figure that has the least; a sketch may be drawn smaller."""
+    return template_for(extents_mm(assignment, figures, assignment.variants()))
+
+
+def template_for(extents: Mapping[str, tuple[float, float]]) -> Fit:
+    """The same for figures whose largest width and height (millimetres) are known already."""
+    figures = tuple(extents)
+    need = {figure: (wide + 2 * MARGIN_MM, high + 2 * MARGIN_MM) for figure, (wide, high) in extents.items()}
+
+    def room(template: Template, figure: str) -> float:
+        _, _, wide, high = template.zones[figure]
+        return min(wide / need[figure][0], high / need[figure][1])
+
+    def worth(template: Template) -> tuple[float, float]:
+        # A plan's scale is the assignment's; the sketch's is often the student's choice.
+        plans = [room(template, figure) for figure in figures if figure != MECHANISM]
+        least = min(min(plans, default=np.inf), 1.0)
+        return (round(least, 6), min(room(template, figure) for figure in figures))
+
+    best = max((template for template in TEMPLATES if template.figures == set(figures)), key=worth)
+    return Fit(best, {figure: room(best, figure) for figure in figures}, need)

@@ -1,0 +1,250 @@
+"""Fonts, texts and shapes of printed PDFs."""
+
+import io
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from reportlab.lib.units import mm
+from reportlab.pdfbase import pdfmetrics
+from reportlab.pdfbase.ttfonts import TTFont
+from reportlab.pdfgen.canvas import Canvas
+
+from grader.printed.layout import FRAME_MM, MARKER_CORNERS, MARKER_MM, PAGE_MM, Template
+from grader.records import Box
+from reference.drawing.canvas import Piece
+
+CELLS = 6
+"""Cells along a marker's side, its black border included."""
+
+
+@cache
+def dictionary() -> cv2.aruco.Dictionary:
+    """OpenCV's DICT_4X4_250 (Garrido-Jurado et al., Pattern Recognition 47, 2014)."""
+    return cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_250)
+
+
+def cells(marker_id: int) -> NDArray[np.bool_]:
+    """(6, 6), True where a marker's cell is white, upright, rows downwards."""
+    image = cv2.aruco.generateImageMarker(dictionary(), marker_id, CELLS, borderBits=1)
+    return np.asarray(image > 127)
+
+
+REGULAR, BOLD = "DejaVuSansCondensed", "DejaVuSansCondensed-Bold"
+_DECIMAL_COMMA = frozenset({"ro", "ru"})
+
+
+@cache
+def embed_fonts() -> None:
+    """Make the fonts known to reportlab; they hold Latin, Romanian, Greek and Cyrillic letters."""
+    for name in (REGULAR, BOLD):
+        path = files("grader") / "data" / "fonts" / f"{name}.ttf"
+        pdfmetrics.registerFont(TTFont(name, str(path)))
+
+
+def width_mm(text: str, font: str, size_pt: float) -> float:
+    """How wide a text is printed."""
+    embed_fonts()
+    return float(pdfmetrics.stringWidth(text, font, size_pt) / mm)
+
+
+def unprintable(text: str) -> str:
+    """Letters of a text that the font does not have."""
+    embed_fonts()
+    known = pdfmetrics.getFont(BOLD).face.charToGlyph
+    return "".join(
+        dict.fromkeys(letter for letter in text if not letter.isspace() and ord(letter) not in known)
+    )
+
+
+def number(value: float, lang: str) -> str:
+    """A datum to six significant digits, as it is written in a language."""
+    text = f"{value:.6g}"
+    if "e" in text and 1e-6 < abs(value) < 1e9:
+        text = f"{value:.6f}".rstrip("0").rstrip(".") if abs(value) < 1.0 else f"{value:.0f}"
+    return text.replace(".", decimal_mark(lang))
+
+
+def decimal_mark(lang: str) -> str:
+    """Comma or point."""
+    return "," if lang in _DECIMAL_COMMA else "."
+
+
+def pieces_width_mm(pieces: Iterable[Piece], font: str, size_pt: float) -> float:
+    """How wide a name is printed."""
+    return sum(width_mm(piece.text, font, piece.size(size_pt)) for piece in pieces)
+
+
+def wrap(text: str, font: str, size_pt: float, wide_mm: float) -> list[str]:
+    """Lines that are no wider than `wide_mm`; a single long word is cut."""
+    lines: list[str] = []
+    line = ""
+    for word in text.split():
+        longer = f"{line} {word}".strip()
+        if width_mm(longer, font, size_pt) <= wide_mm:
+            line = longer
+            continue
+        if line:
+            lines.append(line)
+        line = word
+        while width_mm(line, font, size_pt) > wide_mm:
+            keep = next(
+                n
+                for n in range(len(line) - 1, 0, -1)
+                if n == 1 or width_mm(line[:n], font, size_pt) <= wide_mm
+            )
+            lines.append(line[:keep])
+            line = line[keep:]
+    return [*lines, line] if line else lines
+
+
+def fitted(
+    texts: list[str], font: str, sizes_pt: tuple[float, ...], box_mm: tuple[float, float]
+) -> tuple[float, list[str]]:
+    """The largest of some sizes at which paragraphs fit a box, and their lines; cut at the smallest."""
+    wide, high = box_mm
+    for size in sizes_pt:
+        lines = [line for text in texts for line in wrap(text, font, size, wide)]
+        room = int(high / (1.25 * size / mm))
+        if len(lines) <= room:
+            return size, lines
+    cut = lines[: max(room, 1)]
+    return size, [*cut[:-1], f"{cut[-1].rstrip('.,;')} …"] if cut else []
+
+
+BLACK, GREY = 0.0, 0.55
+_FRAME_PEN_MM = 0.7
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A PDF being drawn."""
+
+    canvas: Canvas
+    buffer: io.BytesIO
+
+    @classmethod
+    def begin(cls, title: str) -> "Drawing":
+        """An empty A3 landscape document. It says the same, byte for byte, for the same input."""
+        embed_fonts()
+        buffer = io.BytesIO()
+        canvas = Canvas(buffer, pagesize=(PAGE_MM[0] * mm, PAGE_MM[1] * mm), pageCompression=1, invariant=1)
+        canvas.setTitle(title)
+        canvas.setCreator("planmark")
+        # Viewers must not shrink the page when it is printed.
+        canvas.setViewerPreference("PrintScaling", "None")
+        return cls(canvas, buffer)
+
+    def finish(self) -> bytes:
+        """The document."""
+        self.canvas.save()
+        return self.buffer.getvalue()
+
+    def next_page(self) -> None:
+        """End this page."""
+        self.canvas.showPage()
+
+    def line(self, ends: tuple[float, float, float, float], pen_mm: float, grey: float = BLACK) -> None:
+        """A line from x, y to x, y."""
+        x0, y0, x1, y1 = ends
+        self.canvas.setLineWidth(pen_mm * mm)
+        self.canvas.setStrokeGray(grey)
+        self.canvas.line(x0 * mm, _up(y0), x1 * mm, _up(y1))
+
+    def box(self, box: Box, pen_mm: float, grey: float = BLACK) -> None:
+        """A rectangle, its pen centred on the edge."""
+        x, y, w, h = box
+        self.canvas.setLineWidth(pen_mm * mm)
+        self.canvas.setStrokeGray(grey)
+        self.canvas.rect(x * mm, _up(y + h), w * mm, h * mm)
+
+    def cells(
+        self, corner: tuple[float, float], cell_mm: float, filled: Iterable[tuple[int, int, int]], grey: float
+    ) -> None:
+        """Rows of filled cells (row, first column, number of columns), as one path without seams."""
+        path = self.canvas.beginPath()
+        x, y = corner
+        for row, first, count in filled:
+            path.rect(
+                (x + first * cell_mm) * mm, _up(y + (row + 1) * cell_mm), count * cell_mm * mm, cell_mm * mm
+            )
+        self.canvas.setFillGray(grey)
+        self.canvas.drawPath(path, stroke=0, fill=1)
+
+    def text(
+        self, at: tuple[float, float], text: str, size_pt: float, font: str = REGULAR, grey: float = BLACK
+    ) -> None:
+        """Text whose base line begins at a point."""
+        self.canvas.setFillGray(grey)
+        self.canvas.setFont(font, size_pt)
+        self.canvas.drawString(at[0] * mm, _up(at[1]), text)
+
+    def paragraphs(
+        self,
+        box: Box,
+        texts: list[str],
+        sizes_pt: tuple[float, ...],
+        font: str = REGULAR,
+        *,
+        lines_down: int = 0,
+        pitch: float = 1.2,
+    ) -> None:
+        """Wrapped texts at the largest size that fits a box.
+
+        The first base line is `lines_down` lines below the box's upper side; lines are `pitch` times
+        their size apart.
+        """
+        x, y, wide, high = box
+        size, lines = fitted(texts, font, sizes_pt, (wide, high))
+        for row, line in enumerate(lines):
+            self.text((x, y + (row + lines_down) * pitch * size / mm), line, size, font)
+
+    def pieces(
+        self, at: tuple[float, float], pieces: Iterable[Piece], size_pt: float, font: str = REGULAR
+    ) -> float:
+        """A name with its indices; gives the x where it ends. An index above stands over one below."""
+        x, y = at
+        begin, below = x, x
+        for piece in pieces:
+            start = begin if piece.height == 1 else x
+            self.text((start, y - piece.rise(size_pt) / mm), piece.text, piece.size(size_pt), font)
+            end = start + width_mm(piece.text, font, piece.size(size_pt))
+            if piece.height == -1:
+                begin = x
+            below = max(below, end)
+            x = below
+        return x
+
+    def frame(self) -> None:
+        """The drawing frame of ISO 5457."""
+        self.box(FRAME_MM, _FRAME_PEN_MM)
+
+    def markers(self, template: Template) -> None:
+        """All markers of a template."""
+        side = MARKER_MM / CELLS
+        for number, corners in zip(template.marker_ids, MARKER_CORNERS, strict=True):
+            corner = (float(corners[0, 0]), float(corners[0, 1]))
+            self.cells(corner, side, ((row, 0, CELLS) for row in range(CELLS)), BLACK)
+            self.cells(corner, side, runs(cells(number).tolist()), 1.0)
+
+
+def runs(rows: Iterable[Iterable[bool]]) -> Iterable[tuple[int, int, int]]:
+    """Stretches of True in a grid: row, first column, number of columns."""
+    for number, row in enumerate(rows):
+        cells = [*row, False]
+        first = None
+        for column, filled in enumerate(cells):
+            if filled and first is None:
+                first = column
+            elif not filled and first is not None:
+                yield number, first, column - first
+                first = None
+
+
+def _up(y_mm: float) -> float:
+    """PDF points from the bottom edge."""
+    return float((PAGE_MM[1] - y_mm) * mm)

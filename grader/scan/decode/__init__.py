@@ -1,0 +1,1 @@
+"""Image and PDF files to pages of grey pixels, within limits."""

@@ -1,0 +1,115 @@
+"""Pages of files of any kind that is accepted (JPEG, PNG, TIFF, PDF), within limits."""
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from grader.records import Page, PageRef
+from grader.scan.decode import pdf, pictures, tiff
+from grader.scan.decode.limits import Door, InputFile, changed, kind_of, load
+from grader.scan.pixels import shrink
+from reference.errors import InputFileError
+
+_DOORS: dict[str, Door] = {"jpeg": pictures.JPEG, "png": pictures.PNG, "tiff": tiff.TIFF, "pdf": pdf.PDF}
+_LONG_SIDE_PX = 1700
+"""About 4 px/mm on A3: strokes of 0.3 mm survive, dust and grain fade."""
+_DARK = 0.16
+"""Contrast of a pencil stroke at this resolution; what shows through paper stays under 0.1."""
+_LONG = 0.012
+"""Of the long side (5 mm on A3): longer than dust, hairs and letters that show through."""
+_RIM = 0.03
+"""Of the long side: scanners leave shadows there."""
+_ENOUGH = 0.1
+"""Of the long side (42 mm): all long marks together on a page that is drawn on."""
+
+
+def pages_of(source: InputFile | Path | str) -> Iterator[Page]:
+    """Pages of a file, decoded one at a time as they are asked for.
+
+    Raises
+    ------
+    InputFileError
+        at the first `next` for a file that cannot be used at all; at a later one for a page that is
+        damaged. The codes are those of `grader.scan.decode.limits`.
+    """
+    file = _loaded(source)
+    for number in range(1, count_pages(file) + 1):
+        yield page_of(file, number)
+
+
+def page_of(source: InputFile | Path | str, number: int) -> Page:
+    """One page of a file, from 1, decoding no other. Raises as `pages_of`, and for a number too high."""
+    file = _loaded(source)
+    door = _DOORS[kind_of(file)]
+    with _as_input_error(file, door, number):
+        page = door.page(file, number)
+    if page is None:
+        raise InputFileError(
+            "page_missing", f"{file.name}: there is no page {number}; it has {count_pages(file)}"
+        )
+    return page
+
+
+def decode(ref: PageRef) -> Page:
+    """The page's pixels. Raises as `pages_of`, and where the file is not what it was when it was listed."""
+    file = load(ref.path)
+    if ref.digest and ref.digest != file.digest:
+        raise changed(ref.file)
+    return replace(page_of(file, ref.page), source=ref.file)
+
+
+def count_pages(source: InputFile | Path | str) -> int:
+    """Number of pages, found without decoding them. Raises as `pages_of` does."""
+    file = _loaded(source)
+    door = _DOORS[kind_of(file)]
+    with _as_input_error(file, door, 1):
+        return door.count(file)
+
+
+def _loaded(source: InputFile | Path | str) -> InputFile:
+    return source if isinstance(source, InputFile) else load(source)
+
+
+@contextmanager
+def _as_input_error(file: InputFile, door: Door, number: int) -> Iterator[None]:
+    """Any error of a library becomes an InputFileError of the page; want of memory stays a MemoryError."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except (InputFileError, MemoryError):
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        if "insufficient memory" in reason.lower():  # OpenCV and libjpeg say it in words
+            raise MemoryError(reason) from error
+        raise InputFileError(
+            door.code,
+            f"{file.name}, page {number}: the {door.noun} is damaged ({reason}); scan or export it again",
+        ) from error
+
+
+def is_blank(page: Page) -> bool:
+    """True for a page that nobody drew on: the back of a duplex scan, with show-through, dust and holes.
+
+    Sums the extents of dark marks of at least 5 mm, away from the page's rim; a sheet with a single
+    short line is not blank.
+    """
+    scale = min(1.0, _LONG_SIDE_PX / max(page.grey.shape))
+    small = shrink(page.grey, scale)
+    paper = cv2.morphologyEx(small, cv2.MORPH_CLOSE, np.ones((31, 31), np.uint8))
+    share = np.asarray(cv2.divide(small, paper, scale=255), dtype=np.uint8)
+    # A strip narrower than two rims has no more than its middle.
+    rim = min(int(_RIM * max(small.shape)), (min(small.shape) - 1) // 2)
+    if rim > 0:
+        share = share[rim:-rim, rim:-rim]
+    inner = np.ascontiguousarray(share < (1.0 - _DARK) * 255).astype(np.uint8)
+    _, _, stats, _ = cv2.connectedComponentsWithStats(inner, connectivity=8)
+    extent = np.hypot(stats[1:, cv2.CC_STAT_WIDTH], stats[1:, cv2.CC_STAT_HEIGHT])
+    long_side = max(small.shape)
+    return bool(extent[extent > _LONG * long_side].sum() < _ENOUGH * long_side)

@@ -1,0 +1,324 @@
+"""JPEG and PNG files, grey levels and resolution tags."""
+
+import io
+import struct
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import simplejpeg
+from PIL import Image
+
+from grader.records import GreyImage, Page
+from grader.scan.decode.limits import Door, InputFile, check_memory, check_size, damaged, truncated
+from grader.scan.pixels import MM_PER_INCH
+from reference.errors import InputFileError
+
+_BYTE = 8
+_BAND_ROWS = 512
+"""A band of an A3 page at 600 dpi in colour is 15 MB."""
+
+
+def to_grey(image: np.ndarray, *, rgb: bool = False) -> GreyImage:
+    """Grey of a decoded image: (h, w), or (h, w, 2..4) with blue, green, red[, alpha], or red first.
+
+    The pixels are bool, uint8, uint16 or float of 0..1.
+
+    Transparent pixels become paper. Colour becomes luma: its weights keep blue (0.11) and red (0.30)
+    ink at over half of full contrast, and, unlike the least channel, it does not carry the coarser
+    sampling of chroma into the strokes' edges.
+    """
+    if image.dtype == np.uint8 and image.ndim == 2:
+        return np.ascontiguousarray(image)
+    # Sensors of 10 to 14 bits are stored in 16 without being stretched.
+    used = max(int(image.max()).bit_length(), _BYTE) if image.dtype == np.uint16 else _BYTE
+    return _in_bands(image, lambda band: _luma(_eight_bit(band, used), rgb=rgb))
+
+
+def of_four_inks(image: np.ndarray) -> GreyImage:
+    """Grey of cyan, magenta, yellow and black, (h, w, 4..) with 0 for no ink: light passes through all."""
+    used = max(int(image.max()).bit_length(), _BYTE) if image.dtype == np.uint16 else _BYTE
+    return _in_bands(image, lambda band: _light(_eight_bit(band, used)))
+
+
+def _in_bands(image: np.ndarray, grey: Callable[[np.ndarray], np.ndarray]) -> GreyImage:
+    """(h, w) made a band of rows at a time: what is needed on the way takes little memory."""
+    result = np.empty(image.shape[:2], dtype=np.uint8)
+    for top in range(0, len(image), _BAND_ROWS):
+        result[top : top + _BAND_ROWS] = grey(image[top : top + _BAND_ROWS])
+    return result
+
+
+def _luma(pixels: GreyImage, *, rgb: bool) -> np.ndarray:
+    if pixels.ndim == 2:
+        return pixels
+    channels: int = pixels.shape[2]
+    if channels <= 2:
+        grey = pixels[..., 0]
+    else:
+        code = cv2.COLOR_RGB2GRAY if rgb else cv2.COLOR_BGR2GRAY
+        grey = np.asarray(cv2.cvtColor(np.ascontiguousarray(pixels[..., :3]), code), dtype=np.uint8)
+    return _on_white(grey, pixels[..., -1]) if channels in (2, 4) else grey
+
+
+def _eight_bit(image: np.ndarray, used: int) -> GreyImage:
+    """Bytes of pixels; `used` is the bits that 16-bit ones make use of."""
+    if image.dtype == np.bool_:
+        return image.astype(np.uint8) * np.uint8(255)
+    if image.dtype == np.uint16:
+        return (image >> (used - _BYTE)).astype(np.uint8)
+    if image.dtype in (np.float32, np.float64):
+        return np.asarray(np.clip(np.nan_to_num(image), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    if image.dtype != np.uint8:
+        message = f"pixels of the type {image.dtype} are not read"
+        raise ValueError(message)
+    return image
+
+
+def _light(inks: GreyImage) -> np.ndarray:
+    clear = 255.0 - inks[..., :4].astype(np.float32)
+    light = clear[..., :3].min(axis=2) * clear[..., 3] / np.float32(255.0)
+    return np.asarray(light + np.float32(0.5))
+
+
+def _on_white(grey: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    if alpha.min() == 255:
+        return grey
+    share = alpha.astype(np.float32) / 255.0
+    return np.asarray(255.0 - (255.0 - grey.astype(np.float32)) * share + 0.5)
+
+
+def from_pillow(image: Image.Image) -> GreyImage:
+    """Grey of an image that only Pillow decodes (CMYK, palettes, odd bit depths)."""
+    if image.mode in ("P", "PA", "LA", "RGBA"):
+        return to_grey(np.asarray(image.convert("RGBA")), rgb=True)
+    return np.asarray(image.convert("L"), dtype=np.uint8).copy()
+
+
+_ORIENTATION_TAG = 274
+"""EXIF 2.3 and TIFF 6.0."""
+_INCH, _CENTIMETRE = 2, 3
+"""TIFF's units of the resolution."""
+_TURN_CCW = {1: 0, 2: 0, 3: 180, 4: 180, 5: 90, 6: 270, 7: 270, 8: 90}
+"""EXIF/TIFF orientation to the counter-clockwise turn that a viewer applies, after undoing the mirror."""
+_MIRRORED = frozenset({2, 4, 5, 7})
+_PLAUSIBLE_DPI = (30.0, 4800.0)
+"""Below and above, a file states a number that is no resolution."""
+
+Dpi = tuple[float, float]
+
+
+def plausible(dpi: tuple[float, float] | None) -> Dpi | None:
+    """The resolution, or None where it is absent or cannot be one."""
+    if dpi is None:
+        return None
+    try:
+        horizontal, vertical = float(dpi[0]), float(dpi[1])
+    except (ArithmeticError, TypeError, ValueError):
+        return None
+    low, high = _PLAUSIBLE_DPI
+    good = low <= horizontal <= high and low <= vertical <= high
+    return (horizontal, vertical) if good else None
+
+
+def from_unit(x: float, y: float, unit: int) -> Dpi | None:
+    """Resolution from TIFF's two numbers and unit (2 inch, 3 cm; 1 means no absolute unit)."""
+    if unit == _INCH:
+        return plausible((x, y))
+    if unit == _CENTIMETRE:
+        return plausible((x * (MM_PER_INCH / 10.0), y * (MM_PER_INCH / 10.0)))
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class Tags:
+    """What a file says of its picture: its resolution, and how a viewer shows it.
+
+    `mirrored` pictures (a selfie's camera, a scan through film) are mirrored left to right first, then
+    turned by `turn_deg` counter-clockwise.
+    """
+
+    dpi: Dpi | None
+    turn_deg: int
+    mirrored: bool = False
+
+    def unmirrored(self, grey: GreyImage) -> GreyImage:
+        """The pixels as drawn: a mirrored drawing is another drawing."""
+        return np.ascontiguousarray(grey[:, ::-1]) if self.mirrored else grey
+
+
+def tags_of(dpi: Dpi | None, orientation: int) -> Tags:
+    """From a resolution and an EXIF orientation; an unknown one counts as upright."""
+    return Tags(dpi, _TURN_CCW.get(orientation, 0), orientation in _MIRRORED)
+
+
+def tags_within(content: bytes) -> Tags:
+    """From JFIF, EXIF or pHYs of an image file; only its header is read."""
+    with Image.open(io.BytesIO(content)) as image:
+        return tags_of(plausible(image.info.get("dpi")), _orientation(image))
+
+
+def _orientation(image: Image.Image) -> int:
+    """As the EXIF says; 1 where there is none, or none that can be read."""
+    try:
+        return int(image.getexif().get(_ORIENTATION_TAG, 1) or 1)
+    except (OSError, SyntaxError, ValueError, TypeError, KeyError, struct.error):
+        return 1
+
+
+_HARMLESS = ("extraneous bytes", "Invalid SOS parameters", "unknown Adobe color transform")
+"""Warnings of libjpeg that leave the picture whole."""
+_JPEG_END = b"\xff\xd9"
+_SCAN = b"\xff\xda"
+_MAX_SCANS = 100
+"""Progressive files of cameras and programs have about 10; each scan costs a pass over all blocks."""
+_PLANES = {"Gray": 1.0, "444": 3.0, "422": 2.0, "440": 2.0, "420": 1.5, "411": 1.5}
+"""Coefficients for a pixel, of two bytes; held in memory where a file has more than one scan."""
+_FOUR_INKS = ("CMYK", "YCCK")
+_LEAST_BYTES = 600
+"""A header with its tables is longer than this."""
+_CUT_OFF = ("remature end", "exhausted", "mpty input")
+
+
+def _jpeg_page(file: InputFile, number: int) -> Page | None:
+    if number > 1:
+        return None
+    if not file.data.rstrip(b"\0").endswith(_JPEG_END) and len(file.data) < _LEAST_BYTES:
+        raise truncated(file, 1)
+    four_inks = check_header(file, 1, file.data) in _FOUR_INKS
+    tags = tags_within(file.data)
+    grey = _four_inks(file.data) if four_inks else decode(file, 1, file.data)
+    return Page(file.name, 1, tags.unmirrored(grey), tags.dpi, tags.turn_deg)
+
+
+def check_header(file: InputFile, page: int, data: bytes, *, least: bool = True) -> str:
+    """Colour space of a JPEG stream; raises InputFileError for one that costs too much, or is too small.
+
+    Arguments: it may be of any size without `least`, as a part of a page.
+    """
+    high, wide, space, sampling = simplejpeg.decode_jpeg_header(data, strict=False)
+    # Counts those of a thumbnail too: more never harms a picture of a sheet's size.
+    scans = data.count(_SCAN)
+    if scans > _MAX_SCANS:
+        raise InputFileError(
+            "image_too_large",
+            f"{file.name}, page {page}: the JPEG has {scans} scans, more than {_MAX_SCANS}; save it again",
+        )
+    planes = _PLANES.get(sampling, 3.0) if space not in _FOUR_INKS else 4.0
+    decoded = 9.0 if space in _FOUR_INKS else 0.0
+    pixel_bytes = decoded + (2.0 * planes if scans > 1 else 0.0)
+    check_memory(file, page, wide * high, int(wide * high * pixel_bytes))
+    if least:
+        check_size(file, page, wide, high)
+    return str(space)
+
+
+def decode(file: InputFile, page: int, data: bytes) -> GreyImage:
+    """Luma of a JPEG stream, (h, w) uint8; raises InputFileError where it is cut off or damaged.
+
+    libjpeg fills what is missing with grey and only warns: the warning is an error here.
+    """
+    try:
+        return _plane(simplejpeg.decode_jpeg(data, colorspace="GRAY", strict=True))
+    except ValueError as error:
+        message = str(error)
+    if any(sign in message for sign in _CUT_OFF):
+        raise truncated(file, page)
+    if not any(harmless in message for harmless in _HARMLESS):
+        raise damaged(file, page, message)
+    return _plane(simplejpeg.decode_jpeg(data, colorspace="GRAY", strict=False))
+
+
+def _plane(image: GreyImage) -> GreyImage:
+    """The only channel of a (h, w, 1) image."""
+    return image[..., 0]
+
+
+def _four_inks(data: bytes) -> GreyImage:
+    with Image.open(io.BytesIO(data)) as image:
+        return from_pillow(image)
+
+
+JPEG = Door(_jpeg_page)
+
+
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_HEADER, _FRAME = struct.Struct(">IIBBxxx"), struct.Struct(">I4s")
+_PIXELS, _PNG_END = (b"IHDR", b"PLTE", b"tRNS", b"IDAT"), b"IEND"
+_DESCRIPTION = (b"pHYs", b"eXIf", b"tEXt", b"zTXt", b"iTXt")
+_MAX_DESCRIPTION = 8_000_000
+"""Bytes of resolution, EXIF and texts; a phone's EXIF with its thumbnail has 0.1 MB."""
+_MAX_CHUNKS = 200_000
+"""Some writers store 8 kB a chunk: a picture of 1 GB has 130,000."""
+_CHANNELS = {0: 1, 2: 3, 3: 4, 4: 4, 6: 4}
+"""As decoded, by the type of colour: palettes and grey with alpha come as four."""
+_MAX_RATIO = 1040
+"""Deflation packs at most 1032 bytes in one; the rest is for headers."""
+
+Chunks = list[tuple[bytes, bytes]]
+
+
+def _png_page(file: InputFile, number: int) -> Page | None:
+    if number > 1:
+        return None
+    chunks = _chunks(file)
+    if not chunks or chunks[0][0] != b"IHDR" or len(chunks[0][1]) != _HEADER.size:
+        raise damaged(file, 1, "its header cannot be read")
+    wide, high, bits, colour = _HEADER.unpack(chunks[0][1])
+    if colour not in _CHANNELS or bits not in {1, 2, 4, 8, 16}:
+        raise damaged(file, 1, "its header cannot be read")
+    check_memory(file, 1, wide * high, wide * high * _CHANNELS[colour] * max(bits // 8, 1))
+    check_size(file, 1, wide, high)
+    packed = sum(len(data) for name, data in chunks if name == b"IDAT")
+    if wide * high * bits // 8 > packed * _MAX_RATIO:
+        raise truncated(file, 1)
+    tags = _tags(file, chunks)
+    # Profiles, texts and the frames of an animation never reach the decoder: they could unpack to anything.
+    stored = np.frombuffer(_written([one for one in chunks if one[0] in _PIXELS]), dtype=np.uint8)
+    pixels = cv2.imdecode(stored, cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise damaged(file, 1, "it cannot be decoded")
+    return Page(file.name, 1, tags.unmirrored(to_grey(pixels)), tags.dpi, tags.turn_deg)
+
+
+def _chunks(file: InputFile) -> Chunks:
+    """Names and contents up to the end; raises InputFileError where one is cut off or its sum is wrong."""
+    chunks: Chunks = []
+    view, at = memoryview(file.data), len(_SIGNATURE)
+    while len(chunks) < _MAX_CHUNKS:
+        if at + _FRAME.size + 4 > len(view):
+            raise truncated(file, 1)
+        length, name = _FRAME.unpack_from(view, at)
+        end = at + _FRAME.size + length
+        if end + 4 > len(view):
+            raise truncated(file, 1)
+        if zlib.crc32(view[at + 4 : end]) != int.from_bytes(view[end : end + 4], "big"):
+            raise damaged(file, 1, f"the checksum of its part {name!r} is wrong")
+        if name == _PNG_END:
+            return chunks
+        chunks.append((name, bytes(view[at + _FRAME.size : end])))
+        at = end + 4
+    raise damaged(file, 1, f"it has more than {_MAX_CHUNKS} parts")
+
+
+def _written(chunks: Chunks) -> bytes:
+    """A PNG file of some chunks."""
+    parts = [_SIGNATURE]
+    for name, data in (*chunks, (_PNG_END, b"")):
+        parts += [_FRAME.pack(len(data), name), data, zlib.crc32(data, zlib.crc32(name)).to_bytes(4, "big")]
+    return b"".join(parts)
+
+
+def _tags(file: InputFile, chunks: Chunks) -> Tags:
+    """Resolution and orientation: those of one white pixel with the picture's description."""
+    described = [one for one in chunks if one[0] in _DESCRIPTION]
+    if sum(len(data) for _, data in described) > _MAX_DESCRIPTION:
+        raise damaged(file, 1, f"its texts are longer than {_MAX_DESCRIPTION // 1_000_000} MB")
+    header = (b"IHDR", _HEADER.pack(1, 1, 8, 0))
+    described_pixel = _written([header, *described, (b"IDAT", zlib.compress(b"\0\xff"))])
+    return tags_within(described_pixel)
+
+
+PNG = Door(_png_page)

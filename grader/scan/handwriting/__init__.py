@@ -1,0 +1,1 @@
+"""Letters and numbers written by hand."""

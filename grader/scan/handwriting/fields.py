@@ -1,0 +1,436 @@
+"""What stands in the printed boxes of an answer sheet: scales and measured lengths."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from itertools import product
+
+import cv2
+import numpy as np
+
+from grader.inputs.scale_text import ByRule, Declared, ParsedScale, parse_scale
+from grader.printed.layout import SCALE_BOXES
+from grader.records import (
+    ACCELERATION_PLAN,
+    MECHANISM,
+    VELOCITY_PLAN,
+    Box,
+    FloatArray,
+    GreyImage,
+    Page,
+    Sheet,
+    Written,
+)
+from grader.scan.handwriting.model import COLUMN, JUNK, Lattice, Segment, lattice_of, normalised, recognise
+from grader.scan.pixels import cut_out
+
+_DIGIT_SIGNS: Mapping[str, str] = {"0": "o", **{digit: digit for digit in "123456789"}}
+"""The sign that each digit looks like."""
+_MARKS: Mapping[str, str] = {".": ".", ",": "'"}
+_LENGTHS = ("m", "cm", "mm")
+_POINTS = ("·", "*")
+_SPELT: Mapping[str, tuple[str, ...]] = {
+    "m": ("m", "M"),
+    "s": ("s", "c"),
+    "L": ("L", "1"),
+    "·": (".",),
+    "*": ("x",),
+    ",": ("'",),
+}
+"""Signs that a letter of the text may look like: a Cyrillic m is a small M, a Cyrillic s a c."""
+_MOST_DIGITS = 7
+"""No scale is written with more."""
+_BEAM = 60
+"""Texts followed at a time; more of them change no reading."""
+_SKIPPED = -2.0
+"""A piece of ink taken for no sign: beside its own probability of being none."""
+_MISPLACED = -4.0
+"""A sign whose size or place in the line is another sign's."""
+_SMALL = 0.35
+"""Of the line's height: lower is a point or a comma, no digit."""
+_TALL = 0.6
+"""Of the line's height: higher is no point."""
+_DOTS = frozenset(".'")
+_FLAT = frozenset("-=:")
+_LOW, _HIGH = 0.72, 0.35
+"""Of the line's height from its top: middles below the first, above the second."""
+_FOOT = 0.45
+"""Of the line's height: what is smaller and low in the line is a point or a comma, of this probability."""
+_CERTAIN = float(np.log(0.95))
+_MERGED = -0.7
+"""For each further piece of ink that a sign is taken to be made of."""
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """One sign written: the column's sign, what it adds to the text, and the state after it."""
+
+    sign: str
+    text: str
+    state: "State"
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Where in the box's text one stands.
+
+    Attributes
+    ----------
+    kind : `start`, `number`, `tail` or `end`
+    digits : how many of the number are written
+    marked : whether its decimal mark is
+    bare_mark : whether nothing stands behind the mark yet
+    is_nought : whether a leading nought stands alone: nobody writes more digits without a mark then
+    after : what may follow, texts spelt sign by sign
+    """
+
+    kind: str
+    digits: int = 0
+    marked: bool = False
+    bare_mark: bool = False
+    is_nought: bool = False
+    after: tuple[str, ...] = ()
+    known_hash: int = field(init=False, repr=False, compare=False, default=0)
+
+    def __post_init__(self) -> None:
+        content = (self.kind, self.digits, self.marked, self.bare_mark, self.is_nought, self.after)
+        object.__setattr__(self, "known_hash", hash(content))
+
+    def __hash__(self) -> int:
+        return self.known_hash
+
+    @property
+    def is_end(self) -> bool:
+        """Whether the text may stop here."""
+        number = self.kind == "number" and self.digits > 0 and not self.bare_mark and not self.is_nought
+        return "" in self.after and (self.kind == "tail" or number)
+
+
+@cache
+def units(name: str) -> tuple[str, ...]:
+    """The units of a scale as people write them, and none."""
+    found = [""]
+    for real, paper in product(_LENGTHS, _LENGTHS):
+        if name == "kL":
+            found.append(f"{real}/{paper}")
+            continue
+        for second in ("s",) if name == "kv" else ("s2", "s^2"):
+            found += [f"({real}/{second})/{paper}", f"{real}/{second}/{paper}"]
+            found += [f"{real}/({second}{point}{paper})" for point in _POINTS]
+            found += [f"{real}/{second}{point}{paper}" for point in _POINTS]
+    return tuple(found)
+
+
+@cache
+def rules(name: str) -> tuple[str, ...]:
+    """Rules by which a scale may be declared."""
+    if name == "kL":
+        return ()
+    speeds = ("ω",) if name == "kv" else ("ω2", "ω^2")
+    found = [f"{speed}{point}kL" for speed in speeds for point in ("", *_POINTS)]
+    if name == "ka":
+        found += [f"ω{point}kv" for point in ("", *_POINTS)]
+        found += ["kv2/kL", "kv^2/kL"]
+    return tuple(found)
+
+
+def start(name: str) -> State:
+    """Before the first sign of the box of `kL`, `kv` or `ka`."""
+    texts = [f"{label}{rest}" for label in ("", f"{name}=") for rest in ("#", *rules(name))]
+    texts += [f"{rule}=#" for rule in rules(name)]
+    if name == "kL":
+        texts += ["1:#", "M1:#"]
+    return State("tail", after=tuple(dict.fromkeys(texts)))
+
+
+@cache
+def moves(name: str, state: State) -> tuple[Move, ...]:
+    """Every sign that may come next. `#` in `after` stands for a number and its unit."""
+    return tuple(_moves(name, state))
+
+
+def _moves(name: str, state: State) -> Iterable[Move]:
+    if state.kind == "number":
+        yield from _digits(state)
+        if state.digits and not state.bare_mark and not state.is_nought:
+            yield from _tails(name, state.after)
+        return
+    yield from _tails(name, state.after)
+
+
+def _digits(state: State) -> Iterable[Move]:
+    if state.digits < _MOST_DIGITS and not state.is_nought:
+        after = State("number", state.digits + 1, state.marked, after=state.after)
+        nought = replace(after, is_nought=state.digits == 0)
+        for digit, sign in _DIGIT_SIGNS.items():
+            yield Move(sign, digit, nought if digit == "0" else after)
+    if state.digits and not state.marked:
+        marked = State("number", state.digits, marked=True, bare_mark=True, after=state.after)
+        for text, sign in _MARKS.items():
+            yield Move(sign, text, marked)
+
+
+def _tails(name: str, after: tuple[str, ...]) -> Iterable[Move]:
+    firsts: dict[str, list[str]] = {}
+    for text in after:
+        if text.startswith("#"):
+            ratio = text == "#:"
+            yield from _digits(State("number", after=("",) if ratio else units(name)))
+        elif text:
+            firsts.setdefault(text[0], []).append(text[1:])
+    for first, rests in firsts.items():
+        if first == "^":
+            # The raised 2 alone is written; the sign for a power is only ours.
+            for rest in rests:
+                yield Move(rest[0], f"^{rest[0]}", State("tail", after=(rest[1:],)))
+            continue
+        if first == ":":
+            yield Move(":", ":", State("tail", after=tuple("#:" for _ in rests)))
+            continue
+        for sign in _SPELT.get(first, (first,)):
+            yield Move(sign, first, State("tail", after=tuple(rests)))
+
+
+# The likeliest texts ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A text that may be written, and the logarithm of its likelihood."""
+
+    text: str
+    log: float
+
+
+def texts_of(lattice: Lattice, name: str) -> tuple[list[Text], float]:
+    """Texts that the box of a scale may hold, likeliest first; and the log likelihood of signs at will.
+
+    The second value is what the ink would be worth if any signs might stand in any order: a text that
+    is much less likely than that was read into the ink.
+    """
+    line = _line(lattice)
+    beams: list[dict[tuple[State, str], float]] = [{} for _ in range(lattice.count + 1)]
+    beams[0][start(name), ""] = 0.0
+    free = np.full(lattice.count + 1, -np.inf)
+    free[0] = 0.0
+    for piece in range(lattice.count):
+        best = sorted(beams[piece].items(), key=lambda item: -item[1])[:_BEAM]
+        for segment in lattice.starting(piece):
+            log = _placed(segment, line) + _MERGED * (segment.last - piece - 1)
+            skipped = segment.last == piece + 1
+            alone = float(segment.log[COLUMN[JUNK]]) + _SKIPPED
+            free[segment.last] = max(
+                free[segment.last], free[piece] + float(log[: COLUMN[JUNK]].max()), free[piece] + alone
+            )
+            for (state, text), score in best:
+                target = beams[segment.last]
+                for move in moves(name, state):
+                    _keep(target, (move.state, text + move.text), score + float(log[COLUMN[move.sign]]))
+                if skipped:
+                    _keep(target, (state, text), score + alone)
+    ended: dict[str, float] = {}
+    for (state, text), score in beams[-1].items():
+        if state.is_end:
+            ended[text] = max(score, ended.get(text, -np.inf))
+    texts = sorted((Text(text, score) for text, score in ended.items()), key=lambda text: -text.log)
+    return texts, float(free[-1])
+
+
+def _keep(target: dict[tuple[State, str], float], key: tuple[State, str], score: float) -> None:
+    if score > target.get(key, -np.inf):
+        target[key] = score
+
+
+def _line(lattice: Lattice) -> tuple[float, float, float]:
+    """Height of the line's signs, and its top and bottom, px."""
+    boxes = np.array([s.box for s in lattice.segments if s.last == s.first + 1], dtype=np.float64)
+    if len(boxes) == 0:
+        return 1.0, 0.0, 1.0
+    high = float(np.quantile(boxes[:, 3], 0.75))
+    tall = boxes[boxes[:, 3] > 0.5 * high]
+    return high, float(np.median(tall[:, 1])), float(np.median(tall[:, 1] + tall[:, 3]))
+
+
+def _placed(segment: Segment, line: tuple[float, float, float]) -> FloatArray:
+    """(signs,) log probabilities with what size and place in the line say of each sign.
+
+    Shapes alone do not tell a point from an o: a small mark at the foot of the line is a point or a
+    comma, whatever it looks like.
+    """
+    high, top, bottom = line
+    _, y, _, h = segment.box
+    share = h / max(high, 1.0)
+    middle = (y + h / 2.0 - top) / max(bottom - top, 1.0)
+    log = segment.log.copy()
+    if share < _FOOT and middle > _LOW:
+        log[[COLUMN[sign] for sign in _DOTS]] = _CERTAIN
+    for sign, column in _COLUMNS.items():
+        if sign in _DOTS:
+            log[column] += _MISPLACED * (float(share > _TALL) + float(middle < _HIGH))
+        elif sign not in _FLAT and share < _SMALL:
+            log[column] += _MISPLACED
+    return log
+
+
+_COLUMNS: Mapping[str, int] = {sign: column for sign, column in COLUMN.items() if sign}
+
+
+_PX_PER_MM = 12.0
+"""Resolution at which writing is read: a digit of 3 mm is as high as the recogniser's picture, and more."""
+_BORDER_MM, _CELL_BORDER_MM = 0.55, 0.4
+"""Inside of a box's and of a cell's printed line, with the print's and the registration's error."""
+_PAPER = 0.8
+"""Quantile of a box's pixels that is paper: writing never fills a fifth of it."""
+_FOREIGN = 0.25
+"""Log likelihood by sign that a text may lack against signs at will, before it is doubted."""
+_LARGE, _HARDLY = 1000.0, -4.0
+"""From here on, a number lost its decimal point more likely than that anybody chose the scale."""
+_MOST_TEXTS = 200
+"""Less likely texts add nothing to the sum of those that mean the same."""
+_SCALE_OF: Mapping[str, str] = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
+_DIGITS = "0123456789"
+_LEAST_PEAK = 40
+"""Of 255: a cell whose darkest ink is fainter is empty."""
+_INK = 0.4
+"""Of a cell's darkest ink: what is fainter is blur."""
+_LEAST_MM = 1.0
+"""Ink no higher than this is no digit: dust, a dot, the border of the next cell."""
+_DUST_MM = 0.35
+"""Nor is it a part of one."""
+_SOFTEN_MM = 0.11
+"""A pencil's grain breaks strokes: they are closed before pieces are told from dust."""
+_FULL = 0.97
+"""Share of a cell that is less inked than the middle of a stroke."""
+_NO_TENTHS = 0.5
+"""Confidence in whole millimetres where the cell of the tenths is left empty: a shifted number looks so."""
+
+
+def written_scales(page: Page, sheet: Sheet, units: Mapping[str, str] | None = None) -> dict[str, Written]:
+    """What stands in the boxes of a printed sheet, by scale; empty boxes, and a plain sheet, give nothing.
+
+    Arguments: `units` are the units of bare numbers where the assignment says them, by scale.
+    """
+    names = [_SCALE_OF[figure] for figure in sheet.zones if figure in _SCALE_OF]
+    if not names:
+        return {}
+    scales = {}
+    for name in names:
+        lattice = lattice_of(_writing(page, sheet, SCALE_BOXES[name], _BORDER_MM), _PX_PER_MM)
+        if lattice.count:
+            scales[name] = read_scale(lattice, name, (units or {}).get(name))
+    return scales
+
+
+def read_scale(lattice: Lattice, name: str, bare_unit: str | None = None) -> Written:
+    """The likeliest scale in a line of writing."""
+    texts, at_will = texts_of(lattice, name)
+    meant = _by_meaning(texts[:_MOST_TEXTS], name, bare_unit)
+    if not meant:
+        return Written("", 0.0)
+    best = max(log for _, log in meant.values())
+    shares = {meaning: (text, float(np.exp(log - best))) for meaning, (text, log) in meant.items()}
+    total = sum(share for _, share in shares.values())
+    fits = float(np.exp(min(0.0, best - at_will + _FOREIGN * lattice.count)))
+    ranked = sorted(
+        ((text, fits * share / total) for text, share in shares.values()), key=lambda one: -one[1]
+    )
+    return Written(ranked[0][0], ranked[0][1], tuple(ranked[1:4]))
+
+
+def _by_meaning(texts: list[Text], name: str, bare_unit: str | None) -> dict[object, tuple[str, float]]:
+    """Texts that mean the same put together: the likeliest spelling, and the log of their sum."""
+    meanings: dict[object, tuple[str, float]] = {}
+    for candidate in texts:
+        meaning = _meaning(parse_scale(name, candidate.text, bare_unit=bare_unit))
+        if meaning is None:
+            continue
+        unlikely = _HARDLY if isinstance(meaning, float) and meaning >= _LARGE else 0.0
+        text, log = meanings.get(meaning, (candidate.text, -np.inf))
+        meanings[meaning] = (text, float(np.logaddexp(log, candidate.log + unlikely)))
+    return meanings
+
+
+def _meaning(parsed: ParsedScale) -> object | None:
+    match parsed:
+        case Declared(per_mm=value):
+            return float(f"{value:.9g}")
+        case ByRule(powers=powers):
+            return tuple(sorted(powers.items()))
+        case _:
+            return None
+
+
+def _writing(page: Page, sheet: Sheet, box: Box, border_mm: float) -> GreyImage:
+    """Contrast inside a printed box without its border, upright, 12 px/mm; empty outside of the picture."""
+    x, y, wide, high = box
+    inner = x + border_mm, y + border_mm, wide - 2.0 * border_mm, high - 2.0 * border_mm
+    grey = cut_out(page.grey, sheet.mm_to_px, inner, _PX_PER_MM)
+    if grey.size == 0:
+        return grey
+    paper = max(float(np.quantile(grey, _PAPER)), 1.0)
+    return np.asarray(np.clip(255.0 * (1.0 - grey / paper), 0.0, 255.0), dtype=np.uint8)
+
+
+# Measured lengths ---------------------------------------------------------------------------------
+
+
+def written_lengths(
+    page: Page, sheet: Sheet, cells: Mapping[str, Sequence[Box]]
+) -> dict[str, tuple[float, float]]:
+    """Millimetres and the probability that they are what is written, by name; nothing for empty boxes.
+
+    Arguments: `cells` are the boxes of a name's digits in sheet mm, from the left, the last for the tenths.
+    What is no number (a gap between digits, a sign that is no digit) has the probability 0.
+    """
+    pictures: list[GreyImage] = []
+    sizes: list[tuple[float, float]] = []
+    filled: dict[str, list[int | None]] = {}
+    for name, boxes in cells.items():
+        filled[name] = []
+        for box in boxes:
+            sign = _sign(_writing(page, sheet, box, _CELL_BORDER_MM))
+            filled[name].append(None if sign is None else len(pictures))
+            if sign is not None:
+                pictures.append(normalised(sign))
+                sizes.append((sign.shape[1], sign.shape[0]))
+    probability = recognise(pictures, np.array(sizes, dtype=np.float64).reshape(-1, 2))
+    return {
+        name: _length(places, probability)
+        for name, places in filled.items()
+        if any(place is not None for place in places)
+    }
+
+
+def _sign(grey: GreyImage) -> GreyImage | None:
+    """What is written in a cell, cut out; None where it is empty."""
+    if grey.size == 0 or grey.max() < _LEAST_PEAK:
+        return None
+    soft = cv2.GaussianBlur(grey, (0, 0), _SOFTEN_MM * _PX_PER_MM)
+    full = max(float(np.quantile(soft, _FULL)), 1.0)
+    even = np.asarray(np.clip(soft * (255.0 / full), 0.0, 255.0), dtype=np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats((even > _INK * 255.0).astype(np.uint8))
+    heights = stats[1:, cv2.CC_STAT_HEIGHT] / _PX_PER_MM
+    if count == 1 or heights.max() < _LEAST_MM:
+        return None
+    rows, columns = np.nonzero(np.isin(labels, 1 + np.flatnonzero(heights >= _DUST_MM)))
+    part = even[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+    return np.ascontiguousarray(part)
+
+
+def _length(places: Sequence[int | None], probability: FloatArray) -> tuple[float, float]:
+    """The number in a row of cells; a digit is told from the other digits and from what is no sign."""
+    columns = [COLUMN[digit] for digit in _DIGITS]
+    value, sure = 0.0, 1.0
+    for place in places:
+        value *= 10.0
+        if place is not None:
+            row = probability[place, columns]
+            best = int(np.argmax(row))
+            sure *= float(row[best] / max(row.sum() + probability[place, COLUMN[JUNK]], 1e-9))
+            value += best
+    begun = places[next(index for index, place in enumerate(places) if place is not None) :]
+    if None in begun[:-1]:
+        sure = 0.0
+    elif begun[-1] is None:
+        sure *= _NO_TENTHS
+    return value / 10.0, sure

@@ -1,0 +1,1 @@
+"""Where a sheet lies in its image: pixels to millimetres."""

@@ -1,0 +1,245 @@
+"""Which long lines are the sheet's edges and frame: every plausible quadrilateral is tried."""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from grader.printed.layout import PAGE_MM
+from grader.records import FloatArray
+from grader.scan.pixels import MM_PER_INCH, inverted, mapped, through_corners
+from grader.scan.register.fitting import Side, affine_of, affine_params
+from grader.scan.register.homography import FRAMES, PAPER, Model, drawn_ends, title_block_mm
+from grader.scan.register.lines import RIDGE, STEP, LongLine
+
+_LINES_EACH_WAY = 12
+"""Of the longest lines in each direction: a title block adds a few to the eight of paper and frame."""
+_APART = 0.4
+"""Of the image's width or height: opposite sides of a sheet are farther apart than this."""
+_LEAST_LENGTH = 0.4
+"""Sides are at least this share of the image's width or height."""
+_SCAN_BEND_MM = 1.2
+"""A quadrilateral whose corners lie nearer than this to a scanner's map is a scan."""
+_MATCH_MM = 2.0
+"""A line lies on a side of a model if both its ends are nearer than this."""
+_TILT_MM = 2.0
+"""A side ruled by hand is askew by less from end to end."""
+_UNEQUAL_SE = 0.004
+"""Relative difference of a scanner's scales along its two axes."""
+_DPI_SE = 0.005
+"""Of a stated resolution, with room for copies at a slightly other scale."""
+_WINDOW_SE = 0.02
+"""Of a resolution that was only guessed by the size of the image."""
+_HOPELESS = 12.0
+"""A reading with a larger penalty is no longer followed."""
+_FLAT = 1e-9
+"""Least determinant of a map that can be inverted."""
+_CAMERA_SE = 0.015
+"""How far off a camera's view may be, by the lines' errors: right angle in radians, ratio of the axes."""
+_LOOKED_AT = 80
+_BLOCK_MM = 200.0
+"""Length of a title block's ruled lines that counts as much as one side that agrees."""
+_BLOCK_WORTH = 3.0
+"""The title block's ruled lines count as much as three sides that agree."""
+_FOCAL = np.geomspace(0.55, 3.0, 12)
+"""Focal lengths in units of the image's long side: 20 mm to 108 mm of a full-frame camera."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """A reading of the long lines: the map that it implies, and the sides that agree with it."""
+
+    mm_to_px: FloatArray
+    perspective: bool
+    score: float
+    sides: tuple[Side, ...] = ()
+    frame: Model | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Resolution:
+    """The resolution to go by: as stated, or as the image's size and a usual dpi suggest."""
+
+    dpi: tuple[float, float]
+    stated: bool
+
+
+def hypotheses(
+    lines: list[LongLine], shape: tuple[int, int], resolution: Resolution | None
+) -> list[Hypothesis]:
+    """The most plausible readings, best first, in each of the four quarter turns.
+
+    Half turns differ by the title block and, where the paper's edges are seen too, by the margins.
+    """
+    found: list[Hypothesis] = []
+    for quad in _quadrilaterals(lines, shape):
+        corners = _corners(quad)
+        for model in (PAPER, *FRAMES):
+            trust = _kind_trust(model, quad)
+            if trust > 0.0:
+                found += _in_each_turn(corners, model, trust, shape, resolution)
+    drawn = drawn_ends(lines)
+    best = sorted(found, key=lambda hypothesis: -hypothesis.score)[:_LOOKED_AT]
+    return sorted((_agreed(one, lines, drawn) for one in best), key=lambda hypothesis: -hypothesis.score)
+
+
+def _agreed(hypothesis: Hypothesis, lines: list[LongLine], drawn: FloatArray) -> Hypothesis:
+    """With the sides that agree with it, and its score raised by them and by a title block in its place."""
+    sides, frame = match_sides(hypothesis.mm_to_px, lines)
+    block = min(title_block_mm(hypothesis.mm_to_px, drawn) / _BLOCK_MM, _BLOCK_WORTH)
+    score = hypothesis.score + sum(_worth(side) for side in sides) + block
+    return replace(hypothesis, sides=sides, frame=frame, score=score)
+
+
+def _quadrilaterals(lines: list[LongLine], shape: tuple[int, int]) -> list[tuple[LongLine, ...]]:
+    """(left, top, right, bottom) of long lines far enough apart."""
+    high, wide = shape
+    pairs = []
+    for across, own, other in ((False, wide, high), (True, high, wide)):
+        long_enough = [
+            line for line in lines if line.across == across and line.length > _LEAST_LENGTH * other
+        ]
+        chosen = []
+        for a, b in combinations(long_enough[:_LINES_EACH_WAY], 2):
+            at = other / 2.0
+            first, second = (a, b) if a.at(at) < b.at(at) else (b, a)
+            if second.at(at) - first.at(at) > _APART * own:
+                chosen.append((first, second))
+        pairs.append(chosen)
+    return [(left, top, right, bottom) for left, right in pairs[0] for top, bottom in pairs[1]]
+
+
+def _kind_trust(model: Model, quad: tuple[LongLine, ...]) -> float:
+    """How well the looks of four lines fit a model: frames are drawn, edges are steps."""
+    kinds = [line.kind for line in quad]
+    if model is not PAPER:
+        return 1.0 if kinds.count(RIDGE) >= 3 else 0.0
+    inward = (1, 1, -1, -1)
+    if any(line.kind == STEP and line.bright != inner for line, inner in zip(quad, inward, strict=True)):
+        return 0.0
+    # A copier shows paper edges as thin dark lines: possible, but less telling.
+    return 0.5 + 0.1 * kinds.count(STEP)
+
+
+def _in_each_turn(
+    corners: FloatArray,
+    model: Model,
+    trust: float,
+    shape: tuple[int, int],
+    resolution: Resolution | None,
+) -> list[Hypothesis]:
+    """Readings of four corners (left top, clockwise) as those of a model; half turns look alike."""
+    found = []
+    for turns in (0, 1):
+        map_px = _quad_map(model, np.roll(corners, turns, axis=0))
+        params = None if map_px is None else affine_params(map_px)
+        if map_px is None or params is None or not np.all(np.isfinite(params)):
+            continue
+        bend = np.abs(mapped(affine_of(params), model.corners()) - mapped(map_px, model.corners())).max()
+        perspective = bool(bend / np.exp(params[:2].mean()) > _SCAN_BEND_MM)
+        penalty = _camera_misfit(map_px, shape) if perspective else _scan_misfit(params, resolution)
+        if penalty < _HOPELESS:
+            turned = _quad_map(model, np.roll(corners, turns + 2, axis=0))
+            found.append(Hypothesis(map_px, perspective, trust - penalty))
+            found += [] if turned is None else [Hypothesis(turned, perspective, trust - penalty)]
+    return found
+
+
+def _quad_map(model: Model, corners: FloatArray) -> FloatArray | None:
+    """Homography from a model's corners to pixels; None for corners that span no area."""
+    matrix = through_corners(model.corners(), corners)
+    good = bool(np.all(np.isfinite(matrix))) and abs(np.linalg.det(matrix)) > _FLAT
+    return matrix if good else None
+
+
+def _corners(quad: tuple[LongLine, ...]) -> FloatArray:
+    left, top, right, bottom = quad
+    return np.array([_meet(top, left), _meet(top, right), _meet(bottom, right), _meet(bottom, left)])
+
+
+def _meet(a: LongLine, b: LongLine) -> FloatArray:
+    p, u = a.ends[0], a.ends[1] - a.ends[0]
+    q, v = b.ends[0], b.ends[1] - b.ends[0]
+    s = np.linalg.solve(np.column_stack([u, -v]), q - p)
+    return np.asarray(p + s[0] * u)
+
+
+def _scan_misfit(params: FloatArray, resolution: Resolution | None) -> float:
+    unequal = (params[0] - params[1]) / _UNEQUAL_SE
+    penalty = 0.5 * unequal**2
+    if resolution is not None:
+        se, most = (_DPI_SE, 3.0) if resolution.stated else (_WINDOW_SE, 1.5)
+        wrong = (params[:2] - np.log(np.array(resolution.dpi) / MM_PER_INCH)) / se
+        penalty += min(most, 0.25 * float(wrong @ wrong))
+    return float(penalty)
+
+
+def _camera_misfit(mm_to_px: FloatArray, shape: tuple[int, int]) -> float:
+    """How unlike a photo of a flat sheet.
+
+    The sheet's axes must be at right angles and equal in scale before a camera of some focal length
+    (Zhang 2000, principal point at the image's middle).
+    """
+    high, wide = shape
+    long_side = max(high, wide)
+    shift = np.array([[1.0, 0.0, -wide / 2.0], [0.0, 1.0, -high / 2.0], [0.0, 0.0, 1.0]])
+    h = shift @ mm_to_px
+    best = np.inf
+    for focal in _FOCAL * long_side:
+        ray = h / np.array([[focal], [focal], [1.0]])
+        first, second = ray[:, 0], ray[:, 1]
+        size = np.linalg.norm(first), np.linalg.norm(second)
+        skewed = float(first @ second / (size[0] * size[1]))
+        unequal = float(np.log(size[0] / size[1]))
+        best = min(best, 0.5 * (skewed / _CAMERA_SE) ** 2 + 0.5 * (unequal / _CAMERA_SE) ** 2)
+    return best
+
+
+def _worth(side: Side) -> float:
+    length_mm = PAGE_MM[1 - side.axis]
+    return float(np.clip(side.line.length * side.line.inked / max(length_mm, 1.0), 0.0, None) > 0) * (
+        1.0 if (side.line.kind == RIDGE) != (side.model is PAPER) else 0.5
+    )
+
+
+def match_sides(mm_to_px: FloatArray, lines: list[LongLine]) -> tuple[tuple[Side, ...], Model | None]:
+    """Long lines that lie on a side of the paper or of one frame, and which frame that is."""
+    inverse = inverted(mm_to_px)
+    by_model = {model.name: on_sides(inverse, model, lines) for model in (PAPER, *FRAMES)}
+    frame = max(FRAMES, key=lambda model: len(by_model[model.name]))
+    frame_sides = by_model[frame.name]
+    if len(frame_sides) < 2:
+        return tuple(by_model[PAPER.name]), None
+    return tuple(by_model[PAPER.name] + frame_sides), frame
+
+
+def on_sides(
+    inverse: FloatArray, model: Model, lines: list[LongLine], within_mm: float = _MATCH_MM
+) -> list[Side]:
+    """For each side of a model the long line that lies on it best, where one does."""
+    if not lines:
+        return []
+    px = np.stack([line.ends for line in lines])
+    mm = mapped(inverse, px)
+    brighter = _brighter_mm(inverse, lines, px)
+    drawn = np.array([line.kind == RIDGE for line in lines])
+    x0, y0, x1, y1 = model.box
+    found: list[Side] = []
+    for axis, value, outer in ((0, x0, -1), (1, y0, -1), (0, x1, 1), (1, y1, 1)):
+        length = (y1 - y0) if axis == 0 else (x1 - x0)
+        along = np.abs(mm[:, 1, 1 - axis] - mm[:, 0, 1 - axis])
+        off = np.abs(mm[:, :, axis] - value).max(axis=1)
+        fits = (np.abs(mm[:, 1, axis] - mm[:, 0, axis]) <= _TILT_MM) & (off <= within_mm)
+        fits &= (along >= 0.5 * length) & (along <= 1.1 * length)
+        fits &= drawn if model is not PAPER else drawn | (brighter[:, axis] * outer < 0)
+        if fits.any():
+            best = int(np.where(fits, off, np.inf).argmin())
+            found.append(Side(lines[best], model, axis, value))
+    return found
+
+
+def _brighter_mm(inverse: FloatArray, lines: list[LongLine], px: FloatArray) -> FloatArray:
+    """(n, 2) the way on the sheet from each line to its bright side; 0 for drawn lines."""
+    middle = px.mean(axis=1)
+    step = np.array([[0.0, 5.0 * line.bright] if line.across else [5.0 * line.bright, 0.0] for line in lines])
+    return mapped(inverse, middle + step) - mapped(inverse, middle)

@@ -1,0 +1,360 @@
+"""Registration of a page: by the markers of an answer sheet, else by frame, borders and grid.
+
+Evidence that disagrees or is missing becomes a problem of the sheet. The most likely hypothesis of the
+sheet's size and pose is taken; where none is sure enough, the page is refused.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grader.printed.layout import PAGE_MM
+from grader.records import FloatArray, Identity, Page, Problem, Sheet, Unread
+from grader.scan.pixels import MM_PER_INCH, Flat, flatten, inverted, local_axes, mapped
+from grader.scan.register import markers
+from grader.scan.register.distortion import find_lens
+from grader.scan.register.fitting import Fit, affine_of, fit_sides
+from grader.scan.register.homography import (
+    HALVES_ADVICE,
+    PAPER,
+    Model,
+    drawable,
+    drawn_ends,
+    looks_a4,
+    off_turn_deg,
+    rotation_deg,
+    size_mm,
+    title_block_mm,
+)
+from grader.scan.register.hypotheses import Hypothesis, Resolution, hypotheses, on_sides
+from grader.scan.register.lines import LongLine, long_lines, without_grid
+from grader.scan.register.markers import identify
+
+_LEAST_PX_PER_MM = 3.0
+"""Along the long side: below this a pencil's stroke is less than a pixel wide."""
+_USUAL_DPI = (100.0, 150.0, 200.0, 240.0, 250.0, 300.0, 400.0, 500.0, 600.0, 800.0, 1200.0)
+"""Resolutions that scanners and copiers for A3 offer."""
+_UNSET_DPI_PLAIN = (72.0, 96.0)
+"""What programs write when they do not know; no evidence either way."""
+_A3_SLACK_MM = (40.0, 22.0)
+"""A scanner's window may be this much larger than the sheet; paper that is cut off is not A3."""
+_A3_SHORT_MM = 5.0
+"""A scanner may cut so much off the sheet's edges."""
+_WINDOW_SE = 0.004
+"""Relative error of a scale by a usual resolution that fits A3."""
+_BAD_FIT = 4.0
+"""Chi squared for each degree of freedom from which the evidence is said to disagree."""
+_NO_FIT_MM = 1.5
+"""Sides that disagree by more are not those of one A3 sheet."""
+_VAGUE_SE = 0.02
+"""A scale less sure than this is no better than a guess."""
+_MOST_SIDES = 3
+"""Sides by which a frame is known,"""
+_SOME_SIDES = 2
+"""and those of the paper that must be seen beside it."""
+_ALL_SIDES = 4
+_COPY_SE = 0.012
+"""Copiers enlarge or reduce by a per cent or two unless told not to."""
+_SAMPLED, _WHITE = 7, 255
+"""Pixels between those that are looked at, and the value of white ones."""
+_FAR_OFF_MM = 1.5
+"""A side farther off after the fit was taken for the wrong line."""
+_EDGE_WITHIN_MM = 6.0
+"""Without a frame the sheet's place is known no better before its edges are looked for."""
+_ASSUMED_PAPER_SE = 0.004
+"""Paper that looks like A3 may be a trimmed sheet or another format of nearly its ratio."""
+_SCALE_DOUBTS = frozenset({"paper_assumed", "registration_disagrees"})
+_SAME = 1e-6
+"""Scores of readings that the drawing does not tell apart differ by rounding only."""
+_AS_LIKELY = 2.0
+"""Scores of readings that differ by less: either may be the right one."""
+_ANOTHER_SCALE = 0.012
+"""Relative difference of two scales that is worth a warning."""
+
+
+def register_plain(page: Page) -> Sheet | Unread:
+    """The map of a plain sheet, or why there is none."""
+    long_px = max(page.grey.shape)
+    if long_px < _LEAST_PX_PER_MM * PAGE_MM[0]:
+        return Unread("sheet", f"{long_px} pixels along the long side are too few for an A3 drawing")
+    flat = flatten(page.grey)
+    shape = (page.grey.shape[0], page.grey.shape[1])
+    lines = without_grid(long_lines(flat), shape)
+    problems: list[Problem] = []
+    resolution = _resolution(page, problems)
+    dpi = resolution.dpi if resolution is not None and resolution.stated else None
+    ranked = hypotheses(lines, shape, resolution)
+    if ranked:
+        rival = None if dpi is not None else _rival_scale(ranked)
+        best = _as_told(ranked, page.turn_deg)
+        sheet = _from_lines(page, best, lines, dpi, problems)
+        if isinstance(sheet, Sheet) and rival is not None:
+            sheet = _with_rival(sheet, rival)
+        if isinstance(sheet, Unread) or not best.perspective:
+            return sheet
+        return _with_lens(flat, sheet, best)
+    if resolution is None:
+        return Unread("sheet", "no drawing frame, no paper edges and no resolution that fits A3 were found")
+    return _from_resolution(page, resolution, lines, problems)
+
+
+def _as_told(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
+    """The best reading; of the half turns that the drawing does not tell apart, the one the file asks for."""
+    alike = [one for one in ranked if one.score > ranked[0].score - _SAME]
+    return min(alike, key=lambda one: off_turn_deg(one.mm_to_px, turn_deg))
+
+
+def _rival_scale(ranked: list[Hypothesis]) -> float | None:
+    """How far, relatively, the scale would be another one by a reading about as likely as the best.
+
+    A sheet's edge may pass for a frame, their sides are nearly in the same ratio; a stated resolution
+    tells them apart.
+    """
+    likely = [one for one in ranked if one.score > ranked[0].score - _AS_LIKELY]
+    scales = np.log([_px_per_mm(one.mm_to_px, 1.0) for one in likely])
+    off = float(np.abs(scales - scales[0]).max())
+    return off if off > _ANOTHER_SCALE else None
+
+
+def _px_per_mm(mm_to_px: FloatArray, step_mm: float) -> float:
+    """The mean resolution at the sheet's middle."""
+    (right,), (down,) = local_axes(mm_to_px, np.array([PAGE_MM]) / 2.0, step_mm)
+    return float(np.sqrt(abs(right[0] * down[1] - right[1] * down[0])))
+
+
+def _with_rival(sheet: Sheet, rival: float) -> Sheet:
+    message = (
+        "frame and paper's edges cannot be told apart, and no resolution says which:"
+        f" lengths may be {100.0 * rival:.0f} % off; scan again with the stated resolution kept"
+    )
+    file = sheet.problems[0].file if sheet.problems else None
+    problem = Problem("registration_disagrees", message, file)
+    scale_se = float(np.hypot(sheet.scale_se, rival))
+    return replace(sheet, scale_se=scale_se, problems=(*sheet.problems, problem))
+
+
+def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
+    """The stated resolution where the page is about A3 by it, else a usual one by which it is."""
+    if page.dpi is not None and _is_a3(page, page.dpi):
+        return Resolution(page.dpi, stated=True)
+    if page.dpi is not None and page.dpi[0] not in _UNSET_DPI_PLAIN:
+        high, wide = page.grey.shape
+        size = f"{wide / page.dpi[0] * MM_PER_INCH:.0f} x {high / page.dpi[1] * MM_PER_INCH:.0f}"
+        message = f"by its stated resolution the page is {size} mm, not A3"
+        problems.append(Problem("resolution_wrong", message, page.source))
+    for usual in _USUAL_DPI:
+        if _is_a3(page, (usual, usual)):
+            return Resolution((usual, usual), stated=False)
+    return None
+
+
+def _is_a3(page: Page, dpi: tuple[float, float]) -> bool:
+    larger = np.subtract(size_mm(page, dpi), PAGE_MM)
+    return bool(np.all((larger >= -_A3_SHORT_MM) & (larger <= _A3_SLACK_MM)))
+
+
+def _from_lines(
+    page: Page,
+    best: Hypothesis,
+    lines: list[LongLine],
+    dpi: tuple[float, float] | None,
+    problems: list[Problem],
+) -> Sheet | Unread:
+    copied = _is_copy(page)
+    try:
+        fit, frame = _settled(_of_the_drawing(best) if copied else best, dpi, copied=copied), best.frame
+    except np.linalg.LinAlgError:
+        return Unread("sheet", "the long lines found do not make one sheet")
+    block_mm = title_block_mm(fit.mm_to_px, drawn_ends(lines))
+    doubt = _doubt(best, fit, block_mm, _Stated(dpi is not None, bool(problems)))
+    if doubt is not None:
+        return Unread("sheet", doubt)
+    if block_mm == 0.0:
+        problems.append(_unsure_upright(page))
+    if fit.freedom > 0 and fit.chi2 / fit.freedom > _BAD_FIT:
+        message = f"frame, paper and resolution disagree by {fit.rms_mm:.1f} mm"
+        problems.append(Problem("registration_disagrees", message, page.source))
+    scale_se = fit.scale_se
+    if frame is None and dpi is None:
+        scale_se = float(np.hypot(scale_se, _ASSUMED_PAPER_SE))
+        message = "only the paper's edges give the scale; taken for A3"
+        problems.append(Problem("paper_assumed", message, page.source))
+    if frame is None and copied:
+        scale_se = float(np.hypot(scale_se, _COPY_SE))
+    return _sheet(fit, frame, scale_se, problems)
+
+
+def _is_copy(page: Page) -> bool:
+    """Whether the page is black and white only, as copiers send it: its drawing may be of any size."""
+    sample = page.grey[::_SAMPLED, ::_SAMPLED]
+    return bool(np.all((sample == 0) | (sample == _WHITE)))
+
+
+def _of_the_drawing(best: Hypothesis) -> Hypothesis:
+    """Without the paper's sides, where the frame has all of its own: a copy's paper is not its drawing's."""
+    drawn = tuple(side for side in best.sides if side.model is not PAPER)
+    return replace(best, sides=drawn) if len(drawn) == _ALL_SIDES else best
+
+
+@dataclass(frozen=True, slots=True)
+class _Stated:
+    """What the file says of its resolution: that the page is A3, or that it is something else."""
+
+    a3: bool
+    other: bool
+
+
+def _doubt(best: Hypothesis, fit: Fit, block_mm: float, stated: _Stated) -> str | None:
+    """Why the lines found are not enough to know the sheet, or None."""
+    of_frame = sum(side.model is not PAPER for side in best.sides)
+    of_paper = len(best.sides) - of_frame
+    both = of_frame >= _MOST_SIDES and of_paper >= _SOME_SIDES
+    if not np.isfinite(fit.scale_se) or fit.scale_se > _VAGUE_SE:
+        return "the long lines found do not settle the scale"
+    if fit.freedom > 0 and fit.rms_mm > _NO_FIT_MM:
+        return f"what could be frame and paper's edges disagree by {fit.rms_mm:.1f} mm: not an A3 drawing"
+    if block_mm == 0.0 and not stated.a3 and not both:
+        return "neither a title block nor frame and paper together show that this is an A3 drawing"
+    if stated.other and not (of_frame >= _MOST_SIDES and block_mm > 0.0):
+        return "by its resolution the page is not A3, and no frame with a title block says otherwise"
+    return None
+
+
+def _unsure_upright(page: Page) -> Problem:
+    return Problem("upright_unsure", "no title block shows which way up the sheet is", page.source)
+
+
+def _with_lens(flat: Flat, sheet: Sheet, best: Hypothesis) -> Sheet:
+    """A photo's sheet with the lens's bend, where one shows."""
+    lens = find_lens(flat, sheet.mm_to_px, list(best.sides))
+    if lens is None:
+        return sheet
+    # A straight picture does not settle whether the paper is A3, or which rectangle was seen.
+    doubted = any(problem.code in _SCALE_DOUBTS for problem in sheet.problems)
+    scale_se = max(lens.scale_se, sheet.scale_se) if doubted else lens.scale_se
+    return replace(sheet, lens=replace(lens, scale_se=scale_se))
+
+
+def _settled(best: Hypothesis, dpi: tuple[float, float] | None, *, copied: bool = False) -> Fit:
+    """Refit with the sides that agree; a side far off after the fit is dropped, once.
+
+    The scale of a copy is not the scanner's: where its frame has all four sides, they alone tell it.
+    """
+    sides = list(best.sides)
+    if copied and len(sides) == _ALL_SIDES and all(side.model is not PAPER for side in sides):
+        dpi = None
+    fit = fit_sides(best.mm_to_px, sides, dpi, perspective=best.perspective)
+    keep = [side for side, off in zip(sides, fit.side_mm, strict=True) if abs(off) < _FAR_OFF_MM]
+    return (
+        fit if len(keep) == len(sides) else fit_sides(fit.mm_to_px, keep, dpi, perspective=best.perspective)
+    )
+
+
+def _from_resolution(
+    page: Page, resolution: Resolution, lines: list[LongLine], problems: list[Problem]
+) -> Sheet | Unread:
+    """Scale from the resolution alone, skew from ruled lines, place from the image's middle."""
+    high, wide = page.grey.shape
+    tilt = _tilt(lines)
+    quarter = 0.0 if wide >= high else np.pi / 2.0
+    drawn = drawn_ends(lines)
+    tried: list[tuple[float, FloatArray]] = []
+    for half in (0.0, np.pi):
+        angle = tilt + quarter + half
+        params = np.array([*np.log(np.array(resolution.dpi) / MM_PER_INCH), angle, wide / 2.0, high / 2.0])
+        matrix = affine_of(params)
+        tried.append((title_block_mm(matrix, drawn), matrix))
+    block, matrix = max(tried, key=lambda one: (one[0], -off_turn_deg(one[1], page.turn_deg)))
+    if not resolution.stated and (block == 0.0 or looks_a4(page)):
+        return Unread(
+            "sheet", "no whole drawing frame, no title block or no stated resolution: not known to be A3"
+        )
+    if block == 0.0:
+        problems.append(_unsure_upright(page))
+    if not resolution.stated:
+        message = f"no stated resolution: {resolution.dpi[0]:.0f} dpi assumed, by which the page is A3"
+        problems.append(Problem("resolution_assumed", message, page.source))
+    message = "no drawing frame: the place on the sheet is rough"
+    scale_se = 0.0015 if resolution.stated else _WINDOW_SE
+    if _is_copy(page):
+        scale_se = float(np.hypot(scale_se, _COPY_SE))
+        message += f", and a copy's lengths are known to {100.0 * _COPY_SE:.0f} % only"
+    problems.append(Problem("frame_missing", message, page.source))
+    return _sheet(_placed(matrix, resolution, lines, scale_se), None, scale_se, problems)
+
+
+def _placed(matrix: FloatArray, resolution: Resolution, lines: list[LongLine], scale_se: float) -> Fit:
+    """The map moved to the paper's edges, where one to three of them are seen."""
+    edges = on_sides(inverted(matrix), PAPER, lines, _EDGE_WITHIN_MM)
+    if not edges:
+        return Fit(matrix, 0.0, 0, 0.0, scale_se, np.zeros(0))
+    return fit_sides(matrix, edges, resolution.dpi, perspective=False)
+
+
+def _tilt(lines: list[LongLine]) -> float:
+    """Weighted median tilt of the long lines from the image's axes, radians."""
+    angles, weights = [], []
+    for line in lines:
+        d = line.ends[1] - line.ends[0]
+        angle = np.arctan2(d[1], d[0]) if line.across else -np.arctan2(d[0], d[1])
+        if abs(angle) < np.radians(5.0):
+            angles.append(float(angle))
+            weights.append(line.length * line.inked)
+    if not angles:
+        return 0.0
+    order = np.argsort(angles)
+    cumulated = np.cumsum(np.array(weights)[order])
+    return float(np.array(angles)[order][np.searchsorted(cumulated, cumulated[-1] / 2.0)])
+
+
+def _sheet(fit: Fit, frame: Model | None, scale_se: float, problems: list[Problem]) -> Sheet:
+    matrix = fit.mm_to_px / fit.mm_to_px[2, 2]
+    return Sheet(
+        mm_to_px=matrix,
+        page_mm=PAGE_MM,
+        method="combined",
+        px_per_mm=_px_per_mm(matrix, 10.0),
+        rotation_deg=rotation_deg(matrix),
+        residual_mm=fit.rms_mm,
+        scale_se=scale_se,
+        drawable_mm=drawable(frame),
+        problems=tuple(problems),
+    )
+
+
+_LEAST_IN_PICTURE = 0.95
+"""Share of the drawing area below which the picture shows a part of the sheet only."""
+_BESIDE_MM = 3.0
+"""A place so far beside the picture still counts: the map's own error, and a frame cut close."""
+
+
+def register(page: Page) -> tuple[Sheet | Unread, Identity | None]:
+    """The page's map from millimetres to pixels, or why there is none; and whose page it is by its code.
+
+    A printed sheet's code is looked for in its place; elsewhere a quick look must do.
+    """
+    printed = markers.register(page)
+    identity = (None if printed is None else printed.identity) or identify(page)
+    sheet = printed or register_plain(page)
+    if isinstance(sheet, Unread):
+        hint = f"; the page is as large as A4, and {HALVES_ADVICE}" if looks_a4(page) else ""
+        return Unread(sheet.name, f"{sheet.reason}{hint}"), identity
+    share = _share_in_picture(page, sheet)
+    if share < _LEAST_IN_PICTURE:
+        reason = f"only {100.0 * share:.0f} % of the sheet is in the picture; {HALVES_ADVICE}"
+        return Unread("sheet", reason), identity
+    return sheet, identity
+
+
+def rectify(page: Page) -> Sheet | Unread:
+    """The page's map from millimetres to pixels, or, false in a condition, why there is none."""
+    return register(page)[0]
+
+
+def _share_in_picture(page: Page, sheet: Sheet) -> float:
+    """Share of the drawing area that lies in the picture."""
+    x, y, wide, high = sheet.drawable_mm
+    mm = np.stack(np.meshgrid(np.linspace(x, x + wide, 31), np.linspace(y, y + high, 21)), axis=-1)
+    at = mapped(sheet.mm_to_px, mm)
+    beside = _BESIDE_MM * sheet.px_per_mm
+    return float(np.mean(np.all((at > -beside) & (at < page.grey.shape[::-1] + np.array(beside)), axis=-1)))

@@ -1,0 +1,1 @@
+"""The ink of a sheet: strokes, arrowheads, circles, hatching."""

@@ -1,0 +1,403 @@
+"""Connected regions of ink, and pieces joined over gaps and crossings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from grader.records import Box, FloatArray, Page, Sheet
+from grader.scan.pixels import (
+    BoolArray,
+    Float32Array,
+    at_full_size,
+    inverted,
+    lengths_and_directions,
+    mapped,
+    parts,
+    reached,
+)
+from grader.scan.strokes.seeds import PX_PER_MM, Seeds
+
+_TURN = 0.16
+"""Pieces that differ by more than 9 degrees are never joined."""
+_ROUNDS = 6
+"""A line grows as it becomes better known; more rounds change nothing."""
+_MOST_OFF = 1.7
+"""Of the distance allowed beside a line: so far off are pieces that lie far beyond its ends."""
+PROBES = 13
+"""Places along a segment at which its distance from another is taken."""
+_SLACK_PX = 1.0
+"""Callers compare in single precision: pairs at the limit are in."""
+_NEIGHBOURHOOD = 256
+"""Pairs of samples around one segment, at most as a rule."""
+
+Rows = NDArray[np.intp]
+
+
+# Near each other ----------------------------------------------------------------------------------
+
+
+def near_pairs(ends: FloatArray, others: FloatArray, reach_px: float) -> tuple[Rows, Rows]:
+    """Rows of all pairs of a segment (k, 2, 2) and another (t, 2, 2) within `reach_px` of each other.
+
+    Returns (n,) rows of `ends`, in order, and (n,) rows of `others`, in order for each segment. Pairs up
+    to two and a half times as far apart may be among them: the caller's own formula decides.
+    """
+    step = reach_px + _SLACK_PX
+    count = len(others)
+    at, row = _samples(others, step)
+    tree = KDTree(at)
+    pairs = [np.zeros(0, dtype=np.intp)]
+    for part in parts(len(ends), _NEIGHBOURHOOD):
+        own_at, own = _samples(ends[part], step)
+        # No point of a segment is further than half a step from a sample.
+        close = KDTree(own_at).sparse_distance_matrix(tree, reach_px + step, output_type="ndarray")
+        pairs.append(np.unique((part.start + own[close["i"]]) * count + row[close["j"]]))
+    first, second = np.divmod(np.concatenate(pairs), max(count, 1))
+    return first, second
+
+
+def _samples(ends: FloatArray, step: float) -> tuple[FloatArray, Rows]:
+    """((n, 2) places along segments, at most `step` apart, both ends among them; (n,) their segments)."""
+    span = ends[:, 1] - ends[:, 0]
+    count = np.ceil(np.hypot(span[:, 0], span[:, 1]) / step).astype(np.intp) + 1
+    row = np.repeat(np.arange(len(ends)), count)
+    number = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    return ends[row, 0] + (number / np.maximum(count[row] - 1, 1))[:, None] * span[row], row
+
+
+def distances(ends: FloatArray, first: Rows, second: Rows) -> Float32Array:
+    """(n, p) distances of places along the `first` (n,) of segments (k, 2, 2) from the `second`."""
+    ends = ends.astype(np.float32)
+    share = np.linspace(0.04, 0.96, PROBES, dtype=np.float32)
+    span = ends[:, 1] - ends[:, 0]
+    length = np.maximum(np.hypot(span[:, 0], span[:, 1]), np.float32(1e-6))
+    u = span / length[:, None]
+    points = ends[:, None, 0] + share[:, None] * span[:, None, :]
+    x = points[first, :, 0] - ends[second, 0, 0, None]
+    y = points[first, :, 1] - ends[second, 0, 1, None]
+    u = u[second, :, None]
+    along = x * u[:, 0] + y * u[:, 1]
+    along -= np.clip(along, np.float32(0.0), length[second, None])
+    across = x * u[:, 1] - y * u[:, 0]
+    return np.asarray(np.hypot(along, across))
+
+
+# On one line --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """Strokes: (n, 2, 2) ends and (n,) widths, px, and the rows that each was joined from."""
+
+    ends: FloatArray
+    width: FloatArray
+    members: tuple[NDArray[np.intp], ...]
+
+    def take(self, which: BoolArray) -> "Pieces":
+        """The chosen rows."""
+        chosen = tuple(self.members[row] for row in np.flatnonzero(which))
+        return Pieces(self.ends[which], self.width[which], chosen)
+
+
+def join(ends: FloatArray, width: FloatArray, off_px: float, gap_px: float) -> Pieces:
+    """Join, longest first, all free pieces within `off_px` of its line and no gap over `gap_px`."""
+    length = lengths_and_directions(ends)[0]
+    free = np.ones(len(ends), dtype=bool)
+    middle = ends.mean(axis=1)
+    joined = np.zeros((len(ends), 2, 2))
+    widths = np.zeros(len(ends))
+    groups: list[NDArray[np.intp]] = []
+    for first in map(int, np.argsort(-length)):
+        if not free[first]:
+            continue
+        line, members = ends[first], np.array([first])
+        for _ in range(_ROUNDS):
+            candidates = np.flatnonzero(free & _may_lie_on(middle, line, off_px))
+            grown = candidates[_on_line(ends[candidates], line, off_px, gap_px)]
+            grown = grown if first in grown else np.sort(np.append(grown, first))
+            if np.array_equal(grown, members):
+                break
+            members, line = grown, _fitted(ends[grown], length[grown])
+        free[members] = False
+        joined[len(groups)] = line
+        widths[len(groups)] = width[members] @ length[members] / length[members].sum()
+        groups.append(members)
+    return Pieces(joined[: len(groups)], widths[: len(groups)], tuple(groups))
+
+
+def _may_lie_on(middle: FloatArray, line: FloatArray, off_px: float) -> BoolArray:
+    """Which pieces, by their middles, are near enough to a line (2, 2) to be looked at."""
+    u = line[1] - line[0]
+    v = np.array([-u[1], u[0]]) / float(np.sqrt(u @ u))
+    return np.asarray(np.abs(middle @ v - float(line[0] @ v)) <= _MOST_OFF * off_px)
+
+
+def _on_line(ends: FloatArray, line: FloatArray, off_px: float, gap_px: float) -> NDArray[np.intp]:
+    """Rows of the pieces near a line and reached from it without too large a gap."""
+    u = line[1] - line[0]
+    size = float(np.sqrt(u @ u))
+    u = u / size
+    relative = ends - line[0]
+    t, d = relative @ u, relative @ np.array([-u[1], u[0]])
+    turn = np.abs(d[:, 1] - d[:, 0]) <= _TURN * np.abs(t[:, 1] - t[:, 0])
+    # A short line does not know its direction: allow for half a pixel at its ends, growing outward.
+    beyond = np.maximum(np.maximum(-t, t - size), 0.0)
+    allowed = off_px + np.minimum(0.5 * beyond / size, (_MOST_OFF - 1.0) * off_px)
+    near = np.flatnonzero(turn & (np.abs(d) <= allowed).all(axis=1))
+    return near[reached(np.sort(t[near], axis=1), np.array([0.0, size]), gap_px)]
+
+
+def _fitted(ends: FloatArray, length: FloatArray) -> FloatArray:
+    """Line by weighted total least squares through the pieces, ending where they end."""
+    points = ends.reshape(-1, 2)
+    weight = np.repeat(length, 2)
+    centre = weight @ points / weight.sum()
+    off = points - centre
+    spread = (off * weight[:, None]).T @ off
+    angle = 0.5 * np.arctan2(2.0 * spread[0, 1], spread[0, 0] - spread[1, 1])
+    u = np.array([np.cos(angle), np.sin(angle)])
+    t = off @ u
+    return np.stack([centre + t.min() * u, centre + t.max() * u])
+
+
+_FRAME_MM = 1.5
+"""Inside of the frame's middle line: its pen and the registration's error."""
+_BLOCK_MM = (215.0, 80.0)
+"""Width and height of the corner in which a title block may lie."""
+_SQUARE = 0.05
+"""Of its length: how far askew a ruled line may be."""
+_PIECE_MM = 3.0
+"""Shorter pieces of borders are letters'."""
+_RULED_MM = 6.0
+"""Shorter joined lines are no part of a table."""
+_OFF_MM = 0.5
+"""Both borders of a ruled line are joined."""
+_BROKEN_MM = 16.0
+"""Letters that touch a ruled line break its border this far."""
+_MEET_MM = 4.0
+"""The block's lines are ruled to their corner no nearer than this."""
+_REACH_MM = 18.0
+"""The block's lines reach the frame, or end this far from it."""
+_EDGE_MM = 2.5
+"""Lines nearer to the sheet's right and lower edge are the paper's shadow."""
+_LEAST_LINES = 4
+"""Top, left and at least two rows."""
+_SAMPLES = 64
+"""Places along each side of a box: 4096 tell a median to a few per cent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """Where on the sheet drawings are looked for.
+
+    Attributes
+    ----------
+    sheet : the page's map
+    boxes : sheet mm, any of them
+    block : the title block, left out
+    scale : working pixels per full pixel
+    """
+
+    sheet: Sheet
+    boxes: tuple[Box, ...]
+    block: Box | None
+    scale: float
+
+    def to_mm(self, points: FloatArray) -> FloatArray:
+        """(..., 2) full pixels to sheet millimetres."""
+        return mapped(inverted(self.sheet.mm_to_px), points)
+
+    def holds(self, points: FloatArray) -> BoolArray:
+        """Which points, (n, 2) mm, are in the field."""
+        inside = np.zeros(len(points), dtype=bool)
+        for box in self.boxes:
+            inside |= _in_box(points, box)
+        return inside if self.block is None else inside & ~_in_box(points, self.block)
+
+    def mask(self, shape: tuple[int, ...]) -> BoolArray:
+        """The field at the working resolution."""
+        picture = np.zeros(shape, dtype=np.uint8)
+        for box in self.boxes:
+            cv2.fillConvexPoly(picture, self._outline(box), 1)
+        if self.block is not None:
+            cv2.fillConvexPoly(picture, self._outline(self.block), 0)
+        return picture > 0
+
+    def _outline(self, box: Box) -> np.ndarray:
+        x, y, w, h = box
+        corners = np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]])
+        return np.rint((mapped(self.sheet.mm_to_px, corners) + 0.5) * self.scale - 0.5).astype(np.int32)
+
+
+def brightness(page: Page, sheet: Sheet, boxes: Sequence[Box] | None) -> float:
+    """Median of the page, 0..255, at places every few millimetres of where drawings are looked for."""
+    shares = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    across, down = (share.ravel() for share in np.meshgrid(shares, shares))
+    mm = [np.column_stack([x + w * across, y + h * down]) for x, y, w, h in boxes or (_inner(sheet),)]
+    last = np.array(page.grey.shape[::-1]) - 1
+    column, row = np.clip(np.rint(mapped(sheet.mm_to_px, np.concatenate(mm))), 0, last).astype(np.intp).T
+    return float(np.median(page.grey[row, column]))
+
+
+def _inner(sheet: Sheet) -> Box:
+    """The frame's inside, clear of its line."""
+    x, y, w, h = sheet.drawable_mm
+    return (x + _FRAME_MM, y + _FRAME_MM, w - 2.0 * _FRAME_MM, h - 2.0 * _FRAME_MM)
+
+
+def field_of(seeds: Seeds, sheet: Sheet, scale: float, boxes: Sequence[Box] | None) -> Field:
+    """The frame's inside, or the boxes asked for, without the title block."""
+    field = Field(sheet, (_inner(sheet),) if boxes is None else tuple(boxes), None, scale)
+    if sheet.zones:
+        return field
+    return replace(field, block=title_block(field.to_mm(at_full_size(seeds.ends, scale)), sheet))
+
+
+def title_block(ends: FloatArray, sheet: Sheet) -> Box | None:
+    """The ruled table at the bottom right, from pieces of lines (n, 2, 2) mm; None without one.
+
+    Its top line runs to the right side and its left line to the bottom, and the two meet: a plan
+    drawn close by is not taken in.
+    """
+    lines = _ruled(ends, sheet)
+    if len(lines) < _LEAST_LINES:
+        return None
+    low, high = lines.min(axis=1), lines.max(axis=1)
+    level = (high - low)[:, 0] > (high - low)[:, 1]
+    right, bottom = high.max(axis=0)
+    tops = lines[level & (high[:, 0] > right - _REACH_MM)]
+    lefts = lines[~level & (high[:, 1] > bottom - _REACH_MM)]
+    best: Box | None = None
+    for top in tops:
+        for left in lefts:
+            x, y = float(left[:, 0].mean()), float(top[:, 1].mean())
+            meets = abs(top[:, 0].min() - x) < _MEET_MM and abs(left[:, 1].min() - y) < _MEET_MM
+            inside = level & (low[:, 1] > y + _MEET_MM / 2.0) & (low[:, 0] > x - _MEET_MM)
+            large = best is None or (right - x) * (bottom - y) > best[2] * best[3]
+            if meets and large and inside.any():
+                best = (x - 1.0, y - 1.0, sheet.page_mm[0] - x + 1.0, sheet.page_mm[1] - y + 1.0)
+    return best
+
+
+def _ruled(ends: FloatArray, sheet: Sheet) -> FloatArray:
+    """(m, 2, 2) level and upright lines near the bottom right corner, pieces joined."""
+    right, bottom = sheet.page_mm
+    span = np.abs(ends[:, 1] - ends[:, 0])
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    ruled = (span.min(axis=1) < np.maximum(_SQUARE * span.max(axis=1), 0.2)) & (span.max(axis=1) >= _PIECE_MM)
+    ruled &= (low[:, 0] > right - _BLOCK_MM[0]) & (low[:, 1] > bottom - _BLOCK_MM[1])
+    ruled &= (high[:, 0] < right - _EDGE_MM) & (high[:, 1] < bottom - _EDGE_MM)
+    lines = join(ends[ruled], np.ones(int(ruled.sum())), _OFF_MM, _BROKEN_MM).ends
+    size = np.abs(lines[:, 1] - lines[:, 0]).max(axis=1)
+    return np.asarray(lines[size >= _RULED_MM])
+
+
+def _in_box(points: FloatArray, box: Box) -> BoolArray:
+    x, y, w, h = box
+    return np.asarray(
+        (points[:, 0] >= x) & (points[:, 0] <= x + w) & (points[:, 1] >= y) & (points[:, 1] <= y + h)
+    )
+
+
+_MARK_MM = 8.0
+"""Larger pieces of ink are no single letter."""
+_LONG_SEED_MM = 4.5
+"""Ink without a straight border of this length holds letters, compass arcs and the like."""
+_LEAST_STROKE_MM = 1.2
+"""Shorter pieces are dots and dust."""
+_THIN = 0.5
+"""Spread across a stroke in pens: 0.29 for an even one."""
+_LONG = 2.5
+"""A stroke is so many times as long as wide."""
+_LONE_MM = 6.0
+"""A straight piece this long is a stroke, whatever stands beside it."""
+_NEIGHBOUR_MM = 5.0
+"""Letters of one word are closer to each other than this."""
+_NEIGHBOURS = 2
+"""A single letter beside a short stroke names it; two are a text of which it is part."""
+_DUST_MM = 0.4
+"""Smaller pieces are dust."""
+
+
+@dataclass(frozen=True, slots=True)
+class Components:
+    """Pieces of ink at the working resolution.
+
+    Attributes
+    ----------
+    box_px : (c, 4) left, top, width, height
+    mark : (c,) too small or too crooked to hold a stroke
+    dash : (c,) straight but short and beside letters: a stroke only as part of a dashed line
+    of_seed : (n,) which piece each seed is of
+    """
+
+    box_px: FloatArray
+    mark: BoolArray
+    dash: BoolArray
+    of_seed: NDArray[np.intp]
+
+
+def find_components(seeds: Seeds) -> Components:
+    """Label the ink and tell marks from what can hold strokes."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(seeds.mask, connectivity=8)
+    box = stats[1:, :4].astype(np.float64)
+    of_seed = labels[seeds.border[:, 0], seeds.border[:, 1]].astype(np.intp) - 1
+    size = np.hypot(box[:, 2], box[:, 3]) / PX_PER_MM
+    longest = np.zeros(len(box))
+    length = lengths_and_directions(seeds.ends)[0] / PX_PER_MM
+    np.maximum.at(longest, of_seed, length)
+    major, minor = _spread(labels.astype(np.int32, copy=False), len(box))
+    straight = (minor <= _THIN * seeds.pen_px) & (major >= _LONG * minor)
+    small = longest < _LONG_SEED_MM
+    stroke_like = straight & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
+    written = small & ~stroke_like & (size > 2.0 * _DUST_MM) & (size < _MARK_MM)
+    text = small & stroke_like & (size < _LONE_MM)
+    text[text] = _beside(box, written, np.flatnonzero(text))
+    return Components(box, small & ~stroke_like, text, of_seed)
+
+
+def _spread(labels: NDArray[np.int32], count: int) -> tuple[FloatArray, FloatArray]:
+    """Standard deviations of each piece's pixels along and across it, (count,) each, px."""
+    inked = np.flatnonzero(labels > 0)
+    row, column = np.divmod(inked, labels.shape[1])
+    label = labels.reshape(-1)[inked] - 1
+    number = np.maximum(np.bincount(label, minlength=count), 1)
+
+    def mean(values: FloatArray) -> FloatArray:
+        return np.asarray(np.bincount(label, weights=values, minlength=count) / number)
+
+    x, y = column.astype(np.float64), row.astype(np.float64)
+    mx, my = mean(x), mean(y)
+    x, y = x - mx[label], y - my[label]
+    xx, yy, xy = mean(x * x), mean(y * y), mean(x * y)
+    half, root = (xx + yy) / 2.0, np.sqrt(((xx - yy) / 2.0) ** 2 + xy**2)
+    return np.sqrt(half + root), np.sqrt(np.maximum(half - root, 0.0))
+
+
+def _beside(box: FloatArray, written: BoolArray, rows: NDArray[np.intp]) -> BoolArray:
+    """Which of the pieces `rows` have at least two letters close by."""
+    centre = (box[:, :2] + box[:, 2:] / 2.0) / PX_PER_MM
+    letters = centre[written]
+    result = np.zeros(len(rows), dtype=bool)
+    if len(letters) < _NEIGHBOURS:
+        return result
+    for index, at in enumerate(centre[rows]):
+        near = np.hypot(*(letters - at).T) < _NEIGHBOUR_MM
+        result[index] = near.sum() >= _NEIGHBOURS
+    return result
+
+
+def mark_boxes(components: Components, field: Field) -> FloatArray:
+    """(j, 4) boxes x, y, w, h in sheet mm of the marks in the field, dust left out."""
+    left, top, wide, high = components.box_px[components.mark | components.dash].T
+    steps = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+    corners = np.stack([np.column_stack([left + dx * wide, top + dy * high]) for dx, dy in steps], axis=1)
+    # A box's edge lies between pixels.
+    mm = field.to_mm(at_full_size(corners - 0.5, field.scale))
+    low, far = mm.min(axis=1), mm.max(axis=1)
+    inside = field.holds((low + far) / 2.0) & ((far - low).max(axis=1) > _DUST_MM)
+    return np.column_stack([low[inside], (far - low)[inside]])

@@ -1,0 +1,237 @@
+"""The ink map of a sheet, and straight pieces of lines in it: the seeds of strokes."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from grader.records import FloatArray, GreyImage
+from grader.scan.pixels import Float32Array, lengths_and_directions, parts
+
+PX_PER_MM = 6.0
+"""Resolution at which ink is looked for; strokes of 0.3 mm are two pixels wide."""
+_WHOLE = 0.08
+"""Relative difference up to which a whole fraction of the resolution is near enough."""
+_FAINT = 20
+"""Of 255: fainter than a construction line drawn with a hard pencil is paper."""
+_PEAK_WINDOW_PX = 7
+"""Wider than a stroke with its blur, narrower than the distance of two strokes."""
+_DARK = 0.62
+"""Of the darkest strokes' contrast: construction lines are lighter."""
+_DARK_QUANTILE = 0.85
+"""Of the ink's contrast: that of the darkest strokes."""
+_POLYGON_PX = 1.0
+"""Distance of a border from the straight runs that replace it."""
+_LEAST_PX = 5.0
+"""0.8 mm: shorter runs have no direction."""
+_SOFTEN_PX = 0.7
+"""Less than a stroke's width: grain fades and gaps stay open."""
+_WIDEST_PX = 12
+"""2 mm: a wider band is a blot."""
+_PEN_PX = 2.0
+"""A pen of 0.35 mm, where a sheet has no long stroke to tell."""
+_BUNDLE = 1.6
+"""An ink band this many pens wide is more than one stroke."""
+_STRIP_MM, _STRIPS, _EVERY = 10.0, 5, 3
+"""Strips narrow enough that a skewed line stays within its own width over most of one."""
+_LEAST_PEAK = 6.0
+"""Of 255: fainter squares do not disturb."""
+_LEAST_LINES = 12
+"""A table has fewer lines; 10 mm of a strip have as many squares."""
+_REGULAR, _ALIKE = 0.6, 0.2
+"""Share of the distances that are whole numbers of squares, to within this share of one."""
+_DARKER = 1.35
+"""Drawn lines are so much darker than printed squares."""
+_DARKEST = 0.9
+"""Quantile of a strip's lines: every fifth or tenth is printed darker."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seeds:
+    """Guesses of strokes at the working resolution, a row each.
+
+    Attributes
+    ----------
+    ends : (n, 2, 2) px on the guessed middle line
+    width : (n,) px, the guessed width of the single stroke
+    border : (n, 2) row and column of an ink pixel on the run, telling which piece of ink it is of
+    pen_px : usual width of a stroke on the sheet
+    mask : (h, w) uint8, 1 = ink
+    soft : (h, w) uint8 contrast, softened
+    """
+
+    ends: FloatArray
+    width: FloatArray
+    border: NDArray[np.intp]
+    pen_px: float
+    mask: GreyImage
+    soft: GreyImage
+
+
+def working_scale(px_per_mm: float) -> float:
+    """Share of the full resolution at which ink is looked for: a whole fraction where one is near.
+
+    Averages over 2 x 2 or 4 x 4 pixels are quick; 300 and 600 dpi come to 5.9 px/mm.
+    """
+    ratio = px_per_mm / PX_PER_MM
+    whole = max(1.0, float(round(ratio)))
+    return 1.0 / whole if abs(ratio / whole - 1.0) < _WHOLE else min(1.0, 1.0 / ratio)
+
+
+def find_seeds(contrast: GreyImage) -> Seeds:
+    """Straight runs of at least 0.8 mm along the borders of the ink."""
+    soft = np.asarray(cv2.GaussianBlur(contrast, (0, 0), _SOFTEN_PX), dtype=np.uint8)
+    mask = ink_mask(soft)
+    first = _runs_of(mask)
+    # Vectors drawn dark over faint construction lines show their own borders only in the dark.
+    second = _runs_of(mask & dark_mask(soft, mask), first.pen_px)
+    return Seeds(
+        np.concatenate([first.ends, second.ends]),
+        np.concatenate([first.width, second.width]),
+        np.concatenate([first.border, second.border]),
+        first.pen_px,
+        mask,
+        soft,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Runs:
+    ends: FloatArray
+    width: FloatArray
+    border: NDArray[np.intp]
+    pen_px: float
+
+
+def _runs_of(mask: GreyImage, pen_px: float | None = None) -> _Runs:
+    """Straight runs of the borders of a mask, moved to the middle of their strokes."""
+    edges = _border_runs(mask)
+    border = edges[:, 0, ::-1].astype(np.intp)
+    if len(edges) == 0:
+        return _Runs(edges, np.zeros(0), border, _PEN_PX if pen_px is None else pen_px)
+    inward, width = _band_width(mask, edges)
+    length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
+    long_enough = length >= 2.0 * PX_PER_MM
+    usual = _usual(width[long_enough], length[long_enough]) if long_enough.any() else _PEN_PX
+    pen = usual if pen_px is None else pen_px
+    single = np.where(width <= _BUNDLE * pen, width, pen)
+    # Border pixels are ink: the band's edge lies half a pixel further out.
+    shift = (single - 1.0) / 2.0
+    return _Runs(edges + (inward * shift[:, None])[:, None, :], single, border, pen)
+
+
+def dark_mask(soft: GreyImage, mask: GreyImage) -> GreyImage:
+    """What is nearly as dark as the darkest strokes of the sheet, as 1."""
+    inked = soft[mask > 0]
+    level = _DARK * float(np.quantile(inked[::7], _DARK_QUANTILE)) if len(inked) else 255.0
+    return np.asarray((soft >= level).astype(np.uint8))
+
+
+def ink_mask(soft: GreyImage) -> GreyImage:
+    """Ink as 1: darker than half of the darkest ink nearby.
+
+    So faint and dark strokes both keep their width, and neighbours their gap.
+    """
+    peak = cv2.dilate(soft, np.ones((_PEAK_WINDOW_PX, _PEAK_WINDOW_PX), np.uint8))
+    half = np.asarray(peak) // 2
+    return np.asarray(((soft >= half) & (soft >= _FAINT)).astype(np.uint8))
+
+
+def _border_runs(mask: GreyImage) -> FloatArray:
+    """(n, 2, 2) straight runs of the borders, with the ink on one fixed hand."""
+    contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    runs = []
+    for contour in contours:
+        if len(contour) < 2 * _LEAST_PX:
+            continue
+        corners = cv2.approxPolyDP(contour, _POLYGON_PX, closed=True)[:, 0, :].astype(np.float64)
+        runs.append(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
+    if not runs:
+        return np.zeros((0, 2, 2))
+    edges = np.concatenate(runs)
+    return np.asarray(edges[np.hypot(*(edges[:, 1] - edges[:, 0]).T) >= _LEAST_PX])
+
+
+def _band_width(mask: GreyImage, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """((n, 2) unit normals into the ink, (n,) median width of the ink band there, px)."""
+    share = np.linspace(0.1, 0.9, 9)
+    direction = lengths_and_directions(edges)[1]
+    normal = np.column_stack([direction[:, 1], -direction[:, 0]])
+    points = edges[:, None, 0] + share[None, :, None] * (edges[:, None, 1] - edges[:, None, 0])
+    depth = np.arange(1.0, _WIDEST_PX + 1.0)
+    inner = np.empty((len(edges), len(share)))
+    for part in parts(len(edges), 2 * len(share) * len(depth)):
+        inner[part] = _run(mask, points[part], normal[part], depth)
+    return normal, np.median(inner, axis=1) + 1.0
+
+
+def _run(mask: GreyImage, points: FloatArray, normal: FloatArray, depth: FloatArray) -> FloatArray:
+    """How many pixels of ink follow each border point along its normal."""
+    at = points[:, :, None, :] + depth[None, None, :, None] * normal[:, None, None, :]
+    column = np.clip(np.rint(at[..., 0]), 0, mask.shape[1] - 1).astype(int)
+    row = np.clip(np.rint(at[..., 1]), 0, mask.shape[0] - 1).astype(int)
+    return np.asarray(np.cumprod(mask[row, column], axis=2).sum(axis=2), dtype=np.float64)
+
+
+def _usual(width: FloatArray, weight: FloatArray) -> float:
+    """Weighted lower quartile: bundles are wider than a pen, nothing is narrower."""
+    order = np.argsort(width)
+    cumulated = np.cumsum(weight[order])
+    return float(width[order][np.searchsorted(cumulated, 0.35 * cumulated[-1])])
+
+
+# Graph paper --------------------------------------------------------------------------------------
+
+
+def squares_darkness(contrast: GreyImage) -> float:
+    """Darkness of printed squares, 0..255 of contrast, 0 where there are none.
+
+    Arguments
+    ---------
+    contrast : 0 = paper .. 255 = black, at about 6 px/mm
+
+    Lines that fill most of a strip, at equal distances, in most strips of both directions. Slanted
+    strokes never fill a strip, and a table's lines are too few.
+    """
+    return min(_of_strips(contrast), _of_strips(np.ascontiguousarray(contrast.T)))
+
+
+def without_squares(contrast: GreyImage) -> GreyImage:
+    """Contrast with all that is no darker than printed squares left out; as given where there are none."""
+    dark = squares_darkness(contrast)
+    if dark == 0.0:
+        return contrast
+    _, drawn = cv2.threshold(contrast, _DARKER * dark, 0, cv2.THRESH_TOZERO)
+    return np.asarray(drawn, dtype=np.uint8)
+
+
+def _of_strips(contrast: GreyImage) -> float:
+    """Darkness of lines at equal distances in most strips across the picture, else 0."""
+    high = contrast.shape[0]
+    deep = round(_STRIP_MM * PX_PER_MM)
+    strips = []
+    for top in np.linspace(0.08 * high, 0.92 * high - deep, _STRIPS).astype(int):
+        strip = contrast[top : top + deep : _EVERY]
+        strips.append(_regular_peaks(np.median(strip, axis=0).astype(np.float32)))
+    squared = [dark for dark in strips if dark > 0.0]
+    return float(np.median(squared)) if 2 * len(squared) > len(strips) else 0.0
+
+
+def _regular_peaks(profile: Float32Array) -> float:
+    """Darkness of the peaks of a profile where they are many and at equal distances, else 0."""
+    above = profile - _floor(profile)
+    inner = above[1:-1]
+    at = 1 + np.flatnonzero((inner >= _LEAST_PEAK) & (inner >= above[:-2]) & (inner > above[2:]))
+    if len(at) < _LEAST_LINES:
+        return 0.0
+    gaps = np.diff(at).astype(np.float64)
+    usual = np.median(gaps)
+    off = np.abs(gaps / usual - np.maximum(np.rint(gaps / usual), 1.0))
+    return float(np.quantile(profile[at], _DARKEST)) if np.mean(off < _ALIKE) > _REGULAR else 0.0
+
+
+def _floor(profile: Float32Array) -> FloatArray:
+    wide = round(2.0 * PX_PER_MM) | 1
+    row = profile[None, :]
+    return np.asarray(cv2.erode(row, np.ones((1, wide), np.uint8))[0], dtype=np.float64)

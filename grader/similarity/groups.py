@@ -1,0 +1,337 @@
+"""Sheets that look alike, more than independent hands come to. Never an accusation: look at both.
+
+Well-drawn plans of one variant are alike anyway, and so are the values of all who work exactly. What
+tells are the errors: two hands miss differently. Each kind of evidence gives the chance that two
+students who work apart come so near; times the number of pairs it is the measure, how many such pairs
+a class of this size would show by chance.
+
+The ink of two sheets is laid over each other as well: the very same drawing, scanned twice, nearly
+covers itself. A small map of each sheet tells where its ink lies. What many sheets have in common (frame,
+title block, a printed sheet's lines) is left out, and how much independent drawings of this class
+resemble each other is measured on the class itself.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from math import exp, log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grader.documents import AlikeDocument, Sign
+from grader.records import FloatArray, GreyImage
+from grader.similarity.drawings import DrawingSimilarity, compare_drawings
+from grader.similarity.numbers import NumberSimilarity, compare_numbers
+from grader.similarity.submission import ComparedSubmission
+from reference.authored.assignment import Assignment
+
+FALSE_ALARMS = 0.001
+"""Pairs of independent students named by chance in a class, of each kind of evidence, on average."""
+NOTED = log(0.05)
+"""Chance below which a part of the evidence is named."""
+MOST_OWNERS = 3
+"""A number that more students have does not tell whose drawing it is."""
+
+CELL_MM = 2.5
+CELLS = (118, 168)
+"""Rows and columns of an A3 sheet's map; what lies outside is left out."""
+COMMON = 0.3
+"""Share of the sheets with ink in a cell from which it belongs to the sheet, not to the drawing."""
+INKED = 3
+"""Of 255: darker cells have ink, of a hard pencil too."""
+DARKEST = 60.0
+"""A darker cell counts as this one: ink and pencil weigh alike."""
+RUN, RUN_INKED = 32, 0.8
+"""Cells of a straight run (80 mm) that is the page's, and the share of them that have ink."""
+PART = 12
+"""Side of a part in cells: 30 mm, a letter or line with its surroundings, less than a figure."""
+FAINT = 20.0
+"""Norm of a part's ink below which it is dust."""
+LEAST_PARTS = 8
+"""A sheet with ink in fewer parts shows too little to be recognised by."""
+LEAST_SHEETS = 7
+"""Of six sheets two are a third: what they share would be taken for the page's."""
+LEAST_OVERLAP = 0.5
+"""Mean correlation of the parts below which two sheets are never the same drawing."""
+LEAST_SPREAD = 0.015
+QUANTILES = 0.84, 0.95
+"""The upper one leaves a copied pair out in a class of seven."""
+TAIL_DROP = float(np.log((1.0 - QUANTILES[0]) / (1.0 - QUANTILES[1])))
+
+Maps = Sequence[Sequence[NDArray[np.uint8]]]
+
+
+@dataclass(frozen=True, slots=True)
+class PictureSimilarity:
+    """Every two students' sheets; arrays (students, students).
+
+    Attributes
+    ----------
+    log_chance : natural logarithm of the chance that sheets of this class are so alike; 0 where not compared
+    overlap : correlation of the ink, the largest of any two sheets
+    pairs : compared
+    """
+
+    log_chance: FloatArray
+    overlap: FloatArray
+    pairs: int
+
+
+@dataclass(slots=True)
+class _Pair:
+    """What speaks for two students' sheets being alike."""
+
+    why: list[Sign] = field(default_factory=list)
+    measure: float | None = None
+    share: float | None = None
+    compared: int = 0
+
+    def add(self, why: Sequence[Sign], measure: float | None, share: float | None, compared: int) -> None:
+        """One more kind of evidence; the rarest coincidence is the one that is told."""
+        self.why += [sign for sign in why if sign not in self.why]
+        if measure is not None and (self.measure is None or measure < self.measure):
+            self.measure, self.share, self.compared = measure, share, compared
+
+
+def find_similar(
+    assignment: Assignment, submissions: Sequence[ComparedSubmission], maps: Maps = ()
+) -> list[AlikeDocument]:
+    """The sheets of a class that a person should hold beside each other, the most similar first.
+
+    Arguments: `maps` are each submission's ink maps (see `ink_map`), in the order of `submissions`.
+    """
+    if len(submissions) < 2:
+        return []
+    pairs: dict[tuple[int, int], _Pair] = {}
+    drawings = compare_drawings(assignment, submissions)
+    _add_drawings(pairs, drawings)
+    _add_numbers(pairs, compare_numbers(assignment, submissions))
+    owners = [k for k, of_student in enumerate(maps) for _ in of_student]
+    printed = np.array([one.printed for one in submissions])
+    pictures = compare_pictures(owners, [sheet for of_student in maps for sheet in of_student], printed)
+    _add_pictures(pairs, pictures, drawings)
+    _add_other_numbers(pairs, submissions, drawings)
+    strangers = [
+        (i, j, pair)
+        for (i, j), pair in pairs.items()
+        if submissions[i].student_id != submissions[j].student_id
+    ]
+    entries = [
+        _document(submissions, members, strangers) for members in _groups([(i, j) for i, j, _ in strangers])
+    ]
+    return sorted(entries, key=lambda entry: (entry.measure is None, entry.measure or 0.0, entry.students))
+
+
+def _rare(log_chance: FloatArray, pairs: int) -> Iterator[tuple[int, int, float]]:
+    """The pairs whose evidence is rarer than chance in the class gives, and how many there would be."""
+    expected = log_chance + log(max(pairs, 1))
+    for i, j in np.argwhere(np.triu(expected < log(FALSE_ALARMS), 1)):
+        yield int(i), int(j), exp(max(float(expected[i, j]), -600.0))
+
+
+def _add_drawings(pairs: dict[tuple[int, int], _Pair], drawings: DrawingSimilarity) -> None:
+    for i, j, measure in _rare(drawings.log_chance, drawings.pairs):
+        why: list[Sign] = ["hand_errors"] if drawings.log_errors[i, j] < NOTED else []
+        why += ["same_place"] if drawings.log_places[i, j] < NOTED else []
+        share = float(np.clip(drawings.cosine[i, j], 0.0, 1.0))
+        pairs.setdefault((i, j), _Pair()).add(why, measure, share, int(drawings.count[i, j]))
+
+
+def _add_numbers(pairs: dict[tuple[int, int], _Pair], numbers: NumberSimilarity) -> None:
+    for i, j, measure in _rare(numbers.log_chance, numbers.pairs):
+        compared = int(numbers.compared[i, j])
+        share = min(float(numbers.equal[i, j]) / max(compared, 1), 1.0)
+        pairs.setdefault((i, j), _Pair()).add(["same_numbers"], measure, share, compared)
+
+
+def _add_pictures(
+    pairs: dict[tuple[int, int], _Pair], pictures: PictureSimilarity, drawings: DrawingSimilarity
+) -> None:
+    # Good drawings whose figures follow one layout have the same ink: that is no rarer than their places.
+    log_chance = np.fmax(pictures.log_chance, drawings.log_layout)
+    for i, j, measure in _rare(log_chance, pictures.pairs):
+        share = float(np.clip(pictures.overlap[i, j], 0.0, 1.0))
+        pairs.setdefault((i, j), _Pair()).add(["same_picture"], measure, share, 0)
+
+
+def _add_other_numbers(
+    pairs: dict[tuple[int, int], _Pair],
+    submissions: Sequence[ComparedSubmission],
+    drawings: DrawingSimilarity,
+) -> None:
+    """Whose number it is that somebody drew with."""
+    for k, one in enumerate(submissions):
+        if one.fits is not None:
+            owners = [other for other, its in enumerate(submissions) if its.variant == one.fits[0]]
+            owners = [other for other in owners if submissions[other].student_id != one.student_id]
+            if len(owners) <= MOST_OWNERS:
+                for other in owners:
+                    pairs.setdefault((min(k, other), max(k, other)), _Pair()).add(
+                        ["other_number"], None, None, 0
+                    )
+    for (i, j), pair in pairs.items():
+        fits = {k: drawings.fits[k] for k in (i, j)}
+        crossed = [(fits[i], submissions[j].variant), (fits[j], submissions[i].variant)]
+        if any(fit is not None and fit[0] == variant for fit, variant in crossed):
+            pair.add(["other_number"], None, None, 0)
+
+
+def _groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
+    """Those who hang together by pairs."""
+    group: dict[int, set[int]] = {}
+    for i, j in pairs:
+        joined = group.get(i, {i}) | group.get(j, {j})
+        for one in joined:
+            group[one] = joined
+    return [sorted(members) for members in {id(one): one for one in group.values()}.values()]
+
+
+def _document(
+    submissions: Sequence[ComparedSubmission], members: Sequence[int], told: Sequence[tuple[int, int, _Pair]]
+) -> AlikeDocument:
+    """One entry for all who hang together, with the measure of the weakest link that has one."""
+    of_these = [pair for i, j, pair in told if i in members and j in members]
+    weakest = max(of_these, key=lambda pair: -1.0 if pair.measure is None else pair.measure)
+    return AlikeDocument(
+        students=[submissions[k].student_id for k in members],
+        positions=[submissions[k].variant.position for k in members],
+        why=list(dict.fromkeys(sign for pair in of_these for sign in pair.why)),
+        measure=weakest.measure,
+        share=weakest.share,
+        compared=weakest.compared,
+    )
+
+
+# Ink ----------------------------------------------------------------------------------------------
+
+
+def ink_map(scan: GreyImage, page_mm: tuple[float, float]) -> NDArray[np.uint8]:
+    """(118, 168) mean darkness of an upright sheet's cells, 0 = paper.
+
+    Arguments: `scan` (h, w) uint8, 255 = paper, that shows the whole page of `page_mm`.
+    """
+    found = np.zeros(CELLS, np.uint8)
+    high, wide = scan.shape
+    if high < CELLS[0] or wide < CELLS[1]:
+        return found
+    edges = [
+        np.minimum((np.arange(cells + 1) * CELL_MM / size * pixels).astype(np.int64), pixels)
+        for cells, size, pixels in ((CELLS[0], page_mm[1], high), (CELLS[1], page_mm[0], wide))
+    ]
+    rows, columns = (edge[:-1][np.diff(edge) > 0] for edge in edges)
+    last = edges[0][len(rows)], edges[1][len(columns)]
+    dark = 255 - scan[: last[0], : last[1]]
+    sums = np.add.reduceat(np.add.reduceat(dark, rows, axis=0, dtype=np.int64), columns, axis=1)
+    area = np.diff([*rows, last[0]])[:, None] * np.diff([*columns, last[1]])
+    found[: len(rows), : len(columns)] = sums / area
+    return found
+
+
+def compare_pictures(
+    owners: Sequence[int], maps: Sequence[NDArray[np.uint8]], printed: NDArray[np.bool_]
+) -> PictureSimilarity:
+    """Compare the sheets of a class.
+
+    Arguments: `owners` tells whose each map is, an index of `printed`: who drew on printed answer sheets.
+    """
+    students = len(printed)
+    overlap = np.zeros((students, students))
+    owner = np.array(owners, np.int64)
+    having = np.unique(owner)
+    if len(having) < LEAST_SHEETS:
+        return PictureSimilarity(np.zeros_like(overlap), overlap, 0)
+    np.maximum.at(overlap, (owner[:, None], owner[None, :]), _agreement(np.array(maps), printed[owner]))
+    rows, columns = having[np.array(np.triu_indices(len(having), 1))]
+    scaled = np.arctanh(np.minimum(overlap, 0.999))
+    # A few printed sheets among plain ones (or the reverse) are each other's like by their print.
+    many = np.bincount(printed[having], minlength=2)[printed.astype(np.int64)] >= LEAST_SHEETS
+    compared = (printed[:, None] != printed[None, :]) | many
+    log = np.where((overlap > LEAST_OVERLAP) & compared, _log_tail(scaled, scaled[rows, columns]), 0.0)
+    return PictureSimilarity(log, overlap, len(rows))
+
+
+def _log_tail(values: FloatArray, known: FloatArray) -> FloatArray:
+    """Log of the chance of values as large, by an exponential tail through upper quantiles of the known ones.
+
+    The tail is heavier than a normal one, as resemblances are, and no steeper than the class shows: where
+    all follow one layout some pairs are much more like each other than others.
+    """
+    middle, high, higher = np.quantile(known, [0.5, *QUANTILES])
+    scale = max((high - middle) / 2.0, (higher - high) / TAIL_DROP, LEAST_SPREAD)
+    return np.asarray(np.minimum(np.log(1.0 - QUANTILES[1]) - (values - higher) / scale, 0.0))
+
+
+def _agreement(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> FloatArray:
+    """(sheets, sheets) correlation of the ink in one part of the page, the mean over parts that have ink.
+
+    A part counts once, however dark it is: a block, a stain or an edge that two sheets share cannot
+    stand for the whole of them.
+    """
+    ink = np.minimum(maps.astype(np.float32), DARKEST) * ~_of_the_page(maps, printed)
+    parts = _parts(_blurred(ink))
+    size = np.sqrt((parts**2).sum(axis=2))
+    parts /= np.maximum(size, FAINT)[..., None]
+    total, count = np.zeros((2, len(maps), len(maps)))
+    for part, its_size in zip(parts, size, strict=True):
+        having = (its_size[:, None] > FAINT) | (its_size[None, :] > FAINT)
+        total += having * (part @ part.T)
+        count += having
+    return np.asarray(total / np.maximum(count, LEAST_PARTS))
+
+
+def _of_the_page(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(sheets, rows, columns) ink of the page, not of the drawing.
+
+    It is what many printed or many plain sheets have in common, and straight runs along an edge that
+    are longer than a figure's lines: frame, rows of a title block, folds, squares, the desk beside
+    the paper.
+    """
+    inked = maps > INKED
+    runs = _long_runs(inked) | _long_runs(inked.transpose(0, 2, 1)).transpose(0, 2, 1)
+    for kind in (printed, ~printed):
+        if kind.any():
+            runs[kind] |= inked[kind].mean(axis=0) >= COMMON
+    return runs
+
+
+def _long_runs(inked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Cells of straight runs along the last axis.
+
+    A run may step aside by a cell, for the page lies askew, and have gaps, for pencil is faint.
+    """
+    # A row has fewer than 256 cells: counts fit into bytes.
+    wide = _with_neighbours(inked).astype(np.uint8)
+    sums = np.pad(wide.cumsum(axis=2, dtype=np.uint8), ((0, 0), (0, 0), (1, 0)))
+    begins = sums[..., RUN:] - sums[..., :-RUN] >= RUN_INKED * RUN
+    marks = np.pad(begins, ((0, 0), (0, 0), (RUN, RUN))).cumsum(axis=2, dtype=np.uint8)
+    covered = marks[..., RUN:] - marks[..., :-RUN] > 0
+    return _with_neighbours(covered[..., : inked.shape[2]])
+
+
+def _with_neighbours(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Cells and those beside them across the last axis."""
+    wide = cells.copy()
+    wide[:, 1:] |= cells[:, :-1]
+    wide[:, :-1] |= cells[:, 1:]
+    return wide
+
+
+def _parts(ink: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(parts, sheets, cells) squares of `PART` cells, those at the end filled up with paper."""
+    sheets, rows, columns = ink.shape
+    down, across = -(-rows // PART), -(-columns // PART)
+    whole = np.zeros((sheets, down * PART, across * PART), np.float32)
+    whole[:, :rows, :columns] = ink
+    cut = whole.reshape(sheets, down, PART, across, PART).transpose(1, 3, 0, 2, 4)
+    return np.ascontiguousarray(cut).reshape(down * across, sheets, PART * PART)
+
+
+def _blurred(ink: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Each cell with its neighbours: a sheet lies a little otherwise at every scan."""
+    down = 0.5 * ink
+    down[:, 1:] += 0.25 * ink[:, :-1]
+    down[:, :-1] += 0.25 * ink[:, 1:]
+    across = 0.5 * down
+    across[:, :, 1:] += 0.25 * down[:, :, :-1]
+    across[:, :, :-1] += 0.25 * down[:, :, 1:]
+    return across

@@ -1,0 +1,186 @@
+"""The exact plan of a variant as the published JSON document, with centres and conditioning."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from grader.documents import PlanDocument, PlanVector, ScalesDocument
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.graph import Construction
+from reference.geometry import ComplexArray, FloatArray
+from reference.kinematics.motion import Motion
+from reference.mechanism import Crank, Mechanism
+from reference.plan import Plan, conditioning
+
+NO_TURN = 1e-12
+"""A link that turns so slowly, over the mechanism's reach and relative to its largest speed, does not."""
+
+
+def instantaneous_centres(
+    mechanism: Mechanism, construction: Construction, motion: Motion
+) -> dict[str, ComplexArray]:
+    """Centres ``I3`` of links about the ground, ``I34`` of two links; complex metres, shape (N,).
+
+    nan where there is none: links that do not turn, or turn alike.
+    """
+    joints = _joints_of_links(mechanism, construction)
+    fields = {link: _spin(motion, joint, motion.omega[link]) for link, joint in joints.items()}
+    still = (np.zeros(1, dtype=np.complex128), np.zeros(1))
+    least = NO_TURN * _largest(motion.velocity) / _largest(motion.position)
+    centres = {f"I{link}": _alike(field, still, least) for link, field in fields.items()}
+    for first, second in combinations(fields, 2):
+        centres[f"I{first}{second}"] = _alike(fields[first], fields[second], least)
+    return centres
+
+
+def acceleration_poles(
+    mechanism: Mechanism, construction: Construction, motion: Motion
+) -> dict[str, ComplexArray]:
+    """``J3`` of every link that turns; complex metres, nan where it neither turns nor speeds up."""
+    poles = {}
+    least = NO_TURN * _largest(motion.acceleration) / _largest(motion.position)
+    for link, joint in _joints_of_links(mechanism, construction).items():
+        swing = np.asarray(1j * motion.epsilon[link] - motion.omega[link] ** 2)
+        poles[f"J{link}"] = motion.position[joint] - _divided(motion.acceleration[joint], swing, least)
+    return poles
+
+
+def _largest(of_joints: Mapping[str, ComplexArray]) -> FloatArray:
+    return np.asarray(np.max([np.abs(values) for values in of_joints.values()], axis=0))
+
+
+def _joints_of_links(mechanism: Mechanism, construction: Construction) -> Mapping[str, str]:
+    """A joint of each link that turns."""
+    driver = mechanism.driver
+    links = {driver.link: driver.pin} if isinstance(driver, Crank) else {}
+    rates = {name.partition("_")[2]: rate for name, rate in construction.rates.items()}
+    return {**links, **{link: rate.link[1] for link, rate in rates.items()}}
+
+
+def _spin(motion: Motion, joint: str, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
+    """A link's velocities as c + i omega z: c and omega."""
+    at, velocity = motion.position[joint], motion.velocity[joint]
+    return np.asarray(velocity - 1j * omega * at), omega
+
+
+def _alike(
+    first: tuple[ComplexArray, FloatArray], second: tuple[ComplexArray, FloatArray], least: FloatArray
+) -> ComplexArray:
+    return _divided(second[0] - first[0], np.asarray(1j * (first[1] - second[1])), least)
+
+
+def _divided(over: ComplexArray, under: ComplexArray, least: FloatArray) -> ComplexArray:
+    with np.errstate(all="ignore"):
+        return np.where(np.abs(under) > least, over / under, np.nan)
+
+
+UNITS = {"kv": "m/s", "ka": "m/s^2"}
+
+
+def variant_numbers(variant: Variant) -> dict[str, int]:
+    """The ``variant`` of documents: n where the assignment has one."""
+    return {} if variant.n is None else {"n": variant.n}
+
+
+def plan_document(assignment: Assignment, plan: Plan, index: int = 0) -> PlanDocument:
+    """The plan of the variant at an index of a plan's arrays."""
+    return _document(assignment, plan, _columns(plan), index)
+
+
+def plan_documents(assignment: Assignment, plan: Plan) -> list[PlanDocument]:
+    """The plans of all variants; everything is evaluated once."""
+    columns = _columns(plan)
+    return [_document(assignment, plan, columns, index) for index in range(len(plan.variants))]
+
+
+@dataclass(frozen=True, slots=True)
+class _Columns:
+    """Everything that a plan's documents tell, a list over variants each."""
+
+    numbers: Mapping[str, Mapping[str, list[float]]]
+    """By what it is (``value``, ``drawn_mm``, ``direction_deg``, ``rate``, ...) and name."""
+    points: Mapping[str, Mapping[str, list[complex]]]
+    """By figure (``mechanism``, ``centres``, the plans) and node."""
+
+
+def _columns(plan: Plan) -> _Columns:
+    count = len(plan.variants)
+
+    def lists(arrays: Mapping[str, np.ndarray]) -> dict[str, list[Any]]:
+        # Adding zero turns minus zero into zero.
+        return {name: (np.broadcast_to(array, (count,)) + 0.0).tolist() for name, array in arrays.items()}
+
+    vectors = plan.construction.vectors
+    numbers = {
+        "value": lists({name: np.abs(plan.vectors_si[name]) for name in vectors}),
+        "drawn_mm": lists({name: np.abs(plan.drawn_mm(name)) for name in vectors}),
+        "direction_deg": lists({name: plan.direction_deg(name) for name in vectors}),
+        "scale": lists({name: getattr(plan.scales, name) for name in ("kL", "kv", "ka")}),
+        "rate": lists(plan.rates),
+        "conditioning": lists(conditioning(plan)),
+    }
+    points = {"mechanism": lists(plan.motion.position), "centres": lists(_centres(plan))}
+    points |= {figure: lists(plan.nodes_mm[figure]) for figure in plan.construction.poles}
+    return _Columns(numbers, points)
+
+
+def _document(assignment: Assignment, plan: Plan, columns: _Columns, index: int) -> PlanDocument:
+    def numbers(what: str) -> dict[str, float]:
+        return {name: values[index] for name, values in columns.numbers[what].items()}
+
+    def points(figure: str) -> dict[str, tuple[float, float]]:
+        return {name: (at[index].real, at[index].imag) for name, at in columns.points[figure].items()}
+
+    value, drawn, direction = numbers("value"), numbers("drawn_mm"), numbers("direction_deg")
+    return PlanDocument(
+        assignment=assignment.id,
+        variant=variant_numbers(plan.variants[index]),
+        position=plan.variants[index].position,
+        scales=ScalesDocument(**numbers("scale")),
+        points_m=points("mechanism"),
+        vectors={
+            name: PlanVector(
+                value=value[name],
+                unit=UNITS[vector.scale],
+                drawn_mm=drawn[name],
+                direction_deg=_known(direction[name]),
+            )
+            for name, vector in plan.construction.vectors.items()
+        },
+        nodes_mm={figure: points(figure) for figure in plan.construction.poles},
+        angular=numbers("rate"),
+        centres_m={name: _known_point(place) for name, place in points("centres").items()},
+        conditioning=_grouped(numbers("conditioning")),
+    )
+
+
+def _centres(plan: Plan) -> dict[str, ComplexArray]:
+    found = (plan.mechanism, plan.construction, plan.motion)
+    poles = acceleration_poles(*found) if plan.motion.acceleration else {}
+    return {**instantaneous_centres(*found), **poles}
+
+
+def _known_point(place: tuple[float, float]) -> tuple[float, float] | None:
+    return place if all(map(math.isfinite, place)) else None
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _grouped(told: Mapping[str, float]) -> dict[str, float | dict[str, float]]:
+    """``transmission B`` and its like gathered under ``transmission``."""
+    groups: dict[str, float | dict[str, float]] = {}
+    for name, value in told.items():
+        kind, _, node = name.partition(" ")
+        if not node:
+            groups[kind] = value
+            continue
+        group = groups.setdefault(kind, {})
+        if isinstance(group, dict):
+            group[node] = value
+    return groups

@@ -1,0 +1,324 @@
+"""The reference drawing as PDF, and the solution step by step as HTML and PDF."""
+
+import io
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from reportlab.lib.colors import Color, HexColor
+from reportlab.lib.enums import TA_LEFT
+from reportlab.lib.pagesizes import A4
+from reportlab.lib.styles import ParagraphStyle
+from reportlab.lib.units import mm
+from reportlab.pdfgen.canvas import Canvas
+from reportlab.pdfgen.pathobject import PDFPathObject
+from reportlab.platypus import (
+    CondPageBreak,
+    Flowable,
+    KeepTogether,
+    Paragraph,
+    SimpleDocTemplate,
+    Spacer,
+    Table,
+)
+
+from grader.language import Tongue
+from grader.printed.pdf import REGULAR, embed_fonts
+from grader.solution.steps import CENTRES, LENGTHS_MM, Explanation, Section, explain
+from reference.drawing import sheets
+from reference.drawing.canvas import (
+    A3_MM,
+    SLANT,
+    Area,
+    Bounds,
+    Curve,
+    Label,
+    Point,
+    Ring,
+    Shape,
+    Stroke,
+    bounds,
+    picture_svg,
+    set_pieces,
+)
+from reference.drawing.sheets import figures_of
+from reference.drawing.subject import Figure, Subject
+
+
+def pdf(sheets: Sequence[Sequence[Shape]], title: str, page_mm: tuple[float, float] = A3_MM) -> bytes:
+    """The sheets as the pages of a PDF document; `page_mm` is their width and height."""
+    embed_fonts()
+    buffer = io.BytesIO()
+    canvas = Canvas(buffer, pagesize=(page_mm[0] * mm, page_mm[1] * mm), invariant=1)
+    canvas.setTitle(title)
+    # Viewers must not shrink the page when it is printed.
+    canvas.setViewerPreference("PrintScaling", "None")
+    for shapes in sheets:
+        put_shapes(canvas, shapes, (0.0, page_mm[1] * mm), mm)
+        canvas.showPage()
+    canvas.save()
+    return buffer.getvalue()
+
+
+def put_shapes(canvas: Canvas, shapes: Iterable[Shape], origin: tuple[float, float], unit: float) -> None:
+    """Draw shapes whose (0, 0) lies at `origin` (points, y up); a millimetre is `unit` points long."""
+    canvas.saveState()
+    canvas.translate(*origin)
+    canvas.scale(unit, unit)
+    canvas.setLineCap(1)
+    for shape in shapes:
+        _put(canvas, shape)
+    canvas.restoreState()
+
+
+@cache
+def ink(colour: str) -> Color:
+    """A colour that leaves the canvas as opaque as it is set."""
+    made = HexColor(colour)
+    made.alpha = None
+    return made
+
+
+def _put(canvas: Canvas, shape: Shape) -> None:
+    """One shape; the canvas' unit is the millimetre, y up."""
+    match shape:
+        case Stroke(start=(x1, y1), end=(x2, y2)):
+            _pen(canvas, shape.width, shape.colour, shape.dash)
+            canvas.line(x1, -y1, x2, -y2)
+        case Ring(centre=(x, y)):
+            _pen(canvas, shape.width, shape.colour)
+            filled = shape.fill != "none"
+            if filled:
+                canvas.setFillColor(ink(shape.fill))
+            canvas.circle(x, -y, shape.radius, stroke=int(shape.width > 0), fill=int(filled))
+        case Area(points=points):
+            _pen(canvas, shape.width, shape.colour)
+            canvas.setFillColor(ink(shape.fill))
+            canvas.drawPath(_path(canvas, points, closed=True), stroke=int(shape.width > 0), fill=1)
+        case Curve(points=points):
+            _pen(canvas, shape.width, shape.colour, shape.dash)
+            canvas.drawPath(_path(canvas, points, closed=False), stroke=1, fill=0)
+        case Label():
+            _write(canvas, shape)
+
+
+def _path(canvas: Canvas, points: Sequence[Point], *, closed: bool) -> PDFPathObject:
+    path = canvas.beginPath()
+    path.moveTo(points[0][0], -points[0][1])
+    for x, y in points[1:]:
+        path.lineTo(x, -y)
+    if closed:
+        path.close()
+    return path
+
+
+def _write(canvas: Canvas, label: Label) -> None:
+    """A text: each of its pieces in its own place."""
+    canvas.setFillColor(ink(label.colour))
+    for piece in set_pieces(label.text, label.size):
+        canvas.saveState()
+        slant = SLANT if label.italic else 0.0
+        canvas.transform(1.0, 0.0, slant, 1.0, label.left + piece.right, piece.above - label.at[1])
+        canvas.setFont(REGULAR, piece.size)
+        canvas.drawString(0.0, 0.0, piece.text)
+        canvas.restoreState()
+
+
+def _pen(canvas: Canvas, width_mm: float, colour: str, dash: tuple[float, ...] = ()) -> None:
+    canvas.setDash(list(dash))
+    canvas.setLineWidth(width_mm)
+    canvas.setStrokeColor(ink(colour))
+
+
+MARGIN_MM = 2.5
+LEAST_PICTURE_MM = (40.0, 12.0)
+COLUMN_MM, GAP_MM, TALLEST_MM = 88.0, 6.0, 105.0
+MODEL_SHARE, MODEL_TALLEST_MM = 0.45, 45.0
+"""The mechanism beside a plan's step is drawn at this part of its size on the printed page, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Shapes and the box they are seen in, sheet millimetres."""
+
+    shapes: tuple[Shape, ...]
+    box: Bounds
+
+    @property
+    def svg(self) -> Markup:
+        """As an element of a page."""
+        return Markup(picture_svg(self.shapes, self.box))  # noqa: S704 - written by the canvas
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height."""
+        return self.box[2] - self.box[0], self.box[3] - self.box[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Illustrated:
+    """A step's words, its figure so far, and what it takes from the mechanism."""
+
+    told: Explanation
+    picture: Picture | None
+    model: Picture | None
+
+
+@dataclass(frozen=True, slots=True)
+class Chapter:
+    """A section with its pictures."""
+
+    section: Section
+    steps: tuple[Illustrated, ...]
+
+
+def chapters(subject: Subject, tongue: Tongue) -> list[Chapter]:
+    """Every figure's steps with their pictures."""
+    figures = figures_of(subject)
+    return [
+        Chapter(section, tuple(_illustrated(subject, figures, section)))
+        for section in explain(subject, tongue)
+    ]
+
+
+def _illustrated(subject: Subject, figures: dict[str, Figure], section: Section) -> Iterator[Illustrated]:
+    if section.figure == CENTRES:
+        yield from _centres(subject, figures["mechanism"], section)
+        return
+    figure, mechanism = figures[section.figure], figures["mechanism"]
+    nodes = subject.nodes(section.figure)
+    base = sheets.grey(mechanism)
+    model_box = _box(base)
+    earlier: list[str] = []
+    for told in section.steps:
+        shapes = (*sheets.stage(figure, earlier, told.step.node), *sheets.compasses(told.step, nodes))
+        marked = tuple(sheets.models(subject, told.step)) if section.figure != "mechanism" else ()
+        model = Picture((*base, *marked), model_box) if marked else None
+        yield Illustrated(told, Picture(shapes, _box(shapes)), model)
+        earlier.append(told.step.node)
+
+
+def _centres(subject: Subject, mechanism: Figure, section: Section) -> Iterator[Illustrated]:
+    """Each centre with its triangle on the finished sketch; one far off the sheet has no picture."""
+    base = sheets.grey(mechanism)
+    for told in section.steps:
+        shapes = (*base, *sheets.centre(subject, told.step.node))
+        box = _box(shapes)
+        fits = max(box[2] - box[0], box[3] - box[1]) <= A3_MM[0]
+        yield Illustrated(told, Picture(shapes, box) if fits else None, None)
+
+
+def _box(shapes: Sequence[Shape]) -> Bounds:
+    """The box that shapes fill, with a margin; a single point has some paper around it."""
+    left, top, right, bottom = bounds(shapes)
+    across, down = (
+        MARGIN_MM + max(0.0, least - size) / 2.0
+        for least, size in zip(LEAST_PICTURE_MM, (right - left, bottom - top), strict=True)
+    )
+    return (left - across, top - down, right + across, bottom + down)
+
+
+@cache
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("grader.solution.steps"), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+
+
+def html_page(subject: Subject, tongue: Tongue) -> str:
+    """The steps as one self-contained page."""
+    return (
+        _environment()
+        .get_template("steps.html")
+        .render(
+            lang=tongue.lang,
+            title=subject.title,
+            note=tongue.gettext(LENGTHS_MM),
+            chapters=chapters(subject, tongue),
+        )
+    )
+
+
+class _Drawn(Flowable):  # type: ignore[misc]  # reportlab has no types
+    """A picture on the printed page, true to size unless it is larger than its place."""
+
+    def __init__(self, picture: Picture, share: float = 1.0, tallest_mm: float = TALLEST_MM) -> None:
+        super().__init__()
+        width, height = picture.size
+        self.picture = picture
+        self.unit = mm * min(share, COLUMN_MM / width, tallest_mm / height)
+        self.width, self.height = width * self.unit, height * self.unit
+
+    def wrap(self, _width: float, _height: float) -> tuple[float, float]:
+        return self.width, self.height
+
+    def draw(self) -> None:
+        left, top = self.picture.box[:2]
+        put_shapes(
+            self.canv, self.picture.shapes, (-left * self.unit, self.height + top * self.unit), self.unit
+        )
+
+
+def pdf_pages(subject: Subject, tongue: Tongue) -> bytes:
+    """The steps as an A4 document."""
+    embed_fonts()
+    buffer = io.BytesIO()
+    title = subject.title
+    document = SimpleDocTemplate(
+        buffer, pagesize=A4, title=title, invariant=1,
+        leftMargin=12 * mm, rightMargin=12 * mm, topMargin=14 * mm, bottomMargin=14 * mm,
+    )  # fmt: skip
+    story: list[Flowable] = [Paragraph(_printed(Markup.escape(title)), _style(14))]
+    story += [Spacer(1, 2 * mm), Paragraph(_printed(Markup.escape(tongue.gettext(LENGTHS_MM))), _style(8.5))]
+    for chapter in chapters(subject, tongue):
+        story += _printed_chapter(chapter)
+    document.build(story)
+    return buffer.getvalue()
+
+
+def _printed_chapter(chapter: Chapter) -> Iterator[Flowable]:
+    yield CondPageBreak(70 * mm)
+    yield Spacer(1, 6 * mm)
+    yield Paragraph(_printed(Markup.escape(chapter.section.title)), _style(12))
+    yield Paragraph(_printed(chapter.section.introduction), _style(9))
+    for step in chapter.steps:
+        yield Spacer(1, 4 * mm)
+        yield KeepTogether([_printed_step(step)])
+
+
+def _printed_step(step: Illustrated) -> Table:
+    head = Markup("{}. {}").format(step.told.number, step.told.sentence)
+    words: list[Flowable] = [Paragraph(_printed(line), _style(8.5, indent=4)) for line in step.told.before]
+    words += [Paragraph(_printed(head), _style(9.5))]
+    words += [Paragraph(_printed(line), _style(8.5, indent=4)) for line in step.told.after]
+    if step.model is not None:
+        words += [Spacer(1, 2 * mm), _Drawn(step.model, MODEL_SHARE, MODEL_TALLEST_MM)]
+    widths = ((COLUMN_MM + GAP_MM) * mm, COLUMN_MM * mm)
+    style = [("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)]
+    picture = _Drawn(step.picture) if step.picture is not None else ""
+    return Table([[words, picture]], colWidths=widths, style=style)
+
+
+def _style(size: float, indent: float = 0.0) -> ParagraphStyle:
+    return ParagraphStyle(
+        f"s{size}i{indent}", fontName=REGULAR, fontSize=size, leading=1.4 * size, alignment=TA_LEFT,
+        leftIndent=indent * mm,
+    )  # fmt: skip
+
+
+def _printed(text: Markup) -> str:
+    """Markup as reportlab reads it; the embedded font has no slanted letters."""
+    marks: Sequence[tuple[str, str]] = (
+        ("<i>", ""),
+        ("</i>", ""),
+        ("<sub>", '<sub rise="2" size="70%">'),
+        ("<sup>", '<super rise="3" size="70%">'),
+        ("</sup>", "</super>"),
+    )
+    written = str(text)
+    for mark, printed in marks:
+        written = written.replace(mark, printed)
+    return written

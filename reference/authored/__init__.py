@@ -1,0 +1,1 @@
+"""Files that authors write: mechanisms, assignments, formulas."""

@@ -1,0 +1,292 @@
+"""From an authored mechanism file to a mechanism with numbers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from reference.authored.formula import Formula, FormulaError, Value
+from reference.authored.mechanism import (
+    AnyGroupTable,
+    CrankTable,
+    CrossSliderTable,
+    DrivenSliderTable,
+    DyadTable,
+    FixedGuideTable,
+    GuideTable,
+    MechanismFile,
+    PlateTable,
+    PointOnLineTable,
+    PointTable,
+    SliderTable,
+    SlottedLinkTable,
+    YokeTable,
+)
+from reference.authored.toml_file import LENGTH_UNITS_M
+from reference.geometry import ComplexArray, FloatArray
+from reference.kinematics import assur
+from reference.mechanism import (
+    Array,
+    Crank,
+    CrossSlider,
+    DrivenSlider,
+    Driver,
+    Dyad,
+    FixedGuide,
+    Group,
+    Guide,
+    Mechanism,
+    MovingGuide,
+    Plate,
+    PointOnLine,
+    Slider,
+    SlotPoint,
+    SlottedLink,
+    Yoke,
+    with_arrays,
+)
+
+IN_LINE_TOLERANCE = 1e-9
+"""Relative: lengths that sum up this nearly are meant to be in line."""
+
+LARGEST = 1e9
+SHORTEST_M = 1e-9
+"""No number of an authored file is larger, no length shorter: their squares then neither over- nor
+underflow."""
+
+SIDES = {"left": 1, "right": -1, "ahead": 1, "behind": -1}
+
+
+class _Numbers:
+    """Formulas to arrays in SI, of shape (N,) or, where they do not depend on the variant, (1,)."""
+
+    def __init__(self, values: Mapping[str, Value], count: int, unit_m: float) -> None:
+        self.values, self.count, self.unit_m = values, count, unit_m
+
+    def number(self, formula: Formula) -> FloatArray:
+        numbers = formula(self.values)
+        if np.abs(numbers).max(initial=0.0) > LARGEST:
+            raise FormulaError(f"'{formula.text}' is larger than {LARGEST:g}: beyond any mechanism")
+        return numbers if numbers.ndim else numbers[None]
+
+    def length(self, formula: Formula, what: str) -> FloatArray:
+        lengths = self.distance(formula)
+        least = lengths.min(initial=LARGEST)
+        if least <= 0.0:
+            raise FormulaError(f"'{formula.text}' ({what}) must be a positive length")
+        if least < SHORTEST_M:
+            raise FormulaError(f"'{formula.text}' ({what}) is shorter than {SHORTEST_M:g} m")
+        return lengths
+
+    def distance(self, formula: Formula) -> FloatArray:
+        """A length with a sign."""
+        # Division by the unit's inverse: 30 cm is then exactly the double nearest to 0.3 m.
+        return np.asarray(self.number(formula) / round(1.0 / self.unit_m))
+
+    def angle(self, formula: Formula) -> FloatArray:
+        """Degrees to radians."""
+        return np.asarray(np.radians(self.number(formula)))
+
+    def point(self, point: list[Formula]) -> ComplexArray:
+        x, y = (self.distance(formula) for formula in point)
+        return np.asarray(x + 1j * y)
+
+    def for_all(self, numbers: Array) -> Array:
+        """Of shape (N,); what all variants share stands in memory once, and is read only."""
+        if numbers.size != 1 or self.count == 1:
+            return numbers
+        shared = np.ndarray((self.count,), numbers.dtype, numbers, strides=(0,))
+        shared.flags.writeable = False
+        return shared
+
+
+@dataclass(slots=True)
+class _Bodies:
+    """Where each link carries its joints, in the link's own axes, metres; and the slotted links."""
+
+    axes: dict[str, dict[str, ComplexArray]] = field(default_factory=dict)
+    slots: dict[str, str] = field(default_factory=dict)
+    """By slotted link: its node."""
+
+    def carry(self, link: str, origin: str, joint: str, length: FloatArray) -> None:
+        """A new link from its origin to a joint, along its own x axis."""
+        self.axes[link] = {origin: np.zeros(np.shape(length), complex), joint: np.asarray(length + 0j)}
+
+    def link_of(self, joints: tuple[str, str]) -> str:
+        """The link that carries both joints."""
+        return next(link for link, held in self.axes.items() if set(joints) <= held.keys())
+
+
+def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int) -> Mechanism:
+    """The mechanism of `count` variants whose data are `values` (arrays of shape (count,)).
+
+    Raises FormulaError for a number or length that no mechanism can have. The file must have passed
+    `reference.authored.mechanism.check_mechanism`.
+    """
+    numbers = _Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
+    bodies = _Bodies()
+    driver = _driver(file, numbers)
+    if isinstance(driver, Crank):
+        bodies.carry(driver.link, driver.pivot, driver.pin, driver.length_m)
+    ground = {joint: numbers.point(point) for joint, point in file.ground.items()}
+    groups_ = (_located(index, table, numbers, bodies) for index, table in enumerate(file.group))
+    return with_arrays(Mechanism(ground, driver, tuple(groups_)), numbers.for_all)
+
+
+def build_driver(file: MechanismFile, values: Mapping[str, Value], count: int) -> Driver:
+    """The driven link alone, as `build_mechanism` has it."""
+    numbers = _Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
+    return with_arrays(_driver(file, numbers), numbers.for_all)
+
+
+def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _Bodies) -> Group:
+    """One group; a fault of its numbers is told with its place in the file."""
+    try:
+        return _group(table, numbers, bodies)
+    except FormulaError as error:
+        raise FormulaError(f"group[{index}]: {error}") from error
+
+
+def _driver(file: MechanismFile, numbers: _Numbers) -> Driver:
+    zero = np.zeros(1)
+    match file.crank or file.driven_slider:
+        case CrankTable() as table:
+            return Crank(
+                link=table.link,
+                pivot=table.pivot,
+                pin=table.pin,
+                length_m=numbers.length(table.length, "crank"),
+                angle_rad=numbers.angle(table.angle_deg),
+                omega=_speed(table, numbers),
+                epsilon=zero if table.epsilon is None else numbers.number(table.epsilon),
+                accelerated=table.epsilon is not None,
+            )
+        case DrivenSliderTable() as table:
+            return DrivenSlider(
+                link=table.link,
+                pin=table.pin,
+                guide_m=numbers.point(table.guide.through),
+                guide_rad=numbers.angle(table.guide.angle_deg),
+                displacement_m=numbers.distance(table.displacement),
+                speed=numbers.distance(table.speed),
+                acceleration=zero if table.acceleration is None else numbers.distance(table.acceleration),
+            )
+    raise ValueError("a mechanism has one driven link")
+
+
+def _speed(crank: CrankTable, numbers: _Numbers) -> FloatArray:
+    """The crank's angular velocity, directly or from rev/min through a gear."""
+    if crank.omega is not None:
+        return numbers.number(crank.omega)
+    if crank.rpm is None:
+        raise ValueError("a crank has omega or rpm")
+    rpm = numbers.number(crank.rpm)
+    if crank.gear_ratio is not None:
+        ratio = numbers.number(crank.gear_ratio)
+        if np.any(ratio == 0.0):
+            raise FormulaError(f"'{crank.gear_ratio.text}' (gear_ratio) must not be zero")
+        rpm = rpm / ratio
+    return np.asarray(np.pi * rpm / 30.0)
+
+
+def _fixed(guide: FixedGuideTable | GuideTable, numbers: _Numbers) -> FixedGuide:
+    if guide.through is None or guide.angle_deg is None:
+        raise ValueError("a fixed guide has a point and a direction")
+    return FixedGuide(numbers.point(guide.through), numbers.angle(guide.angle_deg))
+
+
+def _guide(guide: GuideTable, numbers: _Numbers, bodies: _Bodies) -> Guide:
+    if guide.joints is None or guide.coincident is None:
+        return _fixed(guide, numbers)
+    base = (guide.joints[0], guide.joints[1])
+    return MovingGuide(bodies.link_of(base), base, guide.coincident)
+
+
+def _group(table: AnyGroupTable, numbers: _Numbers, bodies: _Bodies) -> Group:
+    """One group; `bodies` collects what each link carries."""
+    node = table.node
+    if isinstance(table, PlateTable | PointOnLineTable | PointTable):
+        return _link_point(table, numbers, bodies)
+    match table:
+        case DyadTable():
+            (p, q), (link_p, link_q) = table.pins, table.links
+            first, second = (numbers.length(length, node) for length in table.lengths)
+            bodies.carry(link_p, p, node, first)
+            bodies.carry(link_q, q, node, second)
+            return Dyad(node, (p, q), (link_p, link_q), (first, second), SIDES[table.side])
+        case SliderTable():
+            length = numbers.length(table.length, node)
+            guide = _guide(table.guide, numbers, bodies)
+            bodies.carry(table.link, table.pin, node, length)
+            return Slider(node, table.pin, table.link, length, guide, SIDES[table.side])
+        case SlottedLinkTable():
+            return _slotted_link(table, numbers, bodies)
+        case CrossSliderTable():
+            first_guide, second_guide = (_guide(guide, numbers, bodies) for guide in table.guides)
+            return CrossSlider(node, (first_guide, second_guide))
+        case YokeTable():
+            return Yoke(node, table.pin, numbers.angle(table.slot_deg), _fixed(table.guide, numbers))
+
+
+def _slotted_link(table: SlottedLinkTable, numbers: _Numbers, bodies: _Bodies) -> SlottedLink:
+    zero = np.zeros(1)
+    offset = zero if table.offset is None else numbers.distance(table.offset)
+    bodies.axes[table.link] = {table.pivot: np.zeros(1, complex)}
+    if table.foot is not None:
+        if np.any(offset == 0.0):
+            raise FormulaError(f"the offset of link {table.link} is zero: leave out offset and foot")
+        bodies.axes[table.link][table.foot] = np.asarray(1j * offset)
+    bodies.slots[table.link] = table.node
+    side = SIDES[table.side]
+    return SlottedLink(table.node, table.pin, table.pivot, table.link, offset, table.foot, side)
+
+
+def _link_point(
+    table: PlateTable | PointOnLineTable | PointTable, numbers: _Numbers, bodies: _Bodies
+) -> Group:
+    """A further point of a link: rigid with its base, however it is given."""
+    node, link, (p, q) = table.node, table.link, table.base
+    axes = bodies.axes[link]
+    if isinstance(table, PointTable) and q == bodies.slots.get(link):
+        axes[node] = numbers.point(table.at)
+        return SlotPoint(node, q, link, axes[node])
+    base = axes[q] - axes[p]
+    local: ComplexArray | None = None
+    match table:
+        case PointOnLineTable():
+            ratio = numbers.number(table.ratio)
+            axes[node] = axes[p] + ratio * base
+            return PointOnLine(node, (p, q), link, ratio)
+        case PlateTable():
+            first, second = (numbers.length(length, node) for length in table.lengths)
+            side: int | FloatArray = SIDES[table.side or "left"]
+            shape = _shape(np.abs(base), first, second, SIDES[table.side or "left"])
+            if table.side is None and np.any(shape.imag != 0.0):
+                told = f"{node} may lie to the left or to the right of {p} -> {q}; say which: side"
+                raise FormulaError(f"side of {node} is missing: {told}")
+        case PointTable():
+            local = numbers.point(table.at)
+            shape = np.asarray(local / np.abs(base))
+            if np.all(shape.imag == 0.0):
+                axes[node] = axes[p] + shape * base
+                return PointOnLine(node, (p, q), link, np.asarray(shape.real), np.asarray(local.real))
+            sides = np.where(shape.imag < 0.0, -1, 1)
+            side = int(sides[0]) if np.all(sides == sides[0]) else sides
+            first, second = np.abs(shape * base), np.abs((1.0 - shape) * base)
+    axes[node] = axes[p] + shape * base
+    return Plate(node, (p, q), link, (first, second), side, shape, local)
+
+
+def _shape(base: FloatArray, first: FloatArray, second: FloatArray, side: int) -> ComplexArray:
+    """A plate's third point over its base, (C - A) / (B - A); exactly real where it is in line."""
+    with np.errstate(all="ignore"):
+        along, across, _ = assur.rrr_place(base + 0j, first, second, side)
+        shape = np.asarray(along + 1j * across)
+    slack = IN_LINE_TOLERANCE * (base + first + second)
+    for gap, ratio in (
+        (base - first - second, first / base),
+        (first - base - second, first / base),
+        (second - base - first, -first / base),
+    ):
+        shape = np.where(np.abs(gap) <= slack, ratio + 0j, shape)
+    return shape

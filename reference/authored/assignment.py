@@ -1,0 +1,326 @@
+"""An assignment: what varies, the scales, the sheets, the names; its variants and their mechanisms.
+
+Built from authored files, found by name in the library of built-in ones or by path. Everything is
+evaluated on arrays over variants.
+"""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from reference.authored import toml_file
+from reference.authored.assembly import LARGEST, build_driver, build_mechanism
+from reference.authored.formula import Formula, FormulaError, Value
+from reference.authored.mechanism import MechanismFile, check_mechanism
+from reference.authored.toml_file import Authored, FormulaText, Identifier, Text
+from reference.errors import AuthoredFileError, CallError, Finding
+from reference.geometry import FloatArray
+from reference.mechanism import Crank, Driver, Mechanism
+
+MOST_VARIANTS = 10_000
+"""Of an assignment: more than any class has students, and all of them are computed before it is used."""
+
+
+class Range(Authored):
+    """Whole numbers from .. to, both included."""
+
+    first: Annotated[int, Field(alias="from")]
+    last: Annotated[int, Field(alias="to")]
+
+    @property
+    def values(self) -> range:
+        """The numbers."""
+        return range(self.first, self.last + 1)
+
+
+class VariantTable(Authored):
+    """What a student's number n (and a position) sets: formulas, each may use those above it."""
+
+    n: Range | None = None
+    position: Range | None = None
+    values: dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], FormulaText] = Field(default={})
+
+    @model_validator(mode="after")
+    def _has_no_more_than_can_be_graded(self) -> Self:
+        count = 1
+        for numbers in (self.n, self.position):
+            count *= 1 if numbers is None else max(numbers.last - numbers.first + 1, 0)
+        if count > MOST_VARIANTS:
+            raise ValueError(f"has {count} variants, more than {MOST_VARIANTS}: narrow n or position")
+        return self
+
+
+class ScalesTable(Authored):
+    """The assignment's own rule for the scales.
+
+    Formulas of the variant's values and of `crank_mm` (drawn length of the crank), `crank_m` (its
+    real length), `omega`, then `kL`, then `kv`; where a slider drives, of `speed` instead (m/s).
+    """
+
+    crank_mm: FormulaText | None = None
+    kL: FormulaText  # noqa: N815 - the field's own name for it
+    kv: FormulaText
+    ka: FormulaText
+    bare_units: dict[Literal["kL", "kv", "ka"], str] = Field(default={})
+    """The unit of a scale that a student writes as a bare number, where the assignment says one."""
+
+
+class PageTable(Authored):
+    """A sheet that a student hands in, with the figures drawn on it."""
+
+    kind: Literal["all", "velocity", "acceleration"]
+    figures: Annotated[list[Literal["mechanism", "velocity_plan", "acceleration_plan"]], Field(min_length=1)]
+
+
+class GivenTable(Authored):
+    """One datum as told to the student: label = value unit."""
+
+    label: str
+    value: FormulaText
+    unit: str = ""
+
+
+TRADITIONS: dict[str, dict[str, str]] = {
+    "o": {},
+    "p": {"o": "p", "o'": "π", "kL": "μl", "kv": "μv", "ka": "μa"},
+}
+"""What students call poles and scales: o, o', kL, kv, ka; or p, π, μl, μv, μa."""
+
+
+class AssignmentFile(Authored):
+    """An assignment: a mechanism, what varies, the scales, the sheets, the names students see.
+
+    `tradition` fills `names` with those of a school; names given one by one go before it.
+    """
+
+    schema_version: Literal[1]
+    id: Identifier
+    title: Text
+    task: Text
+    mechanism: str | MechanismFile
+    rubric: str
+    variant: VariantTable = VariantTable()
+    scales: ScalesTable
+    plate_images: Literal["perpendiculars", "similarity"] = "perpendiculars"
+    page: Annotated[list[PageTable], Field(min_length=1)]
+    given: list[GivenTable] = Field(default=[])
+    tradition: Literal["o", "p"] = "o"
+    names: dict[str, str] = Field(default={})
+    assumptions: list[str] = Field(default=[])
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_names_of_its_tradition(cls, data: Any) -> Any:  # noqa: ANN401 - not yet validated
+        if not isinstance(data, dict) or not isinstance(data.get("names", {}), dict):
+            return data
+        of_the_school = TRADITIONS.get(str(data.get("tradition", "o")), {})
+        return {**data, "names": {**of_the_school, **data.get("names", {})}}
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One student's task: the number n and the position, None where the assignment has none."""
+
+    n: int | None = None
+    position: int | None = None
+
+    def __str__(self) -> str:
+        told = [
+            f"{name} = {value}"
+            for name, value in (("n", self.n), ("position", self.position))
+            if value is not None
+        ]
+        return ", ".join(told) or "the only variant"
+
+
+@dataclass(frozen=True, slots=True)
+class Scales:
+    """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm."""
+
+    kL: FloatArray  # noqa: N815 - the field's own name for it
+    kv: FloatArray
+    ka: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """An assignment and its mechanism, as authored, and where they came from."""
+
+    file: AssignmentFile
+    mechanism_file: MechanismFile
+    path: Path
+
+    @property
+    def id(self) -> str:
+        """Its name."""
+        return self.file.id
+
+    def variants(self) -> list[Variant]:
+        """Every variant there is, numbers first, positions within."""
+        spec = self.file.variant
+        numbers = list(spec.n.values) if spec.n else [None]
+        positions = list(spec.position.values) if spec.position else [None]
+        return [Variant(n, position) for n in numbers for position in positions]
+
+    def variant(self, n: int | None, position: int | None = None) -> Variant:
+        """The variant asked for; raises CallError that says what is missing or out of range."""
+        spec = self.file.variant
+        chosen: dict[str, int | None] = {}
+        for name, given, allowed in (("n", n, spec.n), ("position", position, spec.position)):
+            if allowed is None:
+                chosen[name] = None
+                continue
+            told = f"{name} from {allowed.first} to {allowed.last}"
+            if given is None:
+                raise CallError(f"{name}_needed", f"assignment {self.id} needs --{name} ({told})")
+            if given not in allowed.values:
+                raise CallError(f"{name}_range", f"{name} = {given}: assignment {self.id} has {told}")
+            chosen[name] = given
+        return Variant(**chosen)
+
+    def values(self, variants: list[Variant]) -> dict[str, Value]:
+        """The variants' data by name, arrays of shape (N,)."""
+        known: dict[str, Value] = {}
+        for name in ("n", "position"):
+            numbers = [getattr(variant, name) for variant in variants]
+            if numbers and numbers[0] is not None:
+                known[name] = np.array(numbers, dtype=np.float64)
+        for name, formula in self.file.variant.values.items():
+            known[name] = formula(known)
+        return known
+
+    def mechanism(self, variants: list[Variant]) -> Mechanism:
+        """The mechanism of every variant, SI, arrays of shape (N,)."""
+        return build_mechanism(self.mechanism_file, self.values(variants), len(variants))
+
+    def scales(
+        self,
+        variants: list[Variant],
+        *,
+        crank_mm: float | FloatArray | None = None,
+        kL: float | FloatArray | None = None,  # noqa: N803
+        kv: float | FloatArray | None = None,
+        ka: float | FloatArray | None = None,
+    ) -> Scales:
+        """The scales: those declared, the others by the assignment's rule.
+
+        A declared kL, or the drawn crank, replaces the proposed length of the crank.
+        """
+        known = self.values(variants)
+        known |= _speeds(build_driver(self.mechanism_file, known, len(variants)))
+        rule = self.file.scales
+        if crank_mm is not None:
+            known["crank_mm"] = np.asarray(crank_mm, float)
+        elif rule.crank_mm is not None:
+            known["crank_mm"] = rule.crank_mm(known)
+        declared = {"kL": kL, "kv": kv, "ka": ka}
+        for name in ("kL", "kv", "ka"):
+            given = declared[name]
+            known[name] = getattr(rule, name)(known) if given is None else np.asarray(given, float)
+            if name == "kL" and given is not None and "crank_m" in known:
+                known["crank_mm"] = np.asarray(known["crank_m"]) / known[name]
+        shape = (len(variants),)
+        return Scales(*(np.broadcast_to(known[name], shape) for name in ("kL", "kv", "ka")))
+
+
+def _speeds(driver: Driver) -> dict[str, Value]:
+    """What the rule for the scales knows of the driven link."""
+    if isinstance(driver, Crank):
+        return {"omega": np.abs(driver.omega), "crank_m": driver.length_m}
+    return {"speed": np.abs(driver.speed)}
+
+
+SUFFIXES = {"assignment": ".assignment.toml", "mechanism": ".mechanism.toml", "rubric": ".rubric.toml"}
+
+
+def library() -> Path:
+    """The folder of built-in files: inside the installed package, or beside it in a checkout."""
+    installed = Path(str(files("reference"))) / "rubrics"
+    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "rubrics"
+
+
+def built_in() -> list[str]:
+    """The names of the built-in assignments."""
+    suffix = SUFFIXES["assignment"]
+    return sorted(path.name.removesuffix(suffix) for path in library().glob(f"*{suffix}"))
+
+
+def locate(kind: str, name: str, beside: Path | None = None) -> Path:
+    """The file of an authored thing: a path ending in .toml, a neighbour, or a built-in name."""
+    if name.endswith(".toml") or os.sep in name:
+        path = Path(name)
+        return path if path.is_absolute() or beside is None else beside.parent / path
+    file = f"{name}{SUFFIXES[kind]}"
+    if beside is not None and toml_file.is_file(beside.parent / file):
+        return beside.parent / file
+    return library() / file
+
+
+def load_assignment(name: str | Path) -> Assignment:
+    """A built-in assignment by its name, or one from the path of its file.
+
+    Raises CallError for an unknown name (naming the known ones), AuthoredFileError with every
+    fault of the files.
+    """
+    path = locate("assignment", str(name))
+    if not toml_file.is_file(path) and not str(name).endswith(".toml"):
+        raise CallError(
+            "unknown_assignment",
+            f"there is no assignment '{name}': built in are {', '.join(built_in())};"
+            " or give the path of an assignment file (.toml)",
+        )
+    return _load(path.resolve(), path.stat().st_mtime_ns if toml_file.is_file(path) else 0)
+
+
+@cache
+def _load(path: Path, _changed_ns: int) -> Assignment:
+    file = toml_file.load(AssignmentFile, path)
+    source, mechanism = path, file.mechanism
+    if isinstance(mechanism, str):
+        source = locate("mechanism", mechanism, path)
+        mechanism = toml_file.load(MechanismFile, source)
+    faults = tuple(check_mechanism(mechanism))
+    if faults:
+        raise AuthoredFileError(str(source), faults)
+    assignment = Assignment(file, mechanism, path)
+    findings = _check_formulas(assignment)
+    if findings:
+        raise AuthoredFileError(str(path), tuple(findings))
+    return assignment
+
+
+def _check_formulas(assignment: Assignment) -> list[Finding]:
+    """Names that no formula above defines; formulas that fail for some variant."""
+    variants = assignment.variants()
+    if not variants:
+        return [Finding("$.variant", "the range of n or position is empty: 'from' must not exceed 'to'")]
+    findings: list[Finding] = []
+
+    def proposed_scales(variants: list[Variant]) -> None:
+        scales = assignment.scales(variants)
+        for name in ("kL", "kv", "ka"):
+            if not np.all((getattr(scales, name) > 1.0 / LARGEST) & (getattr(scales, name) < LARGEST)):
+                raise FormulaError(f"{name} must be above zero for every variant")
+
+    def told(formula: Formula) -> Callable[[list[Variant]], object]:
+        return lambda variants: formula(assignment.values(variants))
+
+    for what, path in (
+        (assignment.values, "$.variant.values"),
+        (assignment.mechanism, "$.mechanism"),
+        (proposed_scales, "$.scales"),
+        *((told(one.value), f"$.given[{index}].value") for index, one in enumerate(assignment.file.given)),
+    ):
+        try:
+            what(variants)
+        except FormulaError as error:
+            findings.append(Finding(path, str(error)))
+            break
+    return findings

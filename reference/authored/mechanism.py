@@ -1,0 +1,423 @@
+"""A mechanism as its author writes it, and the checks that its form alone cannot make.
+
+The tables of a mechanism file are models; joints, links and guides that do not fit together are told
+all at once, each with its path in the file.
+"""
+
+import difflib
+from collections.abc import Iterator
+from itertools import permutations
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from reference.authored.toml_file import (
+    Authored,
+    FormulaText,
+    Identifier,
+    Joint,
+    LinkName,
+    Point,
+    Text,
+    TwoFormulas,
+    TwoJoints,
+)
+from reference.errors import Finding
+
+
+class CrankTable(Authored):
+    """The driven crank. Its speed is `omega` (rad/s), or `rpm` through a gear of `gear_ratio`.
+
+    Counter-clockwise positive.
+    """
+
+    link: LinkName = "1"
+    pivot: Joint
+    pin: Joint
+    length: FormulaText
+    angle_deg: FormulaText
+    omega: FormulaText | None = None
+    rpm: FormulaText | None = None
+    gear_ratio: FormulaText | None = None
+    epsilon: FormulaText | None = None
+
+    @model_validator(mode="after")
+    def _has_one_speed(self) -> Self:
+        if (self.omega is None) == (self.rpm is None):
+            raise ValueError("needs one speed: either omega (rad/s) or rpm (rev/min)")
+        if self.gear_ratio is not None and self.rpm is None:
+            raise ValueError("gear_ratio goes with rpm: the crank then turns at rpm / gear_ratio")
+        return self
+
+
+class FixedGuideTable(Authored):
+    """A fixed straight guide: a point of it and its direction, degrees counter-clockwise from +x."""
+
+    through: Point
+    angle_deg: FormulaText
+
+
+class GuideTable(Authored):
+    """A straight guide: fixed (`through`, `angle_deg`), or the line through two joints of a moving link.
+
+    `coincident` names the moving link's point under the slider, as in ``D5`` under ``D``.
+    """
+
+    through: Point | None = None
+    angle_deg: FormulaText | None = None
+    joints: TwoJoints | None = None
+    coincident: Joint | None = None
+
+    @model_validator(mode="after")
+    def _is_one_kind(self) -> Self:
+        fixed = (self.through is not None, self.angle_deg is not None)
+        moving = (self.joints is not None, self.coincident is not None)
+        if (all(fixed) and not any(moving)) or (all(moving) and not any(fixed)):
+            return self
+        raise ValueError(
+            "needs through and angle_deg (a fixed guide), or joints and coincident (a guide on a moving link)"
+        )
+
+
+class DrivenSliderTable(Authored):
+    """The driven slider, in place of a crank: where it is along its fixed guide, and how it moves.
+
+    In `length_unit`, `length_unit`/s and `length_unit`/s^2, along the guide's direction.
+    """
+
+    link: LinkName = "1"
+    pin: Joint
+    guide: FixedGuideTable
+    displacement: FormulaText
+    speed: FormulaText
+    acceleration: FormulaText | None = None
+
+
+class DyadTable(Authored):
+    """Assur group RRR: two links that meet in `node`."""
+
+    type: Literal["RRR"]
+    node: Joint
+    pins: TwoJoints
+    links: Annotated[list[LinkName], Field(min_length=2, max_length=2)]
+    lengths: TwoFormulas
+    side: Literal["left", "right"]
+    """Of the directed line pins[0] -> pins[1]."""
+
+
+class SliderTable(Authored):
+    """Assur group RRP: a rod from `pin` to the slider `node` on a guide."""
+
+    type: Literal["RRP"]
+    node: Joint
+    pin: Joint
+    link: LinkName
+    length: FormulaText
+    guide: GuideTable
+    side: Literal["ahead", "behind"]
+    """Where the slider is, seen from the pin along the guide's direction."""
+
+
+class SlottedLinkTable(Authored):
+    """Assur group RPR: `link` turns about `pivot`; a block hinged at `pin` slides along its guide."""
+
+    type: Literal["RPR"]
+    node: Joint
+    """The point of the link under the pin, as in ``B3`` under ``B``."""
+    pin: Joint
+    pivot: Joint
+    link: LinkName
+    offset: FormulaText | None = None
+    """How far the pin lies to the left of the parallel to the guide through the pivot."""
+    foot: Joint | None = None
+    """The guide's nearest point to the pivot, where there is an offset."""
+    side: Literal["ahead", "behind"] = "ahead"
+    """Where the pin is, seen from the pivot along the guide's direction."""
+
+    @model_validator(mode="after")
+    def _has_foot_and_offset(self) -> Self:
+        if (self.offset is None) != (self.foot is None):
+            raise ValueError("offset and foot go together; foot names the guide's nearest point to the pivot")
+        return self
+
+
+class CrossSliderTable(Authored):
+    """Assur group PRP: `node` hinges two blocks, each on a guide."""
+
+    type: Literal["PRP"]
+    node: Joint
+    guides: Annotated[list[GuideTable], Field(min_length=2, max_length=2)]
+
+
+class YokeTable(Authored):
+    """Assur group RPP: a block hinged at `pin` slides in a yoke's slot, the yoke on a fixed guide."""
+
+    type: Literal["RPP"]
+    node: Joint
+    """The yoke's point where slot and guide cross."""
+    pin: Joint
+    slot_deg: FormulaText
+    guide: FixedGuideTable
+
+
+class PlateTable(Authored):
+    """A third point of the link through `base`, by its distances from base[0] and base[1]."""
+
+    type: Literal["plate"]
+    node: Joint
+    base: TwoJoints
+    link: LinkName
+    lengths: TwoFormulas
+    side: Literal["left", "right"] | None = None
+    """Of the directed line base[0] -> base[1]; needed unless the three are in line for every variant."""
+
+
+class PointOnLineTable(Authored):
+    """A point of the link through `base`: base[0] + ratio (base[1] - base[0])."""
+
+    type: Literal["point_on_line"]
+    node: Joint
+    base: TwoJoints
+    link: LinkName
+    ratio: FormulaText
+
+
+class PointTable(Authored):
+    """A point of a link by local coordinates: x from base[0] towards base[1], y to the left of it.
+
+    On a slotted link the base is its pivot and its node, and x runs along the guide.
+    """
+
+    type: Literal["point"]
+    node: Joint
+    base: TwoJoints
+    link: LinkName
+    at: Point
+
+
+LinkPointTable = PlateTable | PointOnLineTable | PointTable
+AnyGroupTable = DyadTable | SliderTable | SlottedLinkTable | CrossSliderTable | YokeTable | LinkPointTable
+GroupTable = Annotated[AnyGroupTable, Field(discriminator="type")]
+
+
+class MechanismFile(Authored):
+    """A mechanism: lengths in `length_unit`, numbers or formulas of the assignment's values."""
+
+    schema_version: Literal[1]
+    id: Identifier
+    title: Text
+    length_unit: Literal["m", "cm", "mm"]
+    ground: Annotated[dict[Joint, Point], Field(min_length=1)]
+    crank: CrankTable | None = None
+    driven_slider: DrivenSliderTable | None = None
+    group: list[GroupTable] = Field(default=[])
+
+    @model_validator(mode="after")
+    def _has_one_driver(self) -> Self:
+        if (self.crank is None) == (self.driven_slider is None):
+            raise ValueError("needs one driven link: either [crank] or [driven_slider]")
+        return self
+
+
+Keyed = Iterator[tuple[str, str]]
+"""A key of the group's table, and the joint that stands there."""
+
+
+class _Bodies:
+    """Which joints each link carries, as far as the file has been read."""
+
+    def __init__(self, file: MechanismFile) -> None:
+        self.ground = set(file.ground)
+        self.links: dict[str, set[str]] = {}
+        self.slots: dict[str, set[str]] = {}
+        """By slotted link: its pivot and its node, the base of its points."""
+        self.moments: dict[str, str] = {}
+        """Points that lie under a slider at this instant only, and their links."""
+
+    def one_with(self, joints: set[str]) -> str | None:
+        """The body that carries all these joints, in words; the ground is one."""
+        link = next((link for link, held in self.links.items() if joints <= held), None)
+        return "the ground" if joints <= self.ground else link and f"link {link}"
+
+    def of(self, joints: list[str]) -> str | None:
+        """The moving link that carries all these joints."""
+        return next((link for link, held in self.links.items() if set(joints) <= held), None)
+
+    def told_of(self, joints: list[str]) -> str:
+        """Which links carry each joint."""
+        told = []
+        for joint in joints:
+            links = [link for link, held in self.links.items() if joint in held]
+            on = f"link {', '.join(links)}" if links else "no link"
+            momentary = f"link {self.moments.get(joint)} for this instant only"
+            told.append(f"{joint} is on {momentary if joint in self.moments else on}")
+        return f" ({'; '.join(told)})"
+
+
+def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
+    """Joints not yet placed or placed twice, links named twice, bases and guides that are no one link's."""
+    bodies = _Bodies(file)
+    placed = {*file.ground}
+    later = [joint for group in file.group for _, joint in _added(group)]
+    if file.crank is not None:
+        if file.crank.pivot not in file.ground:
+            yield Finding("$.crank.pivot", _unknown(file.crank.pivot, set(file.ground), "a ground pivot"))
+        bodies.links[file.crank.link] = {file.crank.pivot, file.crank.pin}
+    driven = file.crank or file.driven_slider
+    if driven is not None:
+        if driven.pin in placed:
+            where = "$.crank.pin" if file.crank else "$.driven_slider.pin"
+            yield Finding(where, f"{driven.pin} is a ground pivot already")
+        placed.add(driven.pin)
+    for index, group in enumerate(file.group):
+        where = f"$.group[{index}]"
+        for key, joint in _needed(group):
+            if joint in later and joint not in placed:
+                told = f"{joint} is placed further down: groups stand in the order in which they assemble"
+                yield Finding(f"{where}.{key}", told)
+            elif joint not in placed:
+                yield Finding(f"{where}.{key}", _unknown(joint, placed, "placed above"))
+        for key, joint in _added(group):
+            if joint in placed:
+                told = f"{joint} has a place already: over-constrained; a group places a new joint"
+                yield Finding(f"{where}.{key}", told)
+            placed.add(joint)
+            later.remove(joint)
+        yield from _check_hinges(group, bodies, where)
+        yield from _check_links(group, bodies, where)
+    yield from _check_names(placed)
+
+
+def _check_hinges(group: AnyGroupTable, bodies: _Bodies, where: str) -> Iterator[Finding]:
+    """A group is hinged to points that stay on their links, and to two bodies that move differently."""
+    hinges = {joint for key, joint in _needed(group) if key.startswith(("pin", "pivot"))}
+    for joint in sorted(hinges & bodies.moments.keys()):
+        link = bodies.moments[joint]
+        told = f'hinge it to a fixed point of the link, a group of type = "point" on link {link}'
+        yield Finding(where, f"{joint} is a point of link {link} for this instant only: {told}")
+    moving = [set(guide.joints) for _, guide in _guides(group) if guide.joints]
+    match group:
+        case CrossSliderTable():
+            hinges = set().union(*moving) if len(moving) == len(group.guides) else set()
+        case SliderTable() | YokeTable():
+            hinges |= moving[0] if moving else set()
+    # A single hinge beside a fixed guide moves unless it is itself on the ground.
+    alone = len(hinges) == 1 and not hinges <= bodies.ground
+    body = bodies.one_with(hinges) if hinges and not alone else None
+    if body is not None:
+        told = f"what it is hinged to and slides on is all on {body}: nothing moves between"
+        yield Finding(where, f'{told}; a further point of a link is a group of type = "plate" or "point"')
+
+
+def _check_names(joints: set[str]) -> Iterator[Finding]:
+    yield from _read_alike(joints)
+    lower = [joint.lower() for joint in joints]
+    for joint in sorted(joints):
+        if lower.count(joint.lower()) > 1:
+            yield Finding("$", f"joint {joint}: another one has the same letters in another case")
+
+
+def _read_alike(joints: set[str]) -> Iterator[Finding]:
+    """Names that run together: v_BA is B about A, so no third joint may be called BA."""
+    read_as: dict[str, tuple[str, ...]] = {joint: (joint,) for joint in sorted(joints)}
+    for first, second in permutations(sorted(joints), 2):
+        other = read_as.setdefault(first + second, (first, second))
+        if other != (first, second):
+            told = f"{first + second} would mean both {' about '.join(other)} and {first} about {second}"
+            yield Finding("$", f"joints {', '.join(sorted({*other, first, second}))}: {told}; rename one")
+
+
+def _guides(group: AnyGroupTable) -> list[tuple[str, GuideTable]]:
+    match group:
+        case SliderTable():
+            return [("guide", group.guide)]
+        case CrossSliderTable():
+            return [(f"guides[{index}]", guide) for index, guide in enumerate(group.guides)]
+        case _:
+            return []
+
+
+def _needed(group: AnyGroupTable) -> Keyed:
+    """The joints that must have their place before the group."""
+    match group:
+        case DyadTable(pins=pins):
+            yield from ((f"pins[{index}]", pin) for index, pin in enumerate(pins))
+        case SliderTable(pin=pin) | YokeTable(pin=pin):
+            yield "pin", pin
+        case SlottedLinkTable(pin=pin, pivot=pivot):
+            yield from (("pin", pin), ("pivot", pivot))
+        case PlateTable(base=base) | PointOnLineTable(base=base) | PointTable(base=base):
+            yield from ((f"base[{index}]", joint) for index, joint in enumerate(base))
+    for key, guide in _guides(group):
+        yield from ((f"{key}.joints[{index}]", joint) for index, joint in enumerate(guide.joints or []))
+
+
+def _added(group: AnyGroupTable) -> Keyed:
+    """The joints that the group places."""
+    yield "node", group.node
+    if isinstance(group, SlottedLinkTable) and group.foot is not None:
+        yield "foot", group.foot
+    yield from ((f"{key}.coincident", guide.coincident) for key, guide in _guides(group) if guide.coincident)
+
+
+def _check_links(group: AnyGroupTable, bodies: _Bodies, where: str) -> Iterator[Finding]:
+    """New links have new names; bases and moving guides are carried by one link."""
+    for key, guide in _guides(group):
+        if guide.joints and (guide.joints[0] == guide.joints[1] or bodies.of(guide.joints) is None):
+            told = f"{guide.joints[0]} and {guide.joints[1]} must be two joints of one moving link"
+            yield Finding(f"{where}.{key}.joints", told + bodies.told_of(guide.joints))
+        elif guide.joints and guide.coincident:
+            bodies.moments[guide.coincident] = bodies.of(guide.joints) or ""
+    match group:
+        case DyadTable():
+            if group.pins[0] == group.pins[1]:
+                yield Finding(f"{where}.pins", "the two pins must be different joints")
+            for index, (pin, link) in enumerate(zip(group.pins, group.links, strict=True)):
+                yield from _add_link(link, {pin, group.node}, bodies, f"{where}.links[{index}]")
+        case SliderTable():
+            yield from _add_link(group.link, {group.pin, group.node}, bodies, f"{where}.link")
+        case SlottedLinkTable():
+            if group.pin == group.pivot:
+                yield Finding(f"{where}.pivot", "pin and pivot must be different joints")
+            carried = {group.pivot, *([group.foot] if group.foot else [])}
+            yield from _add_link(group.link, carried, bodies, f"{where}.link")
+            bodies.slots[group.link] = {group.pivot, group.node}
+            bodies.moments[group.node] = group.link
+        case CrossSliderTable(guides=(first, second)):
+            if not first.joints and not second.joints:
+                told = "two fixed guides cross in a fixed point: one of them must be on a moving link"
+                yield Finding(f"{where}.guides", told)
+        case PlateTable() | PointOnLineTable() | PointTable():
+            yield from _check_base(group, bodies, f"{where}.base")
+
+
+def _check_base(
+    group: PlateTable | PointOnLineTable | PointTable, bodies: _Bodies, where: str
+) -> Iterator[Finding]:
+    held = bodies.links.setdefault(group.link, set())
+    on_slot = isinstance(group, PointTable) and set(group.base) == bodies.slots.get(group.link)
+    if group.base[0] == group.base[1] or not (on_slot or set(group.base) <= held):
+        told = ", ".join(sorted(held)) or "no joints yet"
+        advice = ""
+        if group.link in bodies.slots:
+            pivot_and_node = ", ".join(
+                sorted(bodies.slots[group.link], key=lambda one: one in bodies.moments)
+            )
+            advice = f'; points of a slotted link are given by type = "point" from {pivot_and_node}'
+        yield Finding(where, f"must be two joints of link {group.link} ({told}){advice}")
+    elif on_slot and group.base[0] not in held:
+        yield Finding(where, "the pivot comes first, then the slotted link's node")
+    held.add(group.node)
+
+
+def _add_link(link: str, joints: set[str], bodies: _Bodies, where: str) -> Iterator[Finding]:
+    """A group's links are new bodies: under a name that is taken, two bodies would pass for one."""
+    if link in bodies.links:
+        yield Finding(where, f"there is a link {link} already: each link needs a name of its own")
+    bodies.links.setdefault(link, joints)
+
+
+def _unknown(joint: str, known: set[str], what: str) -> str:
+    near = difflib.get_close_matches(joint, sorted(known), n=1, cutoff=0.5)
+    meant = f" (did you mean {near[0]}?)" if near else ""
+    return f"{joint} is not {what}{meant}: known so far are {', '.join(sorted(known))}"

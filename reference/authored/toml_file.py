@@ -1,0 +1,214 @@
+"""Authored files: mechanisms and assignments in TOML, validated, all faults of a file at once."""
+
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    ValidationError,
+    WithJsonSchema,
+)
+
+from reference.authored import formula
+from reference.authored.formula import Formula
+from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
+
+LENGTH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+MAX_BYTES = 200_000
+"""Twenty times the largest file that comes with the program."""
+MAX_DEPTH = 12
+"""Three times as deep as the tables of the formats go."""
+MAX_NAME = 64
+_ENDLESS_KEY = re.compile(rb"(?:\.[ \t]*[\w\"'-]+[ \t]*){100}")
+"""The parser takes time with the square of a dotted key's parts: 20,000 of them take 20 s."""
+LARGEST_NUMBER = 1e300
+"""Its neighbours overflow in the first product."""
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class Authored(BaseModel):
+    """A table of an authored file: frozen, nothing unknown, nothing coerced."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, arbitrary_types_allowed=True, defer_build=True
+    )
+
+
+def _read_formula(value: object) -> Formula:
+    if isinstance(value, Formula):
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError('a number or a formula in quotes, such as "2*(30+n)", is expected')  # noqa: TRY004
+    return formula.parse(value)
+
+
+def _check_joint(name: str) -> str:
+    if not name.isalnum() or not name[0].isupper() or name.lower() in {"o", "n"}:
+        # A joint's image in the plans is its name in lower case: the two must differ.
+        raise ValueError(f"'{name}' is no joint's name: a capital, then letters or digits (not O or N)")
+    return name
+
+
+FormulaText = Annotated[
+    Formula,
+    BeforeValidator(_read_formula),
+    PlainSerializer(lambda f: f.text),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
+]
+Joint = Annotated[str, Field(min_length=1, max_length=4), AfterValidator(_check_joint)]
+Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
+LinkName = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,4}$")]
+Point = Annotated[list[FormulaText], Field(min_length=2, max_length=2)]
+TwoJoints = Annotated[list[Joint], Field(min_length=2, max_length=2)]
+TwoFormulas = Annotated[list[FormulaText], Field(min_length=2, max_length=2)]
+
+
+class Text(Authored):
+    """A text in the languages of feedback; English is required."""
+
+    en: str
+    ro: str | None = None
+    ru: str | None = None
+
+    def in_language(self, language: str) -> str:
+        """The text in a language, or in English where it is not given."""
+        return getattr(self, language, None) or self.en
+
+
+def load(model: type[Model], path: Path) -> Model:
+    """Read and validate one authored file.
+
+    Raises AuthoredFileError with every fault found, each with its path in the file.
+    """
+    try:
+        data = tomllib.loads(_content_of(path).decode("utf-8"))
+    except FileNotFoundError as error:
+        raise AuthoredFileError(str(path), (Finding("$", "there is no such file"),)) from error
+    except OSError as error:
+        raise AuthoredFileError(str(path), (Finding("$", f"cannot be read: {error.strerror}"),)) from error
+    except UnicodeDecodeError as error:
+        raise AuthoredFileError(str(path), (Finding("$", "is not UTF-8 text"),)) from error
+    except (ValueError, RecursionError) as error:
+        # Besides TOMLDecodeError: numbers of thousands of digits, tables nested a thousand deep.
+        raise AuthoredFileError(str(path), (Finding("$", f"is not TOML: {error}"),)) from error
+    faults = tuple(_check_tree(data))
+    if faults:
+        raise AuthoredFileError(str(path), faults)
+    return validate(model, data, str(path))
+
+
+def _content_of(path: Path) -> bytes:
+    """A file's bytes, no more than anything that is authored has; raises OSError, or AuthoredFileError."""
+    if path.exists() and not path.is_file():
+        raise AuthoredFileError(
+            str(path), (Finding("$", "cannot be read: it is a folder or a device, not a file"),)
+        )
+    with path.open("rb") as stream:
+        content = stream.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        finding = Finding("$", f"is larger than {MAX_BYTES // 1000} kB: nothing that is written by hand is")
+        raise AuthoredFileError(str(path), (finding,))
+    if _ENDLESS_KEY.search(content):
+        finding = Finding("$", f"has a key of more than {MAX_DEPTH} parts: nothing that is authored nests so")
+        raise AuthoredFileError(str(path), (finding,))
+    return content
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; a name that the system refuses is none."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
+def _check_tree(data: dict[str, Any]) -> Iterator[Finding]:
+    """Numbers that nothing can be computed with, and tables nested deeper than any that is authored."""
+    waiting: list[tuple[str, Any, int]] = [("$", data, 0)]
+    while waiting:
+        path, value, depth = waiting.pop()
+        if isinstance(value, dict | list) and depth == MAX_DEPTH:
+            yield Finding(path, f"is nested deeper than {MAX_DEPTH} tables")
+        elif isinstance(value, dict):
+            waiting += [(f"{path}.{key[:MAX_NAME]}", inner, depth + 1) for key, inner in value.items()]
+        elif isinstance(value, list):
+            waiting += [(f"{path}[{index}]", inner, depth + 1) for index, inner in enumerate(value)]
+        elif isinstance(value, int | float) and not abs(value) <= LARGEST_NUMBER:
+            # Not a number is no less than any.
+            yield Finding(path, "is no number that can be computed with")
+
+
+def validate(model: type[Model], data: dict[str, Any], file: str) -> Model:
+    """Validate a table; raises AuthoredFileError with every fault."""
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise AuthoredFileError(file, tuple(findings_of(error, model))) from error
+
+
+def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Finding]:
+    """Pydantic's faults as paths and plain sentences: the first twenty, and how many more there are."""
+    faults = error.errors(include_url=False, include_context=False, include_input=False)
+    for fault in faults[:MOST_FINDINGS]:
+        *above, last = fault["loc"] or ("",)
+        is_field = fault["type"] in {"extra_forbidden", "missing"}
+        path = "$" + "".join(map(_path_part, above)) + (f".{last}" if is_field else _path_part(last))
+        message = fault["msg"].removeprefix("Value error, ").replace(" after validation", "")
+        if fault["type"] == "extra_forbidden":
+            message = _not_known(str(fault["loc"][-1]), model)
+        elif fault["type"] == "missing":
+            message = "is missing" + _WHY_NEEDED.get(str(fault["loc"][-1]), "")
+        elif fault["type"].startswith("union_tag"):
+            message = f"needs a type, one of {', '.join(_GROUP_TYPES)}"
+        yield Finding(path, message)
+    if len(faults) > MOST_FINDINGS:
+        yield Finding("$", f"and {len(faults) - MOST_FINDINGS} more faults")
+
+
+_GROUP_TYPES = ("RRR", "RRP", "RPR", "PRP", "RPP", "plate", "point_on_line", "point")
+_UNION_TAGS = {*_GROUP_TYPES, "str", "MechanismFile"}
+
+
+_WHY_NEEDED = {
+    "side": ": without it two assemblies are possible, and the mechanism is never guessed",
+}
+
+
+def _path_part(part: str | int) -> str:
+    if isinstance(part, int):
+        return f"[{part}]"
+    return "" if not part or part in _UNION_TAGS or part.startswith("function-") else f".{part}"
+
+
+def _not_known(name: str, model: type[BaseModel]) -> str:
+    fields = {field for kind in _models_in(model, set()) for field in kind.model_fields}
+    if name in fields:
+        return "does not belong here: another kind of table has it; leave it out"
+    near = near_names(name, sorted(fields), most=1)
+    return "is not known here; check its spelling" + (f" (did you mean {near[0]}?)" if near else "")
+
+
+def _models_in(model: type[BaseModel], seen: set[type[BaseModel]]) -> set[type[BaseModel]]:
+    from typing import get_args  # noqa: PLC0415
+
+    if model in seen:
+        return seen
+    seen.add(model)
+    waiting: list[Any] = [field.annotation for field in model.model_fields.values()]
+    while waiting:
+        kind = waiting.pop()
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            _models_in(kind, seen)
+        else:
+            waiting.extend(get_args(kind))
+    return seen

@@ -1,0 +1,1 @@
+"""A plan as it is drawn: directions, lengths, intersections; evaluated, changed by a mistake, with drafting errors."""

@@ -1,0 +1,471 @@
+"""The construction of a mechanism's plans, derived from the mechanism by one function.
+
+A `Draft` is a construction while it is written down. Each condition on a joint (it turns about a pin,
+it slides on a guide) gives a line of the velocity plan and one of the acceleration plan; two conditions
+place the joint's images where their lines meet.
+
+Node names: a joint's image is its letter in lower case (``B`` -> ``b``, ``b'`` in the acceleration
+plan), ground joints have the pole for their image, a normal component a_BA_n ends in ``n_BA``, a
+Coriolis component a_B3B_c in ``k_B3B``.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from reference.construction.elements import Along, Coriolis, Fixed, FixedLine, Line, Normal, Scaled
+from reference.construction.graph import AngularRate, Construction, Vector, pair
+from reference.construction.steps import (
+    ArcAndLine,
+    Coincide,
+    Divide,
+    Given,
+    Local,
+    OnGuide,
+    Pivot,
+    Pole,
+    Similar,
+    Step,
+    Tangent,
+    TwoArcs,
+    TwoLines,
+)
+from reference.mechanism import (
+    Crank,
+    CrossSlider,
+    DrivenSlider,
+    Driver,
+    Dyad,
+    FixedGuide,
+    Group,
+    Guide,
+    Mechanism,
+    Plate,
+    PointOnLine,
+    Slider,
+    SlotPoint,
+    SlottedLink,
+    Yoke,
+    form_of,
+    moving_guides,
+)
+
+VELOCITY_POLE, ACCELERATION_POLE = "o", "o'"
+
+
+@dataclass(slots=True)
+class Draft:
+    """The construction while it is being written down."""
+
+    mechanism: Mechanism
+    plate_by_similarity: bool
+    sketch: list[Step] = field(default_factory=list)
+    velocity: list[Step] = field(default_factory=list)
+    acceleration: list[Step] = field(default_factory=list)
+    vectors: dict[str, Vector] = field(default_factory=dict)
+    rates: dict[str, AngularRate] = field(default_factory=dict)
+    images: dict[str, Similar] = field(default_factory=dict)
+
+    def image(self, joint: str, *, primed: bool = False) -> str:
+        """The node of a joint in the velocity (or acceleration) plan."""
+        if self.mechanism.is_ground(joint):
+            return ACCELERATION_POLE if primed else VELOCITY_POLE
+        return image_name(joint, primed=primed)
+
+    def relative(self, node: str, pin: str) -> str:
+        """The subscript of a vector of `node` about `pin`: B about A is BA, about the ground B."""
+        return node if self.mechanism.is_ground(pin) else f"{node}{pin}"
+
+    def vector(self, name: str, tail: str, head: str, **about: object) -> None:
+        """Note a vector; `about` are further attributes of `Vector`."""
+        scale = "kv" if name.startswith("v") else "ka"
+        self.vectors[name] = Vector(name, tail, head, scale, **about)  # type: ignore[arg-type]
+
+
+def image_name(joint: str, *, primed: bool = False) -> str:
+    """The lower-case image of a moving joint, primed in the acceleration plan."""
+    return joint.lower() + ("'" if primed else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """One condition on a node: a line of each plan, and the vectors that lie along them.
+
+    `vectors` are names, tails and attributes; their heads are the node's images.
+    """
+
+    velocity: Line
+    acceleration: Line
+    vectors: tuple[tuple[str, str, Mapping[str, object]], ...]
+
+
+def images_at(draft: Draft, node: str, lines: Sequence[Lines]) -> None:
+    """Both images of a node, where the two lines of each plan meet."""
+    image, image_primed = draft.image(node), draft.image(node, primed=True)
+    first, second = lines
+    draft.velocity.append(TwoLines(image, first.velocity, second.velocity))
+    draft.acceleration.append(TwoLines(image_primed, first.acceleration, second.acceleration))
+    for line in lines:
+        for name, tail, about in line.vectors:
+            draft.vector(name, tail, image if name.startswith("v") else image_primed, **about)
+    absolute(draft, node)
+
+
+def rotations(draft: Draft, node: str, links: Mapping[str, str]) -> list[Lines]:
+    """A node that turns about each pin: across the link, from the pin's image."""
+    found = []
+    for pin, link in links.items():
+        across, about = Along(pin, node, 1), draft.relative(node, pin)
+        end = normal_component(draft, node, pin, Normal(draft.image(pin), draft.image(node), pair(pin, node)))
+        found.append(turning(draft, (pin, node), end, across))
+        rates_of(draft, link, about, (pin, node))
+    return found
+
+
+def turning(draft: Draft, link: tuple[str, str], end: str, across: Along) -> Lines:
+    """Across a link from a pin's image, and from the end of the normal component."""
+    pin, node = link
+    about = draft.relative(node, pin)
+    return Lines(
+        Line(draft.image(pin), across),
+        Line(end, across),
+        (
+            (f"v_{about}", draft.image(pin), {"link": link}),
+            (f"a_{about}_t", end, {"link": link, "part": "t"}),
+        ),
+    )
+
+
+def normal_component(draft: Draft, node: str, pin: str, length: Normal) -> str:
+    """Lay off a_(node about pin)^n from the pin's image towards the pin; its end."""
+    about = draft.relative(node, pin)
+    end, start = f"n_{about}", draft.image(pin, primed=True)
+    draft.acceleration.append(Given(end, start, length, Along(node, pin)))
+    draft.vector(f"a_{about}_n", start, end, link=(pin, node), part="n")
+    return end
+
+
+def guide_line(node: str, guide: Guide) -> Line | FixedLine:
+    """A guide on the sketch."""
+    if isinstance(guide, FixedGuide):
+        return FixedLine(f"guide {node}")
+    return Line(guide.base[0], Along(*guide.base))
+
+
+def slides(draft: Draft, node: str, guides: Sequence[Guide]) -> list[Lines]:
+    """A node that slides on guides: along each, from the image of the point under it."""
+    found = []
+    for guide in guides:
+        if isinstance(guide, FixedGuide):
+            along = FixedLine(f"guide {node}").along
+            found.append(Lines(Line(VELOCITY_POLE, along), Line(ACCELERATION_POLE, along), ()))
+            continue
+        under, (g, h) = guide.coincident, guide.base
+        draft.sketch.append(Coincide(under, node))
+        for primed, steps in ((False, draft.velocity), (True, draft.acceleration)):
+            ends = (draft.image(g, primed=primed), draft.image(h, primed=primed))
+            steps.append(Similar(draft.image(under, primed=primed), ends, (g, h, under)))
+        absolute(draft, under)
+        turn = (draft.image(g), draft.image(h))
+        found.append(sliding(draft, (under, node), Along(g, h), turn, (guide.link, g, h)))
+    return found
+
+
+def sliding(
+    draft: Draft, link: tuple[str, str], guide: Along, turn: tuple[str, str], turning: tuple[str, str, str]
+) -> Lines:
+    """The second joint slides about the first along a turning guide: Coriolis, then along the guide.
+
+    Arguments: `turn`, ends of a velocity that turns the guide's link; `turning`, that link and the two
+    joints of it that the velocity belongs to.
+    """
+    other, node = link
+    about, name = f"{node}{other}", turning[0]
+    start, end = draft.image(other, primed=True), f"k_{node}{other}"
+    length = Coriolis((draft.image(other), draft.image(node)), guide, turn, turning[1:])
+    draft.acceleration.append(Given(end, start, length, guide.perpendicular))
+    draft.vector(f"a_{about}_c", start, end, link=link, part="c", turning=name)
+    return Lines(
+        Line(draft.image(other), guide),
+        Line(end, guide),
+        (
+            (f"v_{about}", draft.image(other), {"link": link}),
+            (f"a_{about}_r", end, {"link": link, "part": "r"}),
+        ),
+    )
+
+
+def in_slot(draft: Draft, node: str, pin: str, slot: Fixed) -> Lines:
+    """A yoke's point about the block in its slot: along the slot, which does not turn."""
+    image, image_primed = draft.image(pin), draft.image(pin, primed=True)
+    link = (pin, node)
+    return Lines(
+        Line(image, slot),
+        Line(image_primed, slot),
+        (
+            (f"v_{node}{pin}", image, {"link": link}),
+            (f"a_{node}{pin}_r", image_primed, {"link": link, "part": "r"}),
+        ),
+    )
+
+
+def rigid_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
+    """Both images of a link's point by similarity, without relative vectors."""
+    note_similar_images(draft, node, base)
+    draft.velocity.append(draft.images[draft.image(node)])
+    draft.acceleration.append(draft.images[draft.image(node, primed=True)])
+    absolute(draft, node)
+
+
+def note_similar_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
+    """The similarity steps of a plate's third point, for both plans."""
+    p, q = base
+    for primed in (False, True):
+        ends = (draft.image(p, primed=primed), draft.image(q, primed=primed))
+        image = draft.image(node, primed=primed)
+        draft.images[image] = Similar(image, ends, (p, q, node))
+
+
+def similar_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
+    """Both images of a plate's point by similarity, and the velocities about its base."""
+    rigid_images(draft, node, base)
+    for pin in base:
+        if not draft.mechanism.is_ground(pin):
+            draft.vector(f"v_{node}{pin}", draft.image(pin), draft.image(node), link=(pin, node))
+
+
+def images_on_line(draft: Draft, node: str, base: tuple[str, str]) -> None:
+    """Both images of a point that divides a link."""
+    p, q = base
+    for primed, steps in ((False, draft.velocity), (True, draft.acceleration)):
+        ends = (draft.image(p, primed=primed), draft.image(q, primed=primed))
+        steps.append(Divide(draft.image(node, primed=primed), ends, f"ratio {node}"))
+    absolute(draft, node)
+
+
+def absolute(draft: Draft, node: str) -> None:
+    """The velocity and the acceleration of a joint, from the poles."""
+    if f"v_{node}" not in draft.vectors:
+        draft.vector(f"v_{node}", VELOCITY_POLE, draft.image(node))
+    draft.vector(f"a_{node}", ACCELERATION_POLE, draft.image(node, primed=True))
+
+
+def rates_of(draft: Draft, link: str, about: str, joints: tuple[str, str]) -> None:
+    """Omega and epsilon of a link, from the first vector found that turns it."""
+    for name, vector in ((f"omega_{link}", f"v_{about}"), (f"epsilon_{link}", f"a_{about}_t")):
+        draft.rates.setdefault(name, AngularRate(name, vector, joints, pair(*joints)))
+
+
+def construction_of(
+    mechanism: Mechanism, *, accelerations: bool = True, plate_by_similarity: bool = False
+) -> Construction:
+    """Write down how the mechanism and its plans are drawn, step by step.
+
+    Arguments
+    ---------
+    accelerations : without it, only the mechanism and the velocity plan
+    plate_by_similarity : images of plate points by similar triangles instead of perpendiculars
+        (collinear plates always are: their perpendiculars coincide)
+    """
+    form = (_form_of(mechanism), accelerations, plate_by_similarity)
+    if form not in _written:
+        if len(_written) >= KEPT:
+            _written.clear()
+        _written[form] = _write_down(mechanism, accelerations, plate_by_similarity)
+    return _written[form]
+
+
+KEPT = 256
+"""Constructions that are kept: it is the same for all variants, and for the same mechanism again."""
+_written: dict[tuple[object, ...], Construction] = {}
+
+
+def _form_of(mechanism: Mechanism) -> tuple[object, ...]:
+    """All that the construction depends on: names, kinds, sides, and which points are in line."""
+    in_line = tuple(
+        (group.is_ever_flat, group.line_ratio is None)
+        for group in mechanism.groups
+        if isinstance(group, Plate)
+    )
+    sides = tuple(
+        side.tobytes()
+        for group in mechanism.groups
+        if isinstance(side := getattr(group, "side", 1), np.ndarray)
+    )
+    return (form_of(mechanism), in_line, sides)
+
+
+def _write_down(mechanism: Mechanism, accelerations: bool, plate_by_similarity: bool) -> Construction:
+    draft = Draft(mechanism, plate_by_similarity)
+    draft.velocity.append(Pole(VELOCITY_POLE))
+    draft.acceleration.append(Pole(ACCELERATION_POLE))
+    draft.sketch.extend(Pivot(joint) for joint in mechanism.ground_m)
+    _draw_driver(draft, mechanism.driver)
+    for group in mechanism.groups:
+        _draw_group(draft, group)
+    figures: dict[str, tuple[Step, ...]] = {
+        "mechanism": tuple(draft.sketch),
+        "velocity_plan": tuple(draft.velocity),
+    }
+    poles = {"velocity_plan": VELOCITY_POLE}
+    if accelerations:
+        figures["acceleration_plan"] = tuple(draft.acceleration)
+        poles["acceleration_plan"] = ACCELERATION_POLE
+    keep = {step.node for steps in figures.values() for step in steps}
+    vectors = {name: draft.vectors[name] for name in _in_order(draft) if draft.vectors[name].head in keep}
+    ordered = sorted(draft.rates.values(), key=lambda rate: (rate.name.startswith("epsilon"), rate.name))
+    rates = {rate.name: rate for rate in ordered if rate.vector in vectors}
+    images = {node: step for node, step in draft.images.items() if node in keep}
+    return Construction(figures, poles, vectors, rates, images, _centres(draft, rates))
+
+
+def _centres(draft: Draft, rates: Mapping[str, AngularRate]) -> dict[str, Similar]:
+    """I: triangle I A B similar to o a b; J: triangle J A B similar to o' a' b' (Mehmke)."""
+    centres = {}
+    for name, rate in rates.items():
+        kind, _, link = name.partition("_")
+        tail, head = rate.link
+        if not draft.mechanism.is_ground(tail):
+            primed = kind == "epsilon"
+            images = (draft.image(tail, primed=primed), draft.image(head, primed=primed))
+            pole = ACCELERATION_POLE if primed else VELOCITY_POLE
+            centre = f"{'J' if primed else 'I'}{link}"
+            centres[centre] = Similar(centre, (tail, head), (*images, pole))
+    return centres
+
+
+def _in_order(draft: Draft) -> list[str]:
+    """Names of vectors: velocities first, joint by joint, the absolute one before its parts."""
+    joints = draft.mechanism.joints
+
+    def place(name: str) -> tuple[bool, int, str, str]:
+        kind, about, *part = name.split("_")
+        joint = max((joint for joint in joints if about.startswith(joint)), key=len)
+        other = about.removeprefix(joint)
+        pin = "" if other == "" and not part else f"{joints.index(other) if other else 99:03d}"
+        return kind == "a", joints.index(joint), pin, "".join(part)
+
+    return sorted(draft.vectors, key=place)
+
+
+def _draw_driver(draft: Draft, driver: Driver) -> None:
+    match driver:
+        case Crank():
+            _draw_crank(draft, driver)
+        case DrivenSlider(pin=pin):
+            guide = FixedLine(f"guide {pin}")
+            draft.sketch.append(OnGuide(pin, guide, Scaled(f"s {pin}", "kL")))
+            a, a_primed = draft.image(pin), draft.image(pin, primed=True)
+            draft.velocity.append(Given(a, VELOCITY_POLE, Scaled(f"v_{pin}", "kv"), guide.along))
+            draft.acceleration.append(
+                Given(a_primed, ACCELERATION_POLE, Scaled(f"a_{pin}", "ka"), guide.along)
+            )
+            absolute(draft, pin)
+
+
+def _draw_crank(draft: Draft, crank: Crank) -> None:
+    pivot, pin = crank.pivot, crank.pin
+    length = f"{pivot}{pin}"
+    draft.sketch.append(Given(pin, pivot, Scaled(length, "kL"), Fixed("angle crank")))
+    a, a_primed = draft.image(pin), draft.image(pin, primed=True)
+    across = Along(pivot, pin, 1)
+    draft.velocity.append(Given(a, VELOCITY_POLE, Scaled(f"v_{pin}", "kv"), across))
+    draft.vector(f"v_{pin}", VELOCITY_POLE, a, link=(pivot, pin))
+    inward = Along(pin, pivot)
+    normal = Scaled(f"a_{pin}_n", "ka")
+    if crank.accelerated:
+        end = f"n_{pin}"
+        draft.acceleration.append(Given(end, ACCELERATION_POLE, normal, inward))
+        draft.acceleration.append(Given(a_primed, end, Scaled(f"a_{pin}_t", "ka"), across))
+        draft.vector(f"a_{pin}_n", ACCELERATION_POLE, end, link=(pivot, pin), part="n")
+        draft.vector(f"a_{pin}_t", end, a_primed, link=(pivot, pin), part="t")
+    else:
+        draft.acceleration.append(Given(a_primed, ACCELERATION_POLE, normal, inward))
+    draft.vector(f"a_{pin}", ACCELERATION_POLE, a_primed)
+
+
+def _draw_group(draft: Draft, group: Group) -> None:
+    match group:
+        case Dyad(node=node, pins=(p, q), links=(link_p, link_q)):
+            radii = (Scaled(pair(p, node), "kL"), Scaled(pair(q, node), "kL"))
+            draft.sketch.append(TwoArcs(node, (p, q), radii, group.side))
+            images_at(draft, node, rotations(draft, node, {p: link_p, q: link_q}))
+        case Plate(node=node, base=(p, q), link=link):
+            _draw_plate(draft, group)
+            note_similar_images(draft, node, (p, q))
+            if group.is_ever_flat or draft.plate_by_similarity:
+                similar_images(draft, node, (p, q))
+            else:
+                images_at(draft, node, rotations(draft, node, {p: link, q: link}))
+        case PointOnLine(node=node, base=(p, q)):
+            draft.sketch.append(Divide(node, (p, q), f"ratio {node}"))
+            images_on_line(draft, node, (p, q))
+        case Slider(node=node, pin=pin, link=link, guide=guide):
+            radius = Scaled(pair(pin, node), "kL")
+            draft.sketch.append(ArcAndLine(node, pin, radius, guide_line(node, guide), group.side))
+            turns = rotations(draft, node, {pin: link})
+            images_at(draft, node, turns + slides(draft, node, (guide,)))
+        case CrossSlider(node=node, guides=guides):
+            draft.sketch.append(TwoLines(node, *(guide_line(node, guide) for guide in guides)))
+            images_at(draft, node, slides(draft, node, guides))
+        case Yoke(node=node, pin=pin, guide=guide):
+            slot = Fixed(f"angle slot {node}")
+            draft.sketch.append(TwoLines(node, Line(pin, slot), guide_line(node, guide)))
+            images_at(draft, node, [in_slot(draft, node, pin, slot), *slides(draft, node, (guide,))])
+        case SlottedLink():
+            _draw_slotted_link(draft, group)
+        case SlotPoint(node=node):
+            _draw_slot_point(draft, group)
+
+
+def _draw_plate(draft: Draft, group: Plate) -> None:
+    node, (p, q) = group.node, group.base
+    if group.line_ratio is not None:
+        draft.sketch.append(Divide(node, (p, q), f"ratio {node}"))
+        return
+    radii = (Scaled(pair(p, node), "kL"), Scaled(pair(q, node), "kL"))
+    draft.sketch.append(TwoArcs(node, (p, q), radii, group.side))
+
+
+def _slot_axis(group: SlottedLink) -> Along:
+    """The direction of a slotted link's guide on the sketch."""
+    behind = bool(np.ravel(group.side)[0] < 0)
+    return Along(group.foot or group.pivot, group.pin, 2 if behind else 0)
+
+
+def _draw_slotted_link(draft: Draft, group: SlottedLink) -> None:
+    node, pin, pivot = group.node, group.pin, group.pivot
+    if group.foot is not None:
+        offset = Scaled(f"offset {node}", "kL")
+        draft.sketch.append(Tangent(group.foot, pivot, offset, pin, group.side))
+    draft.sketch.append(Coincide(node, pin))
+    length = Normal(draft.image(pivot), draft.image(node), pair(pivot, node), measured=(pivot, node))
+    end = normal_component(draft, node, pivot, length)
+    turn = (draft.image(pivot), draft.image(node))
+    lines = (
+        turning(draft, (pivot, node), end, Along(pivot, node, 1)),
+        sliding(draft, (pin, node), _slot_axis(group), turn, (group.link, pivot, node)),
+    )
+    images_at(draft, node, lines)
+    rates_of(draft, group.link, draft.relative(node, pivot), (pivot, node))
+    if group.foot is not None and _is_used(draft.mechanism, group.foot):
+        rigid_images(draft, group.foot, (pivot, node))
+
+
+def _is_used(mechanism: Mechanism, joint: str) -> bool:
+    """Whether another group stands on a joint."""
+    several = [getattr(group, key, ()) for group in mechanism.groups for key in ("pins", "base")]
+    single = [getattr(group, key, "") for group in mechanism.groups for key in ("pin", "pivot")]
+    guides = [guide.base for group in mechanism.groups for guide in moving_guides(group)]
+    return any(joint in joints for joints in (*several, single, *guides))
+
+
+def _draw_slot_point(draft: Draft, group: SlotPoint) -> None:
+    node = group.node
+    slotted = next(
+        one for one in draft.mechanism.groups if isinstance(one, SlottedLink) and one.node == group.slotted
+    )
+    x, y = Scaled(f"x {node}", "kL"), Scaled(f"y {node}", "kL")
+    draft.sketch.append(Local(node, slotted.pivot, _slot_axis(slotted), x, y))
+    rigid_images(draft, node, (slotted.pivot, slotted.node))

@@ -1,0 +1,257 @@
+"""What a construction is made of: directions, lengths and lines, as a step sees them.
+
+Everything is in drawn millimetres, complex, y up, and an array over variants.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from reference import geometry
+from reference.geometry import ComplexArray, FloatArray
+
+Parameters = Mapping[str, FloatArray]
+"""Real lengths (m) by the pair of joints (``"O1A"``), crank data and the scales kL, kv, ka; see
+`reference.construction.derive.parameters_of`."""
+Nodes = Mapping[str, ComplexArray]
+Errors = Mapping[tuple[str, int, str], FloatArray]
+"""What the hand does wrong, by (node, which of the step's lines or lengths, kind); kinds are
+``angle`` (radians, of a line), ``shift`` (mm, of a line, to its left), ``length`` (mm, of a
+length transferred), ``x`` and ``y`` (mm, of the node's mark itself)."""
+
+NO_ERROR: FloatArray = np.asarray(0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What a step sees: the nodes so far, the parameters, and the hand's errors."""
+
+    nodes: Nodes
+    parameters: Parameters
+    errors: Errors = field(default_factory=dict)
+
+    def error(self, node: str, slot: int, kind: str) -> FloatArray:
+        """One error of the hand, zero where there is none."""
+        return self.errors.get((node, slot, kind), NO_ERROR)
+
+    def real_length(self, tail: str, head: str) -> FloatArray:
+        """The real length (m) between two joints, measured on the sketch."""
+        return np.asarray(np.abs(self.nodes[head] - self.nodes[tail]) * self.parameters["kL"])
+
+
+# Directions ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Along:
+    """The direction of a link as drawn, from joint `tail` to joint `head`, turned by quarters ccw."""
+
+    tail: str
+    head: str
+    quarters: int = 0
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Nodes it is read from."""
+        return (self.tail, self.head)
+
+    def at(self, view: View) -> ComplexArray:
+        """The unit vector."""
+        link = geometry.unit(view.nodes[self.head] - view.nodes[self.tail])
+        return np.asarray(link * 1j**self.quarters)
+
+    @property
+    def perpendicular(self) -> "Along":
+        """A quarter turn further."""
+        return replace(self, quarters=self.quarters + 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Fixed:
+    """A direction given by an angle in radians among the parameters (crank, guide).
+
+    The parameter ``turn`` (radians, 0 when absent) turns all fixed directions alike: a sketch that
+    is turned on its sheet is legitimate.
+    """
+
+    angle: str
+    quarters: int = 0
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """No nodes."""
+        return ()
+
+    def at(self, view: View) -> ComplexArray:
+        """The unit vector."""
+        turn = view.parameters.get("turn", NO_ERROR)
+        return np.asarray(geometry.direction(view.parameters[self.angle] + turn) * 1j**self.quarters)
+
+    @property
+    def perpendicular(self) -> "Fixed":
+        """A quarter turn further."""
+        return replace(self, quarters=self.quarters + 1)
+
+
+Direction = Along | Fixed
+
+# Lengths ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Scaled:
+    """A real quantity among the parameters, drawn at a scale."""
+
+    quantity: str
+    scale: str
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """No nodes."""
+        return ()
+
+    def at(self, view: View) -> FloatArray:
+        """Drawn millimetres."""
+        return np.asarray(view.parameters[self.quantity] / view.parameters[self.scale])
+
+
+@dataclass(frozen=True, slots=True)
+class Normal:
+    """A normal component v^2 / l, from a velocity as drawn and a real length, at the scale ka.
+
+    `measured` are the sketch's joints between which the length is taken where the mechanism's data do
+    not give it: the distance of a slotted link's point from its pivot.
+    """
+
+    tail: str
+    head: str
+    length: str
+    measured: tuple[str, str] | None = None
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The ends of the velocity, and those of a measured length."""
+        return (self.tail, self.head, *(self.measured or ()))
+
+    def at(self, view: View) -> FloatArray:
+        """Drawn millimetres."""
+        known = view.parameters
+        speed = np.abs(view.nodes[self.head] - view.nodes[self.tail]) * known["kv"]
+        length = known[self.length] if self.measured is None else view.real_length(*self.measured)
+        return np.asarray(speed**2 / (length * known["ka"]))
+
+
+@dataclass(frozen=True, slots=True)
+class Coriolis:
+    """A Coriolis component 2 omega v, from two velocities as drawn, at the scale ka.
+
+    Attributes
+    ----------
+    slide : the sliding velocity's ends in the velocity plan
+    guide : the guide's direction, along which it slides
+    turn : ends of the velocity that turns the guide's link about one of its joints
+    link : those joints, in the same order, in the sketch
+    quarters : how the velocity plan is turned as a whole, by quarters counter-clockwise
+
+    The length is positive to the left of `guide`: 2 omega v of the components along guide and across
+    the link, with their signs.
+    """
+
+    slide: tuple[str, str]
+    guide: "Direction"
+    turn: tuple[str, str]
+    link: tuple[str, str]
+    quarters: int = 0
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Both velocities' ends, the guide's and the link's joints."""
+        return (*self.slide, *self.guide.needs, *self.turn, *self.link)
+
+    def at(self, view: View) -> FloatArray:
+        """Drawn millimetres."""
+        known, nodes = view.parameters, view.nodes
+        back = 1j**-self.quarters
+        sliding, turning = ((nodes[head] - nodes[tail]) * back for tail, head in (self.slide, self.turn))
+        arm = geometry.unit(nodes[self.link[1]] - nodes[self.link[0]])
+        omega = geometry.cross(arm, turning) * known["kv"] / view.real_length(*self.link)
+        speed = geometry.dot(self.guide.at(view), sliding) * known["kv"]
+        return np.asarray(2.0 * omega * speed / known["ka"])
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """The drawn length of a vector between two nodes along a direction, with its sign."""
+
+    tail: str
+    head: str
+    along: "Direction"
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The vector's ends, and what the direction is read from."""
+        return (self.tail, self.head, *self.along.needs)
+
+    def at(self, view: View) -> FloatArray:
+        """Drawn millimetres."""
+        return geometry.dot(view.nodes[self.head] - view.nodes[self.tail], self.along.at(view))
+
+
+Length = Scaled | Normal | Coriolis | Component
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """The line through a node along a direction."""
+
+    through: str
+    along: Direction
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Its foot, and what its direction is read from."""
+        return (self.through, *self.along.needs)
+
+    def at(self, view: View, node: str, slot: int) -> tuple[ComplexArray, ComplexArray]:
+        """A point of the line and its unit vector, with the hand's error in drawing it."""
+        return drawn(view, node, slot, view.nodes[self.through], self.along.at(view))
+
+
+def fixed_point(view: View, name: str) -> ComplexArray:
+    """A fixed point of the mechanism (pivot, or a guide's point) at the scale kL."""
+    known = view.parameters
+    real = known[f"x {name}"] + 1j * known[f"y {name}"]
+    return np.asarray(real / known["kL"] * geometry.direction(known.get("turn", NO_ERROR)))
+
+
+@dataclass(frozen=True, slots=True)
+class FixedLine:
+    """A guide on the ground, by its name: its point and direction are parameters."""
+
+    guide: str
+
+    @property
+    def along(self) -> Fixed:
+        """Its direction."""
+        return Fixed(f"angle {self.guide}")
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """No nodes."""
+        return ()
+
+    def at(self, view: View, node: str, slot: int) -> tuple[ComplexArray, ComplexArray]:
+        """A point of the line and its unit vector, with the hand's error in drawing it."""
+        return drawn(view, node, slot, fixed_point(view, self.guide), self.along.at(view))
+
+
+AnyLine = Line | FixedLine
+
+
+def drawn(
+    view: View, node: str, slot: int, foot: ComplexArray, along: ComplexArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """A line as the hand draws it: its foot shifted sideways, its direction turned a little."""
+    tilted = along * geometry.direction(view.error(node, slot, "angle"))
+    return np.asarray(foot + 1j * along * view.error(node, slot, "shift")), np.asarray(tilted)

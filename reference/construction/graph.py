@@ -1,0 +1,309 @@
+"""A plan as a construction: a short list of steps, each making one node from earlier nodes.
+
+Mechanism sketch, velocity plan and acceleration plan are one construction in drawn millimetres,
+y up, each figure about its own origin (the mechanism about the assignment's origin, a plan about
+its pole). It is data, a directed acyclic graph, and one evaluator answers every question:
+
+- the exact plan: `evaluate(construction, parameters)`, every node an array over variants;
+- follow-through: the same with the student's nodes in `given` instead of the computed ones;
+- a mistake: the same with a changed step or parameter (`reference.construction.graph.mistakes`);
+- a diagnosis: the same step by step beside what was drawn (`reference.replay.replay`);
+- a tolerance: the same with `errors` on lines, lengths and arcs; its derivative is the propagated
+  drafting error (`reference.construction.graph.uncertainty`);
+- only what is needed: `wanted` names the nodes asked for, ancestors alone are evaluated.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from reference.construction.elements import Errors, Fixed, Line, Nodes, Parameters, View
+from reference.construction.steps import (
+    ArcAndLine,
+    Coincide,
+    Divide,
+    Given,
+    Local,
+    Similar,
+    Step,
+    Tangent,
+    TwoArcs,
+    TwoLines,
+)
+from reference.geometry import ComplexArray, FloatArray
+from reference.mechanism import (
+    Crank,
+    CrossSlider,
+    DrivenSlider,
+    Driver,
+    Dyad,
+    FixedGuide,
+    Group,
+    Guide,
+    Mechanism,
+    Plate,
+    PointOnLine,
+    Slider,
+    SlotPoint,
+    SlottedLink,
+    Yoke,
+)
+
+
+def pair(pin: str, node: str) -> str:
+    """The name of the real length between two joints among the parameters."""
+    return f"{pin}{node}"
+
+
+def parameters_of(
+    mechanism: Mechanism, k_length: FloatArray, k_velocity: FloatArray, k_acceleration: FloatArray
+) -> dict[str, FloatArray]:
+    """The construction's parameters: real lengths, crank data, guides and the three scales.
+
+    Arguments: scales in real units per millimetre on paper (m/mm, (m/s)/mm, (m/s^2)/mm).
+    """
+    known: dict[str, FloatArray] = {"kL": k_length, "kv": k_velocity, "ka": k_acceleration}
+    known.update(_driver_parameters(mechanism.driver))
+    for joint, place in mechanism.ground_m.items():
+        known[f"x {joint}"], known[f"y {joint}"] = np.asarray(place.real), np.asarray(place.imag)
+    for group in mechanism.groups:
+        known.update(_group_parameters(group))
+    return known
+
+
+def _driver_parameters(driver: Driver) -> dict[str, FloatArray]:
+    pin = driver.pin
+    match driver:
+        case Crank(length_m=arm):
+            return {
+                "angle crank": driver.angle_rad,
+                pair(driver.pivot, pin): arm,
+                f"v_{pin}": driver.omega * arm,
+                f"a_{pin}_n": driver.omega**2 * arm,
+                f"a_{pin}_t": driver.epsilon * arm,
+            }
+        case DrivenSlider():
+            guide = FixedGuide(driver.guide_m, driver.guide_rad)
+            return {
+                f"s {pin}": driver.displacement_m,
+                f"v_{pin}": driver.speed,
+                f"a_{pin}": driver.acceleration,
+                **_guide_parameters(pin, guide),
+            }
+
+
+def _guide_parameters(node: str, guide: Guide) -> dict[str, FloatArray]:
+    if not isinstance(guide, FixedGuide):
+        return {}
+    return {
+        f"x guide {node}": np.asarray(guide.through_m.real),
+        f"y guide {node}": np.asarray(guide.through_m.imag),
+        f"angle guide {node}": guide.angle_rad,
+    }
+
+
+def _group_parameters(group: Group) -> dict[str, FloatArray]:
+    match group:
+        case Dyad(node=node, pins=pins, lengths_m=lengths) | Plate(node=node, base=pins, lengths_m=lengths):
+            known = {pair(pin, node): length for pin, length in zip(pins, lengths, strict=True)}
+            if isinstance(group, Plate) and group.line_ratio is not None:
+                known[f"ratio {node}"] = group.line_ratio
+            return known
+        case PointOnLine(node=node, ratio=ratio):
+            return {f"ratio {node}": ratio}
+        case Slider(node=node, guide=guide):
+            return {pair(group.pin, node): group.length_m, **_guide_parameters(node, guide)}
+        case CrossSlider(node=node, guides=(first, second)):
+            return {**_guide_parameters(node, first), **_guide_parameters(node, second)}
+        case Yoke(node=node, guide=guide):
+            return {f"angle slot {node}": group.slot_rad, **_guide_parameters(node, guide)}
+        case SlottedLink(node=node):
+            return {f"offset {node}": group.offset_m}
+        case SlotPoint(node=node, local_m=local):
+            return {f"x {node}": np.asarray(local.real), f"y {node}": np.asarray(local.imag)}
+
+
+Part = Literal["", "n", "t", "c", "r"]
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """A named vector of a plan, from node `tail` to node `head`.
+
+    Attributes
+    ----------
+    scale : ``kv`` or ``ka``
+    link : the pair of joints (from, to) whose relative motion it is: of a turning link it is
+        perpendicular or parallel to the line between them, and gives its angular rate; of a slider
+        and the point under it (which lie in one place) it is along the guide
+    part : of an acceleration: ``n`` normal, ``t`` tangential, ``c`` Coriolis, ``r`` along a guide
+    turning : of a Coriolis component, the link that carries the guide
+    """
+
+    name: str
+    tail: str
+    head: str
+    scale: str
+    link: tuple[str, str] | None = None
+    part: Part = ""
+    turning: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AngularRate:
+    """omega_k or epsilon_k from the vector that turns a link: (link x vector) / |link|^2."""
+
+    name: str
+    vector: str
+    link: tuple[str, str]
+    length: str
+
+
+@dataclass(frozen=True, slots=True)
+class Construction:
+    """Steps in an order in which they can be drawn, with the figure each belongs to.
+
+    Attributes
+    ----------
+    figures : steps by ``mechanism``, ``velocity_plan``, ``acceleration_plan``
+    poles : the pole's node by plan
+    vectors : named vectors by name
+    rates : angular velocities and accelerations by name
+    images : for each image of a plate's third point, the step that finds it by similarity, whichever
+        way the construction itself finds it
+    centres : on the sketch, by Mehmke's similarity from the finished plans: instantaneous centres
+        (``I3``) and acceleration poles (``J3``) of links that turn about no fixed pivot
+    """
+
+    figures: Mapping[str, tuple[Step, ...]]
+    poles: Mapping[str, str]
+    vectors: Mapping[str, Vector]
+    rates: Mapping[str, AngularRate]
+    images: Mapping[str, Similar] = field(default_factory=dict)
+    centres: Mapping[str, Similar] = field(default_factory=dict)
+    steps: tuple[Step, ...] = field(init=False, repr=False, compare=False)
+    """All steps in order."""
+    _by_node: dict[str, tuple[str, Step]] = field(init=False, repr=False, compare=False)
+    _upstream: dict[str, frozenset[str]] = field(init=False, repr=False, compare=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        pairs = [(figure, step) for figure, steps in self.figures.items() for step in steps]
+        object.__setattr__(self, "steps", tuple(step for _, step in pairs))
+        object.__setattr__(self, "_by_node", {step.node: (figure, step) for figure, step in pairs})
+
+    def step(self, node: str) -> Step:
+        """The step that makes a node. Raises KeyError for a node that there is not."""
+        return self._by_node[node][1]
+
+    def figure_of(self, node: str) -> str:
+        """The figure that a node belongs to. Raises KeyError for a node that there is not."""
+        return self._by_node[node][0]
+
+    def vectors_of(self, figure: str) -> tuple[Vector, ...]:
+        """The vectors of one plan."""
+        return tuple(v for v in self.vectors.values() if self._by_node[v.head][0] == figure)
+
+    @property
+    def links(self) -> Mapping[str, tuple[str, str]]:
+        """The pairs of joints that are drawn as links of the sketch, by their names run together."""
+        pairs = [one.link for one in self.vectors.values() if one.link and one.part != "r"]
+        apart = {joint.node: joint.other for joint in self.steps if isinstance(joint, Coincide)}
+        return {
+            f"{tail}{head}": (tail, head)
+            for tail, head in pairs
+            if apart.get(tail, tail) != apart.get(head, head)
+        }
+
+    def upstream(self, node: str) -> frozenset[str]:
+        """A node and everything that it is made from."""
+        if node not in self._upstream:
+            further = [self.upstream(need) for need in self.step(node).needs]
+            self._upstream[node] = frozenset({node}).union(*further)
+        return self._upstream[node]
+
+    def with_step(self, changed: Step) -> "Construction":
+        """The same construction with the step of one node replaced."""
+        figures = {
+            figure: tuple(changed if step.node == changed.node else step for step in steps)
+            for figure, steps in self.figures.items()
+        }
+        return replace(self, figures=figures)
+
+
+def ancestors(construction: Construction, wanted: Iterable[str]) -> frozenset[str]:
+    """The nodes wanted and everything that they are made from."""
+    return frozenset().union(*(construction.upstream(node) for node in wanted))
+
+
+def evaluate(
+    construction: Construction,
+    parameters: Parameters,
+    *,
+    given: Nodes | None = None,
+    errors: Errors | None = None,
+    wanted: Iterable[str] | None = None,
+) -> dict[str, ComplexArray]:
+    """Draw the construction.
+
+    Arguments
+    ---------
+    parameters : floats or arrays that broadcast, see `Parameters`
+    given : nodes to take as they are instead of constructing them (millimetres, y up)
+    errors : the hand's errors; `NO_ERROR` where absent
+    wanted : nodes asked for; all by default
+
+    Returns the nodes, complex millimetres; nan where a step has no solution.
+    """
+    given = given or {}
+    needed = None if wanted is None else ancestors(construction, wanted)
+    nodes: dict[str, ComplexArray] = {}
+    view = View(nodes, parameters, errors or {})
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for step in construction.steps:
+            if needed is not None and step.node not in needed:
+                continue
+            if step.node in given:
+                nodes[step.node] = np.asarray(given[step.node])
+            else:
+                mark = view.error(step.node, 0, "x") + 1j * view.error(step.node, 0, "y")
+                nodes[step.node] = np.asarray(step.place(view) + mark)
+    return nodes
+
+
+def bars(construction: Construction) -> tuple[tuple[str, str], ...]:
+    """Every bar that the steps of the sketch lay between two joints, from the earlier to the later one."""
+    return tuple(
+        (start, step.node)
+        for step in construction.figures["mechanism"]
+        for start in _starts(step, construction)
+    )
+
+
+def _starts(step: Step, construction: Construction) -> Iterator[str]:
+    match step:
+        case Given(start=start):
+            yield start
+        case TwoArcs(centres=centres):
+            yield from centres
+        case ArcAndLine(centre=centre) | Tangent(centre=centre):
+            yield centre
+        case Divide(base=base):
+            yield base[0]
+        case Local(origin=origin):
+            yield origin
+        case Coincide(node=node, other=other):
+            # A slotted link's point turns about the link's pivot; a point under a slider has a bar already.
+            velocities = (v.link for v in construction.vectors.values() if v.link and v.scale == "kv")
+            yield from (pivot for pivot, head in velocities if head == node and pivot != other)
+        case TwoLines(first=first, second=second):
+            # The slot of a yoke; guides are no bars.
+            lines = (line for line in (first, second) if isinstance(line, Line))
+            yield from (line.through for line in lines if isinstance(line.along, Fixed))
+
+
+def coincident(construction: Construction) -> Mapping[str, str]:
+    """Joints that lie where another does at this instant, by name."""
+    steps = construction.figures["mechanism"]
+    return {step.node: step.other for step in steps if isinstance(step, Coincide)}

@@ -1,0 +1,300 @@
+"""Mistakes as operators on the construction: one step or parameter changed, the rest followed through.
+
+A mistake is data; `commit` makes of a drawing the drawing with that mistake in it. The reader of
+scans uses them as hypotheses, diagnosis as explanations, the simulated student commits them. The
+codes are those of the published contract.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from reference.construction.elements import Along, Coriolis, Direction, Fixed, Line, Normal, Parameters, View
+from reference.construction.graph import Construction, Vector
+from reference.construction.steps import ArcAndLine, Coincide, Given, Local, Similar, Step, TwoArcs, TwoLines
+
+Code = Literal[
+    "parallel_for_perpendicular",
+    "wrong_link",
+    "sense_reversed",
+    "rpm_not_converted",
+    "scale_wrong",
+    "normal_reversed",
+    "normal_missing",
+    "normal_from_absolute",
+    "other_variant",
+    "other_assembly",
+    "image_mirrored",
+    "wrong_intersection",
+    "vector_missing",
+    "labels_swapped",
+    "figure_rotated",
+    "arithmetic",
+]
+CODES: tuple[Code, ...] = get_args(Code)
+RPM_FACTOR = 30.0 / math.pi
+"""omega = n instead of omega = pi n / 30."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A construction with its parameters: all that is needed to draw it."""
+
+    construction: Construction
+    parameters: Parameters
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """One mistake.
+
+    Attributes
+    ----------
+    code : one of `CODES`
+    at : the node, vector, scale or figure that it is made at
+    slot : which of the step's two lines (0 or 1)
+    other : what is taken instead: the two joints of a link, a node, the two nodes swapped
+    factor : of a length, speed or scale
+    quarters : quarter turns of a figure, counter-clockwise
+    n, position : the other student's variant
+    parameters : that variant's parameters
+    """
+
+    code: str
+    at: str
+    slot: int = 0
+    other: tuple[str, ...] = ()
+    factor: float = 1.0
+    quarters: int = 0
+    n: int | None = None
+    position: int | None = None
+    parameters: Parameters = field(default_factory=dict, repr=False, compare=False)
+
+
+def commit(mistake: Mistake, drawing: Drawing) -> Drawing:
+    """The drawing with the mistake made in it; later steps follow from it.
+
+    Raises ValueError for a mistake that cannot be made at that step.
+    """
+    construction, parameters = drawing.construction, drawing.parameters
+    match mistake.code:
+        case "rpm_not_converted":
+            return Drawing(construction, _with_speed(parameters, mistake.factor))
+        case "scale_wrong" if mistake.at in {"kL", "kv", "ka"}:
+            scaled = np.asarray(parameters[mistake.at] * mistake.factor)
+            return Drawing(construction, {**parameters, mistake.at: scaled})
+        case "other_variant":
+            scales = {name: parameters[name] for name in ("kL", "kv", "ka", "turn") if name in parameters}
+            return Drawing(construction, {**mistake.parameters, **scales})
+        case "vector_missing":
+            kept = {name: one for name, one in construction.vectors.items() if name != mistake.at}
+            return Drawing(replace(construction, vectors=kept), parameters)
+        case "labels_swapped":
+            return Drawing(_with_labels_swapped(construction, mistake.other), parameters)
+        case "figure_rotated":
+            return Drawing(_with_figure_turned(construction, mistake.at, mistake.quarters), parameters)
+        case _:
+            changed = changed_step(mistake, construction)
+            return Drawing(construction.with_step(changed), parameters)
+
+
+def changed_step(mistake: Mistake, construction: Construction) -> Step:
+    """The step of a node as a mistake makes it.
+
+    Raises ValueError for a mistake that cannot be made at that step.
+    """
+    step = construction.step(mistake.at)
+    match mistake.code, step:
+        case (
+            "sense_reversed" | "normal_reversed" | "normal_missing" | "arithmetic" | "scale_wrong",
+            Given(),
+        ):
+            factor = {"normal_missing": 0.0, "arithmetic": mistake.factor, "scale_wrong": mistake.factor}
+            return replace(step, factor=step.factor * factor.get(mistake.code, -1.0))
+        case "normal_from_absolute", Given(length=Normal() as length):
+            return replace(step, length=replace(length, tail=construction.poles["velocity_plan"]))
+        case "parallel_for_perpendicular", TwoLines():
+            return _with_line(step, mistake.slot, lambda line: replace(line, along=_quarter(line.along, 1)))
+        case "wrong_link", TwoLines():
+            tail, head = mistake.other
+            return _with_line(step, mistake.slot, lambda line: _by_link(line, tail, head))
+        case "wrong_intersection", TwoLines():
+            (through,) = mistake.other
+            return _with_line(step, mistake.slot, lambda line: replace(line, through=through))
+        case "image_mirrored", _ if mistake.at in construction.images:
+            return replace(construction.images[mistake.at], mirrored=True)
+        case "other_assembly", TwoArcs() | ArcAndLine():
+            return replace(step, side=-step.side)
+    raise ValueError(f"{mistake.code} cannot be made at the step of {mistake.at}")
+
+
+def _with_line(step: TwoLines, slot: int, change: Callable[[Line], Line]) -> TwoLines:
+    """One of the two lines changed; raises ValueError for a fixed guide on the sketch."""
+    lines = [step.first, step.second]
+    line = lines[slot]
+    if not isinstance(line, Line):
+        raise ValueError(f"line {slot} of {step.node} is a guide on the ground: it is given")  # noqa: TRY004
+    lines[slot] = change(line)
+    return TwoLines(step.node, *lines)
+
+
+def _by_link(line: Line, tail: str, head: str) -> Line:
+    """The line by another link: across it, or along it where it ran along a guide."""
+    turned = isinstance(line.along, Along) and line.along.quarters % 2 == 0
+    return replace(line, along=Along(tail, head, 0 if turned else 1))
+
+
+def _quarter(along: Direction, quarters: int) -> Direction:
+    return replace(along, quarters=along.quarters + quarters)
+
+
+def _with_speed(parameters: Parameters, factor: float) -> Parameters:
+    """All that follows from another crank speed: v by the factor, a by its square."""
+    powers = {"v": 1, "a": 2}
+    speeds = {
+        name: np.asarray(value * factor ** powers[name[0]])
+        for name, value in parameters.items()
+        if name[:2] in {"v_", "a_"} and not name.endswith("_t")
+    }
+    return {**parameters, **speeds}
+
+
+def _with_labels_swapped(construction: Construction, nodes: tuple[str, ...]) -> Construction:
+    first, second = nodes
+    other = {first: second, second: first}
+
+    def relabelled(vector: Vector) -> Vector:
+        return replace(
+            vector, tail=other.get(vector.tail, vector.tail), head=other.get(vector.head, vector.head)
+        )
+
+    return replace(construction, vectors={name: relabelled(v) for name, v in construction.vectors.items()})
+
+
+def _with_figure_turned(construction: Construction, figure: str, quarters: int) -> Construction:
+    def turned(step: Step) -> Step:
+        match step:
+            case Given():
+                return replace(step, along=_quarter(step.along, quarters))
+            case TwoLines(first=Line() as first, second=Line() as second):
+                lines = (replace(line, along=_quarter(line.along, quarters)) for line in (first, second))
+                return TwoLines(step.node, *lines)
+        return step
+
+    figures = {
+        name: tuple(
+            turned(step) if name == figure else _seen_turned(step, figure, quarters) for step in steps
+        )
+        for name, steps in construction.figures.items()
+    }
+    return replace(construction, figures=figures)
+
+
+def _seen_turned(step: Step, figure: str, quarters: int) -> Step:
+    """A Coriolis component is computed from lengths and senses: a turned velocity plan gives the same."""
+    if figure == "velocity_plan" and isinstance(step, Given) and isinstance(step.length, Coriolis):
+        return replace(step, length=replace(step.length, quarters=step.length.quarters + quarters))
+    return step
+
+
+# What could have gone wrong -----------------------------------------------------------------------
+
+
+def single_mistakes(drawing: Drawing, figure: str) -> Iterator[Mistake]:
+    """Every mistake that could be made in one step of a figure, and in the figure as a whole.
+
+    Mistakes of scale are offered at the factors that are met: powers of ten, halves and doubles.
+    """
+    for step in drawing.construction.figures[figure]:
+        for mistake in mistakes_of_step(step, drawing.construction):
+            if mistake.code != "image_mirrored" or not _is_in_line(step, drawing):
+                yield mistake
+    if figure != "mechanism":
+        scale = "kv" if figure == "velocity_plan" else "ka"
+        yield from (Mistake("scale_wrong", scale, factor=f) for f in (0.1, 0.5, 2.0, 10.0))
+        yield from (Mistake("figure_rotated", figure, quarters=q) for q in (1, 2, 3))
+        if "angle crank" in drawing.parameters:
+            yield Mistake("rpm_not_converted", figure, factor=RPM_FACTOR)
+
+
+def mistakes_of_step(step: Step, construction: Construction) -> Iterator[Mistake]:
+    """Every mistake that could be made in one step."""
+    figure = construction.figure_of(step.node)
+    match step:
+        case Given():
+            yield from _mistakes_of_given(step, construction)
+        case TwoLines() if figure != "mechanism":
+            yield from _mistakes_of_lines(step, construction, figure)
+        case TwoArcs() | ArcAndLine():
+            yield Mistake("other_assembly", step.node)
+    if step.node in construction.images and figure != "mechanism":
+        yield Mistake("image_mirrored", step.node)
+
+
+def _is_in_line(step: Step, drawing: Drawing) -> bool:
+    """Whether a point of a slotted link lies on its guide's line: its image's mirror image is itself."""
+    if not isinstance(step, Similar):
+        return False
+    joint = drawing.construction.step(step.model[2])
+    return isinstance(joint, Local) and not np.any(joint.y.at(View({}, drawing.parameters)))
+
+
+def _mistakes_of_given(step: Given, construction: Construction) -> Iterator[Mistake]:
+    match step.length:
+        case Normal() | Coriolis():
+            yield Mistake("normal_missing", step.node)
+            yield Mistake("normal_reversed", step.node)
+            if isinstance(step.length, Normal) and step.length.tail != construction.poles["velocity_plan"]:
+                yield Mistake("normal_from_absolute", step.node)
+        case _ if not isinstance(step.along, Fixed) or step.start in construction.poles.values():
+            yield Mistake("sense_reversed", step.node)
+
+
+def _mistakes_of_lines(step: TwoLines, construction: Construction, figure: str) -> Iterator[Mistake]:
+    links = [
+        tuple(vector.link) for vector in construction.vectors.values() if vector.link and vector.scale == "kv"
+    ]
+    pole = construction.poles[figure]
+    joints = construction.figures["mechanism"]
+    under = {joint.node: joint.other for joint in joints if isinstance(joint, Coincide)}
+    for slot, line in enumerate((step.first, step.second)):
+        if not isinstance(line, Line) or not isinstance(line.along, Along):
+            continue
+        own = {under.get(joint, joint) for joint in line.along.needs}
+        yield Mistake("parallel_for_perpendicular", step.node, slot)
+        for link in dict.fromkeys(links):
+            places = {under.get(joint, joint) for joint in link}
+            if len(places) > 1 and places != own:
+                yield Mistake("wrong_link", step.node, slot, other=link)
+        yield from _wrong_feet(step, slot, line, construction, pole)
+
+
+def _wrong_feet(
+    step: TwoLines, slot: int, line: Line, construction: Construction, pole: str
+) -> Iterator[Mistake]:
+    """The line drawn through the start of a normal component, or the pole, instead of its end."""
+    other = step.second if slot == 0 else step.first
+    other_foot = other.through if isinstance(other, Line) else ""
+    feet = [pole]
+    foot = construction.step(line.through)
+    if isinstance(foot, Given):
+        feet.append(foot.start)
+    for name in dict.fromkeys(feet):
+        if name not in {line.through, other_foot}:
+            yield Mistake("wrong_intersection", step.node, slot, other=(name,))
+
+
+def affected(mistake: Mistake, construction: Construction) -> frozenset[str]:
+    """The nodes that a mistake moves: its own and those drawn from it."""
+    if mistake.at in {"kL", "kv", "ka"} or mistake.code in {"other_variant", "rpm_not_converted"}:
+        return frozenset(step.node for step in construction.steps)
+    if mistake.at in construction.figures:
+        return frozenset(step.node for step in construction.figures[mistake.at])
+    moved = {mistake.at}
+    for step in construction.steps:
+        if moved.intersection(step.needs):
+            moved.add(step.node)
+    return frozenset(moved)

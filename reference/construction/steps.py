@@ -1,0 +1,285 @@
+"""The steps of a construction: what makes one node from earlier nodes.
+
+Everything is in drawn millimetres, complex, y up, and an array over variants.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from reference import geometry
+from reference.construction.elements import AnyLine, Direction, FixedLine, Length, View, drawn, fixed_point
+from reference.geometry import ComplexArray
+from reference.kinematics import assur
+from reference.mechanism import Side
+
+
+class Step(Protocol):
+    """Makes one node of one figure."""
+
+    @property
+    def node(self) -> str:
+        """The node made."""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The nodes it is made from."""
+
+    def place(self, view: View) -> ComplexArray:
+        """Where the node lies, millimetres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pole:
+    """The pole of a plan, its origin."""
+
+    node: str
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """No nodes."""
+        return ()
+
+    def place(self, view: View) -> ComplexArray:
+        """Zero."""
+        del view
+        return np.asarray(0j)
+
+
+@dataclass(frozen=True, slots=True)
+class Pivot:
+    """A fixed point of the mechanism, by its real coordinates among the parameters (``x O2``, ``y O2``)."""
+
+    node: str
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """No nodes."""
+        return ()
+
+    def place(self, view: View) -> ComplexArray:
+        """Real place at the scale kL, turned with the sketch."""
+        return fixed_point(view, self.node)
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A known vector laid off from a node: a length along a direction (a negative one backwards).
+
+    `factor` multiplies the length: 1 for a right one, -1 for a wrong sense, 0 for one left out.
+    """
+
+    node: str
+    start: str
+    length: Length
+    along: Direction
+    factor: float = 1.0
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Its start, and what its length and direction are read from."""
+        return (self.start, *self.length.needs, *self.along.needs)
+
+    def place(self, view: View) -> ComplexArray:
+        """The vector's end."""
+        foot, along = drawn(view, self.node, 0, view.nodes[self.start], self.along.at(view))
+        length = self.factor * self.length.at(view) + view.error(self.node, 0, "length")
+        return np.asarray(foot + along * length)
+
+
+@dataclass(frozen=True, slots=True)
+class OnGuide:
+    """The driven slider: a length along a fixed guide from its point (a negative one backwards)."""
+
+    node: str
+    guide: FixedLine
+    length: Length
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """No nodes."""
+        return self.length.needs
+
+    def place(self, view: View) -> ComplexArray:
+        """The slider's place."""
+        foot, along = self.guide.at(view, self.node, 0)
+        return np.asarray(foot + along * (self.length.at(view) + view.error(self.node, 0, "length")))
+
+
+@dataclass(frozen=True, slots=True)
+class TwoLines:
+    """Where two lines meet."""
+
+    node: str
+    first: AnyLine
+    second: AnyLine
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The nodes both lines start from, and those their directions are read from."""
+        return (*self.first.needs, *self.second.needs)
+
+    def place(self, view: View) -> ComplexArray:
+        """The meeting point."""
+        p, u = self.first.at(view, self.node, 0)
+        q, v = self.second.at(view, self.node, 1)
+        return geometry.meet(p, u, q, v)
+
+
+@dataclass(frozen=True, slots=True)
+class TwoArcs:
+    """Where two compass arcs meet, on one side of the line between their centres."""
+
+    node: str
+    centres: tuple[str, str]
+    radii: tuple[Length, Length]
+    side: Side
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The centres."""
+        return (*self.centres, *self.radii[0].needs, *self.radii[1].needs)
+
+    def place(self, view: View) -> ComplexArray:
+        """The meeting point."""
+        p, q = (view.nodes[centre] for centre in self.centres)
+        r, s = (
+            radius.at(view) + view.error(self.node, slot, "length") for slot, radius in enumerate(self.radii)
+        )
+        return geometry.two_arcs(p, r, q, s, self.side)
+
+
+@dataclass(frozen=True, slots=True)
+class ArcAndLine:
+    """Where a compass arc meets a guide, ahead of (side +1) or behind its centre along the guide."""
+
+    node: str
+    centre: str
+    radius: Length
+    guide: AnyLine
+    side: Side
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The arc's centre, and what the guide is drawn from."""
+        return (self.centre, *self.radius.needs, *self.guide.needs)
+
+    def place(self, view: View) -> ComplexArray:
+        """The meeting point."""
+        foot, along = self.guide.at(view, self.node, 1)
+        radius = self.radius.at(view) + view.error(self.node, 0, "length")
+        return geometry.arc_and_line(view.nodes[self.centre], radius, foot, along, self.side)
+
+
+@dataclass(frozen=True, slots=True)
+class Coincide:
+    """A point that lies where another does at this instant: on the link under a slider."""
+
+    node: str
+    other: str
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The other point."""
+        return (self.other,)
+
+    def place(self, view: View) -> ComplexArray:
+        """The same place."""
+        return view.nodes[self.other]
+
+
+@dataclass(frozen=True, slots=True)
+class Tangent:
+    """Where a line from a point touches a circle.
+
+    From the centre the touching point lies a quarter turn to the left (for a positive radius) of the
+    line's direction; `side` is +1 where that runs from the touching point to `start`, -1 the other way.
+    """
+
+    node: str
+    centre: str
+    radius: Length
+    start: str
+    side: Side
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Centre and start."""
+        return (self.centre, self.start, *self.radius.needs)
+
+    def place(self, view: View) -> ComplexArray:
+        """The touching point."""
+        centre = view.nodes[self.centre]
+        radius = self.radius.at(view) + view.error(self.node, 0, "length")
+        _, along, _ = assur.rpr_place(view.nodes[self.start] - centre, radius, self.side)
+        return np.asarray(centre + 1j * along * radius)
+
+
+@dataclass(frozen=True, slots=True)
+class Local:
+    """A point by its coordinates in a link's own axes, x along a direction, y to its left."""
+
+    node: str
+    origin: str
+    axis: Direction
+    x: Length
+    y: Length
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The origin, and what the axis is read from."""
+        return (self.origin, *self.axis.needs, *self.x.needs, *self.y.needs)
+
+    def place(self, view: View) -> ComplexArray:
+        """Origin + (x + i y) along the axis."""
+        foot, along = drawn(view, self.node, 0, view.nodes[self.origin], self.axis.at(view))
+        x = self.x.at(view) + view.error(self.node, 0, "length")
+        return np.asarray(foot + along * (x + 1j * self.y.at(view)))
+
+
+@dataclass(frozen=True, slots=True)
+class Divide:
+    """A point on the line through two nodes, dividing it in a ratio among the parameters."""
+
+    node: str
+    base: tuple[str, str]
+    ratio: str
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The base."""
+        return self.base
+
+    def place(self, view: View) -> ComplexArray:
+        """base[0] + ratio (base[1] - base[0])."""
+        p, q = (view.nodes[end] for end in self.base)
+        along = geometry.unit(q - p)
+        slip = np.where(np.isfinite(along), along, 0.0) * view.error(self.node, 0, "length")
+        return np.asarray(p + (q - p) * view.parameters[self.ratio] + slip)
+
+
+@dataclass(frozen=True, slots=True)
+class Similar:
+    """The image of a link's third point: the triangle of the plan similar to that of the mechanism.
+
+    `mirrored` for the mistake of a triangle similar but traversed the other way round.
+    """
+
+    node: str
+    base: tuple[str, str]
+    model: tuple[str, str, str]
+    mirrored: bool = False
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The base in the plan and the model in the mechanism."""
+        return (*self.base, *self.model)
+
+    def place(self, view: View) -> ComplexArray:
+        """The third corner."""
+        p, q = (view.nodes[end] for end in self.base)
+        corners = [view.nodes[corner] for corner in self.model]
+        if self.mirrored:
+            corners = [np.conj(corner) for corner in corners]
+        return geometry.similar(p, q, *corners)

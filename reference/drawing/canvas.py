@@ -1,0 +1,327 @@
+"""Shapes and texts on paper in millimetres (x right, y down), and their SVG, true to size.
+
+Text widths are those of DejaVu Sans Condensed, the font that the PDF embeds and the SVG asks for first.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from html import escape
+
+GREEK = {"omega": "ω", "epsilon": "ε"}
+INDEX_SIZE = 0.7
+"""Size of an index to that of its line."""
+RISES = {-1: -0.26, 0: 0.0, 1: 0.44}
+"""How far a piece is raised, in sizes of its line."""
+ASCENT, DESCENT = 0.76, 0.24
+KEPT = 4096
+_DESCENDING = frozenset("gjpqyQ,;()[]_/ȘșȚțДЦЩдцщруфμβφ")
+
+_WIDTHS_PER_MILLE = {
+    200: "′", 240: "'ijlî", 260: "IJÎ", 280: " ,.·\N{NO-BREAK SPACE}", 300: "/:;\\|", 320: "-f", 340: "″",
+    360: "!()[]rt²³ț", 420: '"', 440: "*_`°∥–", 460: "sș", 480: "?zεгз", 500: "Lcсэ", 520: "Fkт",
+    540: "PTYvxyπȚГРТУвкухчья", 560: "EaeoăâЕабеоёЁ", 580: "$0123456789KSbdghnpqu{}√μβȘЗийлнпр",
+    600: "φα", 620: "ABCRVXZĂÂАБВСХЧЬЭЯдц", 640: "Къ", 660: "U", 680: "HNИЙЛНПм", 700: "&DGOQДОЦ",
+    720: "ы", 740: "wЪ", 760: "#+<=>^~−×ωфю≈", 780: "M⊥МФ", 800: "Ы", 820: "жш", 840: "щ", 860: "%",
+    880: "Wm", 900: "@…", 960: "ЖШ", 980: "ЩЮ",
+}  # fmt: skip
+_WIDTH = {letter: width / 1000.0 for width, letters in _WIDTHS_PER_MILLE.items() for letter in letters}
+_WIDTH_OF_OTHERS = 0.7
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of text on one height: 0 on the line, -1 an index below, +1 above."""
+
+    text: str
+    height: int = 0
+
+    def size(self, size: float) -> float:
+        """Its own letter size."""
+        return size if self.height == 0 else INDEX_SIZE * size
+
+    def rise(self, size: float) -> float:
+        """How far it is raised."""
+        return RISES[self.height] * size
+
+
+Text = str | tuple[Piece, ...]
+
+
+def pieces_of(name: str) -> tuple[Piece, ...]:
+    """A name as it is set: ``a_BA_n`` as a with BA below and n above, ``O1A`` with its 1 below."""
+    stem, *indices = name.split("_")
+    if indices and stem:
+        indexed = (Piece(index, height) for index, height in zip(indices, (-1, 1), strict=False))
+        return (Piece(GREEK.get(stem, stem)), *indexed)
+    parts = re.split(r"(?<=[^\W\d_])(\d+)", name)
+    return tuple(Piece(part, -1 if index % 2 else 0) for index, part in enumerate(parts) if part)
+
+
+def scale_pieces(name: str) -> tuple[Piece, ...]:
+    """A scale's name: the letter k (or μ) with L, v or a below it."""
+    return (Piece(name[:1]), Piece(name[1:], -1)) if len(name) > 1 else (Piece(name),)
+
+
+def as_pieces(text: Text) -> tuple[Piece, ...]:
+    """A text as pieces: a plain one is a single piece on the line."""
+    return (Piece(text),) if isinstance(text, str) else text
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A piece in its place: from the text's start to the right, above the line."""
+
+    text: str
+    right: float
+    above: float
+    size: float
+
+
+def set_pieces(text: Text, size: float) -> Iterator[Placed]:
+    """The pieces in their places; an index above stands over the index below that it follows."""
+    right, below_from, below_to = 0.0, 0.0, 0.0
+    for piece in as_pieces(text):
+        own = piece.size(size)
+        wide = sum(_WIDTH.get(letter, _WIDTH_OF_OTHERS) for letter in piece.text) * own
+        start = below_from if piece.height > 0 and below_to == right else right
+        yield Placed(piece.text, start, piece.rise(size), own)
+        if piece.height < 0:
+            below_from, below_to = start, start + wide
+        right = max(right, start + wide)
+
+
+@lru_cache(maxsize=KEPT)
+def width_of(text: Text, size: float) -> float:
+    """How wide a text is set."""
+    return max((piece.right + _width(piece) for piece in set_pieces(text, size)), default=0.0)
+
+
+def _width(piece: Placed) -> float:
+    return sum(_WIDTH.get(letter, _WIDTH_OF_OTHERS) for letter in piece.text) * piece.size
+
+
+@lru_cache(maxsize=KEPT)
+def rise_and_fall(text: Text, size: float) -> tuple[float, float]:
+    """How far a text reaches above and below its line."""
+    rise, fall = 0.0, 0.0
+    for piece in set_pieces(text, size):
+        rise = max(rise, piece.above + ASCENT * piece.size)
+        if _DESCENDING.intersection(piece.text):
+            fall = max(fall, DESCENT * piece.size - piece.above)
+        fall = max(fall, -piece.above)
+    return rise, fall
+
+
+def wrapped(text: str, size: float, wide: float) -> Sequence[str]:
+    """Lines that are no wider than `wide`, broken at spaces."""
+    lines: list[str] = []
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and width_of(longer, size) <= wide:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return lines
+
+
+A3_MM = (420.0, 297.0)
+
+INK = "#1b1f24"
+CONSTRUCTION = "#7d8791"
+PAPER = "#ffffff"
+SLANT = 0.21
+"""How far slanted letters lean to the right, of their height (12 degrees)."""
+FONTS = "'DejaVu Sans Condensed', 'DejaVu Sans', Arial, sans-serif"
+Point = tuple[float, float]
+Bounds = tuple[float, float, float, float]
+"""Left, top, right, bottom."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """A straight line."""
+
+    start: Point
+    end: Point
+    width: float = 0.35
+    colour: str = INK
+    dash: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """A circle, filled with paper white or with a colour."""
+
+    centre: Point
+    radius: float
+    width: float = 0.35
+    colour: str = INK
+    fill: str = PAPER
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """A filled polygon."""
+
+    points: tuple[Point, ...]
+    fill: str
+    width: float = 0.0
+    colour: str = INK
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A line through many points, as an arc is drawn."""
+
+    points: tuple[Point, ...]
+    width: float = 0.35
+    colour: str = INK
+    dash: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """A text whose line starts, ends or has its middle `at` a point; `size` is the height of its line."""
+
+    at: Point
+    text: Text
+    size: float = 4.0
+    anchor: str = "start"
+    colour: str = INK
+    italic: bool = False
+
+    @property
+    def left(self) -> float:
+        """Where its line starts."""
+        share = {"start": 0.0, "middle": 0.5, "end": 1.0}[self.anchor]
+        return self.at[0] - share * width_of(self.text, self.size)
+
+    @property
+    def bounds(self) -> Bounds:
+        """The box that its letters fill."""
+        rise, fall = rise_and_fall(self.text, self.size)
+        right = self.left + width_of(self.text, self.size) + (SLANT * rise if self.italic else 0.0)
+        return (self.left, self.at[1] - rise, right, self.at[1] + fall)
+
+
+Shape = Stroke | Ring | Area | Curve | Label
+
+
+def moved(shape: Shape, by: Point) -> Shape:
+    """The shape elsewhere on the sheet."""
+
+    def shifted(point: Point) -> Point:
+        return (point[0] + by[0], point[1] + by[1])
+
+    match shape:
+        case Stroke():
+            return replace(shape, start=shifted(shape.start), end=shifted(shape.end))
+        case Ring():
+            return replace(shape, centre=shifted(shape.centre))
+        case Area() | Curve():
+            return replace(shape, points=tuple(shifted(point) for point in shape.points))
+        case _:
+            return replace(shape, at=shifted(shape.at))
+
+
+def bounds(shapes: Iterable[Shape]) -> Bounds:
+    """The box that shapes fill; raises ValueError for none."""
+    boxes = [_bounds_of(shape) for shape in shapes]
+    lows, highs = [box[:2] for box in boxes], [box[2:] for box in boxes]
+    left, top = (min(low[axis] for low in lows) for axis in (0, 1))
+    right, bottom = (max(high[axis] for high in highs) for axis in (0, 1))
+    return (left, top, right, bottom)
+
+
+def _bounds_of(shape: Shape) -> Bounds:
+    match shape:
+        case Label():
+            return shape.bounds
+        case Ring(centre=(x, y), radius=reach):
+            return (x - reach, y - reach, x + reach, y + reach)
+        case Stroke():
+            points: Sequence[Point] = (shape.start, shape.end)
+        case _:
+            points = shape.points
+    xs, ys = zip(*points, strict=True)
+    return (min(xs), min(ys), max(xs), max(ys))
+
+
+def svg(sheets: Sequence[Sequence[Shape]], page_mm: tuple[float, float] = A3_MM) -> str:
+    """The sheets, one under another, as one SVG; one user unit is one millimetre."""
+    width, height = page_mm
+    total = height * len(sheets)
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', _svg_tag((0.0, 0.0, width, total))]
+    lines.append(f'<rect width="{width:g}" height="{total:g}" fill="{PAPER}"/>')
+    for row, shapes in enumerate(sheets):
+        lines.append(f'<g transform="translate(0 {row * height:g})">')
+        lines.extend(elements(shapes))
+        lines.append("</g>")
+    return "\n".join([*lines, "</svg>"]) + "\n"
+
+
+def picture_svg(shapes: Sequence[Shape], box: Bounds) -> str:
+    """Shapes as an SVG element of a page, true to size, cut at a box."""
+    return "\n".join([_svg_tag(box), *elements(shapes), "</svg>"])
+
+
+def _svg_tag(box: Bounds) -> str:
+    left, top, width, height = box[0], box[1], box[2] - box[0], box[3] - box[1]
+    size = f'width="{width:g}mm" height="{height:g}mm" viewBox="{left:g} {top:g} {width:g} {height:g}"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="{FONTS}">'
+
+
+def elements(shapes: Iterable[Shape]) -> Iterator[str]:
+    """Each shape as an element of an SVG."""
+    return (_element(shape) for shape in shapes)
+
+
+def _element(shape: Shape) -> str:
+    match shape:
+        case Stroke(start=(x1, y1), end=(x2, y2), width=width, colour=colour, dash=dash):
+            return (
+                f'<line x1="{x1:.3f}" y1="{y1:.3f}" x2="{x2:.3f}" y2="{y2:.3f}" stroke="{colour}"'
+                f' stroke-width="{width:g}" stroke-linecap="round"{_dashes(dash)}/>'
+            )
+        case Ring(centre=(x, y), radius=radius, width=width, colour=colour, fill=fill):
+            return (
+                f'<circle cx="{x:.3f}" cy="{y:.3f}" r="{radius:g}" fill="{fill}" stroke="{colour}"'
+                f' stroke-width="{width:g}"/>'
+            )
+        case Area(points=points, fill=fill, width=width, colour=colour):
+            edge = f' stroke="{colour}" stroke-width="{width:g}"' if width else ""
+            return f'<polygon points="{_corners(points)}" fill="{fill}"{edge}/>'
+        case Curve(points=points, width=width, colour=colour, dash=dash):
+            return (
+                f'<polyline points="{_corners(points)}" fill="none" stroke="{colour}"'
+                f' stroke-width="{width:g}" stroke-linecap="round"{_dashes(dash)}/>'
+            )
+        case _:
+            return _text(shape)
+
+
+def _dashes(dash: tuple[float, ...]) -> str:
+    return f' stroke-dasharray="{" ".join(f"{d:g}" for d in dash)}"' if dash else ""
+
+
+def _corners(points: Sequence[Point]) -> str:
+    return " ".join(f"{x:.3f},{y:.3f}" for x, y in points)
+
+
+def _text(label: Label) -> str:
+    """A text, its indices as spans; each piece at its own place, so that every viewer stacks them alike."""
+    style = ' font-style="italic"' if label.italic else ""
+    placed = list(set_pieces(label.text, label.size))
+    x, y = label.left, label.at[1]
+    look = f'font-size="{label.size:g}" fill="{label.colour}"{style}'
+    if len(placed) == 1:
+        anchor = f'x="{label.at[0]:.3f}" y="{y:.3f}" text-anchor="{label.anchor}"'
+        return f"<text {anchor} {look}>{escape(placed[0].text, quote=False)}</text>"
+    spans = (
+        f'<tspan x="{x + piece.right:.3f}" y="{y - piece.above:.3f}" font-size="{piece.size:g}">'
+        f"{escape(piece.text, quote=False)}</tspan>"
+        for piece in placed
+    )
+    return f'<text x="{x:.3f}" y="{y:.3f}" {look}>{"".join(spans)}</text>'

@@ -1,0 +1,1 @@
+"""Positions, velocities and accelerations of a mechanism, solved to the last digits."""

@@ -1,0 +1,242 @@
+"""The motion over a cycle of the driven link, or over the range in which it can move.
+
+The driven link takes the variant's own speed and acceleration in every position; sides are followed
+through flat positions by `reference.kinematics.continuation`.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from reference.errors import CallError
+from reference.geometry import FloatArray
+from reference.kinematics.continuation import TURN, BoolArray, Event, Following, change, follow
+from reference.kinematics.motion import Motion, move, move_where_possible
+from reference.kinematics.solving import one_variant, solve
+from reference.mechanism import (
+    Crank,
+    CrossSlider,
+    Dyad,
+    FixedGuide,
+    Group,
+    Mechanism,
+    Plate,
+    Slider,
+    SlottedLink,
+    Yoke,
+)
+
+FEWEST, MOST = 3, 100_001
+LOOKED_AT = 1441
+"""Positions of a turn in which other ranges are looked for."""
+AT_IT = 1e-9
+"""A sample this near to a singular position, against the range, is in it."""
+HALF = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """A mechanism's motion over the cycle of its driven link, arrays of shape (N,).
+
+    Attributes
+    ----------
+    following : how far the mechanism can go and where it passes flat positions; makes the mechanism at
+        any other driven coordinate
+    driven : crank angle, rad, or displacement of the driven slider, m; ascending
+    mechanism : at every sample, each group with the side it is on
+    motion : SI; nan in singular samples
+    start : the variant's own driven coordinate
+    turns : of the crank until all is as before: 1, seldom 2; 0 where it cannot turn fully
+    elsewhere : other ranges in which the mechanism assembles with its authored sides
+    untold : why nothing is told, by the sample
+    """
+
+    following: Following
+    driven: FloatArray
+    mechanism: Mechanism
+    motion: Motion
+    start: float
+    turns: int
+    elsewhere: tuple[tuple[float, float], ...]
+    untold: dict[int, str]
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether a crank drives, so that driven coordinates are angles."""
+        return isinstance(self.mechanism.driver, Crank)
+
+    @property
+    def passed(self) -> tuple[Event, ...]:
+        """The flat positions on the cycle; of a full one, not again at its end."""
+        low, high = float(self.driven[0]), float(self.driven[-1])
+        slack = AT_IT * (high - low)
+        last = high - slack if self.turns else high + slack
+        return tuple(event for event in self.following.events if low - slack <= event.at < last)
+
+
+def cycle(mechanism: Mechanism, samples: int = 361) -> Cycle:
+    """The motion of one variant over 0..360 degrees of its crank, or over the range it can reach.
+
+    A crank that returns to another assembly after a turn is followed over two turns; a driven slider
+    over the range in which the mechanism assembles. A group stays on its authored side but for flat
+    positions, which are passed smoothly (by velocity). Nothing is told at singular samples.
+
+    Raises CallError for too few or too many samples, MechanismError where the variant itself has no
+    motion.
+    """
+    if not FEWEST <= samples <= MOST:
+        raise CallError("samples", f"{samples} samples: a whole number from {FEWEST} to {MOST} is needed")
+    move(mechanism, accelerations=False)
+    following, turns = _followed(mechanism)
+    low, high = (0.0, turns * TURN) if turns else (following.low, following.high)
+    driven = np.linspace(low, high, samples)
+    untold = _singular(following, driven)
+    at_samples = following.at(driven)
+    motion = _motion(following, at_samples, driven, untold)
+    elsewhere = () if turns else _elsewhere(following)
+    return Cycle(following, driven, at_samples, motion, following.start, turns, elsewhere, untold)
+
+
+def _followed(mechanism: Mechanism) -> tuple[Following, int]:
+    """The mechanism followed over its whole cycle, and in how many turns that closes."""
+    driver = mechanism.driver
+    if not isinstance(driver, Crank):
+        start, reach = float(driver.displacement_m[0]), _reach(mechanism)
+        return follow(mechanism, start, start - reach, start + reach), 0
+    start = float(driver.angle_rad[0]) % TURN
+    following = follow(mechanism, start, start - TURN, start + 2.0 * TURN)
+    if following.stops == (None, None):
+        reversed_once = any(
+            sum(start < at < start + TURN for at in found) % 2 for found in following.changes.values()
+        )
+        return following, 2 if reversed_once else 1
+    middle = HALF * (following.low + following.high)
+    shift = -TURN * np.floor((middle + HALF * HALF * TURN) / TURN)
+    return _shifted(following, float(shift)), 0
+
+
+def _shifted(following: Following, by: float) -> Following:
+    """The same in angles that are so many turns further, its range about the first turn."""
+    if by == 0.0:
+        return following
+    low, high = (stop and replace(stop, at=stop.at + by) for stop in following.stops)
+    return replace(
+        following,
+        start=following.start + by,
+        low=following.low + by,
+        high=following.high + by,
+        stops=(low, high),
+        changes={node: tuple(at + by for at in found) for node, found in following.changes.items()},
+    )
+
+
+def _reach(mechanism: Mechanism) -> float:
+    """How far a driven slider may go at most: all lengths in line, and all distances on the ground."""
+    take = one_variant(0)
+    places = [complex(take(place)) for place in mechanism.ground_m.values()]
+    places += [complex(take(guide.through_m)) for guide in _fixed_guides(mechanism)]
+    driver = mechanism.driver
+    total = 0.0
+    if not isinstance(driver, Crank):
+        total += abs(float(take(driver.displacement_m)))
+        total += sum(abs(place - complex(take(driver.guide_m))) for place in places)
+    return 2.0 * (total + sum(_lengths(group) for group in mechanism.groups)) or 1.0
+
+
+def _fixed_guides(mechanism: Mechanism) -> list[FixedGuide]:
+    found = []
+    for group in mechanism.groups:
+        match group:
+            case Slider(guide=guide) | Yoke(guide=guide):
+                found.append(guide)
+            case CrossSlider(guides=guides):
+                found.extend(guides)
+            case _:
+                pass
+    return [guide for guide in found if isinstance(guide, FixedGuide)]
+
+
+def _lengths(group: Group) -> float:
+    match group:
+        case Dyad(lengths_m=lengths) | Plate(lengths_m=lengths):
+            return float(np.sum(lengths))
+        case Slider(length_m=length) | SlottedLink(offset_m=length):
+            return float(np.abs(length[0]))
+    return 0.0
+
+
+def _singular(following: Following, driven: FloatArray) -> dict[int, str]:
+    """Samples in a flat position or at a stop, and why nothing is told there."""
+    within = AT_IT * float(driven[-1] - driven[0])
+    stops = tuple(stop for stop in following.stops if stop is not None)
+    untold: dict[int, str] = {}
+    for event in (*following.events, *stops):
+        for index in np.flatnonzero(np.abs(driven - event.at) <= within):
+            untold.setdefault(int(index), f"{event.node}: {event.why}")
+    return untold
+
+
+def _motion(
+    following: Following, at_samples: Mechanism, driven: FloatArray, untold: dict[int, str]
+) -> Motion:
+    """At all samples; of the singular ones the positions alone."""
+    singular = np.zeros(driven.size, dtype=np.bool_)
+    singular[list(untold)] = True
+    motion = move_where_possible(following.at(np.where(singular, following.start, driven)))
+    with np.errstate(all="ignore"):
+        for name, joint in solve(at_samples, accelerations=False).joints.items():
+            place = np.broadcast_to(joint.position, driven.shape)
+            motion.position[name][singular] = place[singular]
+    for index in np.flatnonzero(~np.isfinite(motion.predicted_error)):
+        untold.setdefault(int(index), "too near to a singular position to be determined")
+    _tell_nothing(motion, singular)
+    return motion
+
+
+def _tell_nothing(motion: Motion, singular: BoolArray) -> None:
+    motion.predicted_error[singular] = np.inf
+    for told in (field.name for field in fields(motion)):
+        if told in {"velocity", "acceleration", "omega", "epsilon"}:
+            for values in getattr(motion, told).values():
+                values[singular] = np.nan
+
+
+def _elsewhere(following: Following) -> tuple[tuple[float, float], ...]:
+    """Other ranges in which the mechanism assembles as authored, to full accuracy."""
+    authored = replace(following, changes={})
+    is_crank = isinstance(following.mechanism.driver, Crank)
+    if is_crank:
+        outside = [(following.high, following.low + TURN)]
+    else:
+        reach = _reach(following.mechanism)
+        outside = [
+            (following.start - reach, following.low),
+            (following.high, following.start + reach),
+        ]
+
+    def assembles(driven: FloatArray) -> BoolArray:
+        with np.errstate(all="ignore"):
+            joints = solve(authored.at(driven), accelerations=False).joints.values()
+        closed = [np.broadcast_to(np.isfinite(joint.position), driven.shape) for joint in joints]
+        return np.asarray(np.all(closed, axis=0))
+
+    found: list[tuple[float, float]] = []
+    for low, high in outside:
+        if high - low > AT_IT * TURN:
+            grid = np.linspace(low, high, LOOKED_AT)[1:-1]
+            found += _runs(grid, assembles)
+    return tuple(found)
+
+
+def _runs(grid: FloatArray, assembles: Callable[[FloatArray], BoolArray]) -> Iterator[tuple[float, float]]:
+    """Where on a grid it assembles, the ends of each run as exact as numbers are."""
+    held = assembles(grid)
+    edges = np.flatnonzero(np.diff(held.astype(np.int8), prepend=0, append=0))
+    for first, after in edges.reshape(-1, 2):
+        low, high = grid[first], grid[after - 1]
+        if first > 0:
+            low = change(assembles, low, grid[first - 1])[0]
+        if after < grid.size:
+            high = change(assembles, high, grid[after])[0]
+        yield float(low), float(high)

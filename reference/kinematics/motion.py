@@ -1,0 +1,415 @@
+"""Exact motion in closed form, one Assur group after another.
+
+Positions by Heron's formula and the half chord; velocities and accelerations by eliminating one
+unknown of the rigid-body equations of the group (`reference.kinematics.assur`). This road knows
+nothing of drawings: the construction of `reference.construction.graph` is held against it.
+
+Many variants are solved on arrays, a few on Python's numbers (faster there). A predicted error goes
+with every result. Variants near a singular position are solved again with more digits, their data
+(doubles) taken as exact: first in the processor's extended floating point, on arrays, where it has
+one; where that is not enough, in eighty digits one by one. Where a mechanism has no motion, the
+error says which group fails to close, by how much, and what to do.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.errors import MechanismError
+from reference.geometry import ComplexArray, FloatArray
+from reference.kinematics.solving import (
+    Solution,
+    a_stretch,
+    as_it_is,
+    each_number_once,
+    one_variant,
+    rail_of,
+    solve,
+    some_variants,
+)
+from reference.mechanism import (
+    Crank,
+    CrossSlider,
+    Driver,
+    Dyad,
+    Group,
+    Mechanism,
+    Plate,
+    Slider,
+    SlottedLink,
+    Yoke,
+    moved,
+)
+from reference.numbers import cross, larger
+
+EPSILON = float(np.finfo(np.float64).eps)
+EXTENDED = float(np.finfo(np.longdouble).eps)
+"""As `EPSILON` where the processor or compiler has no wider floats."""
+LOSSY = 1e-9
+"""A predicted relative error from which a variant is solved again: 4e-7 mm in a plan of 400 mm, which nobody
+can draw. Ordinary mechanisms stay far below, and solving again takes ten times as long."""
+EXTENDED_ENOUGH = LOSSY * EPSILON / EXTENDED
+"""A predicted relative error up to which extended floats bring it below `LOSSY`; beyond, eighty digits."""
+LEAST_SINE = 8e-16
+"""Of a transmission angle; below it (as between guides at 0 and 180 degrees) nothing is told: the data's
+last digit decides how the mechanism moves."""
+DIGITS = 80
+
+Put = Callable[[Solution, NDArray[np.intp]], None]
+"""Takes a solution of some variants over into the motion."""
+
+
+def refine(
+    mechanism: Mechanism, predicted: FloatArray, sine: FloatArray, put: Put, *, accelerations: bool
+) -> NDArray[np.bool_]:
+    """Solve again what has lost digits, and say which variants those were.
+
+    `predicted` (N,) is brought up to date in place: infinite where there is no solution. `sine` (N,) is
+    the least of each variant's transmission angles.
+    """
+    predicted[~(sine >= LEAST_SINE)] = np.inf
+    again = (predicted > LOSSY) & np.isfinite(predicted)
+    wide = again & (predicted <= EXTENDED_ENOUGH)
+    rows = np.flatnonzero(wide)
+    if rows.size:
+        put(solve(mechanism, some_variants(rows), accelerations=accelerations, anew=True), rows)
+        predicted[rows] = np.maximum(predicted[rows] * (EXTENDED / EPSILON), EPSILON)
+    for index in np.flatnonzero(again & ~wide):
+        row = np.array([index])
+        solution = _in_digits(mechanism, int(index), accelerations)
+        predicted[index] = EPSILON if solution is not None else np.inf
+        if solution is not None:
+            put(solution, row)
+    return again
+
+
+def _in_digits(mechanism: Mechanism, index: int, accelerations: bool) -> Solution | None:
+    """One variant in eighty digits; None where it divides by zero even so, or does not close."""
+    from mpmath import mp  # noqa: PLC0415 - seldom needed, and slow to import
+
+    with mp.workdps(DIGITS):
+        try:
+            solution = solve(
+                mechanism, one_variant(index, mp.mpmathify), accelerations=accelerations, anew=True
+            )
+        except ZeroDivisionError:
+            return None
+    rates: list[Any] = [
+        number for joint in solution.joints.values() for number in (joint.velocity, joint.acceleration)
+    ]
+    return solution if all(mp.isfinite(rate) for rate in rates) else None
+
+
+ROUNDING = 1e-14
+"""Relative to the mechanism's reach."""
+WHAT_IS_IN_LINE = {
+    Dyad: "its links are in line",
+    Slider: "its rod is perpendicular to the guide",
+    SlottedLink: "the pin is at the link's pivot, or as near to it as the offset lets it",
+    CrossSlider: "its guides are parallel",
+    Yoke: "slot and guide are parallel",
+}
+
+
+def reason(mechanism: Mechanism, broken: NDArray[np.bool_]) -> MechanismError:
+    """The error for the first of the broken variants, which says how many there are."""
+    first = int(np.argmax(broken))
+    where = f" ({int(broken.sum())} of {broken.size} variant(s), the first at index {first})"
+    return reason_at(mechanism, first, "" if broken.size == 1 else where)
+
+
+def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismError:
+    """The error for the variant at an index, from the first group that fails there."""
+    take = one_variant(index, _quiet)
+    groups = mechanism.groups
+    driven = "crank angle" if isinstance(mechanism.driver, Crank) else "displacement of the driven slider"
+    with np.errstate(all="ignore"):
+        for count, group in enumerate(groups):
+            before = solve(replace(mechanism, groups=groups[:count]), take)
+            try:
+                after = solve(replace(mechanism, groups=groups[: count + 1]), take)
+            except ZeroDivisionError:
+                break
+            node = after.joints[group.node]
+            if not np.isfinite(node.position) or np.isnan(after.transmission.get(group.node, 1.0)):
+                gap, reach = _gap(group, before), max(abs(one.position) for one in before.joints.values())
+                # A gap of rounding alone: the group is flat, and its data say so as well as they can.
+                if gap > ROUNDING * reach:
+                    return _open(group, gap, where, driven)
+                return _singular(group, where, driven)
+            if not np.isfinite(node.amplification * np.abs(node.acceleration + node.velocity)):
+                break
+        else:
+            group = min(groups, key=lambda one: float(after.transmission.get(one.node, 1.0)))
+    return _singular(group, where, driven)
+
+
+def _quiet(number: complex) -> np.generic:
+    """NumPy's own scalar: it divides by zero without an error."""
+    scalar: np.generic = np.asarray(number)[()]  # type: ignore[assignment]
+    return scalar
+
+
+def _open(group: Group, gap_m: float, where: str, driven: str) -> MechanismError:
+    return MechanismError(
+        "does_not_assemble",
+        f"the group of {group.node} does not assemble: its links miss each other by {{gap}}{where};"
+        f" check the lengths, the {driven}, and the sides of the groups before it",
+        group=group.node,
+        gap_m=gap_m,
+    )
+
+
+def _singular(group: Group, where: str, driven: str) -> MechanismError:
+    advice = "give slot and guide two directions" if isinstance(group, Yoke) else f"choose another {driven}"
+    why = WHAT_IS_IN_LINE.get(type(group), "its base has no length")
+    message = f"the velocities of the group of {group.node} are not determined: {why}{where}; {advice}"
+    return MechanismError("singular", message, group=group.node)
+
+
+def _gap(group: Group, before: Solution) -> float:
+    """By how much a group fails to close, metres; the group's pins are where `before` has them."""
+    at = {name: joint.position for name, joint in before.joints.items()}
+    take = before.take
+    match group:
+        case Dyad(pins=(p, q)) | Plate(base=(p, q)):
+            distance, first, second = abs(at[q] - at[p]), *map(take, group.lengths_m)
+            gap = max(distance - (first + second), abs(first - second) - distance)
+        case Slider(pin=pin):
+            rail = rail_of(before, group.guide)
+            gap = abs(cross(rail.along, at[pin] - rail.joint.position)) - take(group.length_m)
+        case SlottedLink(pin=pin, pivot=pivot):
+            gap = abs(take(group.offset_m)) - abs(at[pin] - at[pivot])
+        case _:
+            gap = 0.0
+    return float(gap)
+
+
+SAFETY = 32.0
+"""Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""
+FEW = 3
+"""So many variants are faster one by one, on Python's numbers."""
+
+CLASSES = 200
+"""From so many variants on it pays to calculate once what they share."""
+MANY, STRETCH = 100_000, 8192
+"""From so many variants on, arrays are taken so long at a time: what is between stays near the processor."""
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Positions and their derivatives, SI, complex arrays of shape (N,) by joint; links by name.
+
+    Attributes
+    ----------
+    position, velocity, acceleration : by joint; acceleration empty when not asked for
+    omega, epsilon : by link, counter-clockwise positive; epsilon empty when not asked for
+    transmission : |sin| of the angle on which each group's accuracy hangs, by its node: 1 is best,
+        0 is singular
+    predicted_error : (N,) of velocities and accelerations, relative to the largest of each plan;
+        infinite where there is no motion
+    recomputed : (N,) whether the variant was solved again with more digits
+    """
+
+    position: dict[str, ComplexArray]
+    velocity: dict[str, ComplexArray]
+    acceleration: dict[str, ComplexArray]
+    omega: dict[str, FloatArray]
+    epsilon: dict[str, FloatArray]
+    transmission: dict[str, FloatArray]
+    predicted_error: FloatArray
+    recomputed: BoolArray
+
+
+def move(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
+    """Solve the mechanism for every variant at once.
+
+    Raises MechanismError naming the group, the first variant (by its index) and by how much the
+    group does not assemble, or that its velocities are not determined there.
+    """
+    motion = move_where_possible(mechanism, accelerations=accelerations)
+    if np.isinf(motion.predicted_error.max()):
+        raise reason(mechanism, np.isinf(motion.predicted_error))
+    return motion
+
+
+def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
+    """As `move`, but nan (and an infinite predicted error) for variants without a motion."""
+    count, origin = _count(mechanism.driver), _origin(mechanism)
+    if origin.any():
+        # Far from the coordinates' origin, differences of places lose digits: solved about the driven link.
+        motion = _in_doubles(moved(mechanism, -origin), count, accelerations)
+        motion.position.update({name: place + origin for name, place in motion.position.items()})
+    else:
+        motion = _in_doubles(mechanism, count, accelerations)
+    if motion.predicted_error.max() > LOSSY:
+        with np.errstate(all="ignore"):
+            _refine(motion, mechanism, accelerations)
+    return motion
+
+
+def _origin(mechanism: Mechanism) -> ComplexArray:
+    """The driven crank's pivot, or a point of the driven slider's guide."""
+    driver = mechanism.driver
+    return mechanism.ground_m[driver.pivot] if isinstance(driver, Crank) else driver.guide_m
+
+
+def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
+    """More digits for what has lost some; nothing is told of a variant without a motion."""
+
+    def put(solution: Solution, rows: NDArray[np.intp]) -> None:
+        _put(motion, solution, rows)
+
+    predicted = motion.predicted_error
+    sine = reduce(np.minimum, motion.transmission.values(), np.ones(predicted.shape))
+    motion.recomputed[:] = refine(mechanism, predicted, sine, put, accelerations=accelerations)
+    broken = np.isinf(predicted)
+    if broken.any():
+        for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
+            for values in rates.values():
+                values[broken] = np.nan
+
+
+def _put(motion: Motion, solution: Solution, rows: NDArray[np.intp] | slice) -> None:
+    """Take the solution of some variants over into the motion."""
+    for name, joint in solution.joints.items():
+        motion.position[name][rows] = _rounded(joint.position)
+        motion.velocity[name][rows] = _rounded(joint.velocity)
+        if motion.acceleration:
+            motion.acceleration[name][rows] = _rounded(joint.acceleration)
+    for given, found in (
+        (motion.omega, solution.omega),
+        (motion.epsilon, solution.epsilon),
+        (motion.transmission, solution.transmission),
+    ):
+        for name in given:
+            given[name][rows] = np.real(_rounded(found[name]))
+
+
+def _rounded(number: Any) -> Any:  # noqa: ANN401 - of extended floats or of many digits
+    return number if isinstance(number, np.ndarray) else complex(number)
+
+
+def _count(driver: Driver) -> int:
+    """The number of variants: the widest of the driver's numbers."""
+    if isinstance(driver, Crank):
+        return max(driver.angle_rad.size, driver.omega.size, driver.length_m.size, driver.epsilon.size)
+    return max(driver.displacement_m.size, driver.speed.size, driver.acceleration.size)
+
+
+def _in_doubles(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+    if count <= FEW:
+        return _one_by_one(mechanism, count, accelerations)
+    with np.errstate(all="ignore"):
+        if count < MANY:
+            return _on_arrays(mechanism, count, accelerations)
+        return _in_stretches(mechanism, count, accelerations)
+
+
+def _in_stretches(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+    """As `_on_arrays`, on a part of the variants after another: intermediate results stay near."""
+    motion: Motion | None = None
+    for start in range(0, count, STRETCH):
+        rows = slice(start, start + STRETCH)
+        solution = solve(mechanism, a_stretch(rows), accelerations=accelerations)
+        motion = motion or _room_for(solution, count, accelerations)
+        _put(motion, solution, rows)
+        motion.predicted_error[rows] = _predicted_error(_amplification(solution))
+    return cast("Motion", motion)
+
+
+def _room_for(solution: Solution, count: int, accelerations: bool) -> Motion:
+    """A motion not yet filled in, with the names of a solution."""
+
+    def rows(names: Iterable[str], kind: type) -> Any:  # noqa: ANN401 - real or complex
+        return {name: np.empty(count, dtype=kind) for name in names}
+
+    return Motion(
+        rows(solution.joints, complex),
+        rows(solution.joints, complex),
+        rows(solution.joints, complex) if accelerations else {},
+        rows(solution.omega, float),
+        rows(solution.epsilon, float) if accelerations else {},
+        rows(solution.transmission, float),
+        np.empty(count),
+        np.zeros(count, dtype=np.bool_),
+    )
+
+
+def _amplification(solution: Solution) -> Any:  # noqa: ANN401 - an array, or one number
+    """By how much a rounding error may have grown anywhere."""
+    return reduce(larger, [joint.amplification for joint in solution.joints.values()])
+
+
+def _predicted_error(amplification: Any) -> FloatArray:  # noqa: ANN401 - an array, or one number
+    """What the growth of rounding errors up to a result says of it; infinite where it is nan."""
+    predicted = np.atleast_1d(SAFETY * EPSILON * amplification)
+    predicted[np.isnan(predicted)] = np.inf
+    return predicted
+
+
+def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+    take = as_it_is if count < CLASSES else each_number_once
+    solution = solve(mechanism, take, accelerations=accelerations)
+    shape = (count,)
+
+    def wide(values: Any) -> Any:  # noqa: ANN401 - real or complex, array or number
+        own = np.shape(values) == shape and values.flags.writeable
+        return values if own else np.array(np.broadcast_to(values, shape))
+
+    joints = solution.joints
+    predicted = _predicted_error(wide(_amplification(solution)))
+    return Motion(
+        {name: wide(joint.position) for name, joint in joints.items()},
+        {name: wide(joint.velocity) for name, joint in joints.items()},
+        {name: wide(joint.acceleration) for name, joint in joints.items()} if accelerations else {},
+        {name: wide(+rate) for name, rate in solution.omega.items()},
+        {name: wide(+rate) for name, rate in solution.epsilon.items()} if accelerations else {},
+        {name: wide(sine) for name, sine in solution.transmission.items()},
+        predicted,
+        np.zeros(shape, dtype=np.bool_),
+    )
+
+
+def _one_by_one(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+    """The same on Python's numbers, a variant after another; where they divide by zero, on arrays."""
+    try:
+        solutions = [
+            solve(mechanism, one_variant(index, among=count), accelerations=accelerations)
+            for index in range(count)
+        ]
+    except (ZeroDivisionError, OverflowError):
+        with np.errstate(all="ignore"):
+            return _on_arrays(mechanism, count, accelerations)
+    first = solutions[0]
+    grown = [_amplification(one) for one in solutions]
+    predicted = [SAFETY * EPSILON * one if one == one else np.inf for one in grown]  # noqa: PLR0124 - nan
+    states = iter(np.array([_states(one) for one in solutions]).T)
+    rates = iter(np.array([_rates(one, accelerations) for one in solutions]).T)
+    return Motion(
+        dict(zip(first.joints, states, strict=False)),
+        dict(zip(first.joints, states, strict=False)),
+        dict(zip(first.joints if accelerations else (), states, strict=False)),
+        dict(zip(first.omega, rates, strict=False)),
+        dict(zip(first.epsilon if accelerations else (), rates, strict=False)),
+        dict(zip(first.transmission, rates, strict=False)),
+        np.array(predicted),
+        np.zeros(count, dtype=np.bool_),
+    )
+
+
+def _states(one: Solution) -> list[complex]:
+    joints = one.joints.values()
+    positions, velocities = [joint.position for joint in joints], [joint.velocity for joint in joints]
+    return positions + velocities + [joint.acceleration for joint in joints]
+
+
+def _rates(one: Solution, accelerations: bool) -> list[float]:
+    epsilon = one.epsilon.values() if accelerations else ()
+    return [*one.omega.values(), *epsilon, *one.transmission.values()]

@@ -1,0 +1,381 @@
+"""A mechanism solved group by group, on numbers of any kind (`reference.numbers`).
+
+The closed forms are those of `reference.kinematics.assur`; here they meet the mechanism's joints and links.
+Nothing is checked here: what does not assemble is nan, `reference.kinematics.motion` says so in words.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.kinematics import assur
+from reference.mechanism import (
+    Crank,
+    CrossSlider,
+    Driver,
+    Dyad,
+    FixedGuide,
+    Group,
+    Guide,
+    Mechanism,
+    Plate,
+    PointOnLine,
+    Slider,
+    SlotPoint,
+    SlottedLink,
+    Yoke,
+)
+from reference.numbers import Complex, Number, cross, dot, larger, root, where
+
+Take = Callable[[Any], Any]
+"""The number to calculate with, of one that the mechanism holds: the array, or one variant's."""
+
+
+def as_it_is(value: Any) -> Any:  # noqa: ANN401 - arrays of either kind
+    """All variants at once."""
+    return value
+
+
+@dataclass(slots=True)
+class Joint:
+    """Position (and what rounding took from it, where known), velocity, acceleration, SI.
+
+    `amplification` is by how much a rounding error of the data may have grown up to here.
+    """
+
+    position: Complex
+    velocity: Complex = 0j
+    acceleration: Complex = 0j
+    rest: Complex | None = None
+    amplification: Number = 1.0
+
+
+@dataclass(slots=True)
+class Solution:
+    """Joints and links of a mechanism in motion; each group's |sin| of its transmission angle."""
+
+    joints: dict[str, Joint] = field(default_factory=dict)
+    omega: dict[str, Number] = field(default_factory=dict)
+    epsilon: dict[str, Number] = field(default_factory=dict)
+    transmission: dict[str, Number] = field(default_factory=dict)
+    slots: dict[str, tuple[str, Complex]] = field(default_factory=dict)
+    """By a slotted link's node: its pivot, and the direction of its guide."""
+    take: Take = as_it_is
+    anew: bool = False
+    """Whether shapes of links are calculated from their data, not taken as they were rounded."""
+
+
+@dataclass(slots=True)
+class Rail:
+    """A guide in motion: a point of it, its direction, and the rates of the link that carries it.
+
+    Most guides are fixed: what does not turn moves as its point does, and nothing is calculated.
+    """
+
+    joint: Joint
+    along: Complex
+    amplification: Number = 1.0
+    omega: Number = 0.0
+    epsilon: Number = 0.0
+    turns: bool = False
+
+    def velocity(self, place: Complex) -> Complex:
+        """Of the link's point at a place."""
+        if not self.turns:
+            return self.joint.velocity
+        return self.joint.velocity + 1j * self.omega * (place - self.joint.position)
+
+    def acceleration(self, place: Complex) -> Complex:
+        """Of the link's point at a place."""
+        if not self.turns:
+            return self.joint.acceleration
+        swing = assur.turned(place - self.joint.position, self.omega, self.epsilon)
+        return self.joint.acceleration + swing
+
+
+def solve(
+    mechanism: Mechanism, take: Take = as_it_is, *, accelerations: bool = True, anew: bool = False
+) -> Solution:
+    """Solve a mechanism in the numbers that `take` gives; epsilon stays empty without accelerations.
+
+    `anew` calculates the shapes of links in those numbers, from their lengths or coordinates: the
+    mechanism holds them rounded to doubles.
+    """
+    solution = Solution(take=take, anew=anew)
+    for name, place in mechanism.ground_m.items():
+        solution.joints[name] = Joint(take(place))
+    _drive(solution, mechanism.driver, accelerations)
+    for group in mechanism.groups:
+        _add(solution, group, accelerations)
+    return solution
+
+
+def _drive(solution: Solution, driver: Driver, accelerations: bool) -> None:
+    take = solution.take
+    match driver:
+        case Crank():
+            omega, epsilon = take(driver.omega), take(driver.epsilon)
+            axis, rest = assur.arm(take(driver.length_m), take(driver.angle_rad))
+            arm = axis + rest
+            foot, lost = assur.exact_sum(solution.joints[driver.pivot].position, axis)
+            place, lost_too = assur.exact_sum(foot, rest)
+            pin = Joint(place, 1j * omega * arm, rest=lost + lost_too)
+            if accelerations:
+                pin.acceleration = assur.turned(arm, omega, epsilon)
+                solution.epsilon[driver.link] = epsilon
+            solution.omega[driver.link] = omega
+        case _:
+            along = assur.heading(take(driver.guide_rad))
+            place = take(driver.guide_m) + along * take(driver.displacement_m)
+            pin = Joint(place, along * take(driver.speed))
+            if accelerations:
+                pin.acceleration = along * take(driver.acceleration)
+    solution.joints[driver.pin] = pin
+
+
+def _add(solution: Solution, group: Group, accelerations: bool) -> None:
+    match group:
+        case Dyad():
+            _add_dyad(solution, group, accelerations)
+        case Slider():
+            _add_slider(solution, group, accelerations)
+        case SlottedLink():
+            _add_slotted(solution, group, accelerations)
+        case CrossSlider(node=node, guides=(first, second)):
+            rails = (rail_of(solution, first), rail_of(solution, second))
+            _add_crossing(solution, node, rails, accelerations)
+            for guide, rail in zip(group.guides, rails, strict=True):
+                _add_coincident(solution, guide, rail, node)
+        case Yoke(node=node):
+            pin = solution.joints[group.pin]
+            slot = Rail(pin, assur.heading(solution.take(group.slot_rad)), pin.amplification)
+            _add_crossing(solution, node, (rail_of(solution, group.guide), slot), accelerations)
+        case SlotPoint():
+            _add_slot_point(solution, group, solution.take(group.local_m))
+        case Plate() | PointOnLine():
+            _add_point(solution, group)
+
+
+def _between(p: Joint, q: Joint) -> Complex:
+    """From p to q, with what rounding took from either."""
+    d = q.position - p.position
+    if q.rest is not None:
+        d = d + q.rest
+    return d if p.rest is None else d - p.rest
+
+
+def _nearness(size2: Number, p: Joint, q: Joint) -> Number:
+    """A length (its square) over its distance from the origin: so much of a place's rounding it has."""
+    return root(size2 / (size2 + dot(p.position, p.position) + dot(q.position, q.position)))
+
+
+def _add_dyad(solution: Solution, group: Dyad, accelerations: bool) -> None:
+    p, q = (solution.joints[pin] for pin in group.pins)
+    link_p, link_q = group.links
+    take, d = solution.take, _between(p, q)
+    along, across, sine = assur.rrr_place(d, *map(take, (*group.lengths_m, group.side)))
+    corner = along + 1j * across
+    arm = d * corner
+    square = dot(d, d)
+    inverse = d.conjugate() / square
+    stretch = (q.velocity - p.velocity) * inverse
+    omega = assur.rrr_turns(along, across, stretch)
+    solution.omega[link_p], solution.omega[link_q] = omega
+    node = Joint(p.position + arm, p.velocity + 1j * omega[0] * arm)
+    if accelerations:
+        growth = (q.acceleration - p.acceleration) * inverse
+        epsilon = assur.rrr_accelerations(along, across, stretch, growth, omega)
+        solution.epsilon[link_p], solution.epsilon[link_q] = epsilon
+        node.acceleration = p.acceleration + assur.turned(arm, omega[0], epsilon[0])
+    share = sine * sine * _nearness(square, p, q)
+    node.amplification = larger(p.amplification, q.amplification) / share
+    solution.joints[group.node] = node
+    solution.transmission[group.node] = sine
+
+
+def _add_slider(solution: Solution, group: Slider, accelerations: bool) -> None:
+    pin, rail = solution.joints[group.pin], rail_of(solution, group.guide)
+    take, along, foot = solution.take, rail.along, rail.joint.position
+    height = cross(along, pin.position - foot)
+    lost = 0.0 if pin.rest is None else cross(along, pin.rest)
+    length = take(group.length_m)
+    reach, height, sine = assur.rrp_place(height, lost, length, take(group.side))
+    place = foot + along * (dot(along, pin.position - foot) + reach)
+    under = rail.velocity(place)
+    omega, speed = assur.rrp_velocity(reach, height, along, pin.velocity - under)
+    solution.omega[group.link] = omega
+    node = Joint(place, under + along * speed)
+    if accelerations:
+        under = rail.acceleration(place)
+        coriolis = 2.0 * rail.omega * speed if rail.turns else 0.0
+        epsilon, slide = assur.rrp_acceleration(
+            reach, height, along, pin.acceleration - under, omega, coriolis
+        )
+        solution.epsilon[group.link] = epsilon
+        node.acceleration = under + along * (slide + 1j * coriolis)
+    share = sine * sine * _nearness(length * length, pin, rail.joint)
+    node.amplification = larger(pin.amplification, rail.amplification) / share
+    solution.joints[group.node] = node
+    solution.transmission[group.node] = sine
+    _add_coincident(solution, group.guide, rail, group.node)
+
+
+def _add_slotted(solution: Solution, group: SlottedLink, accelerations: bool) -> None:
+    pin, pivot = solution.joints[group.pin], solution.joints[group.pivot]
+    d, offset = _between(pivot, pin), solution.take(group.offset_m)
+    reach, along, sine = assur.rpr_place(d, offset, solution.take(group.side))
+    relative = pin.velocity - pivot.velocity
+    omega, speed = assur.rpr_velocity(reach, offset, along, relative)
+    solution.omega[group.link] = omega
+    node = Joint(pin.position, pivot.velocity + 1j * omega * d, rest=pin.rest)
+    if accelerations:
+        relative = pin.acceleration - pivot.acceleration
+        epsilon = assur.rpr_acceleration(reach, offset, along, relative, (omega, speed))
+        solution.epsilon[group.link] = epsilon
+        node.acceleration = pivot.acceleration + assur.turned(d, omega, epsilon)
+    share = sine * sine * _nearness(dot(d, d), pin, pivot)
+    node.amplification = larger(pin.amplification, pivot.amplification) / share
+    solution.joints[group.node] = node
+    solution.transmission[group.node] = sine
+    solution.slots[group.node] = (group.pivot, along)
+    if group.foot is not None:
+        foot = SlotPoint(group.foot, group.node, group.link, np.asarray(0j))
+        _add_slot_point(solution, foot, 1j * offset)
+
+
+def _add_slot_point(solution: Solution, group: SlotPoint, local: Complex) -> None:
+    pivot_name, along = solution.slots[group.slotted]
+    pivot, arm, omega = solution.joints[pivot_name], along * local, solution.omega[group.link]
+    node = Joint(pivot.position + arm, pivot.velocity + 1j * omega * arm)
+    if group.link in solution.epsilon:
+        node.acceleration = pivot.acceleration + assur.turned(arm, omega, solution.epsilon[group.link])
+    node.amplification = solution.joints[group.slotted].amplification
+    solution.joints[group.node] = node
+
+
+def _add_point(solution: Solution, group: Plate | PointOnLine) -> None:
+    """A rigid link's point is the same combination of its base at every order."""
+    p, q = (solution.joints[joint] for joint in group.base)
+    shape = solution.take(group.shape if isinstance(group, Plate) else group.ratio)
+    d, growth = _between(p, q), 1.0 + abs(shape)
+    if isinstance(group, Plate) and group.local_m is None:
+        growth = growth * assur.plate_growth(shape)
+    if solution.anew:
+        shape = _shape_anew(solution.take, group, shape, d)
+    solution.joints[group.node] = Joint(
+        p.position + shape * d,
+        p.velocity + shape * (q.velocity - p.velocity),
+        p.acceleration + shape * (q.acceleration - p.acceleration),
+        amplification=larger(p.amplification, q.amplification) * growth,
+    )
+
+
+def _shape_anew(take: Take, group: Plate | PointOnLine, shape: Complex, d: Complex) -> Complex:
+    """The shape of a link's point over its base `d`, from the data in the numbers of `d`."""
+    if group.local_m is not None:
+        return take(group.local_m) / abs(d)
+    if isinstance(group, PointOnLine):
+        return shape
+    first, second, side = map(take, (*group.lengths_m, group.side))
+    along, across, _ = assur.rrr_place(d, first, second, side)
+    in_line = first / abs(d)
+    return where(shape.imag == 0.0, where(shape.real < 0.0, -in_line, in_line), along + 1j * across)
+
+
+def rail_of(solution: Solution, guide: Guide) -> Rail:
+    """A guide as it moves; raises KeyError where its link is not placed yet."""
+    if isinstance(guide, FixedGuide):
+        through, angle = solution.take(guide.through_m), solution.take(guide.angle_rad)
+        return Rail(Joint(through), assur.heading(angle))
+    g, h = (solution.joints[joint] for joint in guide.base)
+    d = _between(g, h)
+    amplification = larger(g.amplification, h.amplification) / _nearness(dot(d, d), g, h)
+    epsilon = solution.epsilon.get(guide.link, 0.0)
+    return Rail(g, d / abs(d), amplification, solution.omega[guide.link], epsilon, turns=True)
+
+
+def _add_coincident(solution: Solution, guide: Guide, rail: Rail, node: str) -> None:
+    """The point of a moving guide's link that lies under a slider."""
+    if isinstance(guide, FixedGuide):
+        return
+    over = solution.joints[node]
+    solution.joints[guide.coincident] = Joint(
+        over.position,
+        rail.velocity(over.position),
+        rail.acceleration(over.position),
+        amplification=over.amplification,
+    )
+
+
+def _add_crossing(solution: Solution, node: str, rails: tuple[Rail, Rail], accelerations: bool) -> None:
+    first, second = rails
+    across = second.joint.position - first.joint.position
+    reach, sine = assur.cross_place(across, first.along, second.along)
+    place = first.joint.position + first.along * reach
+    under = (first.velocity(place), second.velocity(place))
+    slides = assur.cross_slides(under[1] - under[0], first.along, second.along, sine)
+    joint = Joint(place, under[0] + first.along * slides[0])
+    if accelerations:
+        carried = tuple(
+            rail.acceleration(place) + 2j * rail.omega * slide * rail.along
+            for rail, slide in zip(rails, slides, strict=True)
+        )
+        slide, _ = assur.cross_slides(carried[1] - carried[0], first.along, second.along, sine)
+        joint.acceleration = carried[0] + first.along * slide
+    joint.amplification = larger(first.amplification, second.amplification) / (sine * sine)
+    solution.joints[node] = joint
+    solution.transmission[node] = abs(sine)
+
+
+# Some variants of a mechanism, in other kinds of numbers -------------------------------------------
+
+
+def each_number_once(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
+    """Takes all variants at once; what they share and an array only repeats, one time."""
+    return values[:1] if type(values) is not int and values.strides == (0,) else values
+
+
+def a_stretch(rows: slice) -> Take:
+    """Takes neighbouring variants; what all variants share, one time."""
+
+    def take(values: Any) -> Any:  # noqa: ANN401 - as above
+        once = each_number_once(values)
+        return once if type(once) is int or once.size == 1 else once[rows]
+
+    return take
+
+
+def one_variant(index: int, number: Callable[[Any], Any] | None = None, *, among: int | None = None) -> Take:
+    """Takes the numbers of one variant out of arrays over variants (those of one entry hold for all).
+
+    Arguments: `number` makes another kind of number of a float or complex; `among`, where given, is the
+    number of variants, and an array of another size raises ValueError.
+    """
+
+    def take(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
+        if type(values) is int:
+            return values
+        if values.size == 1:
+            one = values.item()
+        elif among in {None, values.size}:
+            one = values.item(index)
+        else:
+            raise ValueError(f"data of {values.size} variants in a mechanism whose driver has {among}")
+        return one if number is None else number(one)
+
+    return take
+
+
+def some_variants(rows: NDArray[np.intp]) -> Take:
+    """Takes some variants out of arrays over variants, in the widest floats there are."""
+
+    def take(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
+        if type(values) is int:
+            return values
+        chosen = values if values.size == 1 else values[rows]
+        return chosen.astype(np.clongdouble if np.iscomplexobj(chosen) else np.longdouble)
+
+    return take
