@@ -20,9 +20,9 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.ge
 
 SLOW = (
     "bench", "docs/test_readme", "functional", "fuzz", "laws", "samples", "synthetic", "unit/bench",
-    "unit/ink", "unit/intake/test_hostile", "unit/letters", "unit/older", "unit/reading",
-    "unit/reference/test_exact_plan", "unit/sheet", "unit/similarity", "unit/test_calibration",
-    "unit/workers",
+    "unit/folder/test_workers", "unit/older", "unit/reading", "unit/reference/test_exact_plan",
+    "unit/scan/decode/test_hostile", "unit/scan/handwriting", "unit/scan/register", "unit/scan/strokes",
+    "unit/scan/test_calibration", "unit/similarity",
 )  # fmt: skip
 """Where tests run the whole program, read scans, or try many cases; the others are the quick set."""
 

@@ -1,4 +1,4 @@
-"""One value against one expectation: residual, tolerance, verdict, and what the standard error leaves open."""
+"""One value against one expectation: residual, tolerance, verdict, and what the reading leaves open."""
 
 import cmath
 import math

@@ -58,8 +58,8 @@ RECORDS: Mapping[str, type] = {
 # What a stage depends on --------------------------------------------------------------------------
 
 SCAN_STAGE = (
-    "grader.scan.decode.pages", "grader.scan.register.registration", "grader.scan.strokes.ink", "grader.scan.handwriting.letters",
-    "grader.overlay.picture",
+    "grader.scan.decode.pages", "grader.scan.register.registration", "grader.scan.strokes.ink",
+    "grader.scan.handwriting.letters", "grader.scan.handwriting.fields", "grader.overlay.picture",
 )  # fmt: skip
 """What `grader.pipeline.scan` calls."""
 READ_STAGE = ("grader.reading.read", "grader.inputs.scale_text")

@@ -343,10 +343,10 @@ def make_sheets(
     poles = [poles_mm(assignment, plan.form.template, variants) for plan in plans]
     drawing = Drawing.begin(assignment.file.title.in_language(lang))
     for index, (row, variant) in enumerate(zip(rows, variants, strict=True)):
-        for number, plan in enumerate(plans, start=1):
+        for page, plan in enumerate(plans, start=1):
             identity = Identity(assignment.id, row.student_id, variant.n, variant.position, plan.table.kind)
-            own = {figure: places[index] for figure, places in poles[number - 1].items()}
-            text = PageText(identity, row.name, number, len(plans), own)
+            own = {figure: places[index] for figure, places in poles[page - 1].items()}
+            text = PageText(identity, row.name, page, len(plans), own)
             draw_page(drawing, assignment, text, plan.form, tongue(row.lang or lang))
     layout = Layout(pages=[_layout(plan) for plan in plans])
     return Sheets(drawing.finish(), layout, (*problems, *_unprintable(rows, roster)))

@@ -1,1 +1,1 @@
-"""A plan as it is drawn: directions, lengths, intersections; evaluated, changed by a mistake, with drafting errors."""
+"""A plan as it is drawn, step by step; evaluated, changed by a mistake, with drafting errors."""

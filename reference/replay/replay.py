@@ -1,15 +1,12 @@
 """A finished drawing replayed step by step: at each step the right way first, then the wrong ones.
 
 The same construction once more, with what was drawn beside it. Every branch of the replay is one
-account of the drawing: how each step was made, and where its node came to lie. A step that the right
-way explains is left alone; where it does not, each mistake that `reference.construction.mistakes` knows for that
-step opens a branch, and "something else" one more. Later steps start from what was drawn, as the
-student did, so that one mistake does not hide the next. Branches are arrays: all are drawn at once,
-for hands of every care.
-
-- `costs`: what an account costs
-- `sight`: what was seen of one node
-- `ways`: the ways to make one step
+explanation of the drawing: how each step was made, and where its node came to lie. A step that the
+right way explains is left alone; where it does not, each mistake that
+`reference.construction.mistakes` knows for that step opens a branch, and "something else" one more.
+Later steps start from what was drawn, as the student did, so that one mistake does not hide the next.
+Branches are arrays: all are drawn at once, for drafting errors of every size. The ways to make one
+step and what each costs are in `reference.replay.explanations`.
 """
 
 from collections import ChainMap

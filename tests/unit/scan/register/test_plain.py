@@ -12,7 +12,7 @@ from grader.scan.decode.pages import page_of, pages_of
 from grader.scan.register.distortion import straight, straighten, straightened
 from grader.scan.register.registration import rectify
 
-SHARED = Path(__file__).resolve().parents[4] / "shared"
+SHARED = Path(__file__).resolve().parents[5] / "shared"
 RULED_MM = 0.06
 """Bound on the place of any point: everything ruled exactly, 150 dpi."""
 HAND_MM = 0.6

@@ -10,7 +10,7 @@ from grader.scan.decode.pages import page_of
 from grader.scan.pixels import flatten
 from grader.scan.register.lines import long_lines, without_grid
 
-REAL = Path(__file__).resolve().parents[4] / "shared" / "real" / "hdBPMN"
+REAL = Path(__file__).resolve().parents[5] / "shared" / "real" / "hdBPMN"
 
 
 def squared(pitch, skew=0.01, size=(1754, 2480)):

@@ -16,7 +16,7 @@ from pebble.pool.process import WORKERS_NAME
 from grader.folder.workers import Limits, Workers, result_of
 from grader.records import Problem
 from reference.errors import InputFileError
-from tests.unit.workers import calls
+from tests.unit.folder import calls
 
 LIMITS = Limits(seconds=2.0, memory_mb=400)
 ROOT = Path(__file__).parents[3]
@@ -85,7 +85,7 @@ def test_processes_killed_at_any_moment_lose_no_call():
 
 PARENT = """
 from grader.workers import Limits, Workers
-from tests.unit.workers import calls
+from tests.unit.folder import calls
 if __name__ == "__main__":
     with Workers(2, Limits(), calls.__name__) as workers:
         for index, _ in workers.run(calls.sleeps, [(0.01,), (0.01,), (600,), (600,)]):

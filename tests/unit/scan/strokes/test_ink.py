@@ -13,7 +13,7 @@ from grader.scan.decode.pages import page_of
 from grader.scan.register.registration import rectify
 from grader.scan.strokes.ink import find_ink
 
-SHARED = Path(__file__).resolve().parents[4] / "shared"
+SHARED = Path(__file__).resolve().parents[5] / "shared"
 PX_PER_MM = 200 / 25.4
 SHAPE = (round(297 * PX_PER_MM), round(420 * PX_PER_MM))
 SUBPIXEL = 6

@@ -29,7 +29,7 @@ from reference.errors import InputFileError
 from tests import hostile
 from tests.inline import Inline
 
-PROJECT = Path(__file__).parents[3]
+PROJECT = Path(__file__).parents[4]
 WORKER_BYTES = 1_500_000_000
 
 

@@ -18,7 +18,7 @@ from grader.scan.register.markers import register
 from grader.scan.register.registration import register as register_page
 from reference.authored.assignment import load_assignment
 
-REAL = Path(__file__).resolve().parents[4] / "shared" / "real"
+REAL = Path(__file__).resolve().parents[5] / "shared" / "real"
 CLEAN_MM, HARD_MM = 0.02, 0.08
 """Bounds on the place of any point of the drawing area: a clean scan; one marker pair, 150 dpi."""
 STUDENT = Identity("pump", "s07", 7, None, "velocity")
