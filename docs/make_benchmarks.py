@@ -12,16 +12,13 @@ from pathlib import Path
 import cv2
 
 from tests.bench.judging import JudgingBench
-from tests.bench.judging_class import measure_class
-from tests.bench.judging_scans import judged_scan
-from tests.bench.judging_tables import judging_tables
+from tests.bench.judging_tally import judging_tables
 from tests.bench.lines import lines_tables, measure_lines
 from tests.bench.plain_text import Table, as_text
 from tests.bench.reading import STUDENTS, measure_reading
-from tests.bench.reading_foreign import foreign_tables, measure_foreign
-from tests.bench.reading_tables import reading_tables
-from tests.bench.solver import measure_solver
-from tests.bench.tables import solver_tables
+from tests.bench.reading_scenes import foreign_tables, measure_foreign
+from tests.bench.reading_tally import reading_tables
+from tests.bench.solver import measure_solver, solver_tables
 
 PAGE = Path(__file__).resolve().parent / "benchmarks.md"
 
@@ -38,7 +35,7 @@ def _lines(_: int | None) -> Iterable[Table]:
 
 
 def _judging(students: int | None) -> Iterable[Table]:
-    bench = JudgingBench(students=students, whole_class=measure_class, scan=judged_scan)
+    bench = JudgingBench(students=students, whole=True)
     for _ in bench.run():
         pass
     return judging_tables(bench.figures)

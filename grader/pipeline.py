@@ -28,10 +28,9 @@ from grader.outcomes import Judgement
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import backdrop, overlay
 from grader.overlay.scene import Picture
-from grader.printed.answer_sheet import Asked
 from grader.reading.read import read_figures
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
-from grader.rubric import RubricFile
+from grader.rubric import Asked, RubricFile
 from grader.scan.decode.pages import decode, is_blank
 from grader.scan.handwriting.fields import written_lengths, written_scales
 from grader.scan.handwriting.letters import find_letters
@@ -51,8 +50,10 @@ def scan(ref: PageRef, asked: Asked) -> ScannedPage:
     if page.image is None:
         return page
     reading = page.reading
-    if page.sheet is not None and page.sheet.zones:
-        cells = asked.cells.get(frozenset(page.sheet.zones), {})
+    if page.sheet is not None and page.sheet.zones and asked.assignment is not None:
+        from grader.printed.answer_sheet import cells_of  # noqa: PLC0415 - brings the PDF writer
+
+        cells = cells_of(asked.assignment, tuple(page.sheet.zones), asked.entries)
         reading = replace(reading, lengths=written_lengths(page.image, page.sheet, cells))
     return replace(page, image=None, reading=reading, backdrop=backdrop(page.image, page.sheet))
 
@@ -210,9 +211,8 @@ def _judged(
     except MechanismError as error:
         return Problem(error.code, error.message)
     measured = submission.measured or NOTHING_MEASURED
-    entered: dict[Source, Mapping[str, str]] = {
-        "roster": submission.declared, "measurements": measured.scales,
-    }  # fmt: skip
+    entered: dict[Source, Mapping[str, str]]
+    entered = {"roster": submission.declared, "measurements": measured.scales}
     declared = declarations(task, entered, readings, measured.further_scales)
     by_hand = replace(measured.reading, unread=(*measured.reading.unread, *declared.unread))
     evidence = Submission(drawn, by_hand, measured.values, declared.texts)

@@ -6,12 +6,14 @@ are widened for, the bands of partial points, what happens with what was not han
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from grader.records import MECHANISM
 from reference.authored.assignment import Assignment, locate
 from reference.authored.toml_file import Authored, Identifier, Text, is_file, load
 from reference.construction.derive import construction_of
@@ -234,6 +236,37 @@ class RubricFile(Authored):
         for criterion in self.criterion:
             found[criterion.section] = found.get(criterion.section, 0.0) + criterion.points
         return found
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What is looked for on pages; everything where no figure is named.
+
+    Attributes
+    ----------
+    figures : those that a rubric asks anything of, and the sketch
+    vectors : all vectors of these figures
+    entries : the vectors whose measured lengths have cells on the printed sheets of the `assignment`
+    """
+
+    figures: frozenset[str] = frozenset()
+    vectors: tuple[str, ...] = ()
+    entries: tuple[str, ...] = ()
+    assignment: Assignment | None = None
+
+
+def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
+    """What a rubric asks to be read."""
+    construction = construction_of(
+        assignment.mechanism(assignment.variants()[:1]),
+        accelerations=rubric.needs_accelerations,
+        plate_by_similarity=assignment.file.plate_images == "similarity",
+    )
+    known = [construction.vectors[name] for name in rubric.vectors if name in construction.vectors]
+    plans = dict.fromkeys(construction.figure_of(vector.head) for vector in known)
+    figures = frozenset({MECHANISM, *plans} if plans else ())
+    vectors = tuple(vector.name for plan in plans for vector in construction.vectors_of(plan))
+    return Asked(figures, vectors, tuple(rubric.vectors), assignment)
 
 
 def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding]:

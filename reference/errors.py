@@ -88,19 +88,21 @@ class MechanismError(PlanmarkError):
 
     Attributes
     ----------
-    told : the message, with ``{gap}`` where the gap stands in it
+    template : the message, with ``{gap}`` where the gap stands in it
     group : the joint that the failing group places; None where no single group is meant
     gap_m : by how much the group's links miss each other; None where they meet
     """
 
     exit_status = 3
 
-    def __init__(self, code: str, told: str, *, group: str | None = None, gap_m: float | None = None) -> None:
-        super().__init__(code, told if gap_m is None else told.replace("{gap}", f"{gap_m:.6g} m"))
-        self.told, self.group, self.gap_m = told, group, gap_m
+    def __init__(
+        self, code: str, template: str, *, group: str | None = None, gap_m: float | None = None
+    ) -> None:
+        super().__init__(code, template if gap_m is None else template.replace("{gap}", f"{gap_m:.6g} m"))
+        self.template, self.group, self.gap_m = template, group, gap_m
 
     def __reduce__(self) -> tuple[object, ...]:
-        return (partial(type(self), group=self.group, gap_m=self.gap_m), (self.code, self.told))
+        return (partial(type(self), group=self.group, gap_m=self.gap_m), (self.code, self.template))
 
 
 class InputFileError(PlanmarkError):

@@ -6,7 +6,7 @@ left of the directed line between the group's pins (for a slider: ahead along it
 right (behind); an array where it differs between variants.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from types import NoneType
 from typing import Any, TypeVar, cast
@@ -225,17 +225,15 @@ class Mechanism:
 def moved(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
     """The whole mechanism moved on the ground, metres."""
 
-    def onward(guide: Guide) -> Guide:
+    def onward(guide: Guide) -> Any:  # noqa: ANN401 - of the kind that it is given
         return replace(guide, through_m=guide.through_m + by) if isinstance(guide, FixedGuide) else guide
 
     def carried(group: Group) -> Group:
         match group:
-            case Slider(guide=guide):
-                return replace(group, guide=onward(guide))
+            case Slider() | Yoke():
+                return replace(group, guide=onward(group.guide))
             case CrossSlider(guides=(first, second)):
                 return replace(group, guides=(onward(first), onward(second)))
-            case Yoke(guide=guide):
-                return replace(group, guide=replace(guide, through_m=guide.through_m + by))
         return group
 
     driver = mechanism.driver
@@ -245,16 +243,19 @@ def moved(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
     return Mechanism(ground, driver, tuple(carried(group) for group in mechanism.groups))
 
 
+def guides_of(group: Group) -> tuple[Guide, ...]:
+    """The guides on which a group slides."""
+    match group:
+        case Slider(guide=guide) | Yoke(guide=guide):
+            return (guide,)
+        case CrossSlider(guides=guides):
+            return guides
+    return ()
+
+
 def moving_guides(group: Group) -> tuple[MovingGuide, ...]:
     """The guides of a group that are carried by moving links."""
-    match group:
-        case Slider(guide=guide):
-            guides: tuple[Guide, ...] = (guide,)
-        case CrossSlider(guides=guides):
-            pass
-        case _:
-            return ()
-    return tuple(guide for guide in guides if isinstance(guide, MovingGuide))
+    return tuple(guide for guide in guides_of(group) if isinstance(guide, MovingGuide))
 
 
 def joints_of(group: Group) -> tuple[str, ...]:
@@ -290,27 +291,14 @@ def _changed(part: Any, change: Callable[[Array], Any]) -> Any:  # noqa: ANN401 
     return type(part)(*[_changed(getattr(part, name), change) for name in part.__slots__])
 
 
-def form_of(mechanism: Mechanism) -> tuple[object, ...]:
+def form_of(part: Any) -> Hashable:  # noqa: ANN401 - a mechanism, or whatever a part is made of
     """All of a mechanism except the values of its arrays; equal for mechanisms with one construction."""
-    form: list[object] = []
-    _collect(mechanism, form)
-    return tuple(form)
-
-
-def _collect(part: object, form: list[object]) -> None:
     if isinstance(part, np.ndarray):
-        form.append(part.dtype.kind)
-    elif isinstance(part, PLAIN):
-        form.append(part)
-    else:
-        form.append(type(part))
-        for inner in _inside(part):
-            _collect(inner, form)
-
-
-def _inside(part: Any) -> list[object]:  # noqa: ANN401 - a record, a tuple or a mapping
+        return str(part.dtype.kind)
+    if isinstance(part, PLAIN):
+        return part
     if isinstance(part, tuple):
-        return [len(part), *part]
+        return tuple([form_of(inner) for inner in part])
     if isinstance(part, Mapping):
-        return [len(part), *part.keys(), *part.values()]
-    return [getattr(part, name) for name in part.__slots__]
+        return tuple([(name, form_of(inner)) for name, inner in part.items()])
+    return (type(part), *[form_of(getattr(part, name)) for name in part.__slots__])

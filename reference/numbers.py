@@ -26,29 +26,24 @@ def root(x: Number) -> Number:
 
 def sine(x: Number) -> Number:
     """The sine."""
-    if isinstance(x, float):
-        return math.sin(x)
-    if isinstance(x, np.ndarray):
-        return np.sin(x)
-    return _mp().sin(x)
+    return math.sin(x) if isinstance(x, float) else _library(x).sin(x)
 
 
 def cosine(x: Number) -> Number:
     """The cosine."""
-    if isinstance(x, float):
-        return math.cos(x)
-    if isinstance(x, np.ndarray):
-        return np.cos(x)
-    return _mp().cos(x)
+    return math.cos(x) if isinstance(x, float) else _library(x).cos(x)
 
 
 def nearest(x: Number) -> Number:
     """The nearest whole number."""
     if isinstance(x, float):
         return float(round(x))
-    if isinstance(x, np.ndarray):
-        return np.rint(x)
-    return _mp().nint(x)
+    return np.rint(x) if isinstance(x, np.ndarray) else _mp().nint(x)
+
+
+def _library(x: Number) -> Any:  # noqa: ANN401 - a module, or mpmath's context, which has no types
+    """Whose functions take numbers of this kind, but for Python's own."""
+    return np if isinstance(x, np.ndarray) else _mp()
 
 
 IN_QUARTERS = 0.6366197723675814

@@ -1,7 +1,7 @@
 """The exact plan of a variant, or of many: named nodes and vectors, in SI and in millimetres on paper.
 
 Taken from the closed form of `reference.kinematics.motion`, not from the construction: the two are
-independent roads, and the tests hold them against each other.
+independent, and tests compare them.
 """
 
 from collections.abc import Mapping
@@ -82,18 +82,15 @@ def exact_plan(
     by_similarity = assignment.file.plate_images == "similarity"
     construction = construction_of(mechanism, accelerations=accelerations, plate_by_similarity=by_similarity)
     nodes = _nodes(construction, mechanism, motion, scales)
-    vectors = {
-        name: (nodes[figure][vector.head] - nodes[figure][vector.tail]) * getattr(scales, vector.scale)
-        for figure in construction.poles
-        for vector in construction.vectors_of(figure)
-        for name in (vector.name,)
-    }
-    ordered = {name: vectors[name] for name in construction.vectors}
+    vectors = {}
+    for name, vector in construction.vectors.items():
+        figure = nodes[construction.figure_of(vector.head)]
+        vectors[name] = (figure[vector.head] - figure[vector.tail]) * getattr(scales, vector.scale)
     rates = {name: _rate(motion, name) for name in construction.rates}
     parameters = parameters_of(mechanism, scales.kL, scales.kv, scales.ka)
     parameters = {**_measured(construction, motion), **parameters}
     drawing = Drawing(construction, parameters)
-    return Plan(tuple(variants), mechanism, motion, scales, drawing, nodes, ordered, rates)
+    return Plan(tuple(variants), mechanism, motion, scales, drawing, nodes, vectors, rates)
 
 
 def _nodes(
@@ -161,11 +158,10 @@ def conditioning(plan: Plan) -> dict[str, FloatArray]:
     construction lines of node X meet (90 is best).
     """
     transmission = plan.motion.transmission
-    told: dict[str, FloatArray] = {f"transmission {node}": sine for node, sine in transmission.items()}
-    told["predicted_error"] = plan.motion.predicted_error
+    conditions: dict[str, FloatArray] = {f"transmission {node}": sine for node, sine in transmission.items()}
+    conditions["predicted_error"] = plan.motion.predicted_error
     nodes = evaluate(plan.construction, plan.drawing.parameters)
-    told.update(crossings_deg(plan.construction, plan.drawing, nodes))
-    return told
+    return {**conditions, **crossings_deg(plan.construction, plan.drawing, nodes)}
 
 
 def crossings_deg(

@@ -1,8 +1,9 @@
-"""Make the bundled classes: scans, entered measurements, rosters, and the truth of what was drawn.
+"""Make the sample classes: scans, entered measurements, rosters, and the truth of what was drawn.
 
-    python -m samples.make_samples [FOLDER]
+    python -m samples.make_samples FOLDER
 
-Everything follows from the seeds below; FOLDER is this folder by default.
+Everything follows from the seeds below. The bundled classes were made with an earlier model of a student's
+hand: their drawings differ from those of this script.
 """
 
 import csv
@@ -34,6 +35,7 @@ from samples.simulation import (
     write_truth,
 )
 from samples.simulation.printing import printed_sheets
+from samples.simulation.wording import SCALE_UNITS
 
 QUIET = Scan(dpi=150.0, dpi_tag=150.0, noise=1.0, tint_grain=0.5, jpeg_quality=62, dust=8)
 """A good flatbed, frugal with bytes."""
@@ -76,7 +78,7 @@ class Pupil:
         return f"s{self.number:02d}"
 
 
-def told(
+def settings_of(
     pen: str,
     student: Student | None = None,
     scan: Scan = QUIET,
@@ -93,24 +95,31 @@ CSV, JSON, NOTHING = frozenset({"csv"}), frozenset({"json"}), frozenset[str]()
 TWO = Student(sheets=2)
 
 PUMP = [
-    Pupil(1, 7, told("fine pencil", TWO, replace(QUIET, dpi=200.0, dpi_tag=200.0)), 11, SCANS | CSV),
-    Pupil(2, 12, told("soft pencil", Student(sheets=2, mistakes=("normal_reversed",)), careful=False), 12),
-    Pupil(3, 3, told("ink", Student(sheets=2, ka_ratio=1.25), COPY, PRINTED_FRAME), 13),
-    Pupil(4, 18, told("fine pencil"), 14, PDF),
-    Pupil(5, 24, told("soft pencil", Student(sheets=2, mistakes=("wrong_link",))), 15, PDF),
-    Pupil(6, 9, told("fine pencil", TWO), 16, SHEET),
-    Pupil(7, 15, told("ballpoint", TWO, PHOTO), 17),
-    Pupil(8, 21, told("fine pencil", TWO, WRITTEN_ONLY), 18, JSON),
-    Pupil(9, 27, told("fine pencil", Student(mistakes=("normal_missing",)), WRITTEN_ONLY), 19, CSV),
-    Pupil(10, 30, told("fine pencil"), 20, NOTHING),
+    Pupil(1, 7, settings_of("fine pencil", TWO, replace(QUIET, dpi=200.0, dpi_tag=200.0)), 11, SCANS | CSV),
+    Pupil(
+        2, 12, settings_of("soft pencil", Student(sheets=2, mistakes=("normal_reversed",)), careful=False), 12
+    ),
+    Pupil(3, 3, settings_of("ink", Student(sheets=2, ka_ratio=1.25), COPY, PRINTED_FRAME), 13),
+    Pupil(4, 18, settings_of("fine pencil"), 14, PDF),
+    Pupil(5, 24, settings_of("soft pencil", Student(sheets=2, mistakes=("wrong_link",))), 15, PDF),
+    Pupil(6, 9, settings_of("fine pencil", TWO), 16, SHEET),
+    Pupil(7, 15, settings_of("ballpoint", TWO, PHOTO), 17),
+    Pupil(8, 21, settings_of("fine pencil", TWO, WRITTEN_ONLY), 18, JSON),
+    Pupil(9, 27, settings_of("fine pencil", Student(mistakes=("normal_missing",)), WRITTEN_ONLY), 19, CSV),
+    Pupil(10, 30, settings_of("fine pencil"), 20, NOTHING),
 ]
 PRESS = [
-    Pupil(1, 1, told("fine pencil", TWO, QUIET, RUSSIAN), 31, SCANS | CSV),
-    Pupil(2, 2, told("ink", TWO, replace(COPY, container="png", dpi=200.0, dpi_tag=200.0), RUSSIAN_FORM), 32),
+    Pupil(1, 1, settings_of("fine pencil", TWO, QUIET, RUSSIAN), 31, SCANS | CSV),
+    Pupil(
+        2,
+        2,
+        settings_of("ink", TWO, replace(COPY, container="png", dpi=200.0, dpi_tag=200.0), RUSSIAN_FORM),
+        32,
+    ),
     Pupil(
         3,
         3,
-        told(
+        settings_of(
             "soft pencil",
             Student(sheets=2, mistakes=("wrong_link",)),
             replace(QUIET, quarter_turns=2),
@@ -118,8 +127,8 @@ PRESS = [
         ),
         33,
     ),
-    Pupil(4, 5, told("fine pencil", TWO, WRITTEN_ONLY, RUSSIAN), 34, CSV),
-    Pupil(5, 0, told("fine pencil", TWO, WRITTEN_ONLY, RUSSIAN), 35, CSV),
+    Pupil(4, 5, settings_of("fine pencil", TWO, WRITTEN_ONLY, RUSSIAN), 34, CSV),
+    Pupil(5, 0, settings_of("fine pencil", TWO, WRITTEN_ONLY, RUSSIAN), 35, CSV),
 ]
 
 
@@ -187,13 +196,10 @@ def write_class_pdf(path: Path, sheets: list[SimulatedSheet]) -> None:
     write_pdf(path, pages, quality=QUIET.jpeg_quality)
 
 
-UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
-
-
 def scales_of(sheets: list[SimulatedSheet]) -> dict[str, str]:
     """The scales as declared, with their units."""
     declared = sheets[0].truth["scales"]["declared"]
-    return {name: f"{declared[name]:.6g} {unit}" for name, unit in UNITS.items()}
+    return {name: f"{declared[name]:.6g} {unit}" for name, unit in SCALE_UNITS.items()}
 
 
 def variant_columns(sheets: list[SimulatedSheet]) -> dict[str, Any]:
@@ -204,7 +210,7 @@ def variant_columns(sheets: list[SimulatedSheet]) -> dict[str, Any]:
 
 def roster_line(pupil: Pupil, sheets: list[SimulatedSheet]) -> dict[str, Any]:
     """The student's line of the roster."""
-    scales = scales_of(sheets) if pupil.hands_in else dict.fromkeys(UNITS, "")
+    scales = scales_of(sheets) if pupil.hands_in else dict.fromkeys(SCALE_UNITS, "")
     return {
         "student_id": pupil.student_id,
         "name": f"Student {pupil.number}",
@@ -235,13 +241,13 @@ def write_csv(path: Path, lines: list[dict[str, Any]], delimiter: str) -> None:
 
 def write_json(path: Path, line: dict[str, Any]) -> None:
     """One student's measurements as JSON."""
-    taken = {"student_id", "n", "position", *UNITS}
+    taken = {"student_id", "n", "position", *SCALE_UNITS}
     lengths = {name: value for name, value in line.items() if name not in taken and not name.endswith("_deg")}
     directions = {name.removesuffix("_deg"): value for name, value in line.items() if name.endswith("_deg")}
     document: dict[str, Any] = {
         "student_id": line["student_id"],
         "n": line["n"],
-        "scales": {name: line[name] for name in UNITS},
+        "scales": {name: line[name] for name in SCALE_UNITS},
         "segments_mm": lengths,
         "directions_deg": directions,
         "values": {},
@@ -256,4 +262,6 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parent)
+    if len(sys.argv) != 2:
+        sys.exit("python -m samples.make_samples FOLDER")
+    main(Path(sys.argv[1]))

@@ -15,8 +15,9 @@ from grader.rubric import rubric_of
 from reference.authored.assignment import load_assignment
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Drawing, Mistake, commit
-from samples.simulation import Hand
-from samples.simulation.hand import slips
+from samples.simulation import HandStyle
+from samples.simulation.drawing import drawn_nodes as drawn_with_instruments
+from samples.simulation.wording import declared_texts
 
 ZERO_MM = 1e-9
 
@@ -138,29 +139,18 @@ RULER_MM, PROTRACTOR_DEG = 0.5, 1.0
 
 
 def drawn_by(
-    task: Task, hand: Hand, lot: np.random.Generator, mistakes: tuple[Mistake, ...] = ()
+    task: Task, hand: HandStyle, lot: np.random.Generator, mistakes: tuple[Mistake, ...] = ()
 ) -> dict[str, complex]:
     """All nodes as a hand draws them, with some mistakes followed through."""
     drawing = Drawing(task.construction, task.parameters)
     for mistake in mistakes:
         drawing = commit(mistake, drawing)
-    for _ in range(20):
-        errors = slips(drawing.construction, hand, lot)
-        found = evaluate(drawing.construction, drawing.parameters, errors=errors)
-        nodes = {name: complex(np.ravel(place)[0]) for name, place in found.items()}
-        if all(cmath.isfinite(place) for place in nodes.values()):
-            return nodes
-    raise ValueError("the drawing does not close with this hand")
+    return drawn_with_instruments(drawing.construction, drawing.parameters, hand, lot)
 
 
 def handed_in(task: Task, nodes: Mapping[str, complex], source: str) -> Submission:
     """Drawn nodes as a sheet that was read, or as measured with ruler and protractor or the ruler alone."""
-    declared = {
-        name: f"{value!r} {unit}"
-        for (name, value), unit in zip(
-            rule_scales(task).items(), ("m/mm", "(m/s)/mm", "(m/s2)/mm"), strict=True
-        )
-    }
+    declared = declared_texts(rule_scales(task))
     exact = drawn_nodes(task)
     moved = {name: nodes[name] - exact[name] for name in nodes}
     read = sheet(task, moved=moved)

@@ -22,10 +22,10 @@ NAMED = 6
 
 @dataclass(frozen=True, slots=True)
 class LintFinding:
-    """One finding: how grave, a stable code, where (a path such as ``$.criterion[3]``), what, for whom.
+    """A finding: its severity, a stable code, its place (a path such as ``$.criterion[3]``), the message.
 
-    `variants` is empty where the finding concerns the files as such; `names_them` where the message
-    tells them in its own way.
+    `variants` is empty where the finding concerns the files as such; `names_them` is true where the
+    message names the variants itself.
     """
 
     severity: Severity
@@ -37,8 +37,8 @@ class LintFinding:
     names_them: bool = False
 
     def __str__(self) -> str:
-        told = f" ({named(self.variants)})" if self.variants and not self.names_them else ""
-        return f"{self.file} {self.path}: {self.message}{told}"
+        concerned = f" ({named(self.variants)})" if self.variants and not self.names_them else ""
+        return f"{self.file} {self.path}: {self.message}{concerned}"
 
 
 def chosen(variants: Sequence[Variant], which: BoolArray) -> tuple[Variant, ...]:
@@ -48,17 +48,17 @@ def chosen(variants: Sequence[Variant], which: BoolArray) -> tuple[Variant, ...]
 
 def named(variants: Iterable[Variant]) -> str:
     """Variants as people say them: ``n = 3..7, 12``; with positions ``n = 3, 4, position = 0``."""
-    alike: dict[tuple[int, ...], list[int]] = {}
+    numbers_with: dict[tuple[int, ...], list[int]] = {}
     for n, group in groupby(variants, key=lambda variant: variant.n):
         positions = tuple(variant.position for variant in group if variant.position is not None)
-        alike.setdefault(positions, []).extend([] if n is None else [n])
+        numbers_with.setdefault(positions, []).extend([] if n is None else [n])
     parts = [
         ", ".join(
             f"{name} = {_ranges(numbers)}"
             for name, numbers in (("n", known), ("position", positions))
             if numbers
         )
-        for positions, known in alike.items()
+        for positions, known in numbers_with.items()
     ]
     more = len(parts) - NAMED
     return "; ".join(parts[:NAMED]) + (" and more" if more > 0 else "") or "the only variant"
@@ -72,13 +72,13 @@ def _ranges(numbers: Sequence[int]) -> str:
             runs[-1].append(number)
         else:
             runs.append([number])
-    told: list[str] = []
+    texts: list[str] = []
     for run in runs:
-        told.extend([f"{run[0]}..{run[-1]}"] if len(run) > 2 else map(str, run))
-    if len(told) <= NAMED + 2:
-        return ", ".join(told)
+        texts.extend([f"{run[0]}..{run[-1]}"] if len(run) > 2 else map(str, run))
+    if len(texts) <= NAMED + 2:
+        return ", ".join(texts)
     counted = sum(len(run) for run in runs[NAMED:])
-    return ", ".join(told[:NAMED]) + f" and {counted} more"
+    return ", ".join(texts[:NAMED]) + f" and {counted} more"
 
 
 # Places in files ----------------------------------------------------------------------------------

@@ -62,7 +62,7 @@ class Lint:
 
     Attributes
     ----------
-    rows : one for every variant
+    rows : the figures of every variant
     findings : the gravest first
     scales : the proposed ones, and round ones; none where no variant can be solved
     plan : of the variants that can be solved
@@ -86,7 +86,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     """Hold an assignment and its rubric against every variant.
 
     Everything is evaluated on arrays over the variants; those that cannot be solved are left out of the
-    rest, and only they are looked at one by one.
+    rest, and only these are examined each by itself.
     """
     variants = assignment.variants()
     accelerations = rubric.needs_accelerations or any(

@@ -35,6 +35,7 @@ LEAST_LINK_MM = 20.0
 """The plans' directions are read off the sketch: a shorter link tells them less well than a hand draws."""
 SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
 _SLACK = 1e-9
+"""Relative rounding error of a scale that is a round step: 0.005 computed as 0.0050000000001 is 0.005."""
 
 
 # Lengths of vectors -------------------------------------------------------------------------------

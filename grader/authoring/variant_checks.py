@@ -29,12 +29,13 @@ LEAST_CROSSING_DEG = 20.0
 """Construction lines that meet at less are hard to intersect by hand: an error across one of them
 moves the node by three times as much."""
 LARGEST_ERROR = 1e-9
-"""Relative error of a computed plan that is told: far below a pencil's, far above a rounding's."""
+"""Relative error of a computed plan that is reported: far below a pencil's, far above a rounding error."""
 SAME_MM = 0.5
-"""Drawings whose nodes all lie within this of each other cannot be told apart: a hand's tolerance."""
+"""Drawings whose nodes all lie within this of each other are the same drawing: a hand's tolerance."""
 NAMED_GROUPS = 3
+"""Groups of equal drawings that are named in the message; the others are counted."""
 MOST_PAIRS = 100_000
-"""No more are looked for: where all variants are alike, there are as many as their number squared."""
+"""The search ends there: where all variants are the same, there are as many pairs as their number squared."""
 
 Pairs = tuple[np.ndarray, np.ndarray]
 
@@ -61,12 +62,12 @@ def broken_findings(assignment: Assignment, broken: Sequence[Broken]) -> Iterato
     """A fault for each group and reason, with all its variants and the range of the gaps."""
     by_reason: dict[str, list[Broken]] = defaultdict(list)
     for variant in broken:
-        by_reason[variant.error.told].append(variant)
-    for told, variants in by_reason.items():
+        by_reason[variant.error.template].append(variant)
+    for template, variants in by_reason.items():
         error = variants[0].error
         gaps = sorted(variant.error.gap_m for variant in variants if variant.error.gap_m is not None)
         same = not gaps or f"{gaps[0]:.6g}" == f"{gaps[-1]:.6g}"
-        message = error.message if same else told.replace("{gap}", f"{gaps[0]:.3g} to {gaps[-1]:.3g} m")
+        message = error.message if same else template.replace("{gap}", f"{gaps[0]:.3g} to {gaps[-1]:.3g} m")
         place = group_place(assignment, error.group)
         yield LintFinding("fault", error.code, *place, message, tuple(one.variant for one in variants))
 
@@ -99,9 +100,12 @@ def condition_findings(assignment: Assignment, plan: Plan, conditions: Condition
     variants, whole = plan.variants, mechanism_place(assignment)
     for node, sine in conditions.transmission.items():
         if np.any(weak := sine < LEAST_TRANSMISSION):
-            told = f"near a singular position: the sine of the transmission angle at {node} falls to"
-            message, meant = f"{told} {np.min(sine):.2g}", chosen(variants, weak)
-            yield LintFinding("warning", "transmission", *group_place(assignment, node), message, meant)
+            message = (
+                f"near a singular position: the sine of the transmission angle at {node} falls to"
+                f" {np.min(sine):.2g}"
+            )
+            place = group_place(assignment, node)
+            yield LintFinding("warning", "transmission", *place, message, chosen(variants, weak))
     for nodes, angle in _joined(conditions.crossing_deg).items():
         if np.any(flat := angle < LEAST_CROSSING_DEG):
             least = float(np.min(angle))
@@ -144,7 +148,7 @@ class Ties:
     Attributes
     ----------
     same : every node of every figure lies in the same place
-    passing : every asked vector of one would get full marks for the other
+    passing : every asked vector of either would get full marks for the other
     """
 
     same: Pairs
@@ -243,9 +247,9 @@ def tie_findings(plan: Plan, ties: Ties) -> Iterator[LintFinding]:
     if groups:
         members = sorted(index for group in groups for index in group)
         meant = tuple(variants[index] for index in members)
-        told = "; ".join(named([variants[index] for index in group]) for group in groups[:NAMED_GROUPS])
+        listed = "; ".join(named([variants[index] for index in group]) for group in groups[:NAMED_GROUPS])
         more = f" and {len(groups) - NAMED_GROUPS} more groups" if len(groups) > NAMED_GROUPS else ""
-        message = f"the same drawing within {SAME_MM:g} mm: {told}{more}"
+        message = f"the same drawing within {SAME_MM:g} mm: {listed}{more}"
         yield LintFinding("warning", "ties", "assignment", "$.variant", message, meant, names_them=True)
     count = len(variants)
     further = np.setdiff1d(ties.passing[0] * count + ties.passing[1], ties.same[0] * count + ties.same[1])

@@ -40,14 +40,21 @@ Title = Literal["Scales", "Mechanism", "Velocities", "Accelerations"]
 PLANS: dict[Title, str] = {"Velocities": "velocity_plan", "Accelerations": "acceleration_plan"}
 VALUE_UNITS = {"kv": "m/s", "ka": "m/s²"}
 MARGIN_MM = 15.0
+"""Inside the drawing frame, 10 mm, on all sides."""
 BOTTOM_MM = A3_MM[1] - MARGIN_MM
-ROW_MM = 5.6
+"""The lower end of the last row."""
 TITLE_MM, LETTER_MM, UNIT_MM = 4.4, 3.1, 2.7
+"""Heights of letters: of titles, of cells, of units."""
+ROW_MM = 5.6
+"""Height of a row: a line of letters and room between two lines."""
 CELL_GAP_MM = 3.0
+"""Between two columns of a block."""
 BLOCK_GAP_MM = 4.0
+"""Between two blocks."""
 HEAD_MM = 20.0
 """A table's title and its two lines of headings."""
 BETWEEN_MM = 8.0
+"""Between two tables on one page."""
 PAGE_ROWS = math.floor((BOTTOM_MM - MARGIN_MM - HEAD_MM) / ROW_MM)
 """Rows that a page has room for: a table is broken only where it has more."""
 STRIPE = "#f1f3f5"
@@ -55,7 +62,7 @@ GREY = "#5b6470"
 
 Page = tuple[Shape, ...]
 Tell = Callable[[int, int], None]
-"""How many drawings are done, of how many."""
+"""Called with the number of finished drawings and of all drawings."""
 
 
 # Columns ------------------------------------------------------------------------------------------
@@ -251,7 +258,7 @@ def _tables(assignment: Assignment, plan: Plan, words: Tongue) -> Iterator[_Tabl
         _Cells("", words.gettext(name), tuple(str(number) for number in numbers))
         for name, numbers in identity(plan.variants)
     )
-    free = A3_MM[0] - 2 * MARGIN_MM - sum(one.wide_mm for one in named)
+    free = A3_MM[0] - 2 * MARGIN_MM - sum(cells.wide_mm for cells in named)
     title = assignment.file.title.in_language(words.lang)
     for section in sections_of(plan):
         heading = f"{title} ({assignment.id}). {words.gettext(section.title)}"
@@ -266,7 +273,7 @@ def _spread(
     used = 0.0
     for columns in section.blocks:
         block = tuple(_column(column, assignment, words) for column in columns)
-        wide = BLOCK_GAP_MM + sum(one.wide_mm for one in block)
+        wide = BLOCK_GAP_MM + sum(cells.wide_mm for cells in block)
         if taken and used + wide > free:
             yield taken
             taken, used = [], 0.0
@@ -292,7 +299,7 @@ def _column(column: Column, assignment: Assignment, words: Tongue) -> _Cells:
 def _drawn(table: _Table, rows: range, y: float) -> Iterator[Shape]:
     """So many rows of a table, from a height down."""
     top = y + HEAD_MM
-    wide = sum(one.wide_mm for one in (*table.named, *(one for block in table.blocks for one in block)))
+    wide = sum(cells.wide_mm for block in (table.named, *table.blocks) for cells in block)
     right = MARGIN_MM + wide + BLOCK_GAP_MM * len(table.blocks)
     yield Label((MARGIN_MM, y + TITLE_MM), table.title, TITLE_MM)
     for line in range(1, len(rows), 2):

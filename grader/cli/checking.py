@@ -3,10 +3,8 @@
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal
 
 import typer
-from pydantic import BaseModel
 from rich.console import Console
 from rich.table import Table
 
@@ -16,73 +14,21 @@ from grader.authoring.round_scales import WELL_READ_MM, Proposal, ends_of, ratio
 from grader.cli.app import check_language, new_table
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.documents import (
-    SCHEMA_VERSION,
-    CalibrationDocument,
-    LintDocument,
-    LintLeast,
-    LintVariant,
-    LintWorst,
-    MeasurementsDocument,
-    PlanDocument,
-    ReadingDocument,
-    ReportDocument,
-    ResultsDocument,
-)
+from grader.documents import LintLeast, LintVariant, LintWorst
 from grader.feedback.sentences import mistake_feedback, reason_sentence
 from grader.files import write_whole
 from grader.inputs.measurements import Measurements, names_of, read_measurements
 from grader.language import Tongue, tongue
-from grader.lms.canvas import CanvasMarksDocument
-from grader.lms.moodle_guide import MoodleMarksDocument, MoodleRubricDocument
-from grader.lms.scores import GradescopeDocument, LtiDocument
 from grader.marking.mark import judge
-from grader.marking.self_check import LEVELS, Checked, Level, is_all_right, likely_mistakes, told
+from grader.marking.self_check import LEVELS, Checked, Level, checked_values, is_all_right, likely_mistakes
 from grader.outcomes import NamedMistake, Quantity
 from grader.rubric import RubricFile, load_rubric, rubric_of
-from reference.authored.assignment import Assignment, AssignmentFile, Variant, load_assignment
-from reference.authored.mechanism import MechanismFile
+from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.drawing.canvas import Label
 from reference.drawing.canvas import svg as as_svg
 from reference.drawing.sheets import FRAME, reference_drawing
 from reference.errors import CallError
 from reference.geometry import FloatArray
-
-MODELS: dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]] = {
-    "measurements": (MeasurementsDocument, "validation"),
-    "reading": (ReadingDocument, "serialization"),
-    "report": (ReportDocument, "serialization"),
-    "results": (ResultsDocument, "serialization"),
-    "plan": (PlanDocument, "serialization"),
-    "lint": (LintDocument, "serialization"),
-    "calibration": (CalibrationDocument, "serialization"),
-    "moodle-rubric": (MoodleRubricDocument, "serialization"),
-    "moodle-marks": (MoodleMarksDocument, "serialization"),
-    "canvas-marks": (CanvasMarksDocument, "serialization"),
-    "gradescope": (GradescopeDocument, "serialization"),
-    "lti": (LtiDocument, "serialization"),
-    "mechanism": (MechanismFile, "validation"),
-    "assignment": (AssignmentFile, "validation"),
-    "rubric": (RubricFile, "validation"),
-}
-
-
-def schema_names() -> list[str]:
-    """The names that `schema` knows."""
-    return list(MODELS)
-
-
-def schema(name: str) -> dict[str, Any]:
-    """The JSON Schema (draft 2020-12) of a document or authored file; CallError for an unknown name."""
-    if name not in MODELS:
-        raise CallError("unknown_schema", f"there is no schema '{name}': known are {', '.join(MODELS)}")
-    model, mode = MODELS[name]
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": f"urn:planmark:{name}:{SCHEMA_VERSION}",
-        **model.model_json_schema(mode=mode),
-    }
-
 
 SHOWN_ROWS = 40
 """More variants than that are told in ranges."""
@@ -118,14 +64,14 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
 
 
 def _variants_table(rows: Sequence[LintVariant]) -> Table:
-    figures = (
+    heads = (
         "transmis-\nsion sine",
         "crossing\ndegrees",
         "shortest\nasked mm",
         "under\n8 mm",
         "fits\ntimes",
     )
-    table = new_table("variant", "assembles", *figures, left=("assembles",))
+    table = new_table("variant", "assembles", *heads, left=("assembles",))
     table.columns[0].no_wrap = True
     for group in _ranges(rows):
         broken = [row for row in group if row.problem]
@@ -277,7 +223,7 @@ def check_measured(
             _write_page(page, assignment, rubric, variant, entered, lang, wanted)
         submission = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
         judgement = judge(task_of(assignment, rubric, variant), submission)
-        checked = told(judgement, wanted)
+        checked = checked_values(judgement, wanted)
         _tell(console, checked, wanted, words, assignment)
         _tell_mistakes(console, likely_mistakes(judgement, wanted), lang, assignment)
         all_right = all_right and is_all_right(checked) and bool(checked) and not entered.problems

@@ -158,9 +158,9 @@ def schema(name: Annotated[str, typer.Argument(help="report, results, reading, m
     """The JSON Schema of a document or authored file."""
     import json
 
-    from grader.cli import checking
+    from grader.cli import exporting
 
-    typer.echo(json.dumps(checking.schema(name), indent=2, ensure_ascii=False))
+    typer.echo(json.dumps(exporting.schema(name), indent=2, ensure_ascii=False))
 
 
 @app.command()

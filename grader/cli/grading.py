@@ -14,7 +14,7 @@ from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, Resu
 from grader.feedback.class_page import CAUSES, SIGNS, waiting
 from grader.files import samples_folder
 from grader.folder.batch import Batch, grade, needs_person
-from grader.folder.changes import told_standing
+from grader.folder.changes import standing_text
 from grader.folder.workers import Limits, Workers, result_of
 from grader.marking.report import reading_document
 from grader.pipeline import open_page, read_pages
@@ -151,10 +151,12 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
     typer.echo(f"{len(results.reports)} submissions: {told or 'none'}")
     page = out / "index.html"
-    _list(f"Moved since the last run: {len(results.moved)}", [_moved(one) for one in results.moved], page)
+    _list(
+        f"Moved since the last run: {len(results.moved)}", [_change_line(one) for one in results.moved], page
+    )
     _list(
         "Look alike (no accusation; hold both beside each other):",
-        [_alike(one) for one in results.alike],
+        [_similar_line(one) for one in results.alike],
         page,
     )
     _list("A person must look at:", list(_waiting(results)), page)
@@ -175,7 +177,7 @@ def _waiting(results: ResultsDocument) -> Iterator[str]:
     for one in results.unmatched:
         yield f"{one.file}{'' if one.page is None else f'#{one.page}'}: {one.message}"
     for wait in waiting(results):
-        report = results.reports[wait.index]
+        report = wait.report
         count = f"{len(wait.criteria)} {'criterion' if len(wait.criteria) == 1 else 'criteria'}"
         about = f", {count}, {wait.points:.4g} points at stake" if wait.criteria else ""
         problem = f"; {report.problems[0].message}" if report.problems else ""
@@ -187,24 +189,24 @@ def _waiting(results: ResultsDocument) -> Iterator[str]:
             yield f"{_who(report.student_id, report.position)}: missing{problem}"
 
 
-def _moved(one: MovedDocument) -> str:
+def _change_line(change: MovedDocument) -> str:
     """A student's standing before and now, why, and the criteria."""
-    parts = [f"{told_standing(one.before)} -> {told_standing(one.after)}"]
-    if one.before is not None and one.after is not None:
-        parts += [", ".join(CAUSES[cause] for cause in one.why)]
+    parts = [f"{standing_text(change.before)} -> {standing_text(change.after)}"]
+    if change.before is not None and change.after is not None:
+        parts += [", ".join(CAUSES[cause] for cause in change.why)]
     criteria = [
         f"{each.id} {(each.before or '-').replace('_', ' ')} -> {(each.after or '-').replace('_', ' ')}"
-        for each in one.criteria[:CRITERIA]
+        for each in change.criteria[:CRITERIA]
     ]
-    more = len(one.criteria) - CRITERIA
+    more = len(change.criteria) - CRITERIA
     parts += [", ".join([*criteria, *([f"{more} more"] if more > 0 else [])])]
-    return f"{_who(one.student_id, one.position)}: {'; '.join(part for part in parts if part)}"
+    return f"{_who(change.student_id, change.position)}: {'; '.join(part for part in parts if part)}"
 
 
-def _alike(one: AlikeDocument) -> str:
-    who = ", ".join(_who(*key) for key in zip(one.students, one.positions, strict=True))
-    chance = "" if one.measure is None else f" ({one.measure:.1g} such pairs by chance)"
-    return f"{who}: {'; '.join(SIGNS[sign] for sign in one.why)}{chance}"
+def _similar_line(pair: AlikeDocument) -> str:
+    who = ", ".join(_who(*key) for key in zip(pair.students, pair.positions, strict=True))
+    chance = "" if pair.measure is None else f" ({pair.measure:.1g} such pairs by chance)"
+    return f"{who}: {'; '.join(SIGNS[sign] for sign in pair.why)}{chance}"
 
 
 def _who(student: str, position: int | None) -> str:

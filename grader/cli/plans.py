@@ -14,7 +14,7 @@ import typer
 from grader.authoring.variant_checks import broken_findings, broken_variants
 from grader.authoring.variant_table import class_csv
 from grader.cli.app import check_language, new_table, progress
-from grader.cycle.quantities import Extreme, Selection, Subject, cycle_csv, extremes, strokes_of
+from grader.cycle.quantities import CycleSubject, Extreme, Selection, cycle_csv, extremes, strokes_of
 from grader.files import write_whole
 from grader.language import Tongue, tongue
 from grader.solution.document import plan_document, plan_documents
@@ -86,7 +86,7 @@ def _sound(assignment: Assignment) -> list[Variant]:
     without = {one.variant for one in broken}
     if len(without) == len(variants):
         error = broken[0].error
-        told = f"no variant can be solved; {variants[0]}: {error.told}"
+        told = f"no variant can be solved; {variants[0]}: {error.template}"
         raise MechanismError(error.code, told, group=error.group, gap_m=error.gap_m)
     for finding in broken_findings(assignment, broken):
         typer.secho(f"left out: {finding}", err=True, fg="red")
@@ -101,13 +101,13 @@ def _print_pages(assignment: Assignment, plan: Plan, pdf: Path, *, drawings: boo
     words = tongue(lang)
     pages = table_pages(assignment, plan, words)
     if drawings:
-        with _told(len(plan.variants) >= LONG) as tell:
+        with _drawing_progress(len(plan.variants) >= LONG) as tell:
             pages = class_pages(pages, assignment, plan, wording_of(words), tell)
     write_whole(pdf, as_pdf(numbered(pages), f"{assignment.file.title.in_language(lang)} ({assignment.id})"))
 
 
 @contextmanager
-def _told(is_long: bool) -> "Iterator[Tell | None]":
+def _drawing_progress(is_long: bool) -> "Iterator[Tell | None]":
     if not is_long:
         yield None
         return
@@ -154,7 +154,7 @@ def show_cycle(
     words = tongue(lang)
     assignment = load_assignment(name)
     variant = assignment.variant(n, position)
-    subject = Subject(cycle(assignment.mechanism([variant]), samples))
+    subject = CycleSubject(cycle(assignment.mechanism([variant]), samples))
     selection = subject.select([part.strip() for text in of for part in text.split(",") if part.strip()])
     drawn_in = {kind: file for kind, file in (("svg", svg), ("pdf", pdf)) if file is not None}
     diagrams = _diagrams(assignment, variant, subject, selection, words, list(drawn_in))
@@ -171,7 +171,7 @@ def show_cycle(
 def _diagrams(
     assignment: Assignment,
     variant: Variant,
-    subject: Subject,
+    subject: CycleSubject,
     selection: Selection,
     words: Tongue,
     formats: list[str],
@@ -189,7 +189,7 @@ def _diagrams(
     return cycle_diagram(subject, selection, Setting(assignment, variant, words), formats)
 
 
-def _print(assignment: Assignment, variant: Variant, subject: Subject, selection: Selection) -> None:
+def _print(assignment: Assignment, variant: Variant, subject: CycleSubject, selection: Selection) -> None:
     """The range, strokes, and the extremes of the selected quantities."""
     from rich.console import Console
 
@@ -209,8 +209,8 @@ def _print(assignment: Assignment, variant: Variant, subject: Subject, selection
             table.add_row(quantity.name, unit, "constant", "", "", "", f"{told:.6g}")
             continue
         cells = (
-            *_cycle_text(subject, least, size),
-            *_cycle_text(subject, largest, size),
+            *_extreme_cells(subject, least, size),
+            *_extreme_cells(subject, largest, size),
             f"{here + 0.0:.6g}",
         )
         table.add_row(quantity.name, unit, *cells)
@@ -220,7 +220,7 @@ def _print(assignment: Assignment, variant: Variant, subject: Subject, selection
     console.print("every position: --csv FILE; as a diagram: --svg FILE, --pdf FILE", style="dim")
 
 
-def _path_rows(subject: Subject, point: str, table: "Table") -> None:
+def _path_rows(subject: CycleSubject, point: str, table: "Table") -> None:
     """How far a point's path reaches each way, by its samples."""
     place = np.broadcast_to(subject.cycle.motion.position[point], subject.cycle.driven.shape)
     here = complex(subject.motion_at(np.array([subject.cycle.start])).position[point][0])
@@ -234,7 +234,7 @@ def _path_rows(subject: Subject, point: str, table: "Table") -> None:
         table.add_row(f"{axis}_{point}", "m", *cells, f"{own + 0.0:.6g}")
 
 
-def _cycle_text(subject: Subject, extreme: Extreme, size: float) -> tuple[str, str]:
+def _extreme_cells(subject: CycleSubject, extreme: Extreme, size: float) -> tuple[str, str]:
     value = extreme.value if abs(extreme.value) > ZERO * size else 0.0
     if math.isinf(value):
         text = "∞" if value > 0.0 else "-∞"
@@ -243,19 +243,19 @@ def _cycle_text(subject: Subject, extreme: Extreme, size: float) -> tuple[str, s
     return text, ", ".join(_number(subject, at) for at in extreme.at)
 
 
-def _at(subject: Subject, driven: float) -> str:
+def _at(subject: CycleSubject, driven: float) -> str:
     """A driven coordinate with its unit."""
     return f"{_number(subject, driven)} {'deg' if subject.cycle.is_turned else 'mm'}"
 
 
-def _number(subject: Subject, driven: float) -> str:
+def _number(subject: CycleSubject, driven: float) -> str:
     """A driven coordinate in degrees or millimetres, without a minus zero."""
     if subject.cycle.is_turned:
         return f"{round(math.degrees(driven), 2) + 0.0:.2f}"
     return f"{round(1e3 * driven, 3) + 0.0:.3f}"
 
 
-def _range(subject: Subject) -> Iterator[str]:
+def _range(subject: CycleSubject) -> Iterator[str]:
     """How far the driven link goes, what stops it, and what it passes."""
     found = subject.cycle
     what = "crank" if found.is_turned else "driven slider"
@@ -281,7 +281,7 @@ def _range(subject: Subject) -> Iterator[str]:
         yield f"flat position of {node} at {' and '.join(places)}: passed smoothly, nothing is told in it"
 
 
-def _strokes(subject: Subject) -> Iterator[str]:
+def _strokes(subject: CycleSubject) -> Iterator[str]:
     """What goes to and fro."""
     for stroke in strokes_of(subject):
         whose = f"link {stroke.name}" if stroke.is_angle else stroke.name

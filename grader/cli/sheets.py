@@ -14,7 +14,7 @@ from grader.cli.app import check_language, progress
 from grader.documents import CalibrationDocument
 from grader.files import write_whole
 from grader.folder.cache import PageCache
-from grader.folder.draft_roster import SURE, Thumbnail, contact_sheet, draft_csv, suggest, thumbnail
+from grader.folder.draft_roster import SURE, contact_sheet, draft_csv, suggest, thumbnail
 from grader.folder.inventory import submissions, survey_folder
 from grader.folder.workers import Limits, Workers, result_of
 from grader.inputs.measurements import names_of
@@ -44,7 +44,7 @@ def calibrate_scans(scans: Sequence[Path], svg: Path | None, *, as_json: bool) -
                 continue
             found.append(one)
             if not as_json:
-                _tell(one)
+                _print_page(one)
     if as_json:
         typer.echo(json.dumps([one.model_dump(mode="json") for one in found], indent=2))
     if svg is not None and found:
@@ -53,18 +53,18 @@ def calibrate_scans(scans: Sequence[Path], svg: Path | None, *, as_json: bool) -
     return unread or any(one.advice != [_FIT] for one in found)
 
 
-def _tell(one: CalibrationDocument) -> None:
-    typer.echo(f"{one.source}, page {one.page}")
-    if one.scale_x is not None and one.scale_y is not None and one.scale_se is not None:
-        se = f"\N{PLUS-MINUS SIGN} {100.0 * one.scale_se:.3f}"
-        along, across = 100.0 * one.scale_x, 100.0 * one.scale_y
+def _print_page(page: CalibrationDocument) -> None:
+    typer.echo(f"{page.source}, page {page.page}")
+    if page.scale_x is not None and page.scale_y is not None and page.scale_se is not None:
+        se = f"\N{PLUS-MINUS SIGN} {100.0 * page.scale_se:.3f}"
+        along, across = 100.0 * page.scale_x, 100.0 * page.scale_y
         typer.echo(f"  scale along the sheet {along:.3f} %, across it {across:.3f} % ({se})")
-    if one.unequal is not None:
+    if page.unequal is not None:
         typer.echo(
-            f"  unequal scale {100.0 * one.unequal:+.3f} %, right angles off by {one.skew_deg:+.3f} degrees"
+            f"  unequal scale {100.0 * page.unequal:+.3f} %, right angles off by {page.skew_deg:+.3f} degrees"
         )
-    typer.echo(f"  markers off an even map by {one.residual_mm:.3f} mm")
-    seen = one.segments
+    typer.echo(f"  markers off an even map by {page.residual_mm:.3f} mm")
+    seen = page.segments
     typer.echo(f"  {seen.read} of {seen.printed} segments read")
     if seen.length_rms_mm is not None:
         mean, rms, worst = seen.length_mean_mm, seen.length_rms_mm, seen.length_worst_mm
@@ -73,7 +73,7 @@ def _tell(one: CalibrationDocument) -> None:
         )
         turn, place = seen.direction_rms_deg, seen.place_rms_mm
         typer.echo(f"  directions {turn:.3f} degrees rms, places {place:.3f} mm rms")
-    for line in one.advice:
+    for line in page.advice:
         typer.echo(f"  {line}")
 
 
@@ -185,7 +185,7 @@ def _strokes(cache: PageCache, ref: PageRef) -> FloatArray | None:
     return None if ink is None else ink.strokes.ends
 
 
-def _thumbnail(cache: PageCache, ref: PageRef) -> Thumbnail:
+def _thumbnail(cache: PageCache, ref: PageRef) -> bytes:
     page = cache.page(ref)
     if page.backdrop is None:
         raise InputFileError(page.problems[0].code, page.problems[0].message)

@@ -5,53 +5,48 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from grader.comparison.evidence import Evidence
-from grader.comparison.follow_through import NO_SPREAD, Expectation, Following, scaled
-from grader.comparison.own import Sketch
+from grader.comparison.follow_through import NO_SPREAD, Expectation, Explain, FollowThrough, scaled
+from grader.comparison.own import known
 from grader.comparison.scales import Scale, followed_scales, used_scales
-from grader.comparison.task import Segment, Task
-from grader.comparison.verdicts import FULL, NONE, Mark, the_better
+from grader.comparison.task import Task, TaskSegment
+from grader.comparison.verdicts import FULL, NONE, MarkRange, the_better
 from grader.outcomes import Reason
 from grader.records import MECHANISM
 from reference.construction.steps import Given
-from reference.construction.uncertainty import Spread, spread
+from reference.construction.uncertainty import EndSpread, spread
 
 
 class Against(Protocol):
     """Marks a criterion against one expectation."""
 
-    def __call__(self, expected: complex, reach: Spread = NO_SPREAD, se: Spread = NO_SPREAD) -> Mark:
+    def __call__(
+        self, expected: complex, reach: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
+    ) -> MarkRange:
         """The mark; `reach` is how far a careful hand may miss it, `se` its standard errors."""
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class Marked:
     """A mark with what it was held against."""
 
-    mark: Mark
+    mark: MarkRange
     expected: complex
-    reach: Spread = NO_SPREAD
+    reach: EndSpread = NO_SPREAD
     is_followed: bool = False
 
 
-def open_ledger(
-    task: Task, evidence: Evidence, settled: Mapping[str, Scale], drawn_by: Sketch | None = None
-) -> "Ledger":
-    """The ledger of a submission before anything is marked.
-
-    Arguments: `drawn_by` is what the plans were drawn by instead, where that is known.
-    """
+def new_charges(task: Task, evidence: Evidence, settled: Mapping[str, Scale], explain: Explain) -> "Charges":
+    """The charges of a submission before anything is marked."""
     used, followed = used_scales(settled), followed_scales(settled)
-    following = Following(task, evidence, used, followed)
-    if drawn_by is not None:
-        following.sketch.append(drawn_by)
-    ledger = Ledger(task, evidence, settled, used, followed, following)
+    following = FollowThrough(task, evidence, used, followed, lambda: explain(task, evidence, settled))
+    charges = Charges(task, evidence, settled, used, followed, following)
     # What was drawn contradicts a scale that nobody declared, or that nobody understood.
-    ledger.doubtful.update(name for name, scale in settled.items() if scale.other and scale.used.assumed)
-    return ledger
+    charges.doubtful.update(name for name, scale in settled.items() if scale.other and scale.used.assumed)
+    return charges
 
 
-@dataclass(frozen=True, slots=True)
-class Ledger:
+@dataclass(slots=True)
+class Charges:
     """What has been charged while criteria are marked in the order of construction.
 
     What relies on a wrong node or scale may follow through only when that mistake has cost something:
@@ -66,7 +61,7 @@ class Ledger:
     settled: Mapping[str, Scale]
     used: Mapping[str, float]
     followed: Mapping[str, float]
-    following: Following
+    following: FollowThrough
     charged: set[str] = field(default_factory=set)
     cleared: set[str] = field(default_factory=set)
     by_length: set[str] = field(default_factory=set)
@@ -78,68 +73,75 @@ class Ledger:
     factors: dict[str, float | None] = field(default_factory=dict)
     """By scale, the factor by which all values are off, where that was looked for."""
 
-    def best(self, segment: Segment, against: Against, *, follows_through: bool) -> Found:
+    def best(self, segment: TaskSegment, against: Against, *, follows_through: bool) -> Marked:
         """The mark on the original data, or a better one on what follows from own earlier values."""
         self.charge_shown()
         exact = segment.drawn(self.used)
-        found = Found(against(exact), exact)
-        if not found.mark.is_full:
+        marked = Marked(against(exact), exact)
+        if not marked.mark.is_full:
             reach = self.following.whole_reach(segment, exact)
-            found = Found(against(exact, reach), exact, reach)
-        if not found.mark.is_full and follows_through:
-            found = self.followed_through(segment, against, found)
+            marked = Marked(against(exact, reach), exact, reach)
+        if not marked.mark.is_full and follows_through:
+            marked = self.followed_through(segment, against, marked)
         self.charge_shown()
-        self.remember(segment.head, found.mark)
+        self.remember(segment.head, marked.mark)
         if self.is_by_length(segment):
             self.by_length.add(segment.head)
-        if found.is_followed and found.mark.is_full:
+        if marked.is_followed and marked.mark.is_full:
             self.inherited.add(segment.head)
-        return found
+        return marked
 
     def charge_shown(self) -> None:
         """What the last criterion was the first to show has cost something from now on."""
         self.charged.update(self.shown)
         self.shown.clear()
 
-    def followed_through(self, segment: Segment, against: Against, original: Found) -> Found:
+    def followed_through(self, segment: TaskSegment, against: Against, original: Marked) -> Marked:
         """The best of what follows: from the scale drawn at, from own nodes, from anything else."""
-        found, following = original, self.following
+        marked, following = original, self.following
         at_scale = following.at_followed_scale(segment)
         if at_scale is not None:
-            found = self.the_better(found, at_scale, against)
-        if not found.mark.is_full:
-            found = self.from_own_nodes(segment, against, found, original)
-        if not found.mark.is_full:
-            for one in following.expectations(segment):
-                if not following.is_trivial(segment, one.vector):
-                    found = self.the_better(found, one, against)
-        return found
+            marked = self.the_better(marked, at_scale, against)
+        if not marked.mark.is_full:
+            marked = self.from_own_nodes(segment, against, marked, original)
+        if not marked.mark.is_full:
+            for expectation in following.expectations(segment):
+                if not following.is_trivial(segment, expectation.vector):
+                    marked = self.the_better(marked, expectation, against)
+        return marked
 
-    def from_own_nodes(self, segment: Segment, against: Against, found: Found, original: Found) -> Found:
+    def from_own_nodes(
+        self, segment: TaskSegment, against: Against, marked: Marked, original: Marked
+    ) -> Marked:
         """The mark by the nodes that this step started from, where they are known."""
-        one = self.following.from_nodes(segment, self.used)
-        if not one.relies_on:
-            return found
-        if self.wrong(one.relies_on):
-            is_trivial = self.following.is_trivial(segment, one.vector)
-            return found if is_trivial else self.the_better(found, one, against)
+        expectation = self.following.from_nodes(segment, self.used)
+        if not expectation.relies_on:
+            return marked
+        if self.wrong(expectation.relies_on):
+            is_trivial = self.following.is_trivial(segment, expectation.vector)
+            return marked if is_trivial else self.the_better(marked, expectation, against)
         # Every earlier step is within what a hand may miss: this step alone counts.
-        mark = against(one.vector, one.reach, one.se)
-        if not mark.is_better(found.mark):
-            return found
+        mark = against(expectation.vector, expectation.reach, expectation.se)
+        if not mark.is_better(marked.mark):
+            return marked
         reasons = () if mark.is_full else original.mark.reasons
-        return replace(original, mark=Mark(mark.share, mark.worst, mark.best, reasons))
+        return replace(original, mark=MarkRange(mark.share, mark.worst, mark.best, reasons))
 
-    def the_better(self, found: Found, one: Expectation, against: Against) -> Found:
+    def the_better(self, marked: Marked, expectation: Expectation, against: Against) -> Marked:
         """What was found so far, or what follows where that leaves more."""
-        candidate = self.allowed(one.relies_on, against(one.vector, one.reach, one.se))
-        if not candidate.is_better(found.mark):
-            return found
-        return Found(
-            the_better(candidate, found.mark, *self.why(one)), one.vector, one.reach, is_followed=True
+        candidate = self.allowed(
+            expectation.relies_on, against(expectation.vector, expectation.reach, expectation.se)
+        )
+        if not candidate.is_better(marked.mark):
+            return marked
+        return Marked(
+            the_better(candidate, marked.mark, *self.why(expectation)),
+            expectation.vector,
+            expectation.reach,
+            is_followed=True,
         )
 
-    def opened(self, segment: Segment, mark: Mark, *, follows_through: bool) -> Mark:
+    def opened(self, segment: TaskSegment, mark: MarkRange, *, follows_through: bool) -> MarkRange:
         """A loss on a sheet is open while what it may follow from was not read for certain."""
         unknown = self.unknown_upstream(segment) if follows_through else ()
         if mark.is_full or not unknown:
@@ -147,9 +149,9 @@ class Ledger:
         self.charged.discard(segment.head)
         self.doubtful.add(segment.head)
         told = f"{', '.join(unknown)}, on which it hangs, was not read for certain"
-        return Mark(mark.share, mark.worst, FULL, (*mark.reasons, Reason("unread", {"reason": told})))
+        return MarkRange(mark.share, mark.worst, FULL, (*mark.reasons, Reason("unread", {"reason": told})))
 
-    def unknown_upstream(self, segment: Segment) -> tuple[str, ...]:
+    def unknown_upstream(self, segment: TaskSegment) -> tuple[str, ...]:
         """The nodes that a vector's head is made from and that were not read, of figures that were."""
         construction, nodes = self.task.construction, self.evidence.nodes
         needs = [need for need in construction.step(segment.head).needs if need not in nodes]
@@ -181,7 +183,7 @@ class Ledger:
         reach = scaled(spread(task.traced(self.used).nodes[node].moved, off), task.rubric.hand.sigmas)
         return abs(off) > reach.along
 
-    def is_by_length(self, segment: Segment) -> bool:
+    def is_by_length(self, segment: TaskSegment) -> bool:
         """Whether only the length is known of a vector that is laid off: its sense may be wrong."""
         drawn = self.evidence.vector(segment.name)
         is_laid_off = isinstance(self.task.construction.step(segment.head), Given)
@@ -200,22 +202,22 @@ class Ledger:
         """What is wrong of the nodes and scales relied on: off, and not judged to be within tolerance."""
         blamed = relies_on & (self.charged | self.inherited)
         open_ones = relies_on - blamed - (self.cleared - self.by_length)
-        nodes = self.following.names(self.following.own(self.used)) | self.evidence.nodes.keys()
+        nodes = known(self.following.own(self.used)) | self.evidence.nodes.keys()
         return blamed | {name for name in open_ones if name not in nodes or self.is_off(name)}
 
-    def allowed(self, relies_on: frozenset[str], mark: Mark) -> Mark:
+    def allowed(self, relies_on: frozenset[str], mark: MarkRange) -> MarkRange:
         """Credit for following only where the earlier mistake has been charged; else it is charged here."""
         wrong = self.wrong(relies_on)
         has_doubtful_scale = bool(wrong & self.doubtful & self.settled.keys())
         if not wrong or (wrong & (self.charged | self.inherited) and not has_doubtful_scale):
             return mark
         if wrong & self.doubtful:
-            return Mark(NONE, NONE, mark.best, mark.reasons)
+            return MarkRange(NONE, NONE, mark.best, mark.reasons)
         if mark.is_full:
             self.shown.update(wrong)
-        return Mark(NONE, NONE, NONE, mark.reasons)
+        return MarkRange(NONE, NONE, NONE, mark.reasons)
 
-    def remember(self, name: str, mark: Mark) -> None:
+    def remember(self, name: str, mark: MarkRange) -> None:
         """Whether a node or scale has cost something, or may have, or is right."""
         if not mark.is_certain:
             self.doubtful.add(name)
@@ -235,14 +237,20 @@ class Ledger:
 
     # Why ------------------------------------------------------------------------------------------
 
-    def why(self, one: Expectation) -> tuple[Reason, ...]:
+    def why(self, expectation: Expectation) -> tuple[Reason, ...]:
         """What an expectation follows from, and that its scale is not known where it is not."""
-        follows = Reason("follows", {"what": one.what, "of": one.of or self.named(one)})
-        assumed = self.settled[one.of].reasons if one.what == "scale" and one.of in self.doubtful else ()
+        follows = Reason(
+            "follows", {"what": expectation.what, "of": expectation.of or self.named(expectation)}
+        )
+        assumed = (
+            self.settled[expectation.of].reasons
+            if expectation.what == "scale" and expectation.of in self.doubtful
+            else ()
+        )
         return (*assumed, follows)
 
-    def named(self, one: Expectation) -> str:
+    def named(self, expectation: Expectation) -> str:
         """The last vector charged that an expectation relies on, or the mechanism."""
-        blamed = one.relies_on & (self.charged | self.doubtful)
+        blamed = expectation.relies_on & (self.charged | self.doubtful)
         names = [v.name for v in self.task.construction.vectors.values() if v.head in blamed]
         return names[-1] if names else "mechanism"

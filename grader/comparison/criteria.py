@@ -15,17 +15,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from grader.comparison import verdicts
-from grader.comparison.charges import Against, Found, Ledger, open_ledger
+from grader.comparison.charges import Against, Charges, Marked, new_charges
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
-from grader.comparison.follow_through import NO_SPREAD
-from grader.comparison.own import Sketch
-from grader.comparison.scales import settle
-from grader.comparison.task import Segment, Task, unit_of
+from grader.comparison.follow_through import NO_SPREAD, Explain, ReplayResult, nothing_explained
+from grader.comparison.scales import Scale, settle
+from grader.comparison.task import Task, TaskSegment, unit_of
 from grader.comparison.verdicts import (
     ALL_RIGHT,
     FULL,
     NONE,
-    Mark,
+    MarkRange,
     left_open,
     mark_value,
     mark_vector,
@@ -40,65 +39,7 @@ from grader.rubric import CriterionTable, ToleranceTable
 from reference.construction.elements import Normal
 from reference.construction.graph import AngularRate
 from reference.construction.steps import Given
-from reference.construction.uncertainty import Spread
-
-
-def absent(ledger: Ledger, criterion: CriterionTable, expected: Quantity) -> Outcome:
-    """The outcome of a criterion that there is nothing to hold against."""
-    unread = _why_unread(ledger, criterion)
-    reason = Reason("not_measured") if unread is None else Reason("unread", {"reason": unread})
-    if criterion.optional:
-        return verdicts.unjudged(criterion, "not_judged", (Reason("optional"), reason), expected=expected)
-    if criterion.link is not None and not ledger.evidence.has_sketch:
-        # Links are drawn, not measured: without a sketch that was read nothing is asked of them.
-        return verdicts.unjudged(criterion, "not_judged", (reason,), expected=expected)
-    least, length = ledger.task.rubric.tolerance_of(criterion).least_mm, expected.length_mm
-    if length is not None and length < least:
-        short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
-        return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
-    segment = ledger.task.segments.get(criterion.name)
-    if segment is not None:
-        # Later criteria may hang on what nobody has seen.
-        ledger.doubtful.add(segment.head)
-    verdict = ledger.task.rubric.missing if unread is None else "review"
-    return verdicts.unjudged(criterion, verdict, (reason,), expected=expected)
-
-
-def _why_unread(ledger: Ledger, criterion: CriterionTable) -> str | None:
-    """Why a vector or link was not read, None where no sheet could show it."""
-    segment, evidence = ledger.task.segments.get(criterion.name), ledger.evidence
-    if segment is None or not evidence.has_sheets:
-        return None
-    for name in (segment.name, segment.head, segment.tail):
-        if name in evidence.unread:
-            return evidence.unread[name]
-    return f"{segment.name} was not found on the sheets"
-
-
-def held_against_written(
-    mark: Mark,
-    drawn: DrawnVector,
-    written: tuple[float, float] | None,
-    tolerance: ToleranceTable,
-    least: float,
-) -> Mark:
-    """The mark, open where the two lengths contradict each other: a person must look.
-
-    Either the drawing is misread, or the cells, or the student has measured something else; nothing
-    here says which. A ruler errs by no more than the tolerance of a length.
-
-    Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
-    `least` the probability from which it counts.
-    """
-    if written is None or written[1] < least:
-        return mark
-    length_mm = written[0]
-    allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
-    if abs(drawn.length_mm - length_mm) <= allowed:
-        return mark
-    told: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
-    return open_between(NONE, FULL, mark, Reason("written_disagrees", told))
-
+from reference.construction.uncertainty import EndSpread
 
 SO_MANY = 3
 """Values that are off by one factor were made with a wrong scale; fewer may be so by chance."""
@@ -109,18 +50,18 @@ HALF = 0.5
 
 
 def mark_of_value(
-    ledger: Ledger, criterion: CriterionTable, value: float, found: Found, drawn: DrawnVector
-) -> Mark | None:
+    charges: Charges, criterion: CriterionTable, value: float, marked: Marked, drawn: DrawnVector
+) -> MarkRange | None:
     """The mark on a computed value beside its drawing; None where it is right, or right by the drawing.
 
     A wrong value costs only the value: what the rubric's nearest band takes. A wrong factor in all
     values of a scale costs once.
     """
-    one, table = ledger.task.segments[criterion.name], ledger.task.rubric.tolerance_of(criterion)
-    scale = ledger.used[one.scale]
-    rights = [abs(one.real), abs(found.expected) * scale, drawn.length_mm * scale]
-    factor = common_factor(ledger, one.scale)
-    if factor is not None and _is_charged(ledger, one.scale):
+    one, table = charges.task.segments[criterion.name], charges.task.rubric.tolerance_of(criterion)
+    scale = charges.used[one.scale]
+    rights = [abs(one.real), abs(marked.expected) * scale, drawn.length_mm * scale]
+    factor = common_factor(charges, one.scale)
+    if factor is not None and _is_charged(charges, one.scale):
         rights += [right * factor for right in rights]
     limits = [table.length_at(right / scale) * scale for right in rights]
     marks = [
@@ -131,111 +72,248 @@ def mark_of_value(
     if best.is_full:
         return None
     if factor is not None:
-        ledger.charged.add(_name(one.scale))
+        charges.charged.add(_name(one.scale))
     keeps = max(best.share, table.all_bands[0][1] if table.all_bands else HALF)
-    return Mark(keeps, keeps, keeps, best.reasons)
+    return MarkRange(keeps, keeps, keeps, best.reasons)
 
 
-def common_factor(ledger: Ledger, scale: str) -> float | None:
+def common_factor(charges: Charges, scale: str) -> float | None:
     """The factor by which all values of a scale are off, where they are off by one."""
-    if scale not in ledger.factors:
-        ledger.factors[scale] = _common_factor(ledger, scale)
-    return ledger.factors[scale]
+    if scale not in charges.factors:
+        charges.factors[scale] = _common_factor(charges, scale)
+    return charges.factors[scale]
 
 
-def _common_factor(ledger: Ledger, scale: str) -> float | None:
-    task, evidence = ledger.task, ledger.evidence
-    found = []
+def _common_factor(charges: Charges, scale: str) -> float | None:
+    task, evidence = charges.task, charges.evidence
+    factors = []
     for name, vector in task.construction.vectors.items():
         if vector.scale != scale or name not in evidence.values:
             continue
         drawn = evidence.vector(name)
-        length = abs(task.drawn(name, ledger.used)) if drawn is None else drawn.length_mm
+        length = abs(task.drawn(name, charges.used)) if drawn is None else drawn.length_mm
         if length > task.rubric.tolerance_of(name).least_mm:
-            found.append(abs(evidence.values[name]) / (length * ledger.used[scale]))
-    if len(found) < SO_MANY:
+            factors.append(abs(evidence.values[name]) / (length * charges.used[scale]))
+    if len(factors) < SO_MANY:
         return None
-    factor = statistics.median(found)
-    alike = [one for one in found if abs(one - factor) <= ALIKE * factor]
+    factor = statistics.median(factors)
+    near = [each for each in factors if abs(each - factor) <= ALIKE * factor]
     is_off = abs(factor - 1.0) > 2.0 * task.rubric.tolerance_of(scale).scale_relative
-    return factor if is_off and len(alike) >= max(SO_MANY, len(found) - 1) else None
+    return factor if is_off and len(near) >= max(SO_MANY, len(factors) - 1) else None
 
 
 def _name(scale: str) -> str:
     return f"values by {scale}"
 
 
-def _is_charged(ledger: Ledger, scale: str) -> bool:
-    return _name(scale) in ledger.charged
+def _is_charged(charges: Charges, scale: str) -> bool:
+    return _name(scale) in charges.charged
 
 
-def value_alone(ledger: Ledger, criterion: CriterionTable) -> Outcome:
+def value_alone(charges: Charges, criterion: CriterionTable) -> Outcome:
     """A vector of which only the computed value was handed in, or nothing."""
-    one, values = ledger.task.segments[criterion.name], ledger.evidence.values
-    scale = ledger.used[one.scale]
+    one, values = charges.task.segments[criterion.name], charges.evidence.values
+    scale = charges.used[one.scale]
     if one.name not in values:
-        exact = one.drawn(ledger.used)
-        return absent(ledger, criterion, verdicts.expected_quantity(one.name, exact, scale, 0.0))
+        exact = one.drawn(charges.used)
+        return absent(charges, criterion, verdicts.expected_quantity(one.name, exact, scale, 0.0))
     value, unit = abs(values[one.name]), unit_of(one.name)
 
-    def allowed(expected: complex, reach: Spread) -> Tolerance:
-        plain = tolerances(ledger.task.rubric.tolerance_of(criterion), abs(expected), with_direction=False)
+    def allowed(expected: complex, reach: EndSpread) -> Tolerance:
+        plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(expected), with_direction=False)
         if reach is NO_SPREAD:
             return Tolerance(value=(plain.length_mm or 0.0) * scale)
-        wider = widened(plain, abs(expected), reach, ledger.task.rubric.hand.at_most)
+        wider = widened(plain, abs(expected), reach, charges.task.rubric.hand.at_most)
         return Tolerance(value=(wider.length_mm or 0.0) * scale, widened=wider.widened)
 
-    def against(expected: complex, reach: Spread = NO_SPREAD, se: Spread = NO_SPREAD) -> Mark:
+    def against(expected: complex, reach: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD) -> MarkRange:
         del se
-        limit, table = allowed(expected, reach).value or 0.0, ledger.task.rubric.tolerance_of(criterion)
+        limit, table = allowed(expected, reach).value or 0.0, charges.task.rubric.tolerance_of(criterion)
         plain = table.length_at(abs(expected)) * scale
         return mark_value(value, abs(expected) * scale, limit, plain, table, unit)
 
-    follows = ledger.task.rubric.follows_through(criterion)
-    found = ledger.best(one, against, follows_through=follows)
-    if not found.mark.is_full and follows:
-        found = _by_factor(ledger, one.scale, found, against)
-    measured, right = Quantity(value=values[one.name], unit=unit), abs(found.expected) * scale
+    follows = charges.task.rubric.follows_through(criterion)
+    marked = charges.best(one, against, follows_through=follows)
+    if not marked.mark.is_full and follows:
+        marked = _by_factor(charges, one.scale, marked, against)
+    measured, right = Quantity(value=values[one.name], unit=unit), abs(marked.expected) * scale
     return verdicts.outcome(
         criterion,
-        found.mark,
+        marked.mark,
         measured,
         Quantity(value=right, unit=unit),
-        allowed(found.expected, found.reach),
-        followed=found.is_followed,
+        allowed(marked.expected, marked.reach),
+        followed=marked.is_followed,
     )
 
 
-def _by_factor(ledger: Ledger, scale: str, found: Found, against: Against) -> Found:
+def _by_factor(charges: Charges, scale: str, marked: Marked, against: Against) -> Marked:
     """A value that is off by the factor of all, after the first of them."""
-    factor, exact = common_factor(ledger, scale), found.expected
+    factor, exact = common_factor(charges, scale), marked.expected
     if factor is None:
-        return found
+        return marked
     mark = against(exact * factor)
-    if not _is_charged(ledger, scale):
-        ledger.charged.add(_name(scale))
-        return found
-    if not mark.is_better(found.mark):
-        return found
+    if not _is_charged(charges, scale):
+        charges.charged.add(_name(scale))
+        return marked
+    if not mark.is_better(marked.mark):
+        return marked
     told = Reason("follows", {"what": "scale", "of": scale})
-    return Found(the_better(mark, found.mark, told), exact * factor, is_followed=True)
+    return Marked(the_better(mark, marked.mark, told), exact * factor, is_followed=True)
 
 
-def segment(ledger: Ledger, criterion: CriterionTable, drawn: DrawnVector) -> Outcome:
+# What was not handed in, or not read -------------------------------------------------------------
+
+
+def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> Outcome:
+    """The outcome of a criterion that there is nothing to hold against."""
+    unread = _why_unread(charges, criterion)
+    reason = Reason("not_measured") if unread is None else Reason("unread", {"reason": unread})
+    if criterion.optional:
+        return verdicts.unjudged(criterion, "not_judged", (Reason("optional"), reason), expected=expected)
+    if criterion.link is not None and not charges.evidence.has_sketch:
+        # Links are drawn, not measured: without a sketch that was read nothing is asked of them.
+        return verdicts.unjudged(criterion, "not_judged", (reason,), expected=expected)
+    least, length = charges.task.rubric.tolerance_of(criterion).least_mm, expected.length_mm
+    if length is not None and length < least:
+        short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
+        return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
+    segment = charges.task.segments.get(criterion.name)
+    if segment is not None:
+        # Later criteria may hang on what nobody has seen.
+        charges.doubtful.add(segment.head)
+    verdict = charges.task.rubric.missing if unread is None else "review"
+    return verdicts.unjudged(criterion, verdict, (reason,), expected=expected)
+
+
+def _why_unread(charges: Charges, criterion: CriterionTable) -> str | None:
+    """Why a vector or link was not read, None where no sheet could show it."""
+    segment, evidence = charges.task.segments.get(criterion.name), charges.evidence
+    if segment is None or not evidence.has_sheets:
+        return None
+    for name in (segment.name, segment.head, segment.tail):
+        if name in evidence.unread:
+            return evidence.unread[name]
+    return f"{segment.name} was not found on the sheets"
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """All outcomes in the rubric's order, the scales used, and the evidence they rest on."""
+
+    outcomes: tuple[Outcome, ...]
+    scales: Mapping[str, UsedScale]
+    evidence: Evidence
+    settled: Mapping[str, Scale]
+    explanation: ReplayResult | None
+    """What the drawing was explained by, where that was asked for."""
+
+
+def compare(task: Task, submission: Submission, explain: Explain = nothing_explained) -> Comparison:
+    """Mark every criterion of the task's rubric.
+
+    Arguments: `explain` searches for what was done; it is asked once, when something does not fit.
+    """
+    evidence = gather(task, submission)
+    settled = settle(task, evidence, submission.declared)
+    charges = new_charges(task, evidence, settled, explain)
+    outcomes = {criterion.id: _outcome(charges, criterion) for criterion in _in_order(task, tuple(settled))}
+    return Comparison(
+        outcomes=tuple(outcomes[criterion.id] for criterion in task.rubric.criterion),
+        scales={name: scale.used for name, scale in settled.items()},
+        evidence=evidence,
+        settled=settled,
+        explanation=charges.following.explanation,
+    )
+
+
+def _in_order(task: Task, scales: tuple[str, ...]) -> list[CriterionTable]:
+    """As things are drawn and found: scales, the sketch, velocities, angular ones, accelerations."""
+    construction = task.construction
+    steps = {step.node: place for place, step in enumerate(construction.steps)}
+    kinds = ("v", "omega", "a", "epsilon")
+
+    def place(criterion: CriterionTable) -> tuple[int, int]:
+        name = criterion.name
+        if name in scales:
+            return -2, scales.index(name)
+        kind = -1 if criterion.link else kinds.index(name.partition("_")[0])
+        return kind, steps[task.segments[name].head] if name in task.segments else 0
+
+    return sorted(task.rubric.criterion, key=place)
+
+
+def _outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
+    """The verdict on one criterion, open where it rests on something entered that cannot be used."""
+    outcome = _judged(charges, criterion)
+    entry = charges.evidence.refused.get(criterion.name)
+    if entry is None and outcome.verdict in {"none", "partial"}:
+        entry = _refused_below(charges, criterion.name)
+    if entry is None:
+        return outcome
+    charges.leave_open(criterion.name)
+    return verdicts.entry_refused(outcome, entry)
+
+
+def _refused_below(charges: Charges, name: str) -> str | None:
+    """What was entered for the scale, or for a node that a vector is made from, and cannot be used."""
+    task, evidence = charges.task, charges.evidence
+    turned = task.construction.rates.get(name)
+    segment = task.segments.get(name if turned is None else turned.vector)
+    if segment is None or not evidence.refused:
+        return None
+    needs = {need for need in task.construction.step(segment.head).needs if need not in evidence.nodes}
+    vectors = [vector.name for vector in task.segments.values() if vector.head in needs]
+    below = [name for name in (segment.scale, segment.name, *vectors) if name in evidence.refused]
+    return evidence.refused[below[0]] if below else None
+
+
+def _judged(charges: Charges, criterion: CriterionTable) -> Outcome:
+    """The verdict on what can be used; what it costs is remembered for the later ones."""
+    if criterion.scale is not None:
+        return _scale(charges, criterion)
+    if criterion.angular is not None:
+        return rate(charges, criterion)
+    sources = (charges.evidence.drawn.get(criterion.name), charges.evidence.measured.get(criterion.name))
+    outcomes = [segment(charges, criterion, drawn) for drawn in sources if drawn is not None]
+    if len(outcomes) == 2:
+        return verdicts.both(outcomes[0], outcomes[1], charges.task.rubric.tolerance_of(criterion).length_mm)
+    return outcomes[0] if outcomes else value_alone(charges, criterion)
+
+
+def _scale(charges: Charges, criterion: CriterionTable) -> Outcome:
+    """A declared scale, as it was settled."""
+    name, unit = criterion.name, unit_of(criterion.name)
+    scale, right = charges.settled[name], charges.followed[name]
+    expected = Quantity(value=right, unit=unit)
+    if scale.mark is None:
+        if scale.used.text is None and not criterion.optional:
+            return absent(charges, criterion, expected)
+        return verdicts.unjudged(criterion, "not_judged", scale.reasons, expected=expected)
+    charges.remember(name, scale.mark)
+    measured = Quantity(value=scale.used.declared, unit=unit)
+    allowed = Tolerance(value=charges.task.rubric.tolerance_of(criterion).scale_relative * right)
+    return verdicts.outcome(criterion, scale.mark, measured, expected, allowed)
+
+
+# Vectors and links -------------------------------------------------------------------------------
+
+
+def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> Outcome:
     """A vector that was drawn (or measured), or a link of the sketch."""
-    one, rubric = ledger.task.segments[criterion.name], ledger.task.rubric
+    one, rubric = charges.task.segments[criterion.name], charges.task.rubric
     follows = rubric.follows_through(criterion)
     with_direction = criterion.direction and drawn.direction_rad is not None
-    found = ledger.best(one, _against(ledger, criterion, drawn), follows_through=follows)
-    mark = found.mark
-    is_read = drawn is ledger.evidence.drawn.get(one.name)
+    marked = charges.best(one, _against(charges, criterion, drawn), follows_through=follows)
+    mark = marked.mark
+    is_read = drawn is charges.evidence.drawn.get(one.name)
     if is_read:
-        mark = ledger.opened(one, mark, follows_through=follows)
-    scale = ledger.used[one.scale]
+        mark = charges.opened(one, mark, follows_through=follows)
+    scale = charges.used[one.scale]
     value, wrong_value = drawn.length_mm * scale, None
-    if one.name in ledger.evidence.values:
-        value = ledger.evidence.values[one.name]
-        wrong_value = mark_of_value(ledger, criterion, abs(value), found, drawn)
+    if one.name in charges.evidence.values:
+        value = charges.evidence.values[one.name]
+        wrong_value = mark_of_value(charges, criterion, abs(value), marked, drawn)
     is_arithmetic = wrong_value is not None and mark.share == FULL
     if wrong_value is not None:
         mark = the_worse(mark, wrong_value)
@@ -245,37 +323,36 @@ def segment(ledger: Ledger, criterion: CriterionTable, drawn: DrawnVector) -> Ou
         criterion,
         mark,
         verdicts.quantity(one.name, drawn.length_mm, on_sheet, value),
-        verdicts.expected_quantity(one.name, found.expected, scale, drawn.turn_rad),
-        _allowed(criterion, ledger, found, with_direction=with_direction),
+        verdicts.expected_quantity(one.name, marked.expected, scale, drawn.turn_rad),
+        _allowed(criterion, charges, marked, with_direction=with_direction),
         confidence=drawn.confidence,
-        followed=found.is_followed,
+        followed=marked.is_followed,
         mistake="arithmetic" if is_arithmetic else None,
     )
 
 
-class _against:  # noqa: N801 - used as a function
-    """Marks a drawn vector against an expectation, as the rubric and the sheet's cells have it."""
+def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> Against:
+    """How a drawn vector is marked against an expectation, as the rubric and the sheet's cells have it."""
+    rubric = charges.task.rubric
+    table, least = rubric.tolerance_of(criterion), rubric.least_confidence
+    with_direction = criterion.direction and drawn.direction_rad is not None
+    is_read = drawn is charges.evidence.drawn.get(criterion.name)
+    written = charges.evidence.written.get(criterion.name) if is_read else None
 
-    def __init__(self, ledger: Ledger, criterion: CriterionTable, drawn: DrawnVector) -> None:
-        self.table, self.drawn = ledger.task.rubric.tolerance_of(criterion), drawn
-        self.least, self.at_most = ledger.task.rubric.least_confidence, ledger.task.rubric.hand.at_most
-        self.with_direction = criterion.direction and drawn.direction_rad is not None
-        is_read = drawn is ledger.evidence.drawn.get(criterion.name)
-        self.written = ledger.evidence.written.get(criterion.name) if is_read else None
-
-    def __call__(self, expected: complex, reach: Spread = NO_SPREAD, se: Spread = NO_SPREAD) -> Mark:
-        """The mark; `reach` is how far a careful hand may miss what is expected."""
-        table, drawn, size = self.table, self.drawn, abs(expected)
-        plain = tolerances(table, size, with_direction=self.with_direction)
+    def against(expected: complex, reach: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD) -> MarkRange:
+        size = abs(expected)
+        plain = tolerances(table, size, with_direction=with_direction)
         if reach is NO_SPREAD:
-            found = mark_vector(drawn, expected, plain, table, se)
+            mark = mark_vector(drawn, expected, plain, table, se)
         else:
-            found = mark_vector(drawn, expected, widened(plain, size, reach, self.at_most), table, se)
-            if not found.is_full:
+            mark = mark_vector(drawn, expected, widened(plain, size, reach, rubric.hand.at_most), table, se)
+            if not mark.is_full:
                 by_hand = mark_vector(drawn, expected, widened(plain, size, reach), table, se)
-                found = left_open(found, ALL_RIGHT if _is_boundless(reach, size) else by_hand)
-        found = held_against_written(found, drawn, self.written, table, self.least)
-        return verdicts.with_confidence(found, drawn.confidence, self.least)
+                mark = left_open(mark, ALL_RIGHT if _is_boundless(reach, size) else by_hand)
+        mark = held_against_written(mark, drawn, written, table, least)
+        return verdicts.with_confidence(mark, drawn.confidence, least)
+
+    return against
 
 
 BOUNDLESS_MM, BOUNDLESS_SHARE = 20.0, 0.5
@@ -283,48 +360,53 @@ BOUNDLESS_MM, BOUNDLESS_SHARE = 20.0, 0.5
 hand may miss by anything."""
 
 
-def _is_boundless(reach: Spread, size_mm: float) -> bool:
+def _is_boundless(reach: EndSpread, size_mm: float) -> bool:
     """Whether lines cross so badly that nothing tells how far a careful hand may miss."""
     return max(reach.along, reach.across) > max(BOUNDLESS_MM, BOUNDLESS_SHARE * size_mm)
 
 
-def _allowed(criterion: CriterionTable, ledger: Ledger, found: Found, *, with_direction: bool) -> Tolerance:
+def _allowed(
+    criterion: CriterionTable, charges: Charges, marked: Marked, *, with_direction: bool
+) -> Tolerance:
     """What full marks allow, for the report."""
-    size = abs(found.expected)
-    plain = tolerances(ledger.task.rubric.tolerance_of(criterion), size, with_direction=with_direction)
-    if found.reach is NO_SPREAD:
+    size = abs(marked.expected)
+    plain = tolerances(charges.task.rubric.tolerance_of(criterion), size, with_direction=with_direction)
+    if marked.reach is NO_SPREAD:
         return plain
-    return widened(plain, size, found.reach, ledger.task.rubric.hand.at_most)
+    return widened(plain, size, marked.reach, charges.task.rubric.hand.at_most)
 
 
-def rate(ledger: Ledger, criterion: CriterionTable) -> Outcome:
+# Angular quantities ------------------------------------------------------------------------------
+
+
+def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     """An angular quantity against the exact one, then against what the student's own vector gives."""
-    task, name, unit = ledger.task, criterion.name, unit_of(criterion.name)
+    task, name, unit = charges.task, criterion.name, unit_of(criterion.name)
     right = task.rates[name]
-    if name not in ledger.evidence.values:
-        return absent(ledger, criterion, Quantity(value=right, unit=unit))
-    value, table = ledger.evidence.values[name], task.rubric.tolerance_of(criterion)
+    if name not in charges.evidence.values:
+        return absent(charges, criterion, Quantity(value=right, unit=unit))
+    value, table = charges.evidence.values[name], task.rubric.tolerance_of(criterion)
     turned = task.construction.rates[name]
     segment = task.segments[turned.vector]
-    scale = ledger.used[segment.scale]
+    scale = charges.used[segment.scale]
     per_mm = scale / task.lengths_m[name]
     plain = table.length_at(abs(right) / per_mm) * per_mm
     allowed = Tolerance(value=plain)
     mark, followed = mark_value(value, right, plain, plain, table, unit), False
     if not mark.is_full:
-        allowed = _widened(ledger, criterion, segment, per_mm)
+        allowed = _widened(charges, criterion, segment, per_mm)
         mark = mark_value(value, right, allowed.value or 0.0, plain, table, unit)
-    ledger.remember(name, mark)
+    charges.remember(name, mark)
     follows = task.rubric.follows_through(criterion)
-    own = from_rate(task, ledger.evidence, turned, scale) if follows and not mark.is_full else None
-    factor = common_factor(ledger, segment.scale)
+    own = from_rate(task, charges.evidence, turned, scale) if follows and not mark.is_full else None
+    factor = common_factor(charges, segment.scale)
     if own is None and factor is not None and follows and not mark.is_full:
         own = right
     if own is not None:
         # Values that are all off by one factor give an angular one off by it, too.
         own = own if factor is None else min(own, own * factor, key=lambda one: abs(one - value))
         limit = table.length_at(abs(own) / per_mm) * per_mm
-        candidate = ledger.allowed(
+        candidate = charges.allowed(
             frozenset({segment.head}), mark_value(value, own, limit, limit, table, unit)
         )
         if candidate.is_better(mark):
@@ -334,12 +416,12 @@ def rate(ledger: Ledger, criterion: CriterionTable) -> Outcome:
     return verdicts.outcome(criterion, mark, measured, expected, allowed, followed=followed)
 
 
-def _widened(ledger: Ledger, criterion: CriterionTable, segment: Segment, per_mm: float) -> Tolerance:
+def _widened(charges: Charges, criterion: CriterionTable, segment: TaskSegment, per_mm: float) -> Tolerance:
     """The tolerance with what a careful hand may miss of the vector that turns the link."""
-    exact = segment.drawn(ledger.used)
-    plain = tolerances(ledger.task.rubric.tolerance_of(criterion), abs(exact), with_direction=False)
-    reach = ledger.following.whole_reach(segment, exact)
-    wider = widened(plain, abs(exact), reach, ledger.task.rubric.hand.at_most)
+    exact = segment.drawn(charges.used)
+    plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(exact), with_direction=False)
+    reach = charges.following.whole_reach(segment, exact)
+    wider = widened(plain, abs(exact), reach, charges.task.rubric.hand.at_most)
     return Tolerance(value=(wider.length_mm or 0.0) * per_mm, widened=wider.widened)
 
 
@@ -387,98 +469,29 @@ def _sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
     return sense * math.copysign(1.0, math.cos(own.direction_rad - cmath.phase(along)))
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """All outcomes in the rubric's order, the scales used, and the evidence they rest on."""
-
-    outcomes: tuple[Outcome, ...]
-    scales: Mapping[str, UsedScale]
-    followed: Mapping[str, float]
-    """The scales that the drawing follows, where they contradict those used."""
-    evidence: Evidence
+# The length that the student wrote into the sheet's cells ----------------------------------------
 
 
-def compare(task: Task, submission: Submission, drawn_by: Sketch | None = None) -> Comparison:
-    """Mark every criterion of the task's rubric.
+def held_against_written(
+    mark: MarkRange,
+    drawn: DrawnVector,
+    written: tuple[float, float] | None,
+    tolerance: ToleranceTable,
+    least: float,
+) -> MarkRange:
+    """The mark, open where the two lengths contradict each other: a person must look.
 
-    Arguments: `drawn_by` is what the plans were drawn by instead, where that is known.
+    Either the drawing is misread, or the cells, or the student has measured something else; nothing
+    here says which. A ruler errs by no more than the tolerance of a length.
+
+    Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
+    `least` the probability from which it counts.
     """
-    evidence = gather(task, submission)
-    settled = settle(task, evidence, submission.declared)
-    ledger = open_ledger(task, evidence, settled, drawn_by)
-    found = {criterion.id: _outcome(ledger, criterion) for criterion in _in_order(task, tuple(settled))}
-    return Comparison(
-        outcomes=tuple(found[criterion.id] for criterion in task.rubric.criterion),
-        scales={name: scale.used for name, scale in settled.items()},
-        followed=ledger.followed,
-        evidence=evidence,
-    )
-
-
-def _in_order(task: Task, scales: tuple[str, ...]) -> list[CriterionTable]:
-    """As things are drawn and found: scales, the sketch, velocities, angular ones, accelerations."""
-    construction = task.construction
-    steps = {step.node: place for place, step in enumerate(construction.steps)}
-    kinds = ("v", "omega", "a", "epsilon")
-
-    def place(criterion: CriterionTable) -> tuple[int, int]:
-        name = criterion.name
-        if name in scales:
-            return -2, scales.index(name)
-        kind = -1 if criterion.link else kinds.index(name.partition("_")[0])
-        return kind, steps[task.segments[name].head] if name in task.segments else 0
-
-    return sorted(task.rubric.criterion, key=place)
-
-
-def _outcome(ledger: Ledger, criterion: CriterionTable) -> Outcome:
-    """The verdict on one criterion, open where it rests on something entered that cannot be used."""
-    outcome = _judged(ledger, criterion)
-    entry = ledger.evidence.refused.get(criterion.name)
-    if entry is None and outcome.verdict in {"none", "partial"}:
-        entry = _refused_below(ledger, criterion.name)
-    if entry is None:
-        return outcome
-    ledger.leave_open(criterion.name)
-    return verdicts.entry_refused(outcome, entry)
-
-
-def _refused_below(ledger: Ledger, name: str) -> str | None:
-    """What was entered for the scale, or for a node that a vector is made from, and cannot be used."""
-    task, evidence = ledger.task, ledger.evidence
-    turned = task.construction.rates.get(name)
-    segment = task.segments.get(name if turned is None else turned.vector)
-    if segment is None or not evidence.refused:
-        return None
-    needs = {need for need in task.construction.step(segment.head).needs if need not in evidence.nodes}
-    vectors = [vector.name for vector in task.segments.values() if vector.head in needs]
-    below = [name for name in (segment.scale, segment.name, *vectors) if name in evidence.refused]
-    return evidence.refused[below[0]] if below else None
-
-
-def _judged(ledger: Ledger, criterion: CriterionTable) -> Outcome:
-    """The verdict on what can be used; what it costs is remembered for the later ones."""
-    if criterion.scale is not None:
-        return _scale(ledger, criterion)
-    if criterion.angular is not None:
-        return rate(ledger, criterion)
-    sources = (ledger.evidence.drawn.get(criterion.name), ledger.evidence.measured.get(criterion.name))
-    outcomes = [segment(ledger, criterion, drawn) for drawn in sources if drawn is not None]
-    if len(outcomes) == 2:
-        return verdicts.both(outcomes[0], outcomes[1], ledger.task.rubric.tolerance_of(criterion).length_mm)
-    return outcomes[0] if outcomes else value_alone(ledger, criterion)
-
-
-def _scale(ledger: Ledger, criterion: CriterionTable) -> Outcome:
-    """A declared scale, as it was settled."""
-    name, unit = criterion.name, unit_of(criterion.name)
-    scale, right = ledger.settled[name], ledger.followed[name]
-    expected = Quantity(value=right, unit=unit)
-    if scale.mark is None:
-        if scale.used.text is None and not criterion.optional:
-            return absent(ledger, criterion, expected)
-        return verdicts.unjudged(criterion, "not_judged", scale.reasons, expected=expected)
-    ledger.remember(name, scale.mark)
-    measured = Quantity(value=scale.used.declared, unit=unit)
-    allowed = Tolerance(value=ledger.task.rubric.tolerance_of(criterion).scale_relative * right)
-    return verdicts.outcome(criterion, scale.mark, measured, expected, allowed)
+    if written is None or written[1] < least:
+        return mark
+    length_mm = written[0]
+    allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
+    if abs(drawn.length_mm - length_mm) <= allowed:
+        return mark
+    told: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
+    return open_between(NONE, FULL, mark, Reason("written_disagrees", told))

@@ -8,23 +8,25 @@ the scale that the drawing follows.
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from grader.comparison.evidence import Evidence
-from grader.comparison.own import Nodes, Sketch, known, other_sketch, own_nodes
-from grader.comparison.task import Segment, Task
+from grader.comparison.own import Nodes, PlanBasis, known, other_mechanism, own_nodes
+from grader.comparison.scales import Scale
+from grader.comparison.task import Task, TaskSegment
 from grader.inputs.scale_text import SCALE_NAMES
 from reference.construction.elements import Coriolis, Normal
 from reference.construction.graph import AngularRate
 from reference.construction.mistakes import Drawing, Mistake, commit
 from reference.construction.steps import Divide, Given, Similar
-from reference.construction.uncertainty import Spread, Trace, spread, trace
+from reference.construction.uncertainty import EndSpread, TracedDrawing, spread, trace
 from reference.geometry import ComplexArray
+from reference.replay.replay import Replay
 
-NO_SPREAD = Spread(0.0, 0.0)
+NO_SPREAD = EndSpread(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,22 +46,49 @@ class Expectation:
     what: str
     of: str
     relies_on: frozenset[str]
-    reach: Spread = NO_SPREAD
-    se: Spread = NO_SPREAD
+    reach: EndSpread = NO_SPREAD
+    se: EndSpread = NO_SPREAD
 
 
 @dataclass(frozen=True, slots=True)
-class Following:
+class ReplayResult:
+    """What the search for what was done came to.
+
+    Attributes
+    ----------
+    accounts : the ways in which the drawing may have been made, the likeliest first; none where it may
+        have been made rightly
+    basis : what the plans were drawn by instead, where that is certain
+    """
+
+    accounts: tuple[Replay, ...] = ()
+    basis: PlanBasis | None = None
+
+
+Explain = Callable[[Task, Evidence, Mapping[str, Scale]], ReplayResult]
+"""Searches for what was done, from the evidence and the scales settled."""
+
+
+def nothing_explained(_task: Task, _evidence: Evidence, _settled: Mapping[str, Scale]) -> ReplayResult:
+    """No search: everything is held against the right drawing and the own nodes alone."""
+    return ReplayResult()
+
+
+@dataclass(slots=True)
+class FollowThrough:
     """What follows from one submission's own values, at the scales used and at those that it follows."""
 
     task: Task
     evidence: Evidence
     used: Mapping[str, float]
     followed: Mapping[str, float]
+    explain: Callable[[], ReplayResult]
+    explanation: ReplayResult | None = None
+    """What the search for what was done came to, once it was asked for, and"""
+    instead: PlanBasis | None = None
+    """what the plans were drawn by instead of the right mechanism."""
     places: dict[tuple[object, ...], Nodes] = field(default_factory=dict)
-    traces: dict[tuple[object, ...], Trace] = field(default_factory=dict)
-    sketch: list[Sketch | None] = field(default_factory=list)
-    named_nodes: dict[int, frozenset[str]] = field(default_factory=dict)
+    traces: dict[tuple[object, ...], TracedDrawing] = field(default_factory=dict)
 
     @property
     def wrong_scales(self) -> frozenset[str]:
@@ -68,64 +97,54 @@ class Following:
 
     # From nodes -----------------------------------------------------------------------------------
 
-    def own(self, scales: Mapping[str, float], sketch: Sketch | None = None) -> Nodes:
-        """The student's own nodes, by figure; measured ones as they lie in plans drawn for a sketch."""
-        key = (*(scales[name] for name in SCALE_NAMES), "" if sketch is None else sketch.name)
+    def own(self, scales: Mapping[str, float], basis: PlanBasis | None = None) -> Nodes:
+        """The student's own nodes, by figure; measured ones as they lie in plans drawn by the basis."""
+        key = (*(scales[name] for name in SCALE_NAMES), "" if basis is None else basis.name)
         if key not in self.places:
-            self.places[key] = own_nodes(
-                self.task, self.evidence, self.right(scales) if sketch is None else sketch
-            )
+            self.places[key] = own_nodes(self.task, self.evidence, basis or self.right(scales))
         return self.places[key]
 
-    def names(self, own: Nodes) -> frozenset[str]:
-        """The names of all own nodes."""
-        if id(own) not in self.named_nodes:
-            self.named_nodes[id(own)] = known(own)
-        return self.named_nodes[id(own)]
-
-    def right(self, scales: Mapping[str, float]) -> Sketch:
-        """The right mechanism, its sketch at the scale that it follows."""
+    def right(self, scales: Mapping[str, float]) -> PlanBasis:
+        """The right construction, the mechanism at the scale that it follows."""
         drawn = {**scales, "kL": self.followed["kL"]}
-        return Sketch("right", self.task.construction, self.task.at(drawn))
+        return PlanBasis("right", self.task.construction, self.task.at(drawn))
 
     def traced(
-        self, scales: Mapping[str, float], sketch: Sketch | None = None, *, by_similarity: bool = False
-    ) -> Trace:
+        self, scales: Mapping[str, float], basis: PlanBasis | None = None, *, by_similarity: bool = False
+    ) -> TracedDrawing:
         """The drawing traced from the student's own nodes; plates' images by similarity if that is asked."""
-        key = (*(scales[name] for name in SCALE_NAMES), "" if sketch is None else sketch.name, by_similarity)
+        key = (*(scales[name] for name in SCALE_NAMES), "" if basis is None else basis.name, by_similarity)
         if key not in self.traces:
-            own, drawn = self.own(scales, sketch), sketch or self.right(scales)
+            own, drawn = self.own(scales, basis), basis or self.right(scales)
             construction = self.task.by_similarity if by_similarity else drawn.construction
-            is_plain = not own and sketch is None
-            self.traces[key] = (
-                self.task.traced(scales)
-                if is_plain
-                else trace(construction, drawn.parameters, self.task.skill, own)
-            )
+            if own or basis is not None:
+                self.traces[key] = trace(construction, drawn.parameters, self.task.skill, own)
+            else:
+                self.traces[key] = self.task.traced(scales)
         return self.traces[key]
 
     def from_nodes(
         self,
-        segment: Segment,
+        segment: TaskSegment,
         scales: Mapping[str, float],
-        sketch: Sketch | None = None,
+        basis: PlanBasis | None = None,
         *,
         by_similarity: bool = False,
     ) -> Expectation:
         """The head constructed from the student's own nodes upstream; from none, as it should be."""
-        found, own = self.traced(scales, sketch, by_similarity=by_similarity), self.own(scales, sketch)
+        found, own = self.traced(scales, basis, by_similarity=by_similarity), self.own(scales, basis)
         upstream = self.task.construction.upstream(segment.head) | self.task.construction.upstream(
             segment.tail
         )
-        relies_on = (self.names(own) & upstream) - {segment.head}
-        if not relies_on and sketch is None:
+        relies_on = (known(own) & upstream) - {segment.head}
+        if not relies_on and basis is None:
             exact = segment.drawn(scales)
             return Expectation(exact, "nodes", "", relies_on, self.whole_reach(segment, exact))
         vector = found.vector(segment.tail, segment.head)
         reach, se = self.spreads(found.moved(segment.tail, segment.head), found.hand, vector)
         return Expectation(vector, "nodes", "", relies_on, reach, se)
 
-    def spreads(self, moved: ComplexArray, hand: int, along: complex) -> tuple[Spread, Spread]:
+    def spreads(self, moved: ComplexArray, hand: int, along: complex) -> tuple[EndSpread, EndSpread]:
         """How far a hand may miss, and the standard errors of reading.
 
         Measuring by hand is the student's, and part of what a hand may miss; reading is the program's.
@@ -137,15 +156,15 @@ class Following:
             return scaled(spread(moved[:hand], along), sigmas), spread(moved[hand:], along)
         return scaled(self.with_ruler(spread(moved, along), along), sigmas), NO_SPREAD
 
-    def with_ruler(self, found: Spread, along: complex) -> Spread:
+    def with_ruler(self, found: EndSpread, along: complex) -> EndSpread:
         """With the errors of measuring the vector itself, where it was measured by hand."""
         hand = self.task.rubric.hand
         turned = abs(along) * math.radians(hand.protractor_deg)
-        return Spread(math.hypot(found.along, hand.ruler_mm), math.hypot(found.across, turned))
+        return EndSpread(math.hypot(found.along, hand.ruler_mm), math.hypot(found.across, turned))
 
     # From lengths and values ----------------------------------------------------------------------
 
-    def at_followed_scale(self, segment: Segment) -> Expectation | None:
+    def at_followed_scale(self, segment: TaskSegment) -> Expectation | None:
         """The exact one at the scale that the drawing follows; None where that is the one used."""
         wrong = self.wrong_scales
         if segment.scale not in wrong:
@@ -153,8 +172,8 @@ class Following:
         exact = segment.drawn(self.followed)
         return Expectation(exact, "scale", segment.scale, wrong, self.whole_reach(segment, exact))
 
-    def expectations(self, segment: Segment) -> Iterator[Expectation]:
-        """What follows from a turned plan, other scales, a wrong sketch, and own lengths and values."""
+    def expectations(self, segment: TaskSegment) -> Iterator[Expectation]:
+        """What follows from a turned plan, other scales, a wrong mechanism, and own lengths and values."""
         wrong = self.wrong_scales
         if segment.scale != "kL":
             yield from self.turned_plan(segment)
@@ -162,10 +181,10 @@ class Following:
                 # A plate's image comes by lines or by similarity: of a wrong base they make different ones.
                 yield self.from_nodes(segment, self.followed, by_similarity=True)
             yield from self.from_vectors(segment, self.used)
-            sketch = self.other_sketch()
-            if sketch is not None and segment.head not in sketch.wrong:
-                one = self.from_nodes(segment, self.followed, sketch)
-                yield replace(one, relies_on=one.relies_on | wrong | sketch.wrong)
+            basis = self.drawn_instead()
+            if basis is not None and segment.head not in basis.wrong:
+                one = self.from_nodes(segment, self.followed, basis)
+                yield replace(one, relies_on=one.relies_on | wrong | basis.wrong)
             if wrong:
                 for one in (
                     self.from_nodes(segment, self.followed),
@@ -173,13 +192,15 @@ class Following:
                 ):
                     yield replace(one, relies_on=one.relies_on | wrong)
 
-    def other_sketch(self) -> Sketch | None:
-        """What the plans were drawn by instead, where that is told or no sketch was read."""
-        if not self.sketch:
-            self.sketch.append(other_sketch(self.task, self.evidence, (self.used, self.followed)))
-        return self.sketch[0]
+    def drawn_instead(self) -> PlanBasis | None:
+        """What the plans were drawn by instead: by the search for what was done, else by counting vectors."""
+        if self.explanation is None:
+            self.explanation = self.explain()
+            scales = (self.used, self.followed)
+            self.instead = self.explanation.basis or other_mechanism(self.task, self.evidence, scales)
+        return self.instead
 
-    def is_trivial(self, segment: Segment, expected: complex) -> bool:
+    def is_trivial(self, segment: TaskSegment, expected: complex) -> bool:
         """Near zero, without a solution, or far shorter than the right one: nothing is left to show."""
         if not cmath.isfinite(expected):
             return True
@@ -188,7 +209,7 @@ class Following:
         least = min(rubric.tolerance_of(segment.name).least_mm, right / 2.0)
         return abs(expected) < max(least, rubric.least_followed_share * right)
 
-    def turned_plan(self, segment: Segment) -> Iterator[Expectation]:
+    def turned_plan(self, segment: TaskSegment) -> Iterator[Expectation]:
         """The vector in a plan that is turned as a whole by quarter turns, as the crank's vector tells."""
         task = self.task
         crank = f"{segment.name[0]}_{task.pin}"
@@ -208,11 +229,11 @@ class Following:
             right = self.right(self.followed)
             mistake = Mistake("figure_rotated", figure, quarters=quarters % 4)
             drawing = commit(mistake, Drawing(right.construction, right.parameters))
-            sketch = Sketch(f"{figure} {quarters}", drawing.construction, right.parameters)
-            one = self.from_nodes(segment, self.followed, sketch)
+            basis = PlanBasis(f"{figure} {quarters}", drawing.construction, right.parameters)
+            one = self.from_nodes(segment, self.followed, basis)
             yield replace(one, what="vector", of=crank, relies_on=one.relies_on | {head})
 
-    def whole_reach(self, segment: Segment, along: complex) -> Spread:
+    def whole_reach(self, segment: TaskSegment, along: complex) -> EndSpread:
         """How far a hand may miss a vector from the start of the drawing."""
         task, scales = self.task, (self.used["kv"], self.used["ka"])
         key = ("reach", segment.name, abs(along), cmath.phase(along), *scales, self.evidence.has_sheets)
@@ -220,14 +241,14 @@ class Following:
             task.keep(key, self._whole_reach(segment, along))
         return task.memory[key]  # type: ignore[return-value]
 
-    def _whole_reach(self, segment: Segment, along: complex) -> Spread:
+    def _whole_reach(self, segment: TaskSegment, along: complex) -> EndSpread:
         moved = self.task.traced(self.used).moved(segment.tail, segment.head)
         found = spread(moved * np.exp(1j * (cmath.phase(along) - cmath.phase(segment.real))), along)
         if not self.evidence.has_sheets:
             found = self.with_ruler(found, along)
         return scaled(found, self.task.rubric.hand.sigmas)
 
-    def from_vectors(self, segment: Segment, scales: Mapping[str, float]) -> Iterator[Expectation]:
+    def from_vectors(self, segment: TaskSegment, scales: Mapping[str, float]) -> Iterator[Expectation]:
         """A vector that hangs on one or two others alone, whose lengths are enough."""
         task = self.task
         match task.construction.step(segment.head):
@@ -246,7 +267,7 @@ class Following:
                     yield Expectation(found, "vector", source, frozenset({other}))
 
     def normal(
-        self, segment: Segment, source: str | None, scales: Mapping[str, float]
+        self, segment: TaskSegment, source: str | None, scales: Mapping[str, float]
     ) -> Iterator[Expectation]:
         """v^2 / l from the own velocity; omega^2 l from the own computed angular velocity."""
         task = self.task
@@ -263,7 +284,7 @@ class Following:
             yield Expectation(right * turned**2, "value", rate.name, frozenset({rate.name}))
 
     def coriolis(
-        self, segment: Segment, length: Coriolis, scales: Mapping[str, float]
+        self, segment: TaskSegment, length: Coriolis, scales: Mapping[str, float]
     ) -> Iterator[Expectation]:
         """2 omega v from the own sliding velocity and what turns the guide: velocity, or computed omega.
 
@@ -305,6 +326,6 @@ class Following:
         return next((v.name for v in vectors if {v.tail, v.head} == ends), None)
 
 
-def scaled(found: Spread, by: float) -> Spread:
+def scaled(found: EndSpread, by: float) -> EndSpread:
     """So many standard deviations."""
-    return Spread(by * found.along, by * found.across)
+    return EndSpread(by * found.along, by * found.across)

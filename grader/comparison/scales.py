@@ -8,7 +8,7 @@ from typing import Literal
 
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
 from grader.comparison.task import Task, unit_of
-from grader.comparison.verdicts import FULL, NONE, Limit, Mark, mark
+from grader.comparison.verdicts import FULL, NONE, Limit, MarkRange, mark
 from grader.inputs.scale_text import (
     EXAMPLES,
     SCALE_NAMES,
@@ -42,7 +42,7 @@ class Scale:
 
     used: UsedScale
     other: float | None
-    mark: Mark | None
+    mark: MarkRange | None
     reasons: tuple[Reason, ...] = ()
 
 
@@ -75,7 +75,7 @@ def _settle_one(
     if isinstance(parsed, Refused):
         used = UsedScale(text, None, rule, assumed=True, refused=parsed.why)
         reason = Reason("scale_refused", {"text": text or "", "why": parsed.why})
-        open_mark = Mark(NONE, NONE, FULL, (reason,))
+        open_mark = MarkRange(NONE, NONE, FULL, (reason,))
         return Scale(used, _contradiction(task, evidence, name, rule), open_mark)
     if isinstance(parsed, ByRule):
         value = parsed.per_mm({"omega": task.omega or 0.0, **followed_scales(before)})
@@ -191,7 +191,7 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
     if witness is None:
         if _is_unseen(task, evidence, name, scale.used):
             why = f"{name[1]}_{task.pin}, which tells it, was not read for certain"
-            return Scale(scale, None, Mark(NONE, NONE, FULL, (Reason("unread", {"reason": why}),)))
+            return Scale(scale, None, MarkRange(NONE, NONE, FULL, (Reason("unread", {"reason": why}),)))
         return Scale(scale, None, mark([]) if is_rule else None)
     other = _followed_instead(task, evidence, name, scale.used, None if is_rule else rule)
     if other is None:

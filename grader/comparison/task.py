@@ -1,5 +1,6 @@
 """What is asked: one variant's exact plan, its construction, and the rubric."""
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -10,7 +11,7 @@ from grader.rubric import RubricFile, ToleranceTable
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.elements import Parameters
 from reference.construction.graph import Construction, evaluate
-from reference.construction.uncertainty import Skill, Trace, trace
+from reference.construction.uncertainty import Skill, TracedDrawing, trace
 from reference.mechanism import Crank, Dyad, Mechanism, Slider
 from reference.plan import exact_plan
 
@@ -45,7 +46,7 @@ class Yardstick:
 
 
 @dataclass(frozen=True, slots=True)
-class Segment:
+class TaskSegment:
     """Something drawn from one node to another: a vector of a plan, or a link of the sketch.
 
     Attributes
@@ -88,7 +89,7 @@ class Task:
     construction: Construction
     parameters: Parameters
     real: Mapping[str, complex]
-    segments: Mapping[str, Segment]
+    segments: Mapping[str, TaskSegment]
     rates: Mapping[str, float]
     lengths_m: Mapping[str, float]
     pin: str
@@ -142,7 +143,7 @@ class Task:
             self.keep(key, found)
         return found  # type: ignore[return-value]
 
-    def traced(self, scales: Mapping[str, float]) -> Trace:
+    def traced(self, scales: Mapping[str, float]) -> TracedDrawing:
         """The whole drawing with what a hand's errors make of it, at these scales.
 
         The sketch at the rule's: its size changes next to nothing in how far a hand may miss.
@@ -173,7 +174,7 @@ class Task:
         self.memory[key] = found
 
 
-_tasks: dict[tuple[int, int, Variant], Task] = {}
+_tasks: deque[Task] = deque(maxlen=TASKS)
 
 
 def task_of(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
@@ -181,13 +182,12 @@ def task_of(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Tas
 
     Raises MechanismError where the variant does not assemble.
     """
-    key = (id(assignment), id(rubric), variant)
-    if key not in _tasks:
-        if len(_tasks) >= TASKS:
-            _tasks.clear()
-        # The task holds both, so that no other object takes their place.
-        _tasks[key] = _made(assignment, rubric, variant)
-    return _tasks[key]
+    for task in _tasks:
+        if task.variant == variant and task.assignment is assignment and task.rubric is rubric:
+            return task
+    task = _made(assignment, rubric, variant)
+    _tasks.append(task)
+    return task
 
 
 def _made(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
@@ -197,10 +197,11 @@ def _made(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
     real = {name: complex(vector[0]) for name, vector in plan.vectors_si.items()}
     places = {name: complex(np.ravel(place)[0]) for name, place in plan.motion.position.items()}
     segments = {
-        v.name: Segment(v.name, v.tail, v.head, v.scale, real[v.name]) for v in construction.vectors.values()
+        v.name: TaskSegment(v.name, v.tail, v.head, v.scale, real[v.name])
+        for v in construction.vectors.values()
     }
     segments |= {
-        name: Segment(name, tail, head, "kL", places[head] - places[tail])
+        name: TaskSegment(name, tail, head, "kL", places[head] - places[tail])
         for name, (tail, head) in construction.links.items()
     }
     return Task(

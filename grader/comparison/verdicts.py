@@ -3,14 +3,14 @@
 import cmath
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from grader.comparison.evidence import DrawnVector
 from grader.comparison.task import unit_of
 from grader.documents import Verdict
 from grader.outcomes import Outcome, Quantity, Reason, Tolerance
 from grader.rubric import CriterionTable, ToleranceTable
-from reference.construction.uncertainty import Spread
+from reference.construction.uncertainty import EndSpread
 
 FULL, NONE = 1.0, 0.0
 ROUNDING = 1e-9
@@ -30,7 +30,6 @@ class Limit:
     table : the rubric's: bands of partial marks, and how many standard errors a verdict must be away
         from changing
     reason : said where the mark is not full
-    share, worst, best : the mark on the deviation as it is, at the far and at the near end of its error
     """
 
     what: str
@@ -40,15 +39,21 @@ class Limit:
     se: float
     table: ToleranceTable
     reason: Reason
-    share: float = field(init=False)
-    worst: float = field(init=False)
-    best: float = field(init=False)
 
-    def __post_init__(self) -> None:
-        margin, share = self.table.certain_errors * self.se, self.share_at(self.off)
-        object.__setattr__(self, "share", share)
-        object.__setattr__(self, "worst", self.share_at(self.off + margin) if margin else share)
-        object.__setattr__(self, "best", self.share_at(max(self.off - margin, 0.0)) if margin else share)
+    @property
+    def share(self) -> float:
+        """The mark on the deviation as it is."""
+        return self.share_at(self.off)
+
+    @property
+    def worst(self) -> float:
+        """The mark at the far end of its error."""
+        return self.share_at(self.off + self.table.certain_errors * self.se)
+
+    @property
+    def best(self) -> float:
+        """The mark at the near end of its error."""
+        return self.share_at(max(self.off - self.table.certain_errors * self.se, 0.0))
 
     def share_at(self, off: float) -> float:
         """The share of the points at a deviation; bands are as wide as the plain tolerance says."""
@@ -62,7 +67,7 @@ class Limit:
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class MarkRange:
     """Several limits together: the worst of them counts.
 
     Attributes
@@ -87,18 +92,18 @@ class Mark:
         """Whether it is full marks for certain."""
         return self.worst == FULL
 
-    def is_better(self, other: "Mark") -> bool:
+    def is_better(self, other: "MarkRange") -> bool:
         """Whether it leaves more than another, first for certain, then at best."""
         return (self.worst, self.best) > (other.worst, other.best)
 
 
-ALL_RIGHT = Mark(FULL, FULL, FULL)
+ALL_RIGHT = MarkRange(FULL, FULL, FULL)
 
 
-def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> Mark:
+def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> MarkRange:
     """The mark that several limits give; full where there are none."""
     if not limits:
-        return Mark(FULL, FULL, FULL, remarks)
+        return MarkRange(FULL, FULL, FULL, remarks)
     by_loss = sorted(limits, key=lambda limit: limit.share)
     losses = tuple(limit.reason for limit in by_loss if limit.share != FULL)
     near = tuple(
@@ -109,7 +114,7 @@ def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> Mark:
         for limit in by_loss
         if limit.worst != limit.best
     )
-    return Mark(
+    return MarkRange(
         min(limit.share for limit in limits),
         min(limit.worst for limit in limits),
         min(limit.best for limit in limits),
@@ -117,35 +122,35 @@ def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> Mark:
     )
 
 
-def open_between(low: float, high: float, found: Mark, *reasons: Reason) -> Mark:
+def open_between(low: float, high: float, first: MarkRange, *reasons: Reason) -> MarkRange:
     """A mark that is open between two shares whatever was measured, with the reasons first."""
-    return Mark(found.share, low, high, (*reasons, *found.reasons))
+    return MarkRange(first.share, low, high, (*reasons, *first.reasons))
 
 
-def left_open(found: Mark, by_hand: Mark) -> Mark:
+def left_open(first: MarkRange, by_hand: MarkRange) -> MarkRange:
     """A mark that a careful hand's errors alone leave open; `by_hand` is it with all that they allow."""
-    if by_hand.best <= found.best:
-        return found
-    return open_between(found.worst, by_hand.best, found, Reason("hand_may_miss"))
+    if by_hand.best <= first.best:
+        return first
+    return open_between(first.worst, by_hand.best, first, Reason("hand_may_miss"))
 
 
-def the_better(found: Mark, other: Mark, *reasons: Reason) -> Mark:
+def the_better(first: MarkRange, other: MarkRange, *reasons: Reason) -> MarkRange:
     """Two marks of which the better counts; the reasons are those of `other`, after `reasons`."""
-    return Mark(
-        max(found.share, other.share),
-        max(found.worst, other.worst),
-        max(found.best, other.best),
+    return MarkRange(
+        max(first.share, other.share),
+        max(first.worst, other.worst),
+        max(first.best, other.best),
         (*reasons, *other.reasons),
     )
 
 
-def the_worse(found: Mark, other: Mark) -> Mark:
+def the_worse(first: MarkRange, other: MarkRange) -> MarkRange:
     """Two marks of which the worse counts."""
-    return Mark(
-        min(found.share, other.share),
-        min(found.worst, other.worst),
-        min(found.best, other.best),
-        (*found.reasons, *other.reasons),
+    return MarkRange(
+        min(first.share, other.share),
+        min(first.worst, other.worst),
+        min(first.best, other.best),
+        (*first.reasons, *other.reasons),
     )
 
 
@@ -159,7 +164,7 @@ def tolerances(tolerance: ToleranceTable, expected_mm: float, *, with_direction:
     return Tolerance(tolerance.length_at(expected_mm), turn)
 
 
-def widened(plain: Tolerance, expected_mm: float, reach: Spread, at_most: float = math.inf) -> Tolerance:
+def widened(plain: Tolerance, expected_mm: float, reach: EndSpread, at_most: float = math.inf) -> Tolerance:
     """The tolerance of a vector that a careful hand may miss by `reach`, millimetres, where that is more.
 
     What the end is off across a vector makes it longer too, and a zero vector as long as it is off.
@@ -178,8 +183,8 @@ def widened(plain: Tolerance, expected_mm: float, reach: Spread, at_most: float 
 
 
 def mark_vector(
-    drawn: DrawnVector, expected: complex, allowed: Tolerance, table: ToleranceTable, se: Spread
-) -> Mark:
+    drawn: DrawnVector, expected: complex, allowed: Tolerance, table: ToleranceTable, se: EndSpread
+) -> MarkRange:
     """A vector as drawn against the expected one, both in millimetres.
 
     Arguments: `allowed` has a direction where one is judged; `se` are standard errors of what is expected.
@@ -245,7 +250,7 @@ def degrees(angle_rad: float) -> float:
 
 def mark_value(
     value: float, expected: float, allowed: float, plain: float, table: ToleranceTable, unit: str
-) -> Mark:
+) -> MarkRange:
     """A computed value against the expected one, SI; its sign counts where the expected one has any.
 
     Arguments: `plain` is the tolerance without what it was widened by.
@@ -266,7 +271,7 @@ def mark_value(
 RANKS: dict[Verdict, int] = {"none": 0, "partial": 1, "follow_through": 2, "full": 2}
 
 
-def with_confidence(mark: Mark, confidence: float, least: float) -> Mark:
+def with_confidence(mark: MarkRange, confidence: float, least: float) -> MarkRange:
     """Anything is possible where the reading is less certain than the rubric asks."""
     if confidence >= least:
         return mark
@@ -294,7 +299,7 @@ def verdict_of(share: float, *, followed: bool) -> Verdict:
 
 def outcome(  # noqa: PLR0913 - one argument per field of the record
     criterion: CriterionTable,
-    mark: Mark,
+    mark: MarkRange,
     measured: Quantity,
     expected: Quantity,
     tolerance: Tolerance,

@@ -16,7 +16,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
-from grader.cycle.quantities import UNITS, Kind, Quantity, Selection, Subject, strokes_of, unbounded_ends
+from grader.cycle.quantities import (
+    UNITS,
+    CycleQuantity,
+    CycleSubject,
+    Kind,
+    Selection,
+    strokes_of,
+    unbounded_ends,
+)
 from grader.language import N_, Tongue
 from reference.authored.assignment import Assignment, Variant
 from reference.drawing.canvas import pieces_of
@@ -87,7 +95,7 @@ Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class CycleMark:
     """A line through all panels at a driven coordinate (degrees or mm), with a text above it."""
 
     at: float
@@ -129,7 +137,7 @@ def mathtext(name: str) -> str:
 
 
 def cycle_diagram(
-    subject: Subject, selection: Selection, setting: Setting, formats: Sequence[str]
+    subject: CycleSubject, selection: Selection, setting: Setting, formats: Sequence[str]
 ) -> list[bytes]:
     """The diagram as files of some formats: ``svg``, ``pdf``, ``png``."""
     files = []
@@ -143,7 +151,7 @@ def cycle_diagram(
     return files
 
 
-def cycle_figure(subject: Subject, selection: Selection, setting: Setting) -> Figure:
+def cycle_figure(subject: CycleSubject, selection: Selection, setting: Setting) -> Figure:
     """The page: a panel for each kind of quantity, and the paths beside them."""
     kinds = [kind for kind in TITLES if any(quantity.kind == kind for quantity in selection.quantities)]
     size = WIDE_MM if kinds and selection.points else LANDSCAPE_MM if len(kinds) <= 2 else PORTRAIT_MM
@@ -164,12 +172,12 @@ def cycle_figure(subject: Subject, selection: Selection, setting: Setting) -> Fi
     return figure
 
 
-def _owner(quantity: Quantity) -> str:
+def _owner(quantity: CycleQuantity) -> str:
     """The point, pair of points or link of a quantity: it has one colour in all panels."""
     return quantity.of.partition("_")[2]
 
 
-def _speed(subject: Subject, words: Tongue) -> str:
+def _speed(subject: CycleSubject, words: Tongue) -> str:
     """The speed and the acceleration of the driven link."""
     driver = subject.structure.driver
     if subject.cycle.is_turned:
@@ -187,8 +195,8 @@ def _speed(subject: Subject, words: Tongue) -> str:
 
 def _panels(
     figure: Figure,
-    subject: Subject,
-    quantities: Sequence[Quantity],
+    subject: CycleSubject,
+    quantities: Sequence[CycleQuantity],
     kinds: Sequence[Kind],
     setting: Setting,
     colours: Mapping[str, str],
@@ -218,7 +226,11 @@ def _panels(
 
 
 def _panel(
-    axes: Axes, subject: Subject, quantities: Sequence[Quantity], setting: Setting, colours: Mapping[str, str]
+    axes: Axes,
+    subject: CycleSubject,
+    quantities: Sequence[CycleQuantity],
+    setting: Setting,
+    colours: Mapping[str, str],
 ) -> None:
     """Curves of quantities of one kind with a legend; a ring on each at the variant's own position."""
     words, kind = setting.words, quantities[0].kind
@@ -255,7 +267,9 @@ def _panel(
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=10, handlelength=1.8)
 
 
-def _heights(subject: Subject, quantity: Quantity, values: FloatArray, own: float) -> tuple[float, float]:
+def _heights(
+    subject: CycleSubject, quantity: CycleQuantity, values: FloatArray, own: float
+) -> tuple[float, float]:
     """The least and the largest value to show; without bound, the calm part and the variant's own value."""
     least, most = float(values.min()), float(values.max())
     size = np.abs(values)
@@ -278,7 +292,7 @@ def _number_ticks(axis: Any, words: Tongue) -> int:  # noqa: ANN401 - matplotlib
     return power
 
 
-def _write_marks(axes: Axes, marks: Sequence[Mark]) -> None:
+def _write_marks(axes: Axes, marks: Sequence[CycleMark]) -> None:
     """The texts of the marks above a panel, each in the lowest row that has room for it."""
     left, right = axes.get_xlim()
     figure = cast("Figure", axes.figure)
@@ -300,7 +314,7 @@ def _write_marks(axes: Axes, marks: Sequence[Mark]) -> None:
         text.xyann = (0.0, 6.0 + 11.0 * row)
 
 
-def marks_of(subject: Subject, words: Tongue) -> Iterator[Mark]:
+def marks_of(subject: CycleSubject, words: Tongue) -> Iterator[CycleMark]:
     """The variant's own position, dead points, flat positions and the ends of the range."""
     cycle = subject.cycle
     letter, own = "φ" if cycle.is_turned else "s", words.gettext("this variant")
@@ -319,11 +333,11 @@ def marks_of(subject: Subject, words: Tongue) -> Iterator[Mark]:
             yield _mark(subject, stop.at, text, END, "-")
 
 
-def _mark(subject: Subject, driven: float, text: str, colour: str, dash: str) -> Mark:
-    return Mark(float(_as_read(subject, driven)), text, colour, dash)
+def _mark(subject: CycleSubject, driven: float, text: str, colour: str, dash: str) -> CycleMark:
+    return CycleMark(float(_as_read(subject, driven)), text, colour, dash)
 
 
-def _dead_points(subject: Subject, words: Tongue) -> list[tuple[float, str]]:
+def _dead_points(subject: CycleSubject, words: Tongue) -> list[tuple[float, str]]:
     """The dead points, each with the names of all that stand still in it."""
     dead: dict[float, list[str]] = {}
     for stroke in strokes_of(subject):
@@ -334,19 +348,21 @@ def _dead_points(subject: Subject, words: Tongue) -> list[tuple[float, str]]:
     return [(at, ", ".join(names)) for at, names in dead.items()]
 
 
-def _as_read(subject: Subject, driven: float | FloatArray) -> FloatArray:
+def _as_read(subject: CycleSubject, driven: float | FloatArray) -> FloatArray:
     """Driven coordinates in degrees or millimetres."""
     return np.asarray(np.degrees(driven) if subject.cycle.is_turned else 1e3 * np.asarray(driven))
 
 
-def _driven(subject: Subject, driven: float, words: Tongue) -> str:
+def _driven(subject: CycleSubject, driven: float, words: Tongue) -> str:
     """A driven coordinate with its unit."""
     if subject.cycle.is_turned:
         return f"{words.trimmed(float(np.degrees(driven)), 2)}°"
     return words.quantity(1e3 * driven, 2, "mm")
 
 
-def _paths(figure: Figure, subject: Subject, colours: Mapping[str, str], words: Tongue, room_mm: Box) -> None:
+def _paths(
+    figure: Figure, subject: CycleSubject, colours: Mapping[str, str], words: Tongue, room_mm: Box
+) -> None:
     """Paths of some points at the largest round scale, and the mechanism in this variant's position."""
     cycle = subject.cycle
     here = subject.motion_at(np.array([cycle.start]))
@@ -419,7 +435,7 @@ def _path_axes(figure: Figure, places: ComplexArray, room_mm: Box) -> tuple[Axes
     return axes, scale, unit, factor
 
 
-def _at_round_angles(subject: Subject, point: str) -> ComplexArray:
+def _at_round_angles(subject: CycleSubject, point: str) -> ComplexArray:
     """Where a point is at every 30 degrees of the crank."""
     low, high = np.degrees(subject.cycle.driven[[0, -1]])
     first, last = math.ceil(low / 30.0 - 1e-9), math.floor(high / 30.0 + 1e-9)
@@ -428,7 +444,7 @@ def _at_round_angles(subject: Subject, point: str) -> ComplexArray:
     return np.asarray(places[np.isfinite(places)])
 
 
-def _links(subject: Subject) -> list[tuple[str, str]]:
+def _links(subject: CycleSubject) -> list[tuple[str, str]]:
     """Pairs of joints that a rigid link keeps apart, drawn as lines."""
     pairs = list(subject.construction.links.values())
     for group in subject.structure.groups:

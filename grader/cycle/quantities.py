@@ -31,7 +31,7 @@ MANY = 24
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class CycleQuantity:
     """A number that changes over the cycle: a vector's length or component, or a link's rate."""
 
     name: str
@@ -50,11 +50,11 @@ class Quantity:
 class Selection:
     """What a table or a diagram shows: quantities, and points whose paths are drawn."""
 
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[CycleQuantity, ...]
     points: tuple[str, ...] = ()
 
 
-class Subject:
+class CycleSubject:
     """A mechanism on its cycle, with every quantity of it by name."""
 
     def __init__(self, cycle: Cycle) -> None:
@@ -65,7 +65,7 @@ class Subject:
         self.points = tuple(moving)
         self._known = self._quantities()
 
-    def _quantities(self) -> dict[str, Quantity]:
+    def _quantities(self) -> dict[str, CycleQuantity]:
         kinds: dict[str, Kind] = {"kv": "velocity", "ka": "acceleration"}
         vectors: dict[str, Kind] = {
             name: kinds[vector.scale] for name, vector in self.construction.vectors.items()
@@ -73,12 +73,12 @@ class Subject:
         vectors |= {f"{letter}_{joint}": kind for letter, kind in _LETTERS.items() for joint in self.points}
         known = {}
         for name, kind in vectors.items():
-            known[name] = Quantity(name, kind, name)
+            known[name] = CycleQuantity(name, kind, name)
             for axis in AXES:
-                known[f"{name}_{axis}"] = Quantity(f"{name}_{axis}", kind, name, axis)
+                known[f"{name}_{axis}"] = CycleQuantity(f"{name}_{axis}", kind, name, axis)
         for link in self.cycle.motion.omega:
-            known[f"omega_{link}"] = Quantity(f"omega_{link}", "omega", f"omega_{link}")
-            known[f"epsilon_{link}"] = Quantity(f"epsilon_{link}", "epsilon", f"epsilon_{link}")
+            known[f"omega_{link}"] = CycleQuantity(f"omega_{link}", "omega", f"omega_{link}")
+            known[f"epsilon_{link}"] = CycleQuantity(f"epsilon_{link}", "epsilon", f"epsilon_{link}")
         return known
 
     def select(self, names: list[str]) -> Selection:
@@ -120,7 +120,7 @@ class Subject:
         driven = driven if cycle.turns else driven[1:-1]
         return driven, self.motion_at(driven)
 
-    def values(self, quantity: Quantity, motion: Motion | None = None) -> FloatArray:
+    def values(self, quantity: CycleQuantity, motion: Motion | None = None) -> FloatArray:
         """A quantity over the cycle, or in another motion of the mechanism, SI, (N,).
 
         What is smaller than its own predicted error (relative to the largest of its kind) is zero.
@@ -131,11 +131,11 @@ class Subject:
             is_rounding = np.abs(values) <= motion.predicted_error * _largest(quantity.kind, motion)
         return np.where(is_rounding, 0.0, values)
 
-    def size(self, quantity: Quantity) -> float:
+    def size(self, quantity: CycleQuantity) -> float:
         """How large the largest of a kind usually is over the cycle: against it others are small."""
         return float(np.nanmedian(_largest(quantity.kind, self.fine[1])))
 
-    def _values(self, quantity: Quantity, motion: Motion) -> FloatArray:
+    def _values(self, quantity: CycleQuantity, motion: Motion) -> FloatArray:
         if quantity.kind in {"omega", "epsilon"}:
             rates: Mapping[str, FloatArray] = motion.omega if quantity.kind == "omega" else motion.epsilon
             return rates[quantity.of.partition("_")[2]]
@@ -154,7 +154,7 @@ class Subject:
         with np.errstate(all="ignore"):
             return vectors_of(self.construction, self.structure, motion)[name]
 
-    def values_at(self, quantity: Quantity, driven: FloatArray) -> FloatArray:
+    def values_at(self, quantity: CycleQuantity, driven: FloatArray) -> FloatArray:
         """A quantity at other driven coordinates, nan in singular ones."""
         return self.values(quantity, self.motion_at(driven))
 
@@ -179,7 +179,7 @@ def _largest(kind: Kind, motion: Motion) -> FloatArray:
     return np.asarray(np.max(parts, axis=0))
 
 
-def cycle_csv(subject: Subject, selection: Selection, *, decimal_comma: bool = False) -> str:
+def cycle_csv(subject: CycleSubject, selection: Selection, *, decimal_comma: bool = False) -> str:
     """The driven coordinate and the selected quantities at each sample; the reason where there is none.
 
     Numbers with all their digits (they read back as the same doubles), blank where there is none; the
@@ -204,7 +204,7 @@ def cycle_csv(subject: Subject, selection: Selection, *, decimal_comma: bool = F
     writer.writerow([*(heading for heading, _ in columns), "note"])
     for row in range(cycle.driven.size):
         numbers = [_written(float(values[row]), decimal_comma) for _, values in columns]
-        writer.writerow([*numbers, cycle.untold.get(row, "")])
+        writer.writerow([*numbers, cycle.undetermined.get(row, "")])
     return buffer.getvalue()
 
 
@@ -227,7 +227,7 @@ REST = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Stroke:
+class OutputStroke:
     """To and fro between two dead points.
 
     Attributes
@@ -264,13 +264,13 @@ class _Output:
     place: Callable[[Motion], ComplexArray]
 
 
-def strokes_of(subject: Subject) -> tuple[Stroke, ...]:
+def strokes_of(subject: CycleSubject) -> tuple[OutputStroke, ...]:
     """Of all sliders on fixed guides and all links hinged to the ground that go to and fro."""
     found = (_stroke(subject, output) for output in _outputs(subject))
     return tuple(stroke for stroke in found if stroke.dead_points)
 
 
-def _outputs(subject: Subject) -> Iterator[_Output]:
+def _outputs(subject: CycleSubject) -> Iterator[_Output]:
     for group in subject.structure.groups:
         match group:
             case Slider(guide=FixedGuide() as guide) | Yoke(guide=guide):
@@ -295,7 +295,7 @@ def _slider(node: str, guide: FixedGuide) -> _Output:
     return _Output(node, False, rate, place)  # noqa: FBT003 - the field's name says it
 
 
-def _rockers(subject: Subject, group: Group) -> Iterator[_Output]:
+def _rockers(subject: CycleSubject, group: Group) -> Iterator[_Output]:
     match group:
         case Dyad(pins=pins, links=links):
             arms = [(link, pin, group.node) for pin, link in zip(pins, links, strict=True)]
@@ -315,18 +315,20 @@ def _rockers(subject: Subject, group: Group) -> Iterator[_Output]:
             yield _Output(link, True, rate, place)  # noqa: FBT003 - as above
 
 
-def _stroke(subject: Subject, output: _Output) -> Stroke:
+def _stroke(subject: CycleSubject, output: _Output) -> OutputStroke:
     cycle = subject.cycle
     dead = tuple(sorted(set(_turning_points(subject, output))))
     if not cycle.turns or len(dead) != 2:
-        return Stroke(output.name, output.is_angle, dead, None, None)
+        return OutputStroke(output.name, output.is_angle, dead, None, None)
     first, second = dead
     period = float(cycle.driven[-1] - cycle.driven[0])
     ways = (second - first, period - (second - first))
-    return Stroke(output.name, output.is_angle, dead, _travel(subject, output, dead), max(ways) / min(ways))
+    return OutputStroke(
+        output.name, output.is_angle, dead, _travel(subject, output, dead), max(ways) / min(ways)
+    )
 
 
-def _turning_points(subject: Subject, output: _Output) -> Iterator[float]:
+def _turning_points(subject: CycleSubject, output: _Output) -> Iterator[float]:
     """Where the rate changes its sign, refined from the samples; over a full cycle its two ends are one."""
     cycle = subject.cycle
     samples, motion = subject.fine
@@ -349,7 +351,7 @@ def _turning_points(subject: Subject, output: _Output) -> Iterator[float]:
         yield at
 
 
-def _travel(subject: Subject, output: _Output, dead: tuple[float, ...]) -> float:
+def _travel(subject: CycleSubject, output: _Output, dead: tuple[float, ...]) -> float:
     """Between two dead points, an angle followed from sample to sample."""
     driven, _ = subject.fine
     between = driven[(driven > dead[0]) & (driven < dead[1])]
@@ -360,7 +362,7 @@ def _travel(subject: Subject, output: _Output, dead: tuple[float, ...]) -> float
     return abs(float(np.nansum(turned)))
 
 
-def extremes(subject: Subject, quantity: Quantity) -> tuple[Extreme, Extreme]:
+def extremes(subject: CycleSubject, quantity: CycleQuantity) -> tuple[Extreme, Extreme]:
     """The smallest and the largest value over the cycle, not only at its samples."""
     values = subject.values(quantity, subject.fine[1])
     smallest, largest = (_refined(subject, quantity, values, sign) for sign in (-1.0, 1.0))
@@ -372,7 +374,7 @@ def extremes(subject: Subject, quantity: Quantity) -> tuple[Extreme, Extreme]:
     )
 
 
-def _refined(subject: Subject, quantity: Quantity, values: FloatArray, sign: float) -> Extreme:
+def _refined(subject: CycleSubject, quantity: CycleQuantity, values: FloatArray, sign: float) -> Extreme:
     driven, _ = subject.fine
     if not np.isfinite(values).any():
         return Extreme(np.nan, ())
@@ -391,7 +393,7 @@ def _refined(subject: Subject, quantity: Quantity, values: FloatArray, sign: flo
     return Extreme(value, (at,))
 
 
-def unbounded_ends(subject: Subject, quantity: Quantity) -> Iterator[tuple[float, float]]:
+def unbounded_ends(subject: CycleSubject, quantity: CycleQuantity) -> Iterator[tuple[float, float]]:
     """Ends of the range towards which a quantity grows without bound, and its sign there."""
     cycle: Cycle = subject.cycle
     low, high = float(cycle.driven[0]), float(cycle.driven[-1])

@@ -21,8 +21,14 @@ from grader.documents import (
     StandingDocument,
 )
 from grader.feedback.mistakes import MISTAKES
-from grader.feedback.student_page import environment, score_text
-from grader.feedback.words import STATES, VERDICTS, problem_sentence, unmatched_sentence
+from grader.feedback.words import (
+    STATES,
+    VERDICTS,
+    environment,
+    problem_sentence,
+    score_text,
+    unmatched_sentence,
+)
 from grader.files import write_whole
 from grader.language import N_, Tongue, tongue
 from grader.overlay.scene import COLOURS, MARKS
@@ -71,7 +77,7 @@ def histogram(values: Iterable[float]) -> list[int]:
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class ScoreSpread:
     """Mean, median, least and largest of the final scores, as shares of the maximum."""
 
     mean: float
@@ -80,10 +86,10 @@ class Spread:
     largest: float
 
 
-def spread(results: ResultsDocument) -> Spread | None:
+def spread(results: ResultsDocument) -> ScoreSpread | None:
     """How the final scores spread; None while there are none."""
     values = shares(results)
-    return Spread(mean(values), median(values), min(values), max(values)) if values else None
+    return ScoreSpread(mean(values), median(values), min(values), max(values)) if values else None
 
 
 # Criteria -----------------------------------------------------------------------------------------
@@ -91,37 +97,30 @@ def spread(results: ResultsDocument) -> Spread | None:
 
 @dataclass(frozen=True, slots=True)
 class Hardness:
-    """How a criterion went: share of its points earned where it was judged."""
+    """How a criterion went: the share of its points that was earned where it was judged."""
 
     title: str
     vector: str | None
     earned: float
     judged: int
-    waiting: int
 
 
 def hardest(results: ResultsDocument) -> list[Hardness]:
     """The criteria at which most points were lost, worst first; those that everybody got are left out."""
-    earned: dict[str, float] = {}
-    possible: dict[str, float] = {}
-    judged: Counter[str] = Counter()
-    waiting: Counter[str] = Counter()
-    about: dict[str, tuple[str, str | None]] = {}
+    judged: dict[str, list[CriterionDocument]] = {}
+    first: dict[str, CriterionDocument] = {}
     for report in results.reports:
         for criterion in report.criteria:
-            about.setdefault(criterion.id, (criterion.title, criterion.vector))
-            if criterion.verdict == "review":
-                waiting[criterion.id] += 1
+            first.setdefault(criterion.id, criterion)
             if criterion.verdict in _JUDGED and criterion.points is not None:
-                judged[criterion.id] += 1
-                earned[criterion.id] = earned.get(criterion.id, 0.0) + criterion.points
-                possible[criterion.id] = possible.get(criterion.id, 0.0) + criterion.max_points
-    found = [
-        Hardness(*about[one], earned[one] / possible[one], judged[one], waiting[one])
-        for one in judged
-        if earned[one] < possible[one]
-    ]
-    return sorted(found, key=lambda one: one.earned)[:HARDEST]
+                judged.setdefault(criterion.id, []).append(criterion)
+    hardness = []
+    for name, criteria in judged.items():
+        earned = sum(criterion.points or 0.0 for criterion in criteria)
+        possible = sum(criterion.max_points for criterion in criteria)
+        if earned < possible:
+            hardness.append(Hardness(first[name].title, first[name].vector, earned / possible, len(criteria)))
+    return sorted(hardness, key=lambda criterion: criterion.earned)[:HARDEST]
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,42 +128,46 @@ class Followed:
     """What counts as right because it follows from an own earlier value: each criterion, how often."""
 
     points: float
-    reports: list[int]
+    reports: list[ReportDocument]
     criteria: list[tuple[str, int]]
 
 
 def share_followed(results: ResultsDocument) -> Followed:
-    """Follow-through granted, with the indices of the reports."""
+    """Follow-through granted, with the reports."""
     points, reports, times = 0.0, [], Counter[str]()
-    for index, report in enumerate(results.reports):
-        given = [one for one in report.criteria if one.verdict == "follow_through"]
-        points += sum(one.points or 0.0 for one in given)
-        times.update(one.title for one in given)
-        reports += [index] if given else []
+    for report in results.reports:
+        given = [criterion for criterion in report.criteria if criterion.verdict == "follow_through"]
+        points += sum(criterion.points or 0.0 for criterion in given)
+        times.update(criterion.title for criterion in given)
+        reports += [report] if given else []
     return Followed(points, reports, times.most_common(HARDEST))
 
 
 # Mistakes -----------------------------------------------------------------------------------------
 
 
-def commonest(results: ResultsDocument) -> list[tuple[str, list[int]]]:
-    """Codes of mistakes with the indices of the reports that show them, commonest first."""
-    found: dict[str, list[int]] = {}
-    for index, report in enumerate(results.reports):
+def commonest(results: ResultsDocument) -> list[tuple[str, list[ReportDocument]]]:
+    """Codes of mistakes with the reports that show them, commonest first."""
+    reports: dict[str, list[ReportDocument]] = {}
+    for report in results.reports:
         for code in dict.fromkeys(mistake.code for mistake in report.mistakes):
-            found.setdefault(code, []).append(index)
-    return sorted(found.items(), key=lambda item: -len(item[1]))[:COMMONEST]
+            reports.setdefault(code, []).append(report)
+    return sorted(reports.items(), key=lambda item: -len(item[1]))[:COMMONEST]
 
 
-def wrong_scales(results: ResultsDocument) -> list[tuple[int, list[CriterionDocument], list[str]]]:
-    """Reports (by index) whose scales were not right: the criteria lost, and the scales not understood."""
-    found = []
-    for index, report in enumerate(results.reports):
-        lost = [one for one in report.criteria if _is_scale(one) and one.verdict in _LOST]
-        refused = [f"{name} = {one.text}" for name, one in report.scales.items() if one.refused and one.text]
+def wrong_scales(results: ResultsDocument) -> list[tuple[ReportDocument, list[CriterionDocument], list[str]]]:
+    """Reports whose scales were not right: the criteria lost, and the scales not understood."""
+    wrong = []
+    for report in results.reports:
+        lost = [
+            criterion for criterion in report.criteria if _is_scale(criterion) and criterion.verdict in _LOST
+        ]
+        refused = [
+            f"{name} = {scale.text}" for name, scale in report.scales.items() if scale.refused and scale.text
+        ]
         if lost or refused:
-            found.append((index, lost, refused))
-    return found
+            wrong.append((report, lost, refused))
+    return wrong
 
 
 def _is_scale(criterion: CriterionDocument) -> bool:
@@ -177,21 +180,23 @@ def _is_scale(criterion: CriterionDocument) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A report (by index) that a person must look at, what is at stake, and the criteria that wait."""
+    """A report that a person must look at, the points at stake, and the criteria that wait."""
 
-    index: int
+    report: ReportDocument
     points: float
     criteria: list[CriterionDocument]
 
 
 def waiting(results: ResultsDocument) -> list[Waiting]:
-    """What waits for a person, that first which one look decides most of."""
-    found = [
-        Waiting(index, _stake(report), [one for one in report.criteria if one.verdict == "review"])
-        for index, report in enumerate(results.reports)
-        if report.status in {"needs_review", "unreadable"}
-    ]
-    return sorted(found, key=lambda one: -one.points)
+    """The reports that wait for a person, those with the most points at stake first."""
+    reports = [report for report in results.reports if report.status in {"needs_review", "unreadable"}]
+    return sorted(
+        (
+            Waiting(report, _stake(report), [one for one in report.criteria if one.verdict == "review"])
+            for report in reports
+        ),
+        key=lambda item: -item.points,
+    )
 
 
 def _stake(report: ReportDocument) -> float:
@@ -240,36 +245,38 @@ def index_page(
 ) -> str:
     """The class's page."""
     speaker = tongue(lang)
-    who = _Who(results, student_names)
+    links = _links(results.reports)
     followed = share_followed(results)
+
+    def link(student: ReportDocument | MovedDocument) -> Link:
+        return links.get((student.student_id, student.position), Link(student.student_id))
+
     return environment(speaker.lang).get_template("index.html").render(
         results=results,
         title=title or results.assignment,
-        rows=_rows(results, who, speaker),
+        rows=[_row(report, student_names, link(report), speaker) for report in results.reports],
         has_positions=any(report.position is not None for report in results.reports),
         has_n=any("n" in report.variant for report in results.reports),
-        unmatched=[unmatched_sentence(one, speaker) for one in results.unmatched],
+        unmatched=[unmatched_sentence(page, speaker) for page in results.unmatched],
         states=states(results),
         chart=distribution_svg(results, speaker),
         spread=spread(results),
         has_open=bool(open_shares(results)),
         hardest=hardest(results),
         commonest=[
-            (MISTAKES[code].title, len(found), [who.link(index) for index in found])
-            for code, found in commonest(results)
+            (MISTAKES[code].title, len(reports), [link(report) for report in reports])
+            for code, reports in commonest(results)
             if code in MISTAKES
         ],
         followed=followed,
-        followers=[who.link(index) for index in followed.reports],
-        waiting=[
-            (who.link(one.index), one, results.reports[one.index]) for one in waiting(results)
-        ],
+        followers=[link(report) for report in followed.reports],
+        waiting=[(link(waiting.report), waiting) for waiting in waiting(results)],
         scales=[
-            (who.link(index), [_scale(one, speaker) for one in lost], refused)
-            for index, lost, refused in wrong_scales(results)
+            (link(report), [_scale(criterion, speaker) for criterion in lost], refused)
+            for report, lost, refused in wrong_scales(results)
         ],
-        alike=[_alike(one, who, speaker) for one in results.alike],
-        moved=[_moved(one, who, speaker) for one in results.moved],
+        alike=[_similar_row(pair, links, speaker) for pair in results.alike],
+        moved=[_change_row(change, link(change), speaker) for change in results.moved],
         causes=_causes(results.moved),
         score_text=lambda report: score_text(report, speaker),
         shown=SHOWN,
@@ -293,57 +300,38 @@ def folders_of(reports: Sequence[ReportDocument]) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A student's name as a link; `picture` of the first page, empty where there is none."""
+    """A student's name as a link; `page` is empty for one who is gone, `picture` where there is no scan."""
 
     text: str
-    page: str
-    picture: str
+    page: str = ""
+    picture: str = ""
 
 
-class _Who:
-    """Links to students, by the index of their report or by id and position."""
-
-    def __init__(self, results: ResultsDocument, names: Mapping[str, str]) -> None:
-        reports, folders = results.reports, folders_of(results.reports)
-        several = {student for student, count in Counter(r.student_id for r in reports).items() if count > 1}
-        self.names = names
-        self.links = [
-            Link(
-                f"{report.student_id}, {report.position}"
-                if report.student_id in several
-                else report.student_id,
-                f"{quote(folder)}/feedback.html",
-                f"{quote(folder)}/overlay.png" if report.reading.sheets else "",
-            )
-            for report, folder in zip(reports, folders, strict=True)
-        ]
-        self.index = {(report.student_id, report.position): k for k, report in enumerate(reports)}
-
-    def link(self, index: int) -> Link:
-        """Of a report."""
-        return self.links[index]
-
-    def of(self, student: str, position: int | None) -> Link:
-        """Of a student, who may be gone."""
-        index = self.index.get((student, position))
-        return Link(student, "", "") if index is None else self.links[index]
+Links = Mapping[tuple[str, int | None], Link]
+"""By student and position."""
 
 
-def _rows(results: ResultsDocument, who: _Who, speaker: Tongue) -> list[dict[str, object]]:
-    return [
-        {
-            "report": report,
-            "name": who.names.get(report.student_id, ""),
-            "link": who.link(index).page,
-            "score": score_text(report, speaker),
-            "waiting": sum(criterion.verdict == "review" for criterion in report.criteria),
-            "problems": Counter(
-                problem_sentence(problem, speaker, brief=True) for problem in report.problems
-            ),
-            "best": report.score if report.score is not None else (report.score_range or (-1.0, -1.0))[0],
-        }
-        for index, report in enumerate(results.reports)
-    ]
+def _links(reports: Sequence[ReportDocument]) -> Links:
+    count = Counter(report.student_id for report in reports)
+    links = {}
+    for report, folder in zip(reports, folders_of(reports), strict=True):
+        student, position = report.student_id, report.position
+        text = f"{student}, {position}" if count[student] > 1 else student
+        picture = f"{quote(folder)}/overlay.png" if report.reading.sheets else ""
+        links[student, position] = Link(text, f"{quote(folder)}/feedback.html", picture)
+    return links
+
+
+def _row(report: ReportDocument, names: Mapping[str, str], link: Link, speaker: Tongue) -> dict[str, object]:
+    return {
+        "report": report,
+        "name": names.get(report.student_id, ""),
+        "link": link.page,
+        "score": score_text(report, speaker),
+        "waiting": sum(criterion.verdict == "review" for criterion in report.criteria),
+        "problems": Counter(problem_sentence(problem, speaker, brief=True) for problem in report.problems),
+        "best": report.score if report.score is not None else (report.score_range or (-1.0, -1.0))[0],
+    }
 
 
 def _scale(criterion: CriterionDocument, speaker: Tongue) -> str:
@@ -359,13 +347,17 @@ def _scale(criterion: CriterionDocument, speaker: Tongue) -> str:
 # Sheets that look alike, and what moved -----------------------------------------------------------
 
 
-def _alike(one: AlikeDocument, who: _Who, speaker: Tongue) -> dict[str, object]:
-    chance = "" if one.measure is None else speaker.gettext(CHANCE) % {"chance": _small(one.measure, speaker)}
+def _similar_row(pair: AlikeDocument, links: Links, speaker: Tongue) -> dict[str, object]:
+    chance, share = "", None
+    if pair.measure is not None:
+        chance = speaker.gettext(CHANCE) % {"chance": _small(pair.measure, speaker)}
+    if pair.share is not None:
+        share = f"{speaker.number(100.0 * pair.share, 0)}\N{NO-BREAK SPACE}%"
     return {
-        "students": [who.of(*key) for key in zip(one.students, one.positions, strict=True)],
-        "why": [speaker.gettext(SIGNS[sign]) for sign in one.why],
-        "share": None if one.share is None else f"{speaker.number(100.0 * one.share, 0)}\N{NO-BREAK SPACE}%",
-        "compared": one.compared,
+        "students": [links.get(key, Link(key[0])) for key in zip(pair.students, pair.positions, strict=True)],
+        "why": [speaker.gettext(SIGNS[sign]) for sign in pair.why],
+        "share": share,
+        "compared": pair.compared,
         "chance": chance,
     }
 
@@ -375,31 +367,31 @@ def _small(value: float, speaker: Tongue) -> str:
     return speaker.significant(value, 1) if value >= 1e-6 else f"< {speaker.number(1e-6, 6)}"
 
 
-def _moved(one: MovedDocument, who: _Who, speaker: Tongue) -> dict[str, object]:
+def _change_row(change: MovedDocument, link: Link, speaker: Tongue) -> dict[str, object]:
     return {
-        "student": who.of(one.student_id, one.position),
-        "before": _standing(one.before, speaker),
-        "after": _standing(one.after, speaker),
-        "why": [speaker.gettext(CAUSES[cause]) for cause in one.why],
+        "student": link,
+        "before": _standing(change.before, speaker),
+        "after": _standing(change.after, speaker),
+        "why": [speaker.gettext(CAUSES[cause]) for cause in change.why],
         "criteria": [
             (
                 criterion.title,
                 _verdict(criterion.before, criterion.points_before, speaker),
                 _verdict(criterion.after, criterion.points_after, speaker),
             )
-            for criterion in one.criteria
+            for criterion in change.criteria
         ],
     }
 
 
-def _standing(one: StandingDocument | None, speaker: Tongue) -> str:
-    if one is None:
+def _standing(standing: StandingDocument | None, speaker: Tongue) -> str:
+    if standing is None:
         return "–"
-    if one.score is not None:
-        return speaker.trimmed(one.score, 2)
-    if one.status == "needs_review" and one.score_range is not None:
-        return "–".join(speaker.trimmed(value, 2) for value in dict.fromkeys(one.score_range))
-    return speaker.gettext(STATES[one.status])
+    if standing.score is not None:
+        return speaker.trimmed(standing.score, 2)
+    if standing.status == "needs_review" and standing.score_range is not None:
+        return "–".join(speaker.trimmed(value, 2) for value in dict.fromkeys(standing.score_range))
+    return speaker.gettext(STATES[standing.status])
 
 
 def _verdict(verdict: str | None, points: float | None, speaker: Tongue) -> str:
@@ -409,9 +401,9 @@ def _verdict(verdict: str | None, points: float | None, speaker: Tongue) -> str:
     return told if points is None else f"{told} ({speaker.trimmed(points, 2)})"
 
 
-def _causes(moved: Sequence[MovedDocument]) -> list[tuple[str, int]]:
-    """Why marks moved, and how often."""
-    times = Counter(cause for one in moved for cause in one.why)
+def _causes(changes: Sequence[MovedDocument]) -> list[tuple[str, int]]:
+    """Why marks changed, and how often."""
+    times = Counter(cause for one in changes for cause in one.why)
     return [(CAUSES[cause], count) for cause, count in times.most_common()]
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from grader.documents import MistakeDocument, ReportDocument, RivalDocument
-from grader.feedback.sentences import Level, one_mistake
+from grader.feedback.sentences import Level, mistake_sentence
 from grader.language import N_, Tongue, tongue
 from grader.outcomes import Judgement, NamedMistake
 from grader.solution import sentences
@@ -66,7 +66,7 @@ def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> 
     touched = _touched(construction.steps, node)
     figure = construction.figure_of(node)
     own = [step for step in touched if construction.figure_of(step.node) == figure]
-    told = [_told(speaker, step, with_numbers=with_numbers) for step in own[:MOST_STEPS]]
+    told = [_text(speaker, step, with_numbers=with_numbers) for step in own[:MOST_STEPS]]
     later = [step.node for step in (*own[MOST_STEPS:], *(step for step in touched if step not in own))]
     if later:
         told.append(speaker.say(THEN, nodes=speaker.names(tuple(later))))
@@ -83,15 +83,15 @@ def _touched(steps: tuple[Step, ...], node: str) -> list[Step]:
     return touched
 
 
-def _told(speaker: Speaker, step: Step, *, with_numbers: bool) -> Markup:
+def _text(speaker: Speaker, step: Step, *, with_numbers: bool) -> Markup:
     if not with_numbers:
-        return Markup(". ").join(_untold(speaker, step))
+        return Markup(". ").join(_text_without_numbers(speaker, step))
     computing = Markup("; ").join(computed(speaker, step))
     drawing = sentences.sentence(speaker, step)
     return Markup("{}. {}").format(computing, drawing) if computing else drawing
 
 
-def _untold(speaker: Speaker, step: Step) -> Iterator[Markup]:
+def _text_without_numbers(speaker: Speaker, step: Step) -> Iterator[Markup]:
     """A step without a number: its formula, then what is drawn."""
     match step:
         case TwoLines() | Coincide():
@@ -139,7 +139,7 @@ def with_mistakes_told(
     told = [
         document.model_copy(
             update={
-                "feedback": one_mistake(mistake, speaker, level, names),
+                "feedback": mistake_sentence(mistake, speaker, level, names),
                 "rivals": _rivals(document, mistake, speaker, level, names),
                 "redo": _redo(subject, mistake, speaker, level),
             }
@@ -153,7 +153,7 @@ def _rivals(
     document: MistakeDocument, mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str]
 ) -> list[RivalDocument]:
     return [
-        rival.model_copy(update={"feedback": one_mistake(one, speaker, level, names)})
+        rival.model_copy(update={"feedback": mistake_sentence(one, speaker, level, names)})
         for rival, one in zip(document.rivals, mistake.rivals, strict=True)
     ]
 

@@ -171,8 +171,8 @@ def mistake_feedback(
     if level == "symbol" or mistake.code not in MISTAKES:
         return ""
     speaker = tongue(lang)
-    told = one_mistake(mistake, speaker, level, names)
-    others = [one_mistake(one, speaker, level, names) for one in mistake.rivals if one.code in MISTAKES]
+    told = mistake_sentence(mistake, speaker, level, names)
+    others = [mistake_sentence(one, speaker, level, names) for one in mistake.rivals if one.code in MISTAKES]
     others = [one for one in dict.fromkeys(others) if one != told]
     if not others:
         return told
@@ -181,7 +181,7 @@ def mistake_feedback(
     )
 
 
-def one_mistake(
+def mistake_sentence(
     mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
 ) -> str:
     """What was done and what to redo, whatever its rivals."""

@@ -3,10 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from grader.documents import (
@@ -21,49 +19,13 @@ from grader.documents import (
 )
 from grader.feedback import words
 from grader.feedback.mistakes import MISTAKES, words_of
-from grader.feedback.sentences import HINTS, OR_RIVAL, PLACES, RIVALS, Level, place
-from grader.feedback.words import ProblemText, problem_sentence
+from grader.feedback.sentences import HINTS, PLACES, Level, place
+from grader.feedback.words import ProblemText, environment, problem_sentence, score_text
 from grader.files import write_whole
 from grader.language import N_, Tongue, tongue
 from grader.overlay.closeup import Look, detail, looks_at, scan_element, svg
-from grader.overlay.scene import COLOURS, MARKS, Picture
+from grader.overlay.scene import COLOURS, Picture
 from reference.drawing.subject import SCALE_UNITS
-
-
-@cache
-def environment(lang: str) -> Environment:
-    """Templates with the sentences and numbers of a language."""
-    speaker = tongue(lang)
-    made = Environment(
-        loader=PackageLoader("grader.feedback"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        extensions=["jinja2.ext.i18n"],
-    )
-    made.install_gettext_callables(  # type: ignore[attr-defined]
-        speaker.gettext, speaker.ngettext, newstyle=True
-    )
-    made.filters["symbols"] = words.symbols
-    made.filters["first_up"] = lambda text: text[:1].upper() + text[1:]
-    made.filters["points"] = lambda value: speaker.trimmed(value, 2)
-    made.globals.update(
-        speaker=speaker, verdicts=words.VERDICTS, states_words=words.STATES, state_marks=words.STATE_MARKS,
-        marks=MARKS, rivals=speaker.gettext(RIVALS), either=speaker.gettext(OR_RIVAL),
-    )  # fmt: skip
-    return made
-
-
-def score_text(report: ReportDocument, speaker: Tongue) -> str:
-    """The score, the range it lies in, or a dash."""
-    if report.score is not None:
-        return speaker.trimmed(report.score, 2)
-    if report.score_range is None or report.status in {"missing", "unreadable"}:
-        return "–"
-    low, high = (speaker.trimmed(value, 2) for value in report.score_range)
-    return low if low == high else f"{low}–{high}"
-
 
 NUMBER, POSITION, PAGE = N_("number"), N_("position"), N_("page")
 WIDENED = N_("widened")

@@ -2,11 +2,15 @@
 
 import re
 from dataclasses import dataclass
+from functools import cache
 
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from grader.documents import ProblemDocument, UnmatchedDocument
-from grader.language import N_, ROOT_LANGUAGE, Tongue
+from grader.documents import ProblemDocument, ReportDocument, UnmatchedDocument
+from grader.feedback.sentences import OR_RIVAL, RIVALS
+from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
+from grader.overlay.scene import MARKS
 
 VERDICTS = {
     "full": N_("right"),
@@ -51,15 +55,53 @@ def symbols(text: str) -> Markup:
     return Markup("").join([*parts, escape(text[end:])])
 
 
-def _symbol(found: re.Match[str]) -> Markup:
-    if found["vector"]:
-        part = Markup("<sup>{}</sup>").format(found["part"]) if found["part"] else Markup("")
-        return Markup("<i>{}</i><sub>{}</sub>{}").format(found["vector"], found["points"], part)
-    if found["pivot"]:
-        return Markup("O<sub>{}</sub>").format(found["pivot"])
-    if found["rate"]:
-        return Markup("<i>{}</i><sub>{}</sub>").format(_GREEK[found["rate"]], found["link"])
-    return Markup("<i>{}</i><sub>{}</sub>").format(found["letter"], found["scale"])
+def _symbol(match: re.Match[str]) -> Markup:
+    if match["vector"]:
+        part = Markup("<sup>{}</sup>").format(match["part"]) if match["part"] else Markup("")
+        return Markup("<i>{}</i><sub>{}</sub>{}").format(match["vector"], match["points"], part)
+    if match["pivot"]:
+        return Markup("O<sub>{}</sub>").format(match["pivot"])
+    if match["rate"]:
+        return Markup("<i>{}</i><sub>{}</sub>").format(_GREEK[match["rate"]], match["link"])
+    return Markup("<i>{}</i><sub>{}</sub>").format(match["letter"], match["scale"])
+
+
+# Templates ----------------------------------------------------------------------------------------
+
+
+@cache
+def environment(lang: str) -> Environment:
+    """Templates with the sentences and numbers of a language."""
+    speaker = tongue(lang)
+    made = Environment(
+        loader=PackageLoader("grader.feedback"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        extensions=["jinja2.ext.i18n"],
+    )
+    made.install_gettext_callables(  # type: ignore[attr-defined]
+        speaker.gettext, speaker.ngettext, newstyle=True
+    )
+    made.filters["symbols"] = symbols
+    made.filters["first_up"] = lambda text: text[:1].upper() + text[1:]
+    made.filters["points"] = lambda value: speaker.trimmed(value, 2)
+    made.globals.update(
+        speaker=speaker, verdicts=VERDICTS, states_words=STATES, state_marks=STATE_MARKS,
+        marks=MARKS, rivals=speaker.gettext(RIVALS), either=speaker.gettext(OR_RIVAL),
+    )  # fmt: skip
+    return made
+
+
+def score_text(report: ReportDocument, speaker: Tongue) -> str:
+    """The score, the range it lies in, or a dash."""
+    if report.score is not None:
+        return speaker.trimmed(report.score, 2)
+    if report.score_range is None or report.status in {"missing", "unreadable"}:
+        return "–"
+    low, high = (speaker.trimmed(value, 2) for value in report.score_range)
+    return low if low == high else f"{low}–{high}"
 
 
 PROBLEMS: dict[str, str] = {
@@ -149,7 +191,7 @@ def problem_sentence(problem: ProblemDocument, speaker: Tongue, *, brief: bool =
     """A problem of a submission; `brief` leaves the program's own words out where a sentence says it."""
     if brief and problem.code in PROBLEMS:
         return ProblemText(speaker.gettext(PROBLEMS[problem.code]), "", problem.file or "")
-    return _told(problem.code, problem.message, problem.file or "", speaker)
+    return _text_of(problem.code, problem.message, problem.file or "", speaker)
 
 
 def unmatched_sentence(unmatched: UnmatchedDocument, speaker: Tongue) -> ProblemText:
@@ -157,10 +199,10 @@ def unmatched_sentence(unmatched: UnmatchedDocument, speaker: Tongue) -> Problem
     place = unmatched.file
     if unmatched.page is not None:
         place = f"{place}, {speaker.gettext('page')} {unmatched.page}"
-    return _told(unmatched.code, unmatched.message, place, speaker)
+    return _text_of(unmatched.code, unmatched.message, place, speaker)
 
 
-def _told(code: str, message: str, file: str, speaker: Tongue) -> ProblemText:
+def _text_of(code: str, message: str, file: str, speaker: Tongue) -> ProblemText:
     known = PROBLEMS.get(code)
     # The English message is the more precise one: no summary is needed before it.
     if known is None or (speaker.lang == ROOT_LANGUAGE and message):

@@ -13,17 +13,19 @@ from grader.feedback.sentences import Level
 from grader.feedback.student_page import About, write_feedback
 from grader.files import make_folder, write_whole
 from grader.folder.cache import (
+    CELL_STAGE,
+    CELLS_OF,
     MARK_STAGE,
     READ_STAGE,
     SCAN_STAGE,
     PageCache,
+    cached_maps,
+    cached_reading,
     digest_of,
-    keep_reading,
-    kept_maps,
-    kept_reading,
     stage_digest,
+    store_reading,
 )
-from grader.folder.changes import Inputs, earlier, inputs_of, moved, note_inputs, noted_inputs
+from grader.folder.changes import Inputs, changes_since, earlier, inputs_of, note_inputs, noted_inputs
 from grader.folder.inventory import FileContent, Progress, submissions, survey_folder
 from grader.folder.owners import Unmatched, assign_pages
 from grader.folder.submissions import Unusable, submissions_of
@@ -33,9 +35,8 @@ from grader.inputs.roster import Roster, read_roster
 from grader.lms.table import write_summary
 from grader.marking.report import unjudged_report
 from grader.pipeline import mark, read_submission
-from grader.printed.answer_sheet import asked_of
 from grader.records import Problem, ScannedPage
-from grader.rubric import RubricFile
+from grader.rubric import RubricFile, asked_of
 from grader.similarity.groups import find_similar
 from grader.similarity.submission import compared_submission
 from reference.authored.assignment import Assignment, Variant
@@ -104,11 +105,11 @@ def similar_of_run(
         for job, report in zip(jobs, reports, strict=True)
         if job.submission.variant is not None and report.criteria
     ]
-    maps = [kept_maps(readings, job.name) for job, _ in marked]
+    maps = [cached_maps(readings, job.name) for job, _ in marked]
     return find_similar(assignment, [one for _, one in marked], maps)
 
 
-KEPT_FOLDER = ".planmark"
+CACHE_FOLDER = ".planmark"
 _PASSING = "file_changed"
 """A problem that the next run need not have: nothing that has it is cached."""
 
@@ -168,7 +169,7 @@ def grade(batch: Batch, progress: Progress, workers: Pool | None = None) -> Resu
 def _graded(
     batch: Batch, roster: Roster | None, files: Sequence[Path], progress: Progress, workers: Pool
 ) -> ResultsDocument:
-    notes = batch.out / KEPT_FOLDER
+    notes = batch.out / CACHE_FOLDER
     names, cache = names_of(batch.assignment), _page_cache(batch)
     contents = survey_folder(files, batch.folder, names, workers, progress, cache)
     students, unmatched = _submissions(batch, roster, contents)
@@ -182,7 +183,7 @@ def _graded(
         assignment=batch.assignment.id,
         reports=reports,
         unmatched=unmatched,
-        moved=moved(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
+        moved=changes_since(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
         alike=similar_of_run(batch.assignment, jobs, reports, notes / "readings"),
     )
     _write_results(batch, results, students)
@@ -252,7 +253,10 @@ def _unmatched(page: Unmatched) -> UnmatchedDocument:
 def _page_cache(batch: Batch) -> PageCache:
     asked = asked_of(batch.assignment, batch.rubric)
     key = digest_of((stage_digest(SCAN_STAGE), asked.figures))
-    return PageCache(batch.out / KEPT_FOLDER / "pages", asked, key, digest_of([asked.cells]))
+    cells = digest_of(
+        (stage_digest(CELL_STAGE, CELLS_OF), asked.entries, batch.assignment.file.model_dump_json())
+    )
+    return PageCache(batch.out / CACHE_FOLDER / "pages", asked, key, cells)
 
 
 def _jobs(batch: Batch, cache: PageCache, students: Sequence[StudentSubmission]) -> list[Job]:
@@ -354,13 +358,13 @@ def _mark_one(batch: Batch, cache: PageCache, job: Job) -> ReportDocument:
 
 def _pages_read(batch: Batch, cache: PageCache, job: Job) -> list[ScannedPage]:
     """The pages as read by an earlier run, else now."""
-    folder = batch.out / KEPT_FOLDER / "readings"
-    known = kept_reading(folder, job.name, job.reading_key, cache)
+    folder = batch.out / CACHE_FOLDER / "readings"
+    known = cached_reading(folder, job.name, job.reading_key, cache)
     if known is not None:
         return known
     pages = _read(batch, cache, job.submission)
     if pages and not any(problem.code == _PASSING for page in pages for problem in page.problems):
-        keep_reading(folder, job.name, job.reading_key, pages, cache)
+        store_reading(folder, job.name, job.reading_key, pages, cache)
     return pages
 
 
@@ -393,7 +397,7 @@ def _write_results(batch: Batch, results: ResultsDocument, students: Sequence[St
 
 
 def _key_file(batch: Batch, job: Job) -> Path:
-    return batch.out / KEPT_FOLDER / f"{job.name}.key"
+    return batch.out / CACHE_FOLDER / f"{job.name}.key"
 
 
 def _known(batch: Batch, job: Job) -> ReportDocument | None:

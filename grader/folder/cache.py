@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from grader.files import write_whole
 from grader.pipeline import scan
-from grader.printed.answer_sheet import Asked
 from grader.records import (
     Backdrop,
     Figure,
@@ -45,6 +44,7 @@ from grader.records import (
     Unread,
     Written,
 )
+from grader.rubric import Asked
 from grader.similarity.groups import CELLS, ink_map
 
 RECORDS: Mapping[str, type] = {
@@ -62,11 +62,14 @@ SCAN_STAGE = (
     "grader.scan.handwriting.letters", "grader.scan.handwriting.fields", "grader.overlay.picture",
 )  # fmt: skip
 """What `grader.pipeline.scan` calls."""
+CELL_STAGE = ("grader.printed.layout",)
+"""What says where a printed sheet's cells are, beside `CELLS_OF`."""
+CELLS_OF = ("grader.printed.answer_sheet",)
 READ_STAGE = ("grader.reading.read", "grader.inputs.scale_text")
 """What `grader.pipeline.read_submission` calls beside them."""
 MARK_STAGE = ("grader.folder.batch",)
 """What marks and writes, with all that it rests on."""
-_ORDER = "grader.pipeline"
+ORDER = ("grader.pipeline",)
 """The order of all stages: each depends on its text, none on all that it imports."""
 _PACKAGES = ("grader", "reference")
 _IMPORT = re.compile(
@@ -75,15 +78,21 @@ _IMPORT = re.compile(
 
 
 @cache
-def stage_digest(modules: tuple[str, ...], top: Path = Path(__file__).parents[2]) -> str:
+def stage_digest(
+    modules: tuple[str, ...], texts: tuple[str, ...] = ORDER, top: Path = Path(__file__).parents[2]
+) -> str:
     """A digest of the code and data that modules rest on: all they import, and the files beside it.
 
-    Arguments: `top` is the folder of the packages.
+    Arguments
+    ---------
+    texts : modules that count as well, but not what they import
+    top : the folder of the packages
     """
     sources = _closure(modules, top)
-    sources.setdefault(_ORDER, top / "grader" / "pipeline.py")
+    paths = {*sources.values(), *_data_of(sources, top)}
+    paths |= {top.joinpath(*name.split(".")).with_suffix(".py") for name in texts}
     digest = hashlib.sha256()
-    for path in sorted({*sources.values(), *_data_of(sources, top)}):
+    for path in sorted(paths):
         digest.update(path.relative_to(top).as_posix().encode() + b"\0")
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
@@ -288,7 +297,7 @@ def _pages_in(path: Path, key: str, printed_key: str) -> list[ScannedPage]:
 # Readings -----------------------------------------------------------------------------------------
 
 
-def keep_reading(folder: Path, name: str, key: str, pages: Sequence[ScannedPage], cache: PageCache) -> None:
+def store_reading(folder: Path, name: str, key: str, pages: Sequence[ScannedPage], cache: PageCache) -> None:
     """Keep a submission's pages as read, in place of what was kept of it before.
 
     What a page's scan has already is left out. With it goes where the ink lies on registered pages, for
@@ -302,7 +311,7 @@ def keep_reading(folder: Path, name: str, key: str, pages: Sequence[ScannedPage]
         write_whole(folder / f"{name}.ink", zlib.compress(np.array(maps).tobytes()))
 
 
-def kept_reading(folder: Path, name: str, key: str, cache: PageCache) -> list[ScannedPage] | None:
+def cached_reading(folder: Path, name: str, key: str, cache: PageCache) -> list[ScannedPage] | None:
     """A submission's pages as an earlier run read them; None where anything has changed since."""
     try:
         pages = _pages_in(folder / f"{name}.reading", key, cache.printed_key)
@@ -311,7 +320,7 @@ def kept_reading(folder: Path, name: str, key: str, cache: PageCache) -> list[Sc
     return [replace(page, backdrop=cache.page(page.ref).backdrop) for page in pages]
 
 
-def kept_maps(folder: Path, name: str) -> list[NDArray[np.uint8]]:
+def cached_maps(folder: Path, name: str) -> list[NDArray[np.uint8]]:
     """The ink maps of a submission's pages; none where there are none, or they are damaged."""
     try:
         data = zlib.decompress((folder / f"{name}.ink").read_bytes())

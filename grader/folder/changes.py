@@ -5,13 +5,11 @@ each submission's files and line of the roster. What differs from the note of th
 """
 
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError, field_validator
 
 from grader.documents import (
     Cause,
@@ -19,6 +17,7 @@ from grader.documents import (
     MovedDocument,
     ReportDocument,
     StandingDocument,
+    Status,
     Verdict,
 )
 from grader.files import write_whole
@@ -31,25 +30,39 @@ COMMON = ("assignment", "rubric", "program")
 OWN = ("submission", "roster")
 
 
-@dataclass(frozen=True, slots=True)
-class MarkedCriterion:
-    """A criterion as it was marked."""
+class EarlierCriterion(BaseModel):
+    """A criterion as the run before marked it."""
 
+    id: str
     title: str
     verdict: Verdict
     points: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class Earlier:
-    """Where a student stood, and each criterion by its id."""
+class EarlierReport(BaseModel):
+    """What matters of a report of the run before, which may be another version's."""
 
-    standing: StandingDocument
-    criteria: Mapping[str, MarkedCriterion]
+    student_id: str
+    position: int | None
+    status: Status
+    score: float | None
+    score_range: tuple[float, float] | None
+    criteria: list[EarlierCriterion]
+
+    @field_validator("criteria", mode="before")
+    @classmethod
+    def _with_known_verdicts(cls, criteria: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        return [criterion for criterion in criteria if criterion["verdict"] in get_args(Verdict)]
 
 
-@dataclass(frozen=True, slots=True)
-class Inputs:
+class EarlierResults(BaseModel):
+    """What matters of the results of the run before."""
+
+    assignment: str
+    reports: list[EarlierReport]
+
+
+class Inputs(BaseModel):
     """Digests of what a run's marks came from.
 
     Attributes
@@ -58,8 +71,8 @@ class Inputs:
     own : by the submission's folder, by ``submission`` and ``roster``
     """
 
-    common: Mapping[str, str] = field(default_factory=dict)
-    own: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    common: dict[str, str] = {}
+    own: dict[str, dict[str, str]] = {}
 
 
 def inputs_of(
@@ -88,7 +101,7 @@ def inputs_of(
         }
         for submission, folder in zip(submissions, folders, strict=True)
     }
-    return Inputs({name: _digest(text) for name, text in authored.items()}, own)
+    return Inputs(common={name: _digest(text) for name, text in authored.items()}, own=own)
 
 
 def _digest(*parts: object) -> str:
@@ -98,47 +111,35 @@ def _digest(*parts: object) -> str:
 # The run before -----------------------------------------------------------------------------------
 
 
-def earlier(results: Path, assignment: str) -> Mapping[Key, Earlier] | None:
+def earlier(results: Path, assignment: str) -> Mapping[Key, EarlierReport] | None:
     """Where everybody stood at the end of the last run; None where there was none of this assignment."""
     try:
-        told: Any = json.loads(results.read_bytes())
-        if told["assignment"] != assignment:
-            return None
-        return {(one["student_id"], one["position"]): _earlier(one) for one in told["reports"]}
-    except (OSError, KeyError, TypeError, ValueError, ValidationError):
+        before = EarlierResults.model_validate_json(results.read_bytes())
+    except (OSError, KeyError, TypeError, ValidationError):
         return None
-
-
-def _earlier(told: Mapping[str, Any]) -> Earlier:
-    standing = StandingDocument(status=told["status"], score=told["score"], score_range=told["score_range"])
-    criteria = {
-        one["id"]: MarkedCriterion(str(one["title"]), one["verdict"], one["points"])
-        for one in told["criteria"]
-        if one["verdict"] in get_args(Verdict)
-    }
-    return Earlier(standing, criteria)
+    if before.assignment != assignment:
+        return None
+    return {(report.student_id, report.position): report for report in before.reports}
 
 
 def noted_inputs(folder: Path) -> Inputs:
     """What the last run's marks came from; empty where no note can be understood."""
     try:
-        told: Any = json.loads((folder / NOTE).read_bytes())
-        own = {str(name): {str(k): str(v) for k, v in one.items()} for name, one in told["own"].items()}
-        return Inputs({str(name): str(one) for name, one in told["common"].items()}, own)
-    except (OSError, KeyError, TypeError, ValueError, AttributeError):
+        return Inputs.model_validate_json((folder / NOTE).read_bytes())
+    except (OSError, ValidationError):
         return Inputs()
 
 
 def note_inputs(folder: Path, inputs: Inputs) -> None:
     """Leave a note for the next run."""
-    write_whole(folder / NOTE, json.dumps({"common": dict(inputs.common), "own": dict(inputs.own)}))
+    write_whole(folder / NOTE, inputs.model_dump_json())
 
 
 # What moved ---------------------------------------------------------------------------------------
 
 
-def moved(
-    before: Mapping[Key, Earlier] | None,
+def changes_since(
+    before: Mapping[Key, EarlierReport] | None,
     reports: Sequence[ReportDocument],
     folders: Sequence[str] = (),
     inputs: tuple[Inputs, Inputs] | None = None,
@@ -149,32 +150,29 @@ def moved(
     """
     if before is None:
         return []
-    after = {(one.student_id, one.position): one for one in reports}
-    where = dict(zip(after, folders, strict=False))
-    found = []
+    after = {(report.student_id, report.position): report for report in reports}
+    folder_of = dict(zip(after, folders, strict=False))
+    changes = []
     for key in dict.fromkeys((*after, *before)):
         then, now = before.get(key), after.get(key)
-        criteria = _criteria_moved(then, now)
-        if then is None or now is None or then.standing != standing(now) or criteria:
-            found.append(
-                MovedDocument(
-                    student_id=key[0],
-                    position=key[1],
-                    before=None if then is None else then.standing,
-                    after=None if now is None else standing(now),
-                    why=_why(then, now, where.get(key, ""), inputs),
-                    criteria=criteria,
-                )
-            )
-    return found
+        change = MovedDocument(
+            student_id=key[0],
+            position=key[1],
+            before=None if then is None else StandingDocument.model_validate(then),
+            after=None if now is None else StandingDocument.model_validate(now),
+            why=_why(then, now, folder_of.get(key, ""), inputs),
+            criteria=[] if then is None or now is None else _criteria_changed(then, now),
+        )
+        if change.before != change.after or change.criteria:
+            changes.append(change)
+    return changes
 
 
-def _criteria_moved(then: Earlier | None, now: ReportDocument | None) -> list[CriterionMovedDocument]:
+def _criteria_changed(then: EarlierReport, now: ReportDocument) -> list[CriterionMovedDocument]:
     """The criteria marked otherwise; none where there was or is nothing to compare."""
-    if then is None or now is None:
-        return []
-    after = {one.id: MarkedCriterion(one.title, one.verdict, one.points) for one in now.criteria}
-    if not after or not then.criteria:
+    before = {criterion.id: criterion for criterion in then.criteria}
+    after = {criterion.id: criterion for criterion in now.criteria}
+    if not after or not before:
         return []
     return [
         CriterionMovedDocument(
@@ -185,14 +183,14 @@ def _criteria_moved(then: Earlier | None, now: ReportDocument | None) -> list[Cr
             points_before=old.points if old else None,
             points_after=new.points if new else None,
         )
-        for name in dict.fromkeys((*after, *then.criteria))
-        for old, new in [(then.criteria.get(name), after.get(name))]
+        for name in dict.fromkeys((*after, *before))
+        for old, new in [(before.get(name), after.get(name))]
         if old is None or new is None or (old.verdict, old.points) != (new.verdict, new.points)
     ]
 
 
 def _why(
-    then: Earlier | None, now: ReportDocument | None, folder: str, inputs: tuple[Inputs, Inputs] | None
+    then: EarlierReport | None, now: ReportDocument | None, folder: str, inputs: tuple[Inputs, Inputs] | None
 ) -> list[Cause]:
     """What differs between the two runs' notes."""
     if then is None:
@@ -210,18 +208,13 @@ def _why(
     ]
 
 
-def standing(report: ReportDocument) -> StandingDocument:
-    """A report's standing."""
-    return StandingDocument(status=report.status, score=report.score, score_range=report.score_range)
-
-
-def told_standing(one: StandingDocument | None) -> str:
+def standing_text(standing: StandingDocument | None) -> str:
     """A standing in a few words: ``17.5``, ``12..18 needs review``, ``missing``."""
-    if one is None:
+    if standing is None:
         return "-"
-    words = one.status.replace("_", " ")
-    if one.score is not None:
-        return f"{one.score:g}" if one.status == "graded" else f"{one.score:g} {words}"
-    if one.score_range is not None:
-        return f"{one.score_range[0]:g}..{one.score_range[1]:g} {words}"
+    words = standing.status.replace("_", " ")
+    if standing.score is not None:
+        return f"{standing.score:g}" if standing.status == "graded" else f"{standing.score:g} {words}"
+    if standing.score_range is not None:
+        return f"{standing.score_range[0]:g}..{standing.score_range[1]:g} {words}"
     return words

@@ -29,6 +29,7 @@ from reference.authored.assignment import Assignment, Variant
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, bars, evaluate, parameters_of
 from reference.errors import CallError
+from reference.geometry import ComplexArray
 
 SURE, CHECK = "yes", "check"
 _LIKE_MM = 150.0
@@ -76,7 +77,7 @@ class Suggestion:
 
 
 @dataclass(frozen=True, slots=True)
-class Draft:
+class RosterDraft:
     """Suggestions for every page that is not blank, and what a person should know."""
 
     suggestions: tuple[Suggestion, ...]
@@ -90,7 +91,7 @@ def suggest(
     *,
     look: Look | None = None,
     pages_per_student: int | None = None,
-) -> Draft:
+) -> RosterDraft:
     """Who each page may belong to.
 
     Arguments
@@ -113,7 +114,7 @@ def suggest(
         if (first is None or not first.sure) and not contested and look is not None and variants:
             first = _by_similarity(page, look(page), assignment, variants, first) or first
         found.append(first or Suggestion(page, None, _reason(reasons[page], page), sure=False))
-    return Draft(tuple(_in_order(found, roster)), known.problems)
+    return RosterDraft(tuple(_in_order(found, roster)), known.problems)
 
 
 def _certain(owned: Owned, roster: Roster) -> Suggestion:
@@ -180,12 +181,12 @@ def _by_likely_order(
     return {owned.source: _certain(owned, roster) for owned in dealt.owned if owned.source not in settled}
 
 
-def _in_order(found: list[Suggestion], roster: Roster) -> list[Suggestion]:
+def _in_order(suggestions: list[Suggestion], roster: Roster) -> list[Suggestion]:
     """Choices left open settled by the roster's order, where all pages that have a row follow it."""
     place = {id(row): index for index, row in enumerate(roster.rows)}
     reached = 0
     settled: list[Suggestion] = []
-    for suggestion in found:
+    for suggestion in suggestions:
         row = suggestion.row
         if row is None and suggestion.among:
             row = next((row for row in suggestion.among if place[id(row)] >= reached), None)
@@ -194,7 +195,7 @@ def _in_order(found: list[Suggestion], roster: Roster) -> list[Suggestion]:
                 suggestion = replace(suggestion, row=row, why=why)  # noqa: PLW2901
         if row is not None:
             if place[id(row)] < reached:
-                return found
+                return suggestions
             reached = place[id(row)]
         settled.append(suggestion)
     return settled
@@ -208,7 +209,7 @@ def _who(row: RosterRow) -> str:
     return row.student_id if row.position is None else f"{row.student_id} (position {row.position})"
 
 
-def draft_csv(roster: Roster, draft: Draft) -> str:
+def draft_csv(roster: Roster, draft: RosterDraft) -> str:
     """The roster with `scans` suggested, and the columns `why` and `sure` (`yes` or `check`).
 
     Pages that nobody is suggested for stand on the contact sheet alone: a line without a student
@@ -249,19 +250,6 @@ def _judged(row: RosterRow, mine: list[Suggestion]) -> list[str]:
 # Similarity of strokes and figures ------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class _Outline:
-    """The lines of one figure, in drawn mm at the proposed scales, y up; arrays over variants.
-
-    Attributes
-    ----------
-    tails, heads : (lines, variants)
-    """
-
-    tails: FloatArray
-    heads: FloatArray
-
-
 def figure_similarity(ends_mm: FloatArray, assignment: Assignment, variants: Sequence[Variant]) -> FloatArray:
     """How well a sheet's strokes match each variant's figures.
 
@@ -275,23 +263,25 @@ def figure_similarity(ends_mm: FloatArray, assignment: Assignment, variants: Seq
     if not len(strokes) or not len(variants):
         return np.zeros(len(variants))
     matched = [
-        [_most_matched(outline, index, strokes) for outline in outlines] for index in range(len(variants))
+        [_most_matched(outline[..., index], strokes) for outline in outlines]
+        for index in range(len(variants))
     ]
     return np.asarray(np.sum(matched, axis=1))
 
 
-def _outlines(assignment: Assignment, variants: list[Variant]) -> list[_Outline]:
+def _outlines(assignment: Assignment, variants: list[Variant]) -> list[ComplexArray]:
+    """(lines, 2, variants) ends of the lines of each figure, in drawn mm at the proposed scales, y up."""
     mechanism, scales = assignment.mechanism(variants), assignment.scales(variants)
     construction = construction_of(
         mechanism, plate_by_similarity=assignment.file.plate_images == "similarity"
     )
     nodes = evaluate(construction, parameters_of(mechanism, scales.kL, scales.kv, scales.ka))
     shape = (len(variants),)
-    outlines = []
-    for pairs in _pairs(construction):
-        ends = [[np.broadcast_to(nodes[name], shape) for name in pair] for pair in pairs]
-        outlines.append(_Outline(np.array([pair[0] for pair in ends]), np.array([pair[1] for pair in ends])))
-    return outlines
+    return [
+        np.array([[np.broadcast_to(nodes[name], shape) for name in pair] for pair in pairs])
+        for pairs in _pairs(construction)
+        if pairs
+    ]
 
 
 def _pairs(construction: Construction) -> list[list[tuple[str, str]]]:
@@ -303,9 +293,9 @@ def _pairs(construction: Construction) -> list[list[tuple[str, str]]]:
     return [list(bars(construction)), *plans]
 
 
-def _most_matched(outline: _Outline, variant: int, strokes: FloatArray) -> float:
+def _most_matched(outline: ComplexArray, strokes: FloatArray) -> float:
     """What the figure's lines match in the best of all places that its anchors propose; 0 at least."""
-    tails, heads = outline.tails[:, variant], outline.heads[:, variant]
+    tails, heads = outline.T
     size = np.abs(heads - tails)
     if not np.isfinite(size).all():
         return 0.0
@@ -371,21 +361,14 @@ figcaption b{font-size:1.1em}
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Thumbnail:
-    """A page's small picture, JPEG."""
-
-    jpeg: bytes
-
-
-def thumbnail(grey: GreyImage, quarter_turns: int = 0) -> Thumbnail:
-    """The page reduced, turned counter-clockwise by quarters."""
-    small = np.rot90(shrink(grey, min(1.0, _THUMBNAIL_PX / max(grey.shape))), quarter_turns)
+def thumbnail(grey: GreyImage) -> bytes:
+    """A page reduced, as JPEG."""
+    small = shrink(grey, min(1.0, _THUMBNAIL_PX / max(grey.shape)))
     image = np.ascontiguousarray(small)[:, :, None]
-    return Thumbnail(simplejpeg.encode_jpeg(image, quality=_QUALITY, colorspace="GRAY"))
+    return bytes(simplejpeg.encode_jpeg(image, quality=_QUALITY, colorspace="GRAY"))
 
 
-def contact_sheet(entries: Sequence[tuple[Suggestion, Thumbnail]], lang: str = "en") -> str:
+def contact_sheet(entries: Sequence[tuple[Suggestion, bytes]], lang: str = "en") -> str:
     """A self-contained HTML page: every page's picture, its file, the student suggested, and why."""
     words = tongue(lang)
     title = escape(words.gettext(N_("Whose page is whose")))
@@ -401,8 +384,8 @@ def contact_sheet(entries: Sequence[tuple[Suggestion, Thumbnail]], lang: str = "
     )
 
 
-def _figure(suggestion: Suggestion, picture: Thumbnail, words: Tongue) -> str:
-    image = base64.b64encode(picture.jpeg).decode("ascii")
+def _figure(suggestion: Suggestion, picture: bytes, words: Tongue) -> str:
+    image = base64.b64encode(picture).decode("ascii")
     row = suggestion.row
     if row is None:
         who = words.gettext(N_("nobody is suggested"))

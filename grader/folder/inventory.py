@@ -13,11 +13,12 @@ from pathlib import Path
 
 from grader.documents import UnmatchedDocument
 from grader.folder.cache import PageCache
-from grader.folder.workers import Pool
+from grader.folder.workers import ENDED, Pool
 from grader.inputs.measurements import Measurements, Names, read_measurements, students_in
 from grader.records import PageRef, Problem
 from grader.scan.decode.limits import load
-from grader.scan.decode.pages import count_pages
+from grader.scan.decode.pages import count_pages, decode
+from grader.scan.register.registration import register
 from reference.errors import InputFileError
 
 _TOOL_NAMES = frozenset(
@@ -64,7 +65,7 @@ def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[
     return sorted(found + shut, key=lambda path: natural_key(path.relative_to(folder).as_posix()))
 
 
-def told_name(path: Path, folder: Path) -> str:
+def shown_name(path: Path, folder: Path) -> str:
     """A file's path in the folder as people are told it; bytes that are no text are told by number.
 
     Archives from systems with other alphabets unpack to such names.
@@ -117,7 +118,7 @@ def survey_folder(
     Arguments: `cache` takes the pages as scanned; pages that are not there any more are dropped from it.
     """
     contents = [FileContent()] * len(files)
-    calls = [(path, told_name(path, folder), names) for path in files]
+    calls = [(path, shown_name(path, folder), names) for path in files]
     for done, (index, result) in enumerate(workers.run(open_file, calls), start=1):
         contents[index] = _failed(calls[index][1], result) if isinstance(result, Problem) else result
         progress("opening", done, len(calls))
@@ -130,9 +131,7 @@ def survey_folder(
     scans = workers.run(identify_page, [(cache, page) for _, page in waiting])
     for done, (number, page) in enumerate(scans, start=1):
         index, ref = waiting[number]
-        pages[index].append(
-            replace(ref, problem=replace(page, file=ref.file)) if isinstance(page, Problem) else page
-        )
+        pages[index].append(_with_problem(ref, page, workers) if isinstance(page, Problem) else page)
         progress("looking", done, len(waiting))
     contents = [
         replace(content, pages=tuple(sorted(pages[index], key=lambda page: page.page)))
@@ -160,6 +159,19 @@ def open_file(path: Path, name: str, names: Names) -> FileContent:
 def identify_page(cache: PageCache, page: PageRef) -> PageRef:
     """A page with what is on it: blank, or whose by its QR code."""
     return cache.identified(page)
+
+
+def code_of(page: PageRef) -> PageRef:
+    """A page with what its QR code says, and nothing else looked for. Raises InputFileError."""
+    return replace(page, identity=register(decode(page))[1])
+
+
+def _with_problem(page: PageRef, problem: Problem, workers: Pool) -> PageRef:
+    """A page that could not be scanned; its owner is told, where strokes alone ended the worker."""
+    if problem.code in ENDED:
+        ((_, known),) = workers.run(code_of, [(page,)])
+        page = page if isinstance(known, Problem) else known
+    return replace(page, problem=replace(problem, file=page.file))
 
 
 def _failed(name: str, problem: Problem) -> FileContent:

@@ -122,11 +122,11 @@ class Ownership:
 
 @dataclass(frozen=True, slots=True)
 class _Claim:
-    """What one source says of a page: the rows it may belong to, and how to tell it."""
+    """What one source says of a page: the rows it may belong to, and how a message says it."""
 
     how: How
     rows: tuple[RosterRow, ...]
-    told: str
+    text: str
 
 
 def assign_pages(
@@ -269,7 +269,7 @@ def _order_claims(
     for index, claim in claims_by_index.items():
         for other in certain[index]:
             if not pages[index].blank and not _common([claim, other]):
-                reason = f"it is disproved on page {pages[index].page}: {other.told}; {claim.told}"
+                reason = f"it is disproved on page {pages[index].page}: {other.text}; {claim.text}"
                 # Pages with no other source may be shifted just as well; those that agree may stay.
                 kept = {i: c for i, c in claims_by_index.items() if certain[i]}
                 return kept, {file: reason}
@@ -317,8 +317,8 @@ def _settle(
     common = _common(claims)
     if not common:
         if identity is not None and not claims[0].rows and len(claims) == 1:
-            return problem("owner_not_listed", f"{claims[0].told}, not on the roster so")
-        return problem("owner_disagree", "; ".join(claim.told for claim in claims))
+            return problem("owner_not_listed", f"{claims[0].text}, not on the roster so")
+        return problem("owner_disagree", "; ".join(claim.text for claim in claims))
     if len(common) > 1:
         places = ", ".join(str(row.position) for row in common)
         return problem(
@@ -335,7 +335,7 @@ def _owned(
     n, position = row.n, row.position
     if identity is not None:
         if None not in (identity.n, n) and identity.n != n:
-            return problem("owner_disagree", f"{claims[0].told}; the roster: {row.student_id}, n {n}")
+            return problem("owner_disagree", f"{claims[0].text}; the roster: {row.student_id}, n {n}")
         n = identity.n if n is None else n
         position = identity.position if position is None else position
     return Owned(page, row.student_id, n, position, tuple(claim.how for claim in claims))

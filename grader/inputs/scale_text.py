@@ -152,8 +152,8 @@ def _positive(value: float, text: str) -> float:
     return value
 
 
-def _misfit(name: str, text: str, found: "_Quantity") -> str:
-    if found.is_bare:
+def _misfit(name: str, text: str, quantity: "_Quantity") -> str:
+    if quantity.is_bare:
         return f"'{text}' has no unit, and a unit is never guessed"
     what = {"kL": "a length", "kv": "a velocity", "ka": "an acceleration"}[name]
     return f"'{text}' is not {what} per length on paper"

@@ -1,9 +1,9 @@
 """Canvas: its gradebook filled in or made anew, its rubric, and students' points in it by its API.
 
 Gradebook: Canvas finds columns by their places: Student, ID, SIS User ID, SIS Login ID, Section, then
-assignments as `title (number)`; below the header stand the points possible, and what is written there
-becomes the assignment's. It reads `1,234` as 1.234, and a blank takes a grade back: so of a file that is
-filled in only the cells of those who have a grade change, and a new file holds nobody else.
+assignments as `title (number)`; below the header are the points possible, which become the assignment's.
+It reads `1,234` as 1.234, and a blank takes a grade back: in a file that is filled in only the cells of
+students with a grade change, and a new file has no other students.
 
 Rubric: Canvas rounds points to two decimals, and takes no byte order mark.
 """

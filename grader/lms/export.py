@@ -51,7 +51,7 @@ def _of_a_known_version(document: Any, path: Path) -> Any:  # noqa: ANN401 - wha
     return document
 
 
-# What there is to deliver -------------------------------------------------------------------------
+# What can be exported -------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ KINDS: Mapping[tuple[str, str], _Kind] = {
     ("gradescope", "marks"): _of_grades(".zip", scores.results, "visibility"),
     ("lti", "grades"): _of_grades(".json", scores.scores, "maximum rescale"),
 }
-"""By platform and what; a platform's first is what it is given where nothing is said."""
+"""By platform and thing; the first thing of a platform is the default."""
 
 TARGETS = tuple(dict.fromkeys(to for to, _ in KINDS))
 _COMMON = frozenset({"to", "what", "out", "people", "lang", "now"})
@@ -90,7 +90,7 @@ _COMMON = frozenset({"to", "what", "out", "people", "lang", "now"})
 
 
 def what_of(options: Options) -> str:
-    """What is delivered; CallError for a target or a thing that there is not."""
+    """What is exported; CallError for an unknown target or thing."""
     known = [what for to, what in KINDS if to == options.to]
     if not known:
         raise CallError(
@@ -104,7 +104,7 @@ def what_of(options: Options) -> str:
 
 
 def usual_name(options: Options) -> str:
-    """The file's name where nobody gives one."""
+    """The file's default name."""
     what = what_of(options)
     is_first = what == what_of(replace(options, what=None))
     return f"export-{options.to}{'' if is_first else '-' + what}{KINDS[options.to, what].ending}"

@@ -1,4 +1,4 @@
-"""One grade for each student, or why there is none yet; and what an export is given and gives back."""
+"""A grade for each student, or why there is none yet; options and result of an export."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -120,7 +120,7 @@ class Grade:
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """An export's content, and who is not in it.
+    """An export's content, and the students who are not in it.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ class Delivery:
         return not self.withheld and not self.unplaced
 
     def among(self, grades: Sequence[Grade]) -> "Delivery":
-        """The same, with who of these students is written and who is withheld."""
+        """The same delivery, with the students who are written and those who are withheld."""
         students = [grade.student_id for grade in ready(grades)]
         return replace(
             self,
@@ -158,7 +158,7 @@ def ready(grades: Sequence[Grade]) -> list[Grade]:
 
 
 def in_a_row(names: Sequence[str]) -> str:
-    """Names in one line, the first of many."""
+    """Names in one line, of many only the first."""
     more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
     return ", ".join(names[:_MOST_NAMES]) + more
 
@@ -200,7 +200,7 @@ def grades_of(results: ResultsDocument, options: Options) -> list[Grade]:
 
 
 def _check(reports: Sequence[ReportDocument]) -> None:
-    """InputFileError for results that somebody has changed by hand, or a program has mixed up."""
+    """Check the results; raises InputFileError where they contradict themselves."""
     faults = []
     keys = set()
     for report in reports:

@@ -1,4 +1,4 @@
-"""What a grade is made of: points and remarks by criterion, comments, and the platform's own criteria."""
+"""The parts of a grade: points and remarks by criterion, comments, and the platform's own criteria."""
 
 import json
 import math
@@ -26,8 +26,10 @@ CLOSE = 1e-4
 # Documents that platforms take --------------------------------------------------------------------
 
 Version = Literal[1]
+"""Of each document's form."""
 Filled = Annotated[str, Field(min_length=1)]
 Id = Annotated[int, Field(gt=0)]
+"""A platform's number of a thing."""
 NotNegative = Annotated[float, Field(ge=0.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 Number = Annotated[str, Field(pattern=r"^[0-9]+(\.[0-9]{1,5})?$")]

@@ -4,12 +4,12 @@ Worksheet: only the cells of *Grade* and *Feedback comments* change. Moodle take
 0, skips what is above the maximum and rejects ragged files without saying what is wrong: all of that
 is refused here.
 
-Gradebook: the first bad row aborts Moodle's whole import, so every row is checked here. Who has no
-grade yet has no row: in a new grade item Moodle would store a blank as 0, and in an old one `-` takes
-back what a teacher has entered. Decimal dots, whatever the language of the site.
+Gradebook: the first bad row aborts Moodle's whole import, so every row is checked here. Students without
+a grade have no row: in a new grade item Moodle would store a blank as 0, and in an old one `-` takes back
+what a teacher has entered. Decimal dots, whatever the language of the site.
 
-Feedback: a folder `Participant_<n>_assignfeedback_file` for each student. Underscores part a folder's
-name into what Moodle reads, so a file's own name has none.
+Feedback: a folder `Participant_<n>_assignfeedback_file` for each student. Moodle splits a folder's name at
+its underscores, so a file's own name has none.
 """
 
 import json
@@ -177,7 +177,7 @@ def _columns(header: list[str]) -> tuple[dict[str, int], list[str]]:
 
 
 def _unnamed(table: RawTable, columns: Mapping[str, int]) -> dict[str, int]:
-    """Columns of people that bear other names than those known, by what stands in them.
+    """Columns of names and addresses under unknown headings, recognised by their cells.
 
     Full names follow the identifier, unless the worksheet is anonymous; addresses have an @.
     """
@@ -211,7 +211,7 @@ def _row_faults(sheet: Worksheet) -> Iterator[str]:
 
 
 def _misread(text: str, maximum: float | None, *, comma: bool) -> str:
-    """What Moodle would misread in a grade that stands there already."""
+    """What Moodle would misread in a grade that is in the worksheet already; empty where nothing."""
     value = Worksheet.amount(text)
     if text in NO_GRADE:
         return ""

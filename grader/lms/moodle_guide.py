@@ -41,6 +41,7 @@ _NO_TAGS = str.maketrans("<>", "‹›")
 
 PlainText = Literal[2]
 Html = Literal[1]
+"""Moodle's FORMAT_PLAIN and FORMAT_HTML."""
 
 
 class MoodleCriterion(Payload):

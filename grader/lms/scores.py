@@ -1,12 +1,12 @@
 """A student's score as JSON: Gradescope's `results.json`, and Scores of LTI Advantage.
 
 Gradescope: criteria are test cases. Gradescope guesses a missing status from the points, so each test has
-one. What was not judged has neither passed nor failed: it is no test, and is named beside them. Who has
-no grade yet has no file.
+a status. A criterion that was not judged has neither passed nor failed: it is no test, and is named in the
+output. Students without a grade have no file.
 
 LTI (Assignment and Grade Services 2.0): a sheet that waits for a person is `PendingManual`, without a
-score: anything but `FullyGraded` takes a grade back. Who has handed in nothing has no Score: posting
-one would hand in for them.
+score: anything but `FullyGraded` takes a grade back. Students who have handed in nothing have no Score:
+posting a Score would hand in for them.
 """
 
 import math
@@ -69,7 +69,7 @@ class GradescopeTest(Payload):
 
 
 class GradescopeOrigin(Payload):
-    """Whose results they are."""
+    """The assignment and the student of the results."""
 
     schema_version: Version = 1
     assignment: str

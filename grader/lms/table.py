@@ -1,4 +1,4 @@
-"""Tables: CSV as programs want it, platforms' own CSV files filled in, and which of their rows is whose."""
+"""Tables: CSV files that are written, platforms' own CSV files filled in, and the row of each student."""
 
 import csv
 import io
@@ -21,7 +21,7 @@ from reference.errors import InputFileError, lines_of
 Cell = str | int | float | None
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
-"""What makes spreadsheets take a text for a formula; the full-width forms do so too."""
+"""Characters that make a spreadsheet take a text for a formula; their full-width forms do so too."""
 NO_GRADE = {"", "-"}
 """How platforms write that there is no grade."""
 
@@ -287,7 +287,7 @@ def parse(data: bytes, file: str, delimiter: str | None = ",") -> RawTable:
     return table
 
 
-# Whose row is whose -------------------------------------------------------------------------------
+# The row of each student -------------------------------------------------------------------------------
 
 Evidence = Sequence[tuple[str, str]]
 """Columns and what would stand there, the strongest first; an empty text is no evidence."""

@@ -23,37 +23,11 @@ from reference.construction.graph import Construction, parameters_of
 from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
 from reference.construction.steps import Step, TwoLines
 from reference.construction.uncertainty import Skill
-from reference.replay.explanations import RARITY, Work
-from reference.replay.replay import Account, Root, replay
+from reference.replay.explanations import RARITY, Observations
+from reference.replay.replay import Replay, Root, replay
 
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A drawing to explain.
-
-    Attributes
-    ----------
-    drawing : how it should have been drawn, at the scales declared
-    work : what was drawn
-    lost : the vectors that lost points, or may lose some, with their criteria
-    assignment, variant : whose plan it should be
-    skill : of a usual hand
-    followed : scales that the drawing follows although others were declared
-    assumed : scales that nobody declared
-    scale_criteria : the criterion of each scale that lost
-    """
-
-    drawing: Drawing
-    work: Work
-    lost: Mapping[str, str]
-    assignment: Assignment
-    variant: Variant
-    skill: Skill
-    followed: Mapping[str, float] = field(default_factory=dict)
-    assumed: frozenset[str] = frozenset()
-    scale_criteria: Mapping[str, str] = field(default_factory=dict)
-
-
+LEAST_CONFIDENCE = 0.6
+"""An explanation less certain than this is not named."""
 SURE_TOGETHER = 0.8
 """A mistake and its rivals are told together when one of them it is, this surely."""
 LEAST_RIVAL = 0.1
@@ -70,33 +44,46 @@ SCALES = frozenset({"kL", "kv", "ka"})
 Key = tuple[str, str]
 
 
-def told(accounts: Sequence[Account], case: Case, least: float) -> tuple[NamedMistake, ...]:
+def sure_of(accounts: Sequence[Replay], least: float) -> list[Mistake]:
+    """The mistakes of the likeliest account that are this sure, unless they are slight."""
+    if not accounts:
+        return []
+    shares = _Shares(accounts)
+    return [
+        one for one in accounts[0].made if shares.of(_key(one)) >= least and not _is_slight(one, accounts[0])
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The criteria that lost points, or may lose some, by the vectors and by the scales that they ask for."""
+
+    vectors: Mapping[str, str]
+    scales: Mapping[str, str]
+
+
+def named(accounts: Sequence[Replay], construction: Construction, lost: Lost) -> tuple[NamedMistake, ...]:
     """The mistakes of the likeliest account that are sure enough, in the order of construction."""
     if not accounts:
         return ()
-    best = accounts[0]
-    shares = _Shares(accounts)
-    explained = _explained(best, case)
-    found = []
-    for mistake in _in_order(best.made, case.drawing.construction):
-        share = shares.of(_key(mistake))
-        rivals = shares.rivals(_key(mistake), {_key(one) for one in best.made})
-        together = share + sum(shares.instead(_key(mistake), _key(one)) for one in rivals)
-        if _is_slight(mistake, best):
-            continue
-        if share < least and (together < SURE_TOGETHER or not rivals):
-            continue
-        others = tuple(_record(one, case, (), shares.instead(_key(mistake), _key(one))) for one in rivals)
-        if explained[mistake]:
-            found.append(_record(mistake, case, tuple(explained[mistake]), share, others))
-    return tuple(found)
+    best, shares = accounts[0], _Shares(accounts)
+    explains, mistakes = _explained(best, construction, lost), []
+    for mistake in _in_order(best.made, construction):
+        key, share = _key(mistake), shares.of(_key(mistake))
+        rivals = shares.rivals(key, {_key(one) for one in best.made})
+        together = share + sum(shares.instead(key, _key(one)) for one in rivals)
+        is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
+        if explains[mistake] and is_sure and not _is_slight(mistake, best):
+            others = tuple(_record(one, construction, (), shares.instead(key, _key(one))) for one in rivals)
+            mistakes.append(_record(mistake, construction, tuple(explains[mistake]), share, others))
+    return tuple(mistakes)
 
 
 def _key(mistake: Mistake) -> Key:
     return mistake.code, mistake.at
 
 
-def _is_slight(mistake: Mistake, account: Account) -> bool:
+def _is_slight(mistake: Mistake, account: Replay) -> bool:
     """Whether the step that it was made at is not far off: nothing that a hand could not do."""
     if mistake.code in OF_THE_WHOLE:
         return False
@@ -106,7 +93,7 @@ def _is_slight(mistake: Mistake, account: Account) -> bool:
 class _Shares:
     """What share of the probability accounts with a mistake have."""
 
-    def __init__(self, accounts: Sequence[Account]) -> None:
+    def __init__(self, accounts: Sequence[Replay]) -> None:
         least = accounts[0].cost
         weights = [math.exp((least - account.cost) / 2.0) for account in accounts]
         whole = sum(weights)
@@ -137,16 +124,15 @@ def _in_order(made: Sequence[Mistake], construction: Construction) -> list[Mista
     return sorted(made, key=lambda one: order.index(one.at) if one.at in order else -1)
 
 
-def _explained(account: Account, case: Case) -> dict[Mistake, list[str]]:
+def _explained(account: Replay, construction: Construction, lost: Lost) -> dict[Mistake, list[str]]:
     """Which of the criteria lost each mistake explains: the nearest one before it in the construction."""
-    construction = case.drawing.construction
     made = _in_order(account.made, construction)
     explains: dict[Mistake, list[str]] = {
-        mistake: [name for scale, name in case.scale_criteria.items() if _is_about(mistake, scale)]
+        mistake: [name for scale, name in lost.scales.items() if _is_about(mistake, scale)]
         for mistake in made
     }
     reach = {mistake: affected(mistake, construction) for mistake in made}
-    for name, criterion in case.lost.items():
+    for name, criterion in lost.vectors.items():
         vector = construction.vectors[name]
         if vector.head in account.unexplained:
             continue
@@ -176,7 +162,7 @@ def _is_about(mistake: Mistake, scale: str) -> bool:
 
 def _record(
     mistake: Mistake,
-    case: Case,
+    construction: Construction,
     explains: tuple[str, ...],
     confidence: float,
     rivals: tuple[NamedMistake, ...] = (),
@@ -184,7 +170,7 @@ def _record(
     if mistake.code == "scale_wrong":
         mistake = replace(mistake, code=_code_of_scale(mistake.at, mistake.factor))
     is_line = mistake.code in LINE_MISTAKES
-    line = _line_of(case.drawing.construction.step(mistake.at), mistake.slot) if is_line else {}
+    line = _line_of(construction.step(mistake.at), mistake.slot) if is_line else {}
     return NamedMistake(mistake, explains, min(confidence, 1.0), line, rivals)
 
 
@@ -211,8 +197,6 @@ def _code_of_scale(name: str, factor: float) -> str:
     return "rpm_not_converted" if name in powers and abs(factor / rpm - 1.0) <= RPM_WITHIN else "scale_wrong"
 
 
-LEAST_CONFIDENCE = 0.6
-"""An explanation less certain than this is not told."""
 FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
 CERTAIN = 0.9
@@ -229,38 +213,52 @@ HANDS = (0.6, USUAL, 1.6, 2.5, 4.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Diagnosis:
-    """What explains a drawing.
+class Case:
+    """A drawing to explain.
 
     Attributes
     ----------
-    mistakes : those that explain what was lost, in the order of construction; none where nothing does
-    drawn : the drawing with those mistakes in it that are certain, and
-    wrong : the nodes at which it is wrong, or the mechanism; none where it is the right one
+    drawing : how it should have been drawn, at the scales declared
+    work : what was drawn
+    assignment, variant : whose plan it should be
+    skill : of a usual hand
+    followed : scales that the drawing follows although others were declared
+    assumed : scales that nobody declared
     """
 
-    mistakes: tuple[NamedMistake, ...] = ()
-    drawn: Drawing | None = None
-    wrong: frozenset[str] = frozenset()
+    drawing: Drawing
+    work: Observations
+    assignment: Assignment
+    variant: Variant
+    skill: Skill
+    followed: Mapping[str, float] = field(default_factory=dict)
+    assumed: frozenset[str] = frozenset()
 
 
-def diagnose(case: Case) -> Diagnosis:
-    """The mistakes of the simplest account that fits, where a right drawing would not be believed."""
-    if not case.lost and not case.followed:
-        return Diagnosis()
+def explained(case: Case) -> tuple[Replay, ...]:
+    """The ways in which a drawing may have been made, the likeliest first.
+
+    There are none where a right drawing is to be believed.
+    """
     roots = [Root(), *_other_scales(case)]
     accounts = replay(case.drawing, case.work, roots, case.skill, cares=HANDS)
     innocent = _innocent(accounts)
     if accounts and not _is_clear(accounts, case):
         accounts = _looked_into(case, roots, accounts)
     if not accounts or innocent - accounts[0].cost < BEYOND_DOUBT:
-        return Diagnosis()
-    mistakes = told(accounts, case, LEAST_CONFIDENCE)
-    sure = {(one.code, one.at) for one in mistakes if one.confidence >= CERTAIN}
-    certain = [one for one in accounts[0].made if one.code not in NO_STEPS and (one.code, one.at) in sure]
+        return ()
+    return tuple(accounts)
+
+
+def drawn_instead(accounts: Sequence[Replay], case: Case) -> tuple[Drawing, frozenset[str]]:
+    """The drawing with those mistakes in it that are certain, and the nodes at which it is wrong.
+
+    Of a wrong mechanism that is the mechanism as a whole; of the right drawing there are none.
+    """
     joints = {step.node for step in case.drawing.construction.figures[MECHANISM]}
+    certain = [one for one in sure_of(accounts, CERTAIN) if one.code not in NO_STEPS]
     wrong = {MECHANISM if one.at in joints or one.code == "other_variant" else one.at for one in certain}
-    return Diagnosis(mistakes, _with(certain, case.drawing), frozenset(wrong))
+    return _with(certain, case.drawing), frozenset(wrong)
 
 
 def _with(mistakes: Sequence[Mistake], drawing: Drawing) -> Drawing:
@@ -273,7 +271,7 @@ def _with(mistakes: Sequence[Mistake], drawing: Drawing) -> Drawing:
     return drawing
 
 
-def _looked_into(case: Case, roots: Sequence[Root], accounts: Sequence[Account]) -> list[Account]:
+def _looked_into(case: Case, roots: Sequence[Root], accounts: Sequence[Replay]) -> list[Replay]:
     """The accounts with mistakes of the whole drawing among them, and with guesses at what was not seen.
 
     A careless hand is also taken for a usual one that has made some mistake. What one mistake explains,
@@ -290,17 +288,17 @@ def _looked_into(case: Case, roots: Sequence[Root], accounts: Sequence[Account])
     return sorted(found, key=lambda account: account.cost)
 
 
-def _is_explained(account: Account) -> bool:
+def _is_explained(account: Replay) -> bool:
     """Whether a usual hand and one mistake at most explain everything."""
     return not account.unexplained and len(account.made) <= 1 and account.care <= USUAL
 
 
-def _innocent(accounts: Sequence[Account]) -> float:
+def _innocent(accounts: Sequence[Replay]) -> float:
     """What the account costs in which everything was made rightly; infinite where it is beyond belief."""
     return min((account.cost for account in accounts if account.is_innocent), default=math.inf)
 
 
-def _is_clear(accounts: Sequence[Account], case: Case) -> bool:
+def _is_clear(accounts: Sequence[Replay], case: Case) -> bool:
     """Whether a usual hand made everything rightly, or one mistake at a step whose beginnings were seen.
 
     What goes wrong in a mechanism that nobody saw shows in more than one step.
@@ -374,7 +372,7 @@ def _other_variants(case: Case) -> Iterator[Root]:
             yield Root((other,), parameters, cost=RARITY["other_variant"])
 
 
-def _swaps(drawing: Drawing, account: Account) -> Iterator[Mistake]:
+def _swaps(drawing: Drawing, account: Replay) -> Iterator[Mistake]:
     """Two images of a plan with each other's letters, both of which are off by the likeliest account."""
     construction = drawing.construction
     off = {*account.unexplained, *(mistake.at for mistake in account.made)}
@@ -387,7 +385,7 @@ def _swaps(drawing: Drawing, account: Account) -> Iterator[Mistake]:
                 yield Mistake("labels_swapped", pair[0], other=pair)
 
 
-def _renamed(work: Work, pair: tuple[str, ...]) -> Work:
+def _renamed(work: Observations, pair: tuple[str, ...]) -> Observations:
     """What was drawn, under the right names where two letters were swapped."""
     other = {pair[0]: pair[1], pair[1]: pair[0]}
     seen = (

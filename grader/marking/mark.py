@@ -8,10 +8,12 @@ import numpy as np
 
 from grader.comparison.criteria import Comparison, compare
 from grader.comparison.evidence import Evidence, Submission
-from grader.comparison.own import Sketch
+from grader.comparison.follow_through import ReplayResult
+from grader.comparison.own import PlanBasis
+from grader.comparison.scales import Scale
 from grader.comparison.task import Task
 from grader.documents import Verdict
-from grader.marking.diagnosis import LEAST_CONFIDENCE, Case, diagnose
+from grader.marking.diagnosis import LEAST_CONFIDENCE, Case, Lost, drawn_instead, explained, named
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
 from grader.rubric import CriterionTable, RubricFile
 from reference.construction.elements import Coriolis, Normal, Parameters
@@ -19,7 +21,7 @@ from reference.construction.mistakes import Drawing, Mistake
 from reference.construction.steps import Given
 from reference.construction.uncertainty import trace
 from reference.geometry import ComplexArray
-from reference.replay.explanations import Seen, Spread, Work
+from reference.replay.explanations import Covariance, Observation, Observations
 
 DECIMALS = 6
 """Points are told to so many decimals; more is the computer's rounding."""
@@ -110,47 +112,52 @@ class _Total:
         return self.low * self.scale, self.high * self.scale
 
 
-CHARGED = frozenset({"none", "partial"})
-LOST = CHARGED | {"follow_through", "review"}
-"""Verdicts whose cause is looked for: also where a person has still to decide."""
 LEAST_MISS_MM = 0.15
 """However well a hand draws, and however well its drawing is read."""
 NOTHING: ComplexArray = np.zeros(0, np.complex128)
 
 
-def case_of(task: Task, comparison: Comparison) -> Case:
+def explain(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> ReplayResult:
+    """What was done, most likely, and what the plans were drawn by where that is certain."""
+    case = case_of(task, evidence, settled)
+    accounts = explained(case)
+    drawn, wrong = drawn_instead(accounts, case)
+    # Where a sheet shows the mechanism as it was drawn, and no plan is turned, the own nodes tell the rest.
+    is_needed = wrong and (wrong & task.construction.poles.keys() or not evidence.has_sheets)
+    basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong) if is_needed else None
+    return ReplayResult(accounts, basis)
+
+
+def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Case:
     """The drawing to explain, at the scales used, with what contradicts them."""
-    scales, followed, vectors = comparison.scales, comparison.followed, task.construction.vectors
+    assumed = frozenset(name for name, scale in settled.items() if scale.used.assumed)
+    others = {name: scale.other for name, scale in settled.items() if scale.other}
     used = {
-        name: np.asarray(followed[name] if scale.assumed else scale.used) for name, scale in scales.items()
+        name: np.asarray(others.get(name, scale.used.used) if name in assumed else scale.used.used)
+        for name, scale in settled.items()
     }
     parameters = {**task.parameters, **used}
-    lost = [one for one in comparison.outcomes if one.verdict in LOST]
     return Case(
         drawing=Drawing(task.construction, parameters),
-        work=Work(tuple(_seen(task, comparison, parameters)), comparison.evidence.sketches),
-        lost={one.name: one.criterion for one in lost if one.name in vectors},
+        work=Observations(tuple(_seen(task, evidence, parameters)), evidence.sketches),
         assignment=task.assignment,
         variant=task.variant,
         skill=task.skill,
         followed={
             name: other
-            for name, other in followed.items()
-            if other != scales[name].used and not scales[name].assumed
+            for name, other in others.items()
+            if name not in assumed and other != settled[name].used.used
         },
-        assumed=frozenset(name for name, scale in scales.items() if scale.assumed),
-        scale_criteria={
-            one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED
-        },
+        assumed=assumed,
     )
 
 
-def _seen(task: Task, comparison: Comparison, parameters: Parameters) -> list[Seen]:
+def _seen(task: Task, evidence: Evidence, parameters: Parameters) -> list[Observation]:
     """The student's own nodes, and the vectors that lead to none of them."""
-    evidence, construction = comparison.evidence, task.construction
+    construction = task.construction
     given = {*construction.poles.values(), *task.ground}
     seen = [
-        Seen(name, None, place, _missed_by(task, evidence, name))
+        Observation(name, None, place, _missed_by(task, evidence, name))
         for name, place in evidence.nodes.items()
         if name not in given
     ]
@@ -161,16 +168,16 @@ def _seen(task: Task, comparison: Comparison, parameters: Parameters) -> list[Se
             continue
         value, read_mm = drawn.as_complex, math.hypot(LEAST_MISS_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
         if value is not None:
-            seen.append(Seen(vector.head, vector.tail, value, _spread(NOTHING, read_mm)))
+            seen.append(Observation(vector.head, vector.tail, value, _spread(NOTHING, read_mm)))
             continue
         # What leads to a length is not seen: all earlier errors are in it.
         traced = traced or trace(construction, parameters, task.skill)
         spread = _spread(traced.moved(vector.tail, vector.head), read_mm)
-        seen.append(Seen(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
+        seen.append(Observation(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
     return seen
 
 
-def _missed_by(task: Task, evidence: Evidence, node: str) -> Spread:
+def _missed_by(task: Task, evidence: Evidence, node: str) -> Covariance:
     """How far a node may be missed by being read, or by the measurements that lead to it."""
     vectors = [one for one in task.construction.vectors.values() if one.head == node]
     hand = task.rubric.hand
@@ -212,26 +219,37 @@ def _computed_within(task: Task, evidence: Evidence, node: str, each_mm: float) 
     return math.hypot(*errors)
 
 
-def _spread(moved: ComplexArray, least_mm: float) -> Spread:
+def _spread(moved: ComplexArray, least_mm: float) -> Covariance:
     """What independent errors make of an end together: variance along x, covariance, variance along y."""
     x, y = moved.real, moved.imag
     return float(x @ x) + least_mm**2, float(x @ y), float(y @ y) + least_mm**2
 
 
+CHARGED = frozenset({"none", "partial"})
+LOST = CHARGED | {"follow_through", "review"}
+"""Verdicts whose cause is looked for: also where a person has still to decide."""
+
+
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
-    comparison = compare(task, submission)
-    diagnosis = diagnose(case_of(task, comparison))
-    is_turned = bool(diagnosis.wrong & task.construction.poles.keys())
-    if diagnosis.drawn and diagnosis.wrong and (is_turned or not comparison.evidence.has_sheets):
-        # Where no sheet shows what was drawn, or a plan is turned, diagnosis tells what follows from what.
-        drawn = diagnosis.drawn
-        drawn_by = Sketch("told", drawn.construction, drawn.parameters, diagnosis.wrong)
-        comparison = compare(task, submission, drawn_by)
-    mistakes = diagnosis.mistakes
+    comparison = compare(task, submission, explain)
+    mistakes = _named(task, comparison)
     mistakes = (*mistakes, *_swaps_seen(task, submission, mistakes), *_not_drawn(task, comparison))
     outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
+
+
+def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
+    """The mistakes that explain what was lost, or may be."""
+    scales, vectors = comparison.settled, task.construction.vectors
+    lost = [one for one in comparison.outcomes if one.verdict in LOST]
+    by_vector = {one.name: one.criterion for one in lost if one.name in vectors}
+    by_scale = {one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED}
+    is_other_scale = any(scale.other and not scale.used.assumed for scale in scales.values())
+    if not by_vector and not is_other_scale:
+        return ()
+    explanation = comparison.explanation or explain(task, comparison.evidence, scales)
+    return named(explanation.accounts, task.construction, Lost(by_vector, by_scale))
 
 
 def _swaps_seen(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:

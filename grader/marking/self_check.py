@@ -45,10 +45,10 @@ class Checked:
 
 def self_check(task: Task, submission: Submission, level: Level = "hint") -> tuple[Checked, ...]:
     """Check everything that was handed in, in the rubric's order; what was not is passed over."""
-    return told(judge(task, submission), level)
+    return checked_values(judge(task, submission), level)
 
 
-def told(judgement: Judgement, level: Level) -> tuple[Checked, ...]:
+def checked_values(judgement: Judgement, level: Level) -> tuple[Checked, ...]:
     """What a judgement may tell at a level."""
     return tuple(_checked(one, level) for one in judgement.outcomes if _is_handed_in(one))
 

@@ -204,13 +204,13 @@ def scan_element(picture: Picture, index: int) -> Markup:
     ).format(index, width, height, kind, base64.b64encode(picture.scan).decode("ascii"))
 
 
-def svg(look: Look, picture: Picture, told: str) -> Markup:
-    """A look; `told` says in words what is seen. The scan is taken from the page's `scan_element`."""
+def svg(look: Look, picture: Picture, description: str) -> Markup:
+    """A look; `description` says in words what is seen. The scan is taken from the page's `scan_element`."""
     image = Markup('<use href="#scan-{}"/>').format(look.picture) if picture.scan else Markup("")
     return Markup(
         '<svg class="sheet" viewBox="{:.1f} {:.1f} {:.1f} {:.1f}" role="img" aria-label="{}"'
         ' font-family="{}">{}<g class="marks">{}</g></svg>'
-    ).format(*look.box, told, FONTS, image, Markup("").join(_elements(look)))
+    ).format(*look.box, description, FONTS, image, Markup("").join(_elements(look)))
 
 
 def _elements(look: Look) -> Iterator[Markup]:

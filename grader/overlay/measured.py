@@ -7,16 +7,27 @@ without a direction can only be drawn along the expected direction, where that m
 import cmath
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from grader.outcomes import Outcome
-from grader.overlay.scene import LEAST_ARROW_MM, XY, Arrow, Dot, Ghost, Picture, Scene
+from grader.overlay.scene import (
+    LEAST_ARROW_MM,
+    OFF,
+    XY,
+    Arrow,
+    Dot,
+    Ghost,
+    Picture,
+    Scene,
+    expected_vector,
+    ghost_of,
+    on_paper,
+)
 from grader.records import Reading
 from reference.construction.graph import Construction, Vector
 
 MARGIN_MM = 14.0
 GAP_MM = 22.0
-OFF = frozenset({"none", "partial", "review"})
 
 
 def measured_picture(
@@ -46,20 +57,6 @@ def measured_picture(
     return Picture(source, 1, b"", b"", 0, 0, _side_by_side(list(drawn.values())))
 
 
-@dataclass(frozen=True, slots=True)
-class _Plan:
-    """One plan about its pole, millimetres, y down."""
-
-    arrows: tuple[Arrow, ...]
-    ghosts: tuple[Ghost, ...]
-    dots: tuple[Dot, ...]
-
-    @property
-    def points(self) -> list[XY]:
-        ends: list[Arrow | Ghost] = [*self.arrows, *self.ghosts]
-        return [point for one in ends for point in (one.tail, one.tip)]
-
-
 def _plan(
     figure: str,
     pole: str,
@@ -68,9 +65,10 @@ def _plan(
     outcomes: Mapping[str, Outcome],
     *,
     show_expected: bool,
-) -> _Plan:
+) -> Scene:
+    """One plan about its pole."""
     entered = reading.figures[figure].vectors
-    expected = {name: _expected(outcomes.get(name)) for name in entered} if show_expected else {}
+    expected = {name: expected_vector(outcomes.get(name)) for name in entered} if show_expected else {}
     steps: dict[str, complex] = {}
     for name, one in entered.items():
         if one.length_mm is None:
@@ -87,32 +85,24 @@ def _plan(
     nodes = _nodes(pole, vectors, steps)
     arrows = tuple(_arrows(figure, vectors, steps, nodes, outcomes))
     ghosts = tuple(
-        Ghost(one.name, figure, one.tail, (one.tail[0] + found.real, one.tail[1] - found.imag), one.verdict)
-        for one in arrows
-        if one.verdict in OFF and (found := expected.get(one.name)) is not None
+        ghost_of(arrow, vector)
+        for arrow in arrows
+        if arrow.verdict in OFF and (vector := expected.get(arrow.name)) is not None
     )
     dots = tuple(
-        Dot(name, _xy(place), doubtful=False, lettered=True, figure=figure) for name, place in nodes.items()
+        Dot(name, on_paper(place), doubtful=False, lettered=True, figure=figure)
+        for name, place in nodes.items()
     )
-    return _Plan(arrows, ghosts, dots)
-
-
-def _expected(outcome: Outcome | None) -> complex | None:
-    if outcome is None or outcome.expected.length_mm is None or outcome.expected.direction_deg is None:
-        return None
-    return cmath.rect(outcome.expected.length_mm, math.radians(outcome.expected.direction_deg))
+    return Scene((0.0, 0.0), arrows, ghosts, dots)
 
 
 def _nodes(pole: str, vectors: list[Vector], steps: Mapping[str, complex]) -> dict[str, complex]:
     """Where the vectors lead to, from the pole on."""
     nodes = {pole: 0j}
-    found = True
-    while found:
-        found = False
+    for _ in vectors:
         for vector in vectors:
             if vector.tail in nodes and vector.head not in nodes:
                 nodes[vector.head] = nodes[vector.tail] + steps[vector.name]
-                found = True
     return nodes
 
 
@@ -127,22 +117,19 @@ def _arrows(
         if vector.tail in nodes:
             tail, outcome = nodes[vector.tail], outcomes.get(vector.name)
             verdict = "not_judged" if outcome is None else outcome.verdict
-            tip = _xy(tail + steps[vector.name])
-            yield Arrow(vector.name, figure, _xy(tail), tip, verdict, doubtful=verdict == "review")
+            tip = on_paper(tail + steps[vector.name])
+            yield Arrow(vector.name, figure, on_paper(tail), tip, verdict, doubtful=verdict == "review")
 
 
-def _xy(at: complex) -> XY:
-    return (at.real, -at.imag)
-
-
-def _side_by_side(plans: list[_Plan]) -> Scene:
+def _side_by_side(plans: list[Scene]) -> Scene:
     """The plans beside each other on a page just large enough."""
     left, height = MARGIN_MM, 0.0
     arrows: list[Arrow] = []
     ghosts: list[Ghost] = []
     dots: list[Dot] = []
     for plan in plans:
-        xs, ys = zip(*plan.points, strict=True)
+        lines: list[Arrow | Ghost] = [*plan.arrows, *plan.ghosts]
+        xs, ys = zip(*(point for line in lines for point in (line.tail, line.tip)), strict=True)
         by = (left - min(xs), MARGIN_MM - min(ys))
         arrows += [replace(a, tail=_by(a.tail, by), tip=_by(a.tip, by)) for a in plan.arrows]
         ghosts += [replace(g, tail=_by(g.tail, by), tip=_by(g.tip, by)) for g in plan.ghosts]

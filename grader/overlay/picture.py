@@ -17,7 +17,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from grader.outcomes import Outcome
 from grader.overlay.scene import XY, Picture, Scene, between, layers_of, scene_of
-from grader.records import Backdrop, FloatArray, GreyImage, Page, Reading, Sheet
+from grader.records import Backdrop, GreyImage, Page, Reading, Sheet
+from grader.scan.pixels import cut_out, reduction
 from reference.construction.graph import Vector
 from reference.drawing.canvas import Area, Curve, Label, Ring, Shape, Stroke, set_pieces
 
@@ -118,22 +119,13 @@ def _turned(page: Page, width_px: int) -> GreyImage:
 def _upright(grey: GreyImage, sheet: Sheet, width_px: int) -> GreyImage:
     """The sheet upright, the paper's width across `width_px`."""
     scale = width_px / sheet.page_mm[0]
-    size = (width_px, max(1, round(sheet.page_mm[1] * scale)))
     shrink = max(1, int(sheet.px_per_mm / scale))
     if shrink > 1:
         # Averaging before the warp: a warp alone would skip pixels, and with them thin lines.
         smaller = (max(1, grey.shape[1] // shrink), max(1, grey.shape[0] // shrink))
         grey = _grey(cv2.resize(grey, smaller, interpolation=cv2.INTER_AREA))
-    to_mm = np.array([[1 / scale, 0, 0.5 / scale], [0, 1 / scale, 0.5 / scale], [0, 0, 1]])
-    # The centre of pixel i of the shrunken image lies at shrink * i + (shrink - 1) / 2 of the stored one.
-    offset = (shrink - 1) / 2
-    shrunk = np.array([[1 / shrink, 0, -offset / shrink], [0, 1 / shrink, -offset / shrink], [0, 0, 1]])
-    output_to_stored: FloatArray = shrunk @ sheet.mm_to_px @ to_mm
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    return _grey(
-        cv2.warpPerspective(
-            grey, output_to_stored, size, flags=flags, borderMode=cv2.BORDER_CONSTANT, borderValue=(255.0,)
-        )
+    return cut_out(
+        grey, reduction(1.0 / shrink) @ sheet.mm_to_px, (0.0, 0.0, *sheet.page_mm), scale, outside=255
     )
 
 

@@ -5,6 +5,7 @@ Right and wrong differ by colour, mark *and* line: wrong ones are thick, nearly 
 dashes, doubtful ones short ones, expected ones dots. Nothing rests on colour alone.
 """
 
+import cmath
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,8 +15,9 @@ import numpy as np
 from grader.outcomes import Outcome
 from grader.records import MECHANISM, Box, FloatArray, Reading
 from reference.construction.graph import Vector
-from reference.drawing.canvas import PAPER, Area, Curve, Ring, Shape, Stroke, Text, pieces_of, width_of
-from reference.drawing.canvas import Label as Lettering
+from reference.drawing import symbols
+from reference.drawing.canvas import PAPER, Area, Curve, Label, Ring, Shape, Stroke, Text, pieces_of, width_of
+from reference.drawing.labels import lengths_inside
 
 XY = tuple[float, float]
 
@@ -71,6 +73,8 @@ GHOST_DASH_MM = (0.35, 1.0)
 GHOST_WIDTH_MM = 0.5
 """Expected vectors are dotted."""
 NODE_COLOUR = "#24303c"
+OFF = frozenset({"none", "partial", "review"})
+"""Verdicts of vectors that have a ghost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,24 +108,6 @@ class Arrow:
         if self.doubtful:
             return DASH_MM
         return NEARLY_MM if self.verdict == "partial" else None
-
-    def neck(self, size: float = 1.0) -> XY:
-        """Where the shaft ends and the head begins."""
-        if self.is_link:
-            return self.tip
-        head = min(ARROWHEAD_MM[0] * size, 0.45 * self.length)
-        share = 1.0 - head / self.length if self.length > 0.0 else 1.0
-        return between(self.tail, self.tip, share)
-
-    def head(self, size: float = 1.0) -> tuple[XY, XY, XY]:
-        """The three corners of the arrowhead."""
-        neck, half = self.neck(size), ARROWHEAD_MM[1] / ARROWHEAD_MM[0]
-        across = (-(self.tip[1] - neck[1]) * half, (self.tip[0] - neck[0]) * half)
-        return (
-            self.tip,
-            (neck[0] + across[0], neck[1] + across[1]),
-            (neck[0] - across[0], neck[1] - across[1]),
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +179,7 @@ def scene_of(
     """The scene of one sheet's reading; `outcomes` by the vector's or link's name."""
     arrows = [*_arrows(reading, vectors, outcomes), *_links(reading, links, outcomes)]
     dots = tuple(
-        Dot(name, _xy(node.at), node.confidence < LEAST_SURE, figure=kind)
+        Dot(name, on_paper(node.at), node.confidence < LEAST_SURE, figure=kind)
         for kind, figure in reading.figures.items()
         for name, node in figure.nodes.items()
     )
@@ -201,7 +187,8 @@ def scene_of(
     return Scene(page_mm, tuple(arrows), ghosts, dots)
 
 
-def _xy(at: complex) -> XY:
+def on_paper(at: complex) -> XY:
+    """A point of the plane, y up, in sheet millimetres, y down."""
     return (at.real, -at.imag)
 
 
@@ -222,7 +209,7 @@ def _arrows(
                 continue
             outcome = outcomes.get(name)
             verdict = "not_judged" if outcome is None else outcome.verdict
-            tail, tip = _xy(figure.nodes[ends.tail].at), _xy(figure.nodes[ends.head].at)
+            tail, tip = on_paper(figure.nodes[ends.tail].at), on_paper(figure.nodes[ends.head].at)
             doubtful = verdict == "review" or read.confidence < LEAST_SURE
             yield Arrow(name, kind, tail, tip, verdict, doubtful)
 
@@ -237,7 +224,7 @@ def _links(
         if sketch is None or outcome is None or tail not in sketch.nodes or head not in sketch.nodes:
             continue
         if outcome.verdict != "not_judged":
-            ends = (_xy(sketch.nodes[tail].at), _xy(sketch.nodes[head].at))
+            ends = (on_paper(sketch.nodes[tail].at), on_paper(sketch.nodes[head].at))
             doubtful = outcome.verdict == "review"
             yield Arrow(name, MECHANISM, *ends, outcome.verdict, doubtful, is_link=True)
 
@@ -245,15 +232,22 @@ def _links(
 def _ghosts(arrows: list[Arrow], outcomes: Mapping[str, Outcome]) -> Iterator[Ghost]:
     """What was expected of the vectors that are off, or wait for a person."""
     for arrow in arrows:
-        if arrow.verdict not in {"none", "partial", "review"}:
-            continue
-        expected = outcomes[arrow.name].expected
-        if expected.length_mm is None or expected.direction_deg is None:
-            continue
-        angle = math.radians(expected.direction_deg)
-        x, y = arrow.tail
-        tip = (x + expected.length_mm * math.cos(angle), y - expected.length_mm * math.sin(angle))
-        yield Ghost(arrow.name, arrow.figure, arrow.tail, tip, arrow.verdict)
+        expected = expected_vector(outcomes.get(arrow.name))
+        if arrow.verdict in OFF and expected is not None:
+            yield ghost_of(arrow, expected)
+
+
+def expected_vector(outcome: Outcome | None) -> complex | None:
+    """The drawn vector that was expected, complex millimetres, y up; None where that is not known."""
+    if outcome is None or outcome.expected.length_mm is None or outcome.expected.direction_deg is None:
+        return None
+    return cmath.rect(outcome.expected.length_mm, math.radians(outcome.expected.direction_deg))
+
+
+def ghost_of(arrow: Arrow, expected: complex) -> Ghost:
+    """The expected vector, laid off from where the drawn one starts."""
+    tip = (arrow.tail[0] + expected.real, arrow.tail[1] - expected.imag)
+    return Ghost(arrow.name, arrow.figure, arrow.tail, tip, arrow.verdict)
 
 
 LABEL_HEIGHT_MM = 3.4
@@ -277,7 +271,7 @@ _NO_NAMES: Mapping[str, str] = {}
 
 
 @dataclass(frozen=True, slots=True)
-class Label:
+class ArrowLabel:
     """Where an arrow's mark and name stand; `size` as of `labels_of`."""
 
     arrow: Arrow
@@ -307,7 +301,7 @@ class Label:
 
 def labels_of(
     arrows: Sequence[Arrow], within: Box, size: float = 1.0, names: Mapping[str, str] = _NO_NAMES
-) -> list[Label]:
+) -> list[ArrowLabel]:
     """A place for each arrow's mark and name; `size` 1 suits a whole sheet, less a close-up.
 
     Greedy, long arrows first: each label takes the cheapest of its places.
@@ -315,20 +309,22 @@ def labels_of(
     taken = np.zeros((0, 4))
     labels = []
     for arrow in sorted(arrows, key=lambda one: -one.length):
-        others = np.array([(*one.tail, *one.tip) for one in arrows if one is not arrow]).reshape(-1, 4)
+        others = np.array([(*one.tail, *one.tip, 0.0) for one in arrows if one is not arrow]).reshape(-1, 5)
         text = pieces_of(names.get(arrow.name, arrow.name))
         wide = BADGE_MM + 1.0 + BOLD_SHARE * width_of(text, NAME_MM)
         far, boxes = _places(arrow, within, size, wide)
-        crowded = OVERLAP_COST * _overlaps(boxes, taken) + CROSSING_COST * _crossings(boxes, others)
+        corners = np.hstack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
+        crossed = lengths_inside(corners, others, clear=0.0).sum(axis=1)
+        crowded = OVERLAP_COST * _overlaps(boxes, taken) + CROSSING_COST * crossed
         best = boxes[int(np.argmin(far + crowded / size**2))]
         taken = np.vstack([taken, best])
         x, y, width, height = best.tolist()
-        labels.append(Label(arrow, text, (x, y, width, height), size))
+        labels.append(ArrowLabel(arrow, text, (x, y, width, height), size))
     return labels
 
 
 def _places(arrow: Arrow, within: Box, size: float, wide_mm: float) -> tuple[FloatArray, FloatArray]:
-    """How far-fetched each place is, (p,), and the places, (p, 4): x, y, width, height."""
+    """What each place costs by its distance, (p,), and the places, (p, 4): x, y, width, height."""
     box = size * np.array([wide_mm, LABEL_HEIGHT_MM + 0.6])
     tail, along = np.array(arrow.tail), np.array([1.0, 0.0])
     step = np.array(arrow.tip) - tail
@@ -349,20 +345,6 @@ def _overlaps(boxes: FloatArray, taken: FloatArray) -> FloatArray:
     high = np.minimum(boxes[:, None, :2] + boxes[:, None, 2:], taken[:, :2] + taken[:, 2:])
     shared: FloatArray = np.prod(np.maximum(high - low, 0.0), axis=2).sum(axis=1)
     return shared
-
-
-def _crossings(boxes: FloatArray, arrows: FloatArray) -> FloatArray:
-    """Length of (a, 4) arrows inside each of (p, 4) boxes (Liang and Barsky's clipping)."""
-    tails, steps = arrows[:, :2], arrows[:, 2:] - arrows[:, :2]
-    # An arrow along an axis never meets the sides across it: a tiny step puts them at infinity.
-    steps = np.where(np.abs(steps) < 1e-9, 1e-9, steps)
-    low = (boxes[:, None, :2] - tails) / steps
-    high = (boxes[:, None, :2] + boxes[:, None, 2:] - tails) / steps
-    enter = np.maximum(np.minimum(low, high).max(axis=2), 0.0)
-    leave = np.minimum(np.maximum(low, high).min(axis=2), 1.0)
-    lengths = np.hypot(arrows[:, 2] - arrows[:, 0], arrows[:, 3] - arrows[:, 1])
-    inside: FloatArray = (np.maximum(leave - enter, 0.0) * lengths).sum(axis=1)
-    return inside
 
 
 # Marks as shapes ---------------------------------------------------------------------------------
@@ -425,26 +407,28 @@ def _dot(dot: Dot, size: float) -> Iterator[Shape]:
     yield Ring(dot.at, 0.8 * size, 0.3 * size, colour, "none")
     if dot.lettered:
         at = (dot.at[0] + 1.3 * size, dot.at[1] - 1.3 * size)
-        yield Lettering(at, pieces_of(dot.name), 3.0 * size, "start", colour)
+        yield Label(at, pieces_of(dot.name), 3.0 * size, "start", colour)
 
 
 def _arrow(arrow: Arrow, size: float) -> Iterator[Shape]:
     if arrow.length < LEAST_ARROW_MM:
         return
-    colour = COLOURS[arrow.verdict]
+    colour, width = COLOURS[arrow.verdict], ARROW_WIDTH_MM[arrow.verdict] * size
     dash = tuple(length * size for length in arrow.dash or ())
-    width = ARROW_WIDTH_MM[arrow.verdict] * size
-    yield Stroke(arrow.tail, arrow.neck(size), width, colour, dash)
-    if not arrow.is_link:
-        yield Area(arrow.head(size), colour)
+    if arrow.is_link:
+        yield Stroke(arrow.tail, arrow.tip, width, colour, dash)
+        return
+    start, end = (complex(x, -y) for x, y in (arrow.tail, arrow.tip))
+    head_mm = (ARROWHEAD_MM[0] * size, ARROWHEAD_MM[1] * size)
+    yield from symbols.arrow(start, end, width, colour, head_mm, dash)
 
 
-def _ground(label: Label) -> Shape:
+def _ground(label: ArrowLabel) -> Shape:
     x, y, width, height = label.box
     return Area(((x, y), (x + width, y), (x + width, y + height), (x, y + height)), PAPER)
 
 
-def _label(label: Label) -> Iterator[Shape]:
+def _label(label: ArrowLabel) -> Iterator[Shape]:
     """The mark in a disc and the name, with a thin line to an arrow far off."""
     arrow, size = label.arrow, label.size
     colour = COLOURS[arrow.verdict]
@@ -455,4 +439,4 @@ def _label(label: Label) -> Iterator[Shape]:
     for stroke in MARK_STROKES[arrow.verdict]:
         points = tuple((x + 0.95 * size * dx, y + 0.95 * size * dy) for dx, dy in stroke)
         yield Curve(points, 0.42 * size, PAPER)
-    yield Lettering(label.foot, label.text, NAME_MM * size, "start", colour)
+    yield Label(label.foot, label.text, NAME_MM * size, "start", colour)

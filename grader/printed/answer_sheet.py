@@ -43,9 +43,7 @@ from grader.printed.pdf import (
     wrap,
 )
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity, Problem
-from grader.rubric import RubricFile
 from reference.authored.assignment import Assignment, PageTable, Variant
-from reference.construction.derive import construction_of
 from reference.drawing.canvas import Piece, pieces_of
 from reference.errors import AuthoredFileError, CallError, Finding
 
@@ -408,41 +406,6 @@ def cells_of(
     construction = construction_for(assignment, table.figures)
     ordered = dict.fromkeys(table.figures)
     return combs_of(_boxes([v.name for figure in ordered for v in construction.vectors_of(figure)], asked))
-
-
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What a rubric asks to be read on pages; everything where it asks for no vector.
-
-    Attributes
-    ----------
-    figures : those that it asks anything of, and the sketch
-    vectors : all vectors of these figures
-    cells : the printed boxes for measured lengths, by vector, for each page of the answer sheet
-    """
-
-    figures: frozenset[str] = frozenset()
-    vectors: tuple[str, ...] = ()
-    cells: Mapping[frozenset[str], Mapping[str, tuple[Box, ...]]] = field(default_factory=dict)
-
-
-def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
-    """What a rubric asks to be read."""
-    construction = construction_of(
-        assignment.mechanism(assignment.variants()[:1]),
-        accelerations=rubric.needs_accelerations,
-        plate_by_similarity=assignment.file.plate_images == "similarity",
-    )
-    known = [construction.vectors[name] for name in rubric.vectors if name in construction.vectors]
-    plans = dict.fromkeys(construction.figure_of(vector.head) for vector in known)
-    return Asked(
-        frozenset({MECHANISM, *plans} if plans else ()),
-        tuple(vector.name for plan in plans for vector in construction.vectors_of(plan)),
-        {
-            frozenset(page.figures): cells_of(assignment, page.figures, rubric.vectors)
-            for page in assignment.file.page
-        },
-    )
 
 
 def _boxes(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:

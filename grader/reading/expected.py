@@ -6,31 +6,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grader.reading.lines import Lines
-from grader.records import FloatArray
+from grader.records import MECHANISM, FloatArray
 from reference.construction.elements import Normal, Scaled
 from reference.construction.graph import Construction, bars, coincident, evaluate
 from reference.construction.mistakes import Drawing, Mistake, commit, single_mistakes
-from reference.construction.steps import (
-    ArcAndLine,
-    Coincide,
-    Divide,
-    Given,
-    Local,
-    OnGuide,
-    Similar,
-    Step,
-    Tangent,
-    TwoArcs,
-    TwoLines,
-)
+from reference.construction.steps import Given, Similar, Step
+from reference.construction.uncertainty import acts_of
 from reference.geometry import ComplexArray
 
 STEP_OF_DERIVATIVE = 1e-5
+"""Millimetres or radians: small against any curvature, large against the digits of a length."""
 
 
 @dataclass(frozen=True, slots=True)
-class Hand:
-    """Standard errors of a hand that draws without much care."""
+class DraftingErrors:
+    """Standard errors of a student who draws without much care.
+
+    Attributes
+    ----------
+    angle_rad, shift_mm : of a line's direction, and of its foot to the side
+    length_mm, relative : of a length laid off, and in addition this share of it
+    mark_mm : of a point's mark, along x and along y
+    """
 
     angle_rad: float = float(np.radians(0.8))
     shift_mm: float = 0.35
@@ -38,16 +35,59 @@ class Hand:
     relative: float = 0.02
     mark_mm: float = 0.15
 
+    def of(self, step: Step, kind: str, size_mm: float) -> float:
+        """The standard error of one act of a step, mm or rad.
+
+        Arguments: `kind` as in `reference.construction.elements.Errors`; `size_mm` is the length that the step lays off.
+        """
+        match kind:
+            case "angle":
+                return self.angle_rad
+            case "shift":
+                return self.shift_mm
+            case "length" if isinstance(step, Given):
+                # A computed length is laid off after one more measurement than a given one.
+                share = self.relative if isinstance(step.length, Scaled) else 2.0 * self.relative
+                return self.length_mm + share * size_mm
+            case "length":
+                return self.length_mm
+            case _:
+                return self.length_mm if isinstance(step, Similar) else self.mark_mm
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where a figure lies on the sheet.
+
+    Attributes
+    ----------
+    at : its origin, complex mm
+    size, turn_rad : relative to the expected figure, counter-clockwise
+    score : share of the figure that has strokes there, 0..1
+    """
+
+    at: complex
+    size: float
+    turn_rad: float
+    score: float
+
+
+@dataclass(frozen=True, slots=True)
+class Slack:
+    """Standard errors of a figure's pose before its strokes are assigned."""
+
+    shift_mm: float = 2.0
+    turn_rad: float = float(np.radians(1.0))
+    relative: float = 0.04
+
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A straight piece of a figure between two of its nodes, by their places in the figure's list."""
+    """A straight piece of a figure between two of its nodes, by their index in the figure's list."""
 
     name: str
     tail: int
     head: int
-    drawn: bool = True
-    """False for a helping line that nobody needs to draw (and whose absence costs nothing)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +100,7 @@ class Expected:
     at : (n,) complex mm; a plan about its own pole until it is placed
     cov : (2n, 2n) covariance, x and y of each node in turn
     edges : what should be drawn between them
-    tied : pairs of nodes that lie in one place
+    tied : pairs of nodes that lie at one point
     """
 
     names: tuple[str, ...]
@@ -69,136 +109,98 @@ class Expected:
     edges: tuple[Edge, ...]
     tied: tuple[tuple[int, int], ...] = ()
 
-    def placed(self, at: complex, size: float, turn_rad: float, slack: "Slack") -> "Expected":
-        """The same figure somewhere on the sheet, with the freedom left to it."""
-        spin = size * np.exp(1j * turn_rad)
-        moved = at + spin * self.at
-        rotate = np.kron(np.eye(len(self.at)), np.array([[spin.real, -spin.imag], [spin.imag, spin.real]]))
-        arm = moved - at
-        free = np.column_stack(
-            [
-                _pairs(np.full(len(moved), slack.shift_mm + 0j)),
-                _pairs(np.full(len(moved), slack.shift_mm * 1j)),
-                _pairs(1j * slack.turn_rad * arm),
-                _pairs(slack.relative * arm),
-            ]
-        )
-        return replace(self, at=moved, cov=rotate @ self.cov @ rotate.T + free @ free.T)
+    def length_mm(self, edge: Edge) -> float:
+        """The expected length of an edge."""
+        return float(abs(self.at[edge.head] - self.at[edge.tail]))
 
-
-@dataclass(frozen=True, slots=True)
-class Slack:
-    """How well a figure's place is known before its strokes are told apart."""
-
-    shift_mm: float = 2.0
-    turn_rad: float = float(np.radians(1.0))
-    relative: float = 0.04
+    def placed(self, pose: Pose, slack: Slack) -> "Expected":
+        """The same figure at a pose on the sheet, with the errors that the pose may have."""
+        spin = pose.size * np.exp(1j * pose.turn_rad)
+        arm = spin * self.at
+        rotate = np.kron(np.eye(len(arm)), np.array([[spin.real, -spin.imag], [spin.imag, spin.real]]))
+        everywhere = np.full(len(arm), slack.shift_mm)
+        free = [everywhere, 1j * everywhere, 1j * slack.turn_rad * arm, slack.relative * arm]
+        moves = np.column_stack([xy(move) for move in free])
+        return replace(self, at=pose.at + arm, cov=rotate @ self.cov @ rotate.T + moves @ moves.T)
 
 
 def expect(
-    drawing: Drawing, figure: str, given: Mapping[str, ComplexArray], hand: Hand, edges: Iterable[Edge]
+    drawing: Drawing,
+    figure: str,
+    given: Mapping[str, ComplexArray],
+    errors: DraftingErrors,
+    edges: Iterable[Edge],
 ) -> Expected:
-    """The nodes of one figure, given the nodes of others, with the covariance of a hand's errors."""
+    """The nodes of one figure, from the known nodes of others, with the covariance of drafting errors.
+
+    Arguments: `given` are nodes that are already read, complex mm, by name.
+    """
     construction, parameters = drawing.construction, drawing.parameters
     steps = construction.figures[figure]
     names = tuple(step.node for step in steps)
-    nominal = evaluate(construction, parameters, given=given, wanted=names)
-    sources = list(_sources(steps, nominal, hand))
-    errors = {}
-    for row, (key, _) in enumerate(sources):
-        errors[key] = np.zeros(len(sources))
-        errors[key][row] = STEP_OF_DERIVATIVE
-    at = np.array([complex(np.ravel(nominal[name])[0]) for name in names])
-    bent = evaluate(construction, parameters, given=given, errors=errors, wanted=names)
+    exact = evaluate(construction, parameters, given=given, wanted=names)
+    place = {name: complex(np.ravel(at)[0]) for name, at in exact.items()}
+    deviation = {
+        (step.node, slot, kind): errors.of(step, kind, _size_mm(step, place))
+        for step in steps
+        for slot, kind in acts_of(step)
+    }
+    tried = dict(zip(deviation, STEP_OF_DERIVATIVE * np.eye(len(deviation)), strict=True))
+    bent = evaluate(construction, parameters, given=given, errors=tried, wanted=names)
+    at = np.array([place[name] for name in names])
     with np.errstate(invalid="ignore"):
-        moves = np.stack([np.broadcast_to(bent[name], len(sources)) for name in names]) - at[:, None]
-    moves = np.where(np.isfinite(moves), moves, 0.0) / STEP_OF_DERIVATIVE
-    moves = moves * np.array([sigma for _, sigma in sources])
-    slopes = np.concatenate([_pairs(column)[:, None] for column in moves.T], axis=1) if sources else None
-    cov = np.zeros((2 * len(names), 2 * len(names))) if slopes is None else slopes @ slopes.T
+        moves = np.stack([np.broadcast_to(bent[name], len(tried)) for name in names]) - at[:, None]
+    moves = np.where(np.isfinite(moves), moves, 0.0) / STEP_OF_DERIVATIVE * list(deviation.values())
+    slopes = np.stack([moves.real, moves.imag], axis=1).reshape(2 * len(names), -1)
     under = coincident(construction)
-    tied = tuple((names.index(one), names.index(under[one])) for one in names if one in under)
-    return Expected(names, at, cov, tuple(edges), tied)
+    tied = tuple((names.index(name), names.index(under[name])) for name in names if name in under)
+    return Expected(names, at, slopes @ slopes.T, tuple(edges), tied)
 
 
-def _pairs(values: ComplexArray) -> FloatArray:
-    """X and y in turn."""
+def _size_mm(step: Step, place: Mapping[str, complex]) -> float:
+    """The length that a step lays off."""
+    return abs(place[step.node] - place[step.start]) if isinstance(step, Given) else 0.0
+
+
+def xy(values: ComplexArray) -> FloatArray:
+    """(2n,) x and y in turn of (n,) complex numbers."""
     return np.column_stack([values.real, values.imag]).ravel()
-
-
-def _sources(
-    steps: Iterable[Step], nominal: Mapping[str, ComplexArray], hand: Hand
-) -> Iterable[tuple[tuple[str, int, str], float]]:
-    """Every error of the hand in these steps, with its standard error."""
-    for step in steps:
-        node = step.node
-        if isinstance(step, Coincide):
-            continue
-        mark = hand.length_mm if isinstance(step, Similar) else hand.mark_mm
-        yield (node, 0, "x"), mark
-        yield (node, 0, "y"), mark
-        match step:
-            case Given():
-                size = abs(complex(np.ravel(nominal[node])[0]) - complex(np.ravel(nominal[step.start])[0]))
-                share = hand.relative if isinstance(step.length, Scaled) else 2.0 * hand.relative
-                yield (node, 0, "length"), hand.length_mm + share * size
-                yield (node, 0, "angle"), hand.angle_rad
-                yield (node, 0, "shift"), hand.shift_mm
-            case TwoLines():
-                for slot in (0, 1):
-                    yield (node, slot, "angle"), hand.angle_rad
-                    yield (node, slot, "shift"), hand.shift_mm
-            case TwoArcs():
-                yield (node, 0, "length"), hand.length_mm
-                yield (node, 1, "length"), hand.length_mm
-            case ArcAndLine():
-                yield (node, 0, "length"), hand.length_mm
-                yield (node, 1, "angle"), hand.angle_rad
-                yield (node, 1, "shift"), hand.shift_mm
-            case Divide() | Tangent():
-                yield (node, 0, "length"), hand.length_mm
-            case Local() | OnGuide():
-                yield (node, 0, "length"), hand.length_mm
-                yield (node, 0, "angle"), hand.angle_rad
-                yield (node, 0, "shift"), hand.shift_mm
-
-
-# What is drawn between the nodes ------------------------------------------------------------------
 
 
 def links_of(construction: Construction) -> tuple[Edge, ...]:
     """The links of a mechanism sketch: every bar that its steps lay between two joints."""
-    steps = construction.figures["mechanism"]
-    place = {step.node: index for index, step in enumerate(steps)}
-    return tuple(Edge(f"{tail}{head}", place[tail], place[head]) for tail, head in bars(construction))
+    index = {step.node: row for row, step in enumerate(construction.figures[MECHANISM])}
+    return tuple(Edge(f"{tail}{head}", index[tail], index[head]) for tail, head in bars(construction))
 
 
 def vectors_of(construction: Construction, figure: str, absent: Iterable[str] = ()) -> tuple[Edge, ...]:
     """The vectors of a plan, without those at nodes that are not drawn."""
-    steps = construction.figures[figure]
-    place = {step.node: index for index, step in enumerate(steps)}
+    index = {step.node: row for row, step in enumerate(construction.figures[figure])}
     gone = set(absent)
     return tuple(
-        Edge(vector.name, place[vector.tail], place[vector.head])
+        Edge(vector.name, index[vector.tail], index[vector.head])
         for vector in construction.vectors_of(figure)
-        if not {vector.tail, vector.head} & gone and vector.tail in place
+        if not {vector.tail, vector.head} & gone and vector.tail in index
     )
 
 
 REGULAR = ("as constructed", "plates by similarity")
+"""Labels of the hypotheses without a mistake."""
 COST_OF_SIMILARITY = 0.7
+"""Nats: odds of one in two, against perpendiculars throughout."""
 COST_OF_MISTAKE = 8.0
-"""Nats: a third of plans have a mistake, one of some forty; and strokes of one hand err alike."""
+"""Nats: a third of plans have a mistake, one of some forty; and strokes of one student err alike."""
 LEFT_OUT = {
     "n": "not drawn: the normal component is left out",
     "k": "not drawn: the Coriolis component is left out",
 }
 """By the first letter of the node in which the component ends."""
 OF_THE_WHOLE = {"figure_rotated", "scale_wrong", "rpm_not_converted", "vector_missing"}
+"""Mistakes that the search for the plan's pose finds anyway, as it turns and scales the plan."""
 
 
 @dataclass(frozen=True, slots=True)
-class Hypothesis:
+class PlanHypothesis:
     """One way in which the plan may have been drawn.
 
     Attributes
@@ -206,7 +208,7 @@ class Hypothesis:
     label : for people
     drawing : the construction as this student would follow it
     absent : nodes that are not drawn then, with the reason
-    cost : nats, how unlikely before looking
+    cost : nats, how unlikely before strokes are considered
     """
 
     label: str
@@ -215,37 +217,34 @@ class Hypothesis:
     cost: float
 
 
-def regular(drawing: Drawing, figure: str) -> list[Hypothesis]:
+def regular(drawing: Drawing, figure: str) -> list[PlanHypothesis]:
     """As it should be: by perpendiculars throughout, and with plates by similarity."""
-    by_similarity = similar(drawing.construction, figure)
-    told = [Hypothesis(REGULAR[0], drawing, {}, 0.0)]
-    if by_similarity is not None:
-        changed, absent = by_similarity
-        told.append(Hypothesis(REGULAR[1], Drawing(changed, drawing.parameters), absent, COST_OF_SIMILARITY))
-    return told
+    hypotheses = [PlanHypothesis(REGULAR[0], drawing, {}, 0.0)]
+    changed, absent = _by_similarity(drawing.construction, figure)
+    if changed is not drawing.construction:
+        similar = Drawing(changed, drawing.parameters)
+        hypotheses.append(PlanHypothesis(REGULAR[1], similar, absent, COST_OF_SIMILARITY))
+    return hypotheses
 
 
-def mistaken(base: Hypothesis, figure: str) -> Iterator[tuple[Hypothesis, Mistake]]:
-    """Every single mistake on top of a hypothesis; the search for its place turns and scales it anyway."""
+def mistaken(base: PlanHypothesis, figure: str) -> Iterator[tuple[PlanHypothesis, Mistake]]:
+    """Every single mistake that can be made on top of a hypothesis."""
     for mistake in single_mistakes(base.drawing, figure):
         if mistake.code in OF_THE_WHOLE or mistake.at in base.absent:
             continue
-        gone = dict(base.absent)
+        absent = dict(base.absent)
         if mistake.code == "normal_missing":
-            gone[mistake.at] = LEFT_OUT[mistake.at[0]]
+            absent[mistake.at] = LEFT_OUT[mistake.at[0]]
         try:
             changed = commit(mistake, base.drawing)
         except ValueError:
             continue
-        told = _told(mistake) if base.label in REGULAR else f"{base.label}, {_told(mistake)}"
-        yield Hypothesis(told, changed, gone, base.cost + COST_OF_MISTAKE), mistake
+        label = " ".join([mistake.code, mistake.at, *mistake.other])
+        label = label if base.label in REGULAR else f"{base.label}, {label}"
+        yield PlanHypothesis(label, changed, absent, base.cost + COST_OF_MISTAKE), mistake
 
 
-def _told(mistake: Mistake) -> str:
-    return " ".join([mistake.code, mistake.at, *mistake.other])
-
-
-def similar(construction: Construction, figure: str) -> tuple[Construction, dict[str, str]] | None:
+def _by_similarity(construction: Construction, figure: str) -> tuple[Construction, dict[str, str]]:
     """The construction with every plate's image by similarity, and the nodes that vanish."""
     steps = {step.node: step for step in construction.figures[figure]}
     changed, absent = construction, {}
@@ -257,10 +256,10 @@ def similar(construction: Construction, figure: str) -> tuple[Construction, dict
             tail = steps.get(vector.tail)
             if vector.head == node and isinstance(tail, Given) and isinstance(tail.length, Normal):
                 absent[vector.tail] = f"not drawn: {node} found by similarity"
-    return None if changed is construction else (changed, absent)
+    return changed, absent
 
 
-def tied(hypothesis: Hypothesis) -> Construction:
+def tied(hypothesis: PlanHypothesis) -> Construction:
     """Vectors that would start from a normal component left out start where it would have started."""
     construction = hypothesis.drawing.construction
     vectors = dict(construction.vectors)
@@ -280,15 +279,22 @@ def resized(drawing: Drawing, figure: str, size: float) -> dict[str, FloatArray]
     return {**drawing.parameters, scale: np.asarray(drawing.parameters[scale] / size)}
 
 
-OFF_MM = 1.6
-"""How far strokes may lie off a figure that is laid roughly."""
-OFF_PER_MM = 0.03
-"""And further, the further from where it was laid on."""
+RESIDUAL_MM = 1.6
+"""How far strokes may lie off a figure that is placed roughly: a few drafting errors."""
+RESIDUAL_PER_MM = 0.03
+"""The same for each mm from where it was laid on: a degree of turn, and scale."""
 HIGHEST_WEIGHT_MM = 40.0
+"""Longer edges count no more than this: one long stroke must not decide alone."""
 LEAST_EDGE_MM = 8.0
+"""Shorter edges are laid on letters and arrowheads as well."""
 OVERRUN_MM = 25.0
+"""How much longer a stroke may be than its edge: lines run on past nodes."""
 PROPOSING_EDGES = 4
+"""Of a figure: one of so many long edges is nearly always drawn."""
 SHORT_LIST = 60
+"""Poses judged by all edges, by the rough score: the right one is far up."""
+SAME_POSE_MM = 4.0
+"""Poses that move no node by more are one."""
 PAIRS = 1 << 13
 """Of segments and strokes compared at a time: their arrays stay in a processor's own cache."""
 FARTHEST_SQUARED = 1500.0
@@ -298,24 +304,14 @@ SPECK_MM = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """A figure's origin on the sheet (complex mm), its size relative to the expected, turn, score 0..1."""
-
-    at: complex
-    size: float
-    turn_rad: float
-    score: float
-
-
-@dataclass(frozen=True, slots=True)
 class Search:
-    """Where to look.
+    """Which poses to try.
 
     Attributes
     ----------
-    turns_rad : turns of the whole figure to try
+    turns_rad : turns of the whole figure
     give_rad : freedom about each
-    sizes : sizes to try; 0 stands for "as long as the stroke"
+    sizes : sizes relative to the expected; 0 stands for "as long as the stroke"
     smallest, largest : bounds of free sizes
     short_mm : how much shorter a stroke may be than its edge (links stop at joint circles)
     """
@@ -328,71 +324,65 @@ class Search:
     short_mm: float = 3.0
 
 
-def places(expected: Expected, lines: Lines, search: Search, count: int = 3) -> list[Place]:
-    """The best places of a figure among the strokes, best first."""
-    proposed = _proposals(expected, lines, search)
+def poses(expected: Expected, lines: Lines, search: Search, count: int = 3) -> list[Pose]:
+    """The best poses of a figure among the strokes, best first."""
+    longest = _longest(expected)
+    proposed = _proposals(expected, lines, search, longest)
     if not len(proposed):
         return []
     # The longest edges, on long strokes alone, leave few proposals for a look at everything.
-    rough = _scores(expected, lines, proposed, _longest(expected))
+    rough = _scores(expected, lines, proposed, longest)
     proposed = proposed[np.argsort(-rough)[:SHORT_LIST]]
-    scores = _scores(expected, lines, proposed, list(range(len(expected.edges))))
+    scores = _scores(expected, lines, proposed, range(len(expected.edges)))
     return _apart(proposed, scores, float(np.abs(expected.at).max()), count)
 
 
-def _proposals(expected: Expected, lines: Lines, search: Search) -> FloatArray:
-    """(m, 4) origin x, y, size, turn."""
-    found: list[FloatArray] = []
-    for edge in (expected.edges[one] for one in _longest(expected)):
+def _longest(expected: Expected) -> list[int]:
+    """Indices of the longest edges."""
+    size = np.nan_to_num([expected.length_mm(edge) for edge in expected.edges], posinf=0.0)
+    order = np.argsort(-size)[:PROPOSING_EDGES]
+    return [int(edge) for edge in order if size[edge] >= LEAST_EDGE_MM]
+
+
+def _proposals(expected: Expected, lines: Lines, search: Search, edges: Sequence[int]) -> FloatArray:
+    """(m, 4) origin x, y, size, turn: each of the edges laid on each stroke."""
+    proposed = [np.zeros((0, 4))]
+    for edge in (expected.edges[index] for index in edges):
         tail, head = complex(expected.at[edge.tail]), complex(expected.at[edge.head])
         # A stroke has no sense: it may lie either way.
         for start, end in ((lines.start, lines.end), (lines.end, lines.start)):
             turn_all = np.angle((end - start) / (head - tail))
             for turn in search.turns_rad:
-                off = np.abs(np.angle(np.exp(1j * (turn_all - turn))))
-                turned = np.flatnonzero(off < search.give_rad)
+                rest = np.abs(np.angle(np.exp(1j * (turn_all - turn))))
+                turned = np.flatnonzero(rest < search.give_rad)
                 for size in search.sizes:
-                    found.extend(_laid((tail, head), (start[turned], end[turned]), size, search))
-    return np.concatenate(found) if found else np.zeros((0, 4))
-
-
-def _longest(expected: Expected) -> list[int]:
-    """The longest edges, by their place in the list, each in a direction of its own."""
-    span = np.array([expected.at[edge.head] - expected.at[edge.tail] for edge in expected.edges])
-    size = np.where(np.isfinite(span), np.abs(span), 0.0)
-    chosen: list[int] = []
-    for edge in np.argsort(-size):
-        if size[edge] < LEAST_EDGE_MM or len(chosen) == PROPOSING_EDGES:
-            break
-        chosen.append(int(edge))
-    return chosen
+                    proposed.extend(_laid((tail, head), (start[turned], end[turned]), size, search))
+    return np.concatenate(proposed)
 
 
 def _laid(
     edge: tuple[complex, complex], strokes: tuple[ComplexArray, ComplexArray], size: float, search: Search
 ) -> list[FloatArray]:
-    """Origins with the edge's tail on the stroke's start, and with its head on the stroke's end."""
+    """Proposals with the edge's tail on the stroke's start, and with its head on the stroke's end."""
     (tail, head), (start, end) = edge, strokes
     span = head - tail
     drawn = np.abs(end - start)
     if size > 0.0:
         wanted = size * abs(span)
         fits = (drawn > wanted * 0.9 - search.short_mm) & (drawn < wanted * 1.1 + OVERRUN_MM)
-        sizes = np.full(int(fits.sum()), size)
+        sizes = np.full(len(drawn), size)
     else:
         sizes = drawn / abs(span)
         fits = (sizes > search.smallest) & (sizes < search.largest)
-        sizes = sizes[fits]
-    start, end = start[fits], end[fits]
+    sizes, start, end = sizes[fits], start[fits], end[fits]
     turn = np.angle((end - start) / span)
     spin = sizes * np.exp(1j * turn)
-    by_tail = start - spin * tail
-    by_head = end - spin * head
-    return [np.column_stack([at.real, at.imag, sizes, turn]) for at in (by_tail, by_head)]
+    origins = (start - spin * tail, end - spin * head)
+    return [np.column_stack([at.real, at.imag, sizes, turn]) for at in origins]
 
 
 def _scores(expected: Expected, lines: Lines, proposed: FloatArray, edges: Sequence[int]) -> FloatArray:
-    """Share of the figure's edges (by length, capped) that have a stroke, for every proposal."""
+    """(m,) share of the figure's edges (by length, capped) that have a stroke, for every proposal."""
     origin = proposed[:, 0] + 1j * proposed[:, 1]
     spin = proposed[:, 2] * np.exp(1j * proposed[:, 3])
     total, weights = np.zeros(len(proposed)), np.zeros(len(proposed))
@@ -402,14 +392,14 @@ def _scores(expected: Expected, lines: Lines, proposed: FloatArray, edges: Seque
         if not np.isfinite(size).all():
             continue
         weight = np.minimum(size, HIGHEST_WEIGHT_MM) * (size > SPECK_MM)
-        reach = OFF_MM + OFF_PER_MM * np.maximum(np.abs(tail - origin), np.abs(head - origin))
+        farthest = np.maximum(np.abs(tail - origin), np.abs(head - origin))
         long = lines.take(lines.length > 0.3 * size.min())
-        total += weight * best_support(long, tail, head, reach)
+        total += weight * _support(long, tail, head, RESIDUAL_MM + RESIDUAL_PER_MM * farthest)
         weights += weight
     return np.asarray(total / np.maximum(weights, 1e-9))
 
 
-def best_support(lines: Lines, tail: ComplexArray, head: ComplexArray, sigma: FloatArray) -> FloatArray:
+def _support(lines: Lines, tail: ComplexArray, head: ComplexArray, sigma: FloatArray) -> FloatArray:
     """How well the best stroke lies under each segment, 0..1. Arguments: segments (m,), sigma mm (m,)."""
     support = np.zeros(len(tail))
     rows = max(1, PAIRS // max(1, len(lines)))
@@ -417,31 +407,31 @@ def best_support(lines: Lines, tail: ComplexArray, head: ComplexArray, sigma: Fl
         part = slice(first, first + rows)
         from_start = (tail[part, None] - lines.start) * np.conj(lines.along)
         to_end = (head[part, None] - lines.start) * np.conj(lines.along)
-        off2 = from_start.imag**2 + to_end.imag**2
+        squared = from_start.imag**2 + to_end.imag**2
         low = np.minimum(from_start.real, to_end.real)
         high = np.maximum(from_start.real, to_end.real)
         shared = np.minimum(high, lines.length) - np.maximum(low, 0.0)
-        at = np.nonzero((shared > 0.0) & (off2 < FARTHEST_SQUARED * sigma[part, None] ** 2))
+        at = np.nonzero((shared > 0.0) & (squared < FARTHEST_SQUARED * sigma[part, None] ** 2))
         span = np.maximum(high[at] - low[at], 1e-6)
         true_span = np.abs(head[part] - tail[part])[at[0]]
         share = np.clip(shared[at] / np.maximum(true_span, span), 0.0, 1.0)
-        fit = np.exp(-0.5 * off2[at] / sigma[part][at[0]] ** 2) * share
+        fit = np.exp(-0.5 * squared[at] / sigma[part][at[0]] ** 2) * share
         np.maximum.at(support[part], at[0], fit)
     return support
 
 
-def _apart(proposed: FloatArray, scores: FloatArray, radius: float, count: int) -> list[Place]:
-    """The best proposals that are not the same place again."""
+def _apart(proposed: FloatArray, scores: FloatArray, radius: float, count: int) -> list[Pose]:
+    """The best proposals that are not the same pose again."""
     chosen: list[int] = []
     origin = proposed[:, 0] + 1j * proposed[:, 1]
     spin = proposed[:, 2] * np.exp(1j * proposed[:, 3])
     for index in np.argsort(-scores):
-        moved = [abs(origin[index] - origin[one]) + radius * abs(spin[index] - spin[one]) for one in chosen]
-        if all(distance > 4.0 for distance in moved):
+        apart = np.abs(origin[index] - origin[chosen]) + radius * np.abs(spin[index] - spin[chosen])
+        if (apart > SAME_POSE_MM).all():
             chosen.append(int(index))
         if len(chosen) == count:
             break
     return [
-        Place(complex(origin[one]), float(proposed[one, 2]), float(proposed[one, 3]), float(scores[one]))
-        for one in chosen
+        Pose(complex(origin[row]), float(proposed[row, 2]), float(proposed[row, 3]), float(scores[row]))
+        for row in chosen
     ]

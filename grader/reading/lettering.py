@@ -1,9 +1,9 @@
 """What the letters beside a figure's nodes say of the names that the construction gave to them.
 
 A letter is written a few millimetres off its node, mostly nearer to it than to any other: each piece of
-writing is, with some probability, the label of each node about it, or of none. How likely the writing is
-under the names as read, under two of them changed over, and under names at random tells whether the
-letters bear a name out. They are evidence beside the strokes: students swap letters, and pieces of
+writing is, with some probability, the label of each node about it, or of none. The likelihoods of the
+writing under the names as read, under two of them swapped, and under names at random show whether the
+letters confirm a name. They are evidence beside the strokes: students swap letters, and pieces of
 strokes look like letters.
 """
 
@@ -19,23 +19,25 @@ from reference.construction.graph import Construction
 from reference.geometry import ComplexArray
 
 REACH_MM = 8.0
+"""Writing farther from every node is no label of one."""
 FALL_MM = 1.4
 """Letters become fewer by 1/e with so much more of a gap between their box and their node."""
 STRAY = 0.03
-"""How many other letters are within a gap's reach, against a node's own at no gap."""
+"""Density of other letters, relative to that of a node's own letter at no gap."""
 LEAST_MM, MOST_MM = 1.0, 7.5
 """Heights of letters; primes and points are lower, words run together are wider."""
 SHARED = 0.5
 """Pieces that share so much of the smaller one's box are the same ink."""
 RARE_NATS = 5.0
 """Two given letters of a plan are swapped in one plan of 150."""
-UNSEEN = 1.0 / (1.0 + math.exp(RARE_NATS))
-"""Probability of a swap before letters are looked at: the confidences hold with it."""
-TOLD = 0.5
-"""Probability from which a swap is told at all; what it is used for is another stage's choice."""
+PRIOR_OF_SWAP = 1.0 / (1.0 + math.exp(RARE_NATS))
+"""Probability of a swap before letters are considered: the confidences hold with it."""
+REPORTED = 0.5
+"""Probability from which a swap is reported; what it is used for is another stage's choice."""
 COMPONENTS = ("n_", "k_")
 """How names of ends of normal and Coriolis components begin: few write them, and they share a letter."""
 POLE_SIGNS = ("o", "p", "π")
+"""What the pole of a plan is called in different schools."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,21 +64,9 @@ class Lettering:
 
         Arguments: `named` (n,) the column whose letter stands at each node; each its own by default.
         """
-        return float(self._logs(self.fits if named is None else self.fits[:, named]).sum())
-
-    def _logs(self, fits: FloatArray) -> FloatArray:
-        told = self.stray + (self.share * fits).sum(axis=1)
-        return np.asarray(np.log(1.0 - self.letter + self.letter * told))
-
-    def borne_out(self) -> FloatArray:
-        """(n,) nats by which the writing is likelier with a node's own letter than with one at random."""
-        own = self._logs(self.fits)
-        told = np.empty(len(self.nodes))
-        for node in range(len(self.nodes)):
-            fits = self.fits.copy()
-            fits[:, node] = 1.0
-            told[node] = float((own - self._logs(fits)).sum())
-        return told
+        fits = self.fits if named is None else self.fits[:, named]
+        likelihood = self.stray + (self.share * fits).sum(axis=1)
+        return float(np.log(1.0 - self.letter + self.letter * likelihood).sum())
 
     def swaps(self) -> Iterator[tuple[int, int, float]]:
         """Pairs of nodes of one figure, with the nats by which the writing is likelier with them swapped."""
@@ -94,55 +84,38 @@ def support(
 ) -> float:
     """What letters say of a mechanism's joints, nats against letters at random; 0 without letters."""
     nodes = {(MECHANISM, name): at for name, at in joints.items()}
-    found = lettering(nodes, letters, renamed=renamed)
-    return 0.0 if found is None else found.log()
-
-
-def agreement(
-    figures: Mapping[str, Figure],
-    letters: Letters | None,
-    poles: Collection[str] = (),
-    renamed: Mapping[str, str] | None = None,
-) -> dict[str, dict[str, float]]:
-    """How far the letters bear out each node, by figure and name: 1 fully, 0 silent, -1 another's letter.
-
-    Arguments are those of `lettering`.
-    """
-    found = lettering(_nodes(figures), letters, poles, renamed)
-    told = {figure: dict.fromkeys(read.nodes, 0.0) for figure, read in figures.items()}
-    if found is not None:
-        for (figure, node), nats in zip(found.nodes, found.borne_out(), strict=True):
-            told[figure][node] = math.tanh(float(nats) / 2.0)
-    return told
+    writing = lettering(nodes, letters, renamed=renamed)
+    return 0.0 if writing is None else writing.log()
 
 
 def lettered(
     reading: Reading, letters: Letters | None, construction: Construction, renamed: Mapping[str, str]
 ) -> Reading:
-    """A sheet's reading, less sure where letters of a plan seem swapped, with the likely swaps told.
+    """A sheet's reading, less certain where letters of a plan seem swapped, with the likely swaps.
 
     The names stay those of the construction: which of the two the student meant, a person decides.
     """
     poles = frozenset(construction.poles.values())
-    found = lettering(_nodes(reading.figures), letters, poles, renamed)
-    if found is None:
+    nodes = {
+        (figure, name): node.at
+        for figure, read in reading.figures.items()
+        for name, node in read.nodes.items()
+    }
+    writing = lettering(nodes, letters, poles, renamed)
+    if writing is None:
         return reading
-    figures, told = dict(reading.figures), []
-    for first, second, nats in found.swaps():
-        (figure, one), (_, other) = found.nodes[first], found.nodes[second]
-        if figure == MECHANISM or any(name in poles or name.startswith(COMPONENTS) for name in (one, other)):
+    figures, swaps = dict(reading.figures), []
+    for first, second, nats in writing.swaps():
+        (figure, p), (_, q) = writing.nodes[first], writing.nodes[second]
+        if figure == MECHANISM or any(name in poles or name.startswith(COMPONENTS) for name in (p, q)):
             continue
         chance = 1.0 / (1.0 + math.exp(RARE_NATS - nats))
-        left = min(1.0, (1.0 - chance) / (1.0 - UNSEEN))
-        figures[figure] = _doubted(figures[figure], {one, other}, construction, left)
-        if chance >= TOLD:
-            told.append(Swapped(figure, one, other, chance))
-    told.sort(key=lambda swap: -swap.confidence)
-    return replace(reading, figures=figures, swapped=tuple(told))
-
-
-def _nodes(figures: Mapping[str, Figure]) -> dict[tuple[str, str], complex]:
-    return {(figure, name): node.at for figure, read in figures.items() for name, node in read.nodes.items()}
+        left = min(1.0, (1.0 - chance) / (1.0 - PRIOR_OF_SWAP))
+        figures[figure] = _doubted(figures[figure], {p, q}, construction, left)
+        if chance >= REPORTED:
+            swaps.append(Swapped(figure, p, q, chance))
+    swaps.sort(key=lambda swap: -swap.confidence)
+    return replace(reading, figures=figures, swapped=tuple(swaps))
 
 
 def _doubted(figure: Figure, names: Collection[str], construction: Construction, share: float) -> Figure:
@@ -198,8 +171,8 @@ def lettering(
 def _signs(name: str, poles: Collection[str], renamed: Mapping[str, str], letters: Letters) -> list[int]:
     """The columns of the letters that may be written at a node: its name's first, any school's at a pole."""
     written = renamed.get(name, name)[:1]
-    told = (written, *POLE_SIGNS) if name in poles else (written,)
-    return sorted({letters.column[sign] for sign in told if sign in letters.column})
+    signs = (written, *POLE_SIGNS) if name in poles else (written,)
+    return sorted({letters.column[sign] for sign in signs if sign in letters.column})
 
 
 def _gaps(box_mm: FloatArray, at: ComplexArray) -> FloatArray:
@@ -213,11 +186,11 @@ def _gaps(box_mm: FloatArray, at: ComplexArray) -> FloatArray:
 def _apart(rows: IntArray, box_mm: FloatArray, known: FloatArray) -> IntArray:
     """One row for each piece of ink: the one that is likeliest a letter of those that overlap."""
     order = rows[np.argsort(-known[rows], kind="stable")]
-    over = _overlaps(box_mm[order]) >= SHARED
-    kept = np.zeros(len(order), dtype=bool)
-    for place in range(len(order)):
-        kept[place] = not (over[place] & kept).any()
-    return np.asarray(order[kept], dtype=np.int64)
+    overlap = _overlaps(box_mm[order]) >= SHARED
+    chosen = np.zeros(len(order), dtype=bool)
+    for row in range(len(order)):
+        chosen[row] = not (overlap[row] & chosen).any()
+    return np.asarray(order[chosen], dtype=np.int64)
 
 
 def _overlaps(box_mm: FloatArray) -> FloatArray:

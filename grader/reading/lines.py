@@ -1,7 +1,7 @@
-"""Strokes as lines in the complex plane, y up, ready to be compared with vectors.
+"""Strokes as straight lines in complex millimetres (y up), ready to be compared with vectors.
 
-Pieces that lie on one line with a gap between them are offered joined as well as apart: whether
-they are one vector or two in a row is for the figure to say.
+Pieces that lie on one line with a gap between them are offered joined as well as apart: whether they
+are one vector or two in a row is decided when strokes are assigned to a figure.
 """
 
 from dataclasses import dataclass
@@ -18,21 +18,33 @@ LEAST_MM = 1.2
 SE_OFFSET_MM = 0.04
 """No line of ink is known better: paper and pen are not ideal."""
 CLEAR_END_MM, HIDDEN_END_MM = 0.2, 1.0
-"""How well an end is seen: clear, or hidden in other ink. That strokes run on past nodes comes on top,
-and is what the larger part of an end's stated error is made of."""
+"""Standard error of a stroke's end, clear or hidden in other ink. The error that the ink stage states is
+mostly the part for strokes that run on past nodes, which is modelled separately."""
 HIDDEN = 1.8
 """Ends stated this many times worse than the sheet's good ones are hidden."""
 LONG_MM = 12.0
+"""Longer strokes show how much ink the pen leaves: they are no letters."""
 ENOUGH = 6
+"""With fewer long strokes nothing is said of thin ones."""
 THIN = 0.62
+"""Share of the usual ink per length below which a stroke is a construction line."""
 MOST_PIECES = 5
+"""A chain of more pieces is a dashed line, which is no vector."""
+JOINABLE_MM = 4.0
+"""Shorter pieces have no direction that is good enough to extend them."""
 JOIN_OFF_MM = 0.45
+"""How far a piece's ends may lie off the line that it continues: a pencil line's width."""
 JOIN_GAP_MM = 14.0
+"""The widest gap: a label or another figure's strokes over the line."""
 JOIN_TURN_RAD = 0.03
+"""How far two pieces of one line may differ in direction."""
+JOIN_BEYOND_MM = 1.0
+"""A piece that adds less to another's length lies on it."""
 PART = 256
 """Strokes compared with all others at a time, so that memory does not grow with their square."""
-
 OTHER_SORT = 0.5
+"""Weight of a head's tip where a tail's is looked for, and the reverse: a drawing without arrowheads shows
+where vectors end, but not which end it is."""
 TIP_MM = 0.2
 """Standard error of an arrowhead's tip, or of what else marks a node, along its vector."""
 
@@ -53,8 +65,8 @@ class Lines:
     darkness, width : means over the stroke
     thin : much thinner or fainter than the long strokes of its sheet
     members : (n, k) the strokes it is made of, by their number, repeated to fill the row
-    tip_along, tip_kind, tip_sure : (n, t) ends of vectors seen along it, as in `records.Tips`, from
-        `start`; a probability of 0 fills the row
+    tip_along, tip_kind, tip_sure : (n, t) ends of vectors visible along it, as in `records.Tips`, measured
+        from `start`; a probability of 0 fills the row
     """
 
     start: ComplexArray
@@ -83,13 +95,14 @@ class Lines:
     def tips_towards(
         self, rows: IntArray, forward: BoolArray, *, head: bool
     ) -> tuple[FloatArray, FloatArray]:
-        """(place along from `start` (r, t), probability (r, t)) of tips of vectors that come from behind.
+        """Tips that may mark one end of a vector on each of some lines.
 
         Arguments
         ---------
         rows, forward : lines (r,), and whether the vector's end in question is its farther one along it
-        head : whether that end is the vector's head. A drawing without arrowheads tells ends, but not
-            which: a tip of the other sort counts for less
+        head : whether that end is the vector's head; tips of the other sort count for `OTHER_SORT`
+
+        Returns the distances from `start` (r, t), mm, and the probabilities (r, t).
         """
         kind = self.tip_kind[rows]
         ahead = forward[:, None]
@@ -97,12 +110,6 @@ class Lines:
         other = np.where(ahead, TAIL_BACK, TAIL_AHEAD) if head else np.where(ahead, HEAD_AHEAD, HEAD_BACK)
         share = np.where(kind == same, 1.0, np.where(kind == other, OTHER_SORT, 0.0))
         return self.tip_along[rows], self.tip_sure[rows] * share
-
-    def nearer_end(self, row: int, to: complex) -> tuple[complex, float]:
-        """The end of one line that is nearer to a point, and its standard error along the line."""
-        ends = (complex(self.start[row]), complex(self.end[row]))
-        side = int(abs(ends[1] - to) < abs(ends[0] - to))
-        return ends[side], float(self.se_end[row, side])
 
     def take(self, chosen: BoolArray | IntArray) -> "Lines":
         """Some of the rows; `members` keep their numbers."""
@@ -112,45 +119,48 @@ class Lines:
 def lines_of(ink: Ink) -> Lines:
     """The strokes of a sheet as lines, with joined ones added."""
     strokes = ink.strokes
-    ends = strokes.ends[..., 0] - 1j * strokes.ends[..., 1]
-    ends = _without_caps(ends.reshape(-1, 2), strokes.width)
-    kept = np.abs(ends[:, 1] - ends[:, 0]) >= LEAST_MM
-    number = np.flatnonzero(kept)
-    length = np.abs(ends[kept, 1] - ends[kept, 0])
+    inked = strokes.ends[..., 0] - 1j * strokes.ends[..., 1]
+    span = (inked[:, 1] - inked[:, 0]).ravel()
+    full = np.maximum(np.abs(span), 1e-9)
+    # Ink goes on half a pen's width beyond where the pen stopped.
+    cap = np.minimum(0.5 * strokes.width, 0.25 * full)
+    start, end = inked[:, 0] + cap * span / full, inked[:, 1] - cap * span / full
+    number = np.flatnonzero(np.abs(end - start) >= LEAST_MM)
+    length = np.abs(end - start)[number]
+    tip_along, tip_kind, tip_sure = _tips(ink.tips, number, cap)
     single = Lines(
-        start=ends[kept, 0],
-        end=ends[kept, 1],
-        along=(ends[kept, 1] - ends[kept, 0]) / length,
+        start=start[number],
+        end=end[number],
+        along=(end - start)[number] / length,
         length=length,
-        se_offset=np.maximum(strokes.se_offset[kept], SE_OFFSET_MM),
-        se_angle=np.maximum(strokes.se_angle[kept], SE_OFFSET_MM / length),
-        se_end=_seen(strokes.se_end)[kept],
-        darkness=strokes.darkness[kept],
-        width=strokes.width[kept],
-        thin=_thin(strokes.width[kept] * strokes.darkness[kept], length),
+        se_offset=np.maximum(strokes.se_offset[number], SE_OFFSET_MM),
+        se_angle=np.maximum(strokes.se_angle[number], SE_OFFSET_MM / length),
+        se_end=_end_errors(strokes.se_end)[number],
+        darkness=strokes.darkness[number],
+        width=strokes.width[number],
+        thin=_thin(strokes.width[number] * strokes.darkness[number], length),
         members=np.repeat(number[:, None], MOST_PIECES, axis=1),
-        **_tips(ink.tips, number, strokes.ends, ends),
+        tip_along=tip_along,
+        tip_kind=tip_kind,
+        tip_sure=tip_sure,
     )
     return _with_joined(single)
 
 
-def _tips(tips: Tips, number: IntArray, as_found: FloatArray, ends: ComplexArray) -> dict[str, Any]:
-    """The tips of each stroke kept, side by side; measured from its end without the cap."""
-    full = np.hypot(*(as_found[:, 1] - as_found[:, 0]).T)
-    cap = (full - np.abs(ends[:, 1] - ends[:, 0])) / 2.0
-    found = [np.flatnonzero(tips.stroke == one) for one in number]
-    most = max((len(one) for one in found), default=0)
-    shape = (len(number), most)
+def _tips(tips: Tips, number: IntArray, cap: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
+    """`tip_along`, `tip_kind` and `tip_sure` of some strokes, measured from their ends without caps."""
+    of_stroke = [np.flatnonzero(tips.stroke == stroke) for stroke in number]
+    shape = (len(number), max((len(chosen) for chosen in of_stroke), default=0))
     along, kind, sure = np.zeros(shape), np.zeros(shape, np.int64), np.zeros(shape)
-    for row, chosen in enumerate(found):
+    for row, chosen in enumerate(of_stroke):
         part = slice(0, len(chosen))
         along[row, part] = tips.along[chosen] - cap[number[row]]
         kind[row, part], sure[row, part] = tips.kind[chosen], tips.sure[chosen]
-    return {"tip_along": along, "tip_kind": kind, "tip_sure": sure}
+    return along, kind, sure
 
 
-def _seen(stated: FloatArray) -> FloatArray:
-    """How well ends are seen, from which of them are stated to be much worse than others."""
+def _end_errors(stated: FloatArray) -> FloatArray:
+    """Standard errors of ends, mm, from which of them are stated to be much worse than others."""
     good = float(np.quantile(stated, 0.1)) if stated.size else 0.0
     return np.where(stated > HIDDEN * good, HIDDEN_END_MM, CLEAR_END_MM)
 
@@ -163,97 +173,90 @@ def _thin(ink: FloatArray, length: FloatArray) -> BoolArray:
     return np.asarray(ink < THIN * np.quantile(ink[long], 0.7))
 
 
-def _without_caps(ends: ComplexArray, width: FloatArray) -> ComplexArray:
-    """Ends half a pen's width shorter: ink goes on that far beyond where the pen stopped."""
-    span = ends[:, 1] - ends[:, 0]
-    length = np.maximum(np.abs(span), 1e-9)
-    cap = np.minimum(0.5 * width, 0.25 * length) * span / length
-    return np.column_stack([ends[:, 0] + cap, ends[:, 1] - cap])
+# Strokes in pieces --------------------------------------------------------------------------------
 
 
 def _with_joined(single: Lines) -> Lines:
     """Add the strokes that pieces on one line make: every two, and every longest chain of more."""
-    first, second = _in_line(single)
-    chains = [[int(one), int(other)] for one, other in zip(first, second, strict=True)]
+    chains = _pairs_in_line(single).tolist()
     chains.extend(_longest_chains(chains))
     if not chains:
         return single
-    joined = [_joined(single, chain) for chain in chains]
-    wide = max(single.tip_along.shape[1], *(len(one["tip_along"]) for one in joined))
-    return Lines(
-        *(
-            np.concatenate(
-                [_padded(getattr(single, name), wide), [_filled(one[name], wide) for one in joined]]
-            )
-            if name.startswith("tip_")
-            else np.concatenate([getattr(single, name), np.array([one[name] for one in joined])])
-            for name in Lines.__slots__
-        )
-    )
+    joined = _joined(single, chains)
+    return Lines(*(_stacked(getattr(single, name), getattr(joined, name)) for name in Lines.__slots__))
 
 
-def _padded(rows: NDArray[Any], wide: int) -> NDArray[Any]:
-    return np.pad(rows, ((0, 0), (0, wide - rows.shape[1])))
-
-
-def _filled(row: NDArray[Any], wide: int) -> NDArray[Any]:
-    return np.pad(row, (0, wide - len(row)))
+def _stacked(first: NDArray[Any], second: NDArray[Any]) -> NDArray[Any]:
+    """Rows of both; the narrower ones are filled with zeros."""
+    if first.ndim == 1:
+        return np.concatenate([first, second])
+    wide = max(first.shape[1], second.shape[1])
+    return np.concatenate([np.pad(rows, ((0, 0), (0, wide - rows.shape[1]))) for rows in (first, second)])
 
 
 def _longest_chains(pairs: list[list[int]]) -> list[list[int]]:
     """Pieces that are linked by pairs, where more than two are."""
     group: dict[int, set[int]] = {}
-    for one, other in pairs:
-        merged = group.get(one, {one}) | group.get(other, {other})
+    for first, second in pairs:
+        merged = group.get(first, {first}) | group.get(second, {second})
         for piece in merged:
             group[piece] = merged
     longest = {tuple(sorted(pieces)) for pieces in group.values() if 2 < len(pieces) <= MOST_PIECES}
     return [list(pieces) for pieces in sorted(longest)]
 
 
-def _joined(single: Lines, chain: list[int]) -> dict[str, Any]:
-    """One stroke from the one far end of its pieces to the other."""
-    pieces = np.array(chain)
-    along = single.along[pieces[np.argmax(single.length[pieces])]]
-    ends = np.concatenate([single.start[pieces], single.end[pieces]])
-    errors = np.concatenate([single.se_end[pieces, 0], single.se_end[pieces, 1]])
-    place = (ends * np.conj(along)).real
-    low, high = int(np.argmin(place)), int(np.argmax(place))
-    length = float(abs(ends[high] - ends[low]))
-    offset = float(single.se_offset[pieces].max())
-    members = np.resize(single.members[pieces, 0], MOST_PIECES)
-    return {
-        **_joined_tips(single, pieces, complex(ends[low]), complex(along)),
-        "start": ends[low],
-        "end": ends[high],
-        "along": (ends[high] - ends[low]) / length,
-        "length": length,
-        "se_offset": offset,
-        "se_angle": (SE_OFFSET_MM + offset) / length,
-        "se_end": np.array([errors[low], errors[high]]),
-        "darkness": single.darkness[pieces].min(),
-        "width": single.width[pieces].min(),
-        "thin": bool(single.thin[pieces].any()),
-        "members": members,
-    }
+def _joined(single: Lines, chains: list[list[int]]) -> Lines:
+    """For each chain of pieces, one stroke from the one far end to the other."""
+    pieces = np.array([np.resize(chain, MOST_PIECES) for chain in chains])
+    repeated = np.arange(MOST_PIECES) >= np.array([len(chain) for chain in chains])[:, None]
+    rows = np.arange(len(pieces))
+    along = single.along[pieces[rows, single.length[pieces].argmax(axis=1)]]
+    ends = np.concatenate([single.start[pieces], single.end[pieces]], axis=1)
+    errors = np.concatenate([single.se_end[pieces, 0], single.se_end[pieces, 1]], axis=1)
+    place = (ends * np.conj(along)[:, None]).real
+    low, high = place.argmin(axis=1), place.argmax(axis=1)
+    start, end = ends[rows, low], ends[rows, high]
+    length = np.abs(end - start)
+    offset = single.se_offset[pieces].max(axis=1)
+    tip_along, tip_kind, tip_sure = _joined_tips(single, pieces, repeated, start, along)
+    return Lines(
+        start=start,
+        end=end,
+        along=(end - start) / length,
+        length=length,
+        se_offset=offset,
+        se_angle=(SE_OFFSET_MM + offset) / length,
+        se_end=np.column_stack([errors[rows, low], errors[rows, high]]),
+        darkness=single.darkness[pieces].min(axis=1),
+        width=single.width[pieces].min(axis=1),
+        thin=single.thin[pieces].any(axis=1),
+        members=single.members[pieces, 0],
+        tip_along=tip_along,
+        tip_kind=tip_kind,
+        tip_sure=tip_sure,
+    )
 
 
-def _joined_tips(single: Lines, pieces: IntArray, start: complex, along: complex) -> dict[str, Any]:
-    """The tips of all pieces along the stroke that they make."""
-    same_way = (single.along[pieces] * np.conj(along)).real > 0
+def _joined_tips(
+    single: Lines, pieces: IntArray, repeated: BoolArray, start: ComplexArray, along: ComplexArray
+) -> tuple[FloatArray, IntArray, FloatArray]:
+    """`tip_along`, `tip_kind` and `tip_sure` of joined strokes: the tips of all their pieces."""
     at = single.start[pieces, None] + single.tip_along[pieces] * single.along[pieces, None]
-    kind = np.where(same_way[:, None], single.tip_kind[pieces], single.tip_kind[pieces] ^ 1)
-    known = single.tip_sure[pieces] > 0.0
-    return {
-        "tip_along": ((at - start) * np.conj(along)).real[known],
-        "tip_kind": kind[known],
-        "tip_sure": single.tip_sure[pieces][known],
-    }
+    places = ((at - start[:, None, None]) * np.conj(along)[:, None, None]).real
+    same_way = (single.along[pieces] * np.conj(along)[:, None]).real > 0
+    kinds = np.where(same_way[:, :, None], single.tip_kind[pieces], single.tip_kind[pieces] ^ 1)
+    sure = np.where(repeated[:, :, None], 0.0, single.tip_sure[pieces])
+    sure = sure.reshape(len(pieces), -1)
+    # Rows no wider than the fullest one.
+    most = int(np.count_nonzero(sure, axis=1).max(initial=0))
+    known = np.argsort(sure <= 0.0, axis=1, kind="stable")[:, :most]
+    rows = np.arange(len(pieces))[:, None]
+    return places.reshape(sure.shape)[rows, known], kinds.reshape(sure.shape)[rows, known], sure[rows, known]
 
 
-def _in_line(single: Lines) -> tuple[IntArray, IntArray]:
-    """Pairs of strokes, each over 4 mm, that continue one another."""
-    long = np.flatnonzero(single.length >= 4.0)
+def _pairs_in_line(single: Lines) -> IntArray:
+    """(p, 2) strokes that continue one another, the one whose line decides first."""
+    long = np.flatnonzero(single.length >= JOINABLE_MM)
     pairs = [np.zeros((0, 2), dtype=np.int64)]
     for start in range(0, len(long), PART):
         some = long[start : start + PART]
@@ -261,9 +264,10 @@ def _in_line(single: Lines) -> tuple[IntArray, IntArray]:
         pairs.append(np.column_stack([start + first, second]))
     first, second = np.concatenate(pairs).T
     length = single.length[long]
-    keep = (length[first] != length[second]) | (first < second)
-    keep &= first != second
-    return long[first[keep]], long[second[keep]]
+    # Of two strokes of one length, each continues the other: the pair is taken once.
+    once = (length[first] != length[second]) | (first < second)
+    once &= first != second
+    return np.column_stack([long[first[once]], long[second[once]]])
 
 
 def _continues(single: Lines, rows: IntArray, others: IntArray) -> BoolArray:
@@ -273,11 +277,11 @@ def _continues(single: Lines, rows: IntArray, others: IntArray) -> BoolArray:
     near = turn < JOIN_TURN_RAD + np.minimum(JOIN_OFF_MM / single.length[others], 0.05)
     relative_start = (single.start[others] - start) * np.conj(along)
     relative_end = (single.end[others] - start) * np.conj(along)
-    off = np.maximum(np.abs(relative_start.imag), np.abs(relative_end.imag))
+    residual = np.maximum(np.abs(relative_start.imag), np.abs(relative_end.imag))
     low = np.minimum(relative_start.real, relative_end.real)
     high = np.maximum(relative_start.real, relative_end.real)
     gap = np.maximum(low - length, -high)
+    # The longer stroke's line decides, the shorter must lie on it.
     shorter = single.length[others] <= length
-    # Contained pieces add nothing; the longer stroke's line decides, the shorter must lie on it.
-    beyond = np.maximum(high - length, -low)
-    return np.asarray(near & shorter & (off < JOIN_OFF_MM) & (gap < JOIN_GAP_MM) & (beyond > 1.0))
+    beyond = np.maximum(high - length, -low) > JOIN_BEYOND_MM
+    return np.asarray(near & shorter & (residual < JOIN_OFF_MM) & (gap < JOIN_GAP_MM) & beyond)

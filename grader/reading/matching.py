@@ -1,6 +1,6 @@
 """Strokes assigned to the lines of a figure, and how sure each assignment is."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,17 +13,18 @@ from reference.geometry import ComplexArray
 REDRAW_MM = 0.3
 """How far a stroke misses the nodes that it joins, one standard error."""
 SHARED_MM = 0.4
-"""And further where it serves two edges, that lie this near to each other."""
+"""The same in addition where it serves two edges, that lie this near to each other."""
 END_MM, END_SHARE = 0.3, 0.4
+"""Of the ink's end as the mark of a node: standard error along, and share of vectors that end with it."""
 RUN_ON_FAR = 4e-4
 """Density per mm of ends anywhere: the stroke goes on as another edge, or as a line drawn through."""
-UNTOLD_MM = 1e5
-"""Standard error of what an end tells that is not at its node: nothing."""
+UNKNOWN_MM = 1e5
+"""Standard error along a stroke that does not end at the node: nothing is known."""
 
 
 @dataclass(frozen=True, slots=True)
-class Ends:
-    """How strokes end at nodes: log densities (per mm) of an end at, beyond and short of its node."""
+class EndPrior:
+    """How strokes end at nodes: shares of ends at, beyond and short of the node, and how far off they are."""
 
     at_mm: float = 0.3
     at_share: float = 0.57
@@ -71,12 +72,12 @@ class Beliefs:
         return Beliefs(self.at[rows], self.cov[rows])
 
     def spans(self, tail: int, head: int) -> Spans:
-        """What is believed of an edge's nodes."""
+        """The beliefs of an edge's two nodes."""
         cov = np.empty((3, len(self.cov), 3))
-        for pair, (one, other) in enumerate(((tail, tail), (tail, head), (head, head))):
-            cov[pair, :, 0] = self.cov[:, 2 * one, 2 * other]
-            cov[pair, :, 1] = self.cov[:, 2 * one, 2 * other + 1] + self.cov[:, 2 * one + 1, 2 * other]
-            cov[pair, :, 2] = self.cov[:, 2 * one + 1, 2 * other + 1]
+        for pair, (p, q) in enumerate(((tail, tail), (tail, head), (head, head))):
+            cov[pair, :, 0] = self.cov[:, 2 * p, 2 * q]
+            cov[pair, :, 1] = self.cov[:, 2 * p, 2 * q + 1] + self.cov[:, 2 * p + 1, 2 * q]
+            cov[pair, :, 2] = self.cov[:, 2 * p + 1, 2 * q + 1]
         return Spans(self.at[:, tail], self.at[:, head], cov)
 
 
@@ -88,7 +89,7 @@ def _squares(direction: ComplexArray) -> FloatArray:
     return squares
 
 
-def offsets(spans: Spans, lines: Lines) -> tuple[FloatArray, FloatArray]:
+def line_residuals(spans: Spans, lines: Lines) -> tuple[FloatArray, FloatArray]:
     """Distances of both nodes from each line (2, s, lines), and their covariances (3, s, lines).
 
     The covariances are those of the tail, of tail with head, and of the head.
@@ -97,30 +98,30 @@ def offsets(spans: Spans, lines: Lines) -> tuple[FloatArray, FloatArray]:
     from_middle = (nodes - lines.middle) * np.conj(lines.along)
     spread = spans.cov @ _squares(1j * lines.along).T
     arm = from_middle.real
-    for pair, (one, other) in enumerate(((0, 0), (0, 1), (1, 1))):
-        spread[pair] += lines.se_offset**2 + lines.se_angle**2 * arm[one] * arm[other]
+    for pair, (p, q) in enumerate(((0, 0), (0, 1), (1, 1))):
+        spread[pair] += lines.se_offset**2 + lines.se_angle**2 * arm[p] * arm[q]
     spread[::2] += REDRAW_MM**2
     return from_middle.imag, spread
 
 
-def mahalanobis(off: FloatArray, spread: FloatArray) -> tuple[FloatArray, FloatArray]:
+def mahalanobis(residual: FloatArray, spread: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Squared distances of pairs (2, ...) by their covariances (3, ...), and log determinants."""
     a, b, c = spread
     det = np.maximum(a * c - b * b, 1e-9)
-    distance = (c * off[0] ** 2 - 2 * b * off[0] * off[1] + a * off[1] ** 2) / det
+    distance = (c * residual[0] ** 2 - 2 * b * residual[0] * residual[1] + a * residual[1] ** 2) / det
     return distance, np.log(det)
 
 
-def ends_at(spans: Spans, lines: Lines, ends: Ends) -> tuple[FloatArray, BoolArray, BoolArray]:
-    """How strokes end about the nodes of an edge, stroke by stroke (n,).
+def ends_at(spans: Spans, lines: Lines, prior: EndPrior) -> tuple[FloatArray, BoolArray, BoolArray]:
+    """How each stroke ends about the nodes of the edge that it is taken for; arguments of n rows each.
 
-    Returns log densities (n,), whether they end at the nodes (n, 2), and whether they cover the edge (n,).
+    Returns log densities (n,), whether it ends at the tail and at the head (n, 2), and whether it covers
+    the edge (n,).
     """
     span = spans.head - spans.tail
     forward = (lines.along * np.conj(span)).real > 0
     along = np.where(forward, lines.along, -lines.along)
-    ways = np.stack([lines.start, lines.end]) - spans.tail
-    places = (ways * np.conj(along)).real
+    places = ((np.stack([lines.start, lines.end]) - spans.tail) * np.conj(along)).real
     first, last = places.min(axis=0), places.max(axis=0)
     size = (span * np.conj(along)).real
     covers = (last > 0.35 * size) & (first < 0.65 * size) & (last - first > 0.3 * size)
@@ -128,45 +129,49 @@ def ends_at(spans: Spans, lines: Lines, ends: Ends) -> tuple[FloatArray, BoolArr
     total, ended = np.zeros(len(lines)), np.zeros((len(lines), 2), dtype=bool)
     for slot, (node, gap) in enumerate(((spans.tail, -first), (spans.head, last - size))):
         around = (spans.cov[2 * slot] * _squares(along)).sum(axis=1)
-        variance = around + errors[:, slot] ** 2 + ends.at_mm**2
-        off, sure = _tips_off(lines, node, forward == bool(slot), head=slot == 1)
-        score, ended[:, slot] = _end_score(gap, variance, ends, _marked(off, sure, variance))
+        variance = around + errors[:, slot] ** 2 + prior.at_mm**2
+        tips, sure = _tips_from(lines, node, forward == bool(slot), head=slot == 1)
+        score, ended[:, slot] = _end_score(gap, variance, prior, _tip_density(tips, sure, variance))
         total += score
     return total, ended, covers
 
 
-def _tips_off(
+def _tips_from(
     lines: Lines, node: ComplexArray, ahead: BoolArray, *, head: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """How far tips lie off nodes along their strokes (n, t), and their probabilities."""
+    """How far tips lie from nodes along their strokes (n, t), mm, and their probabilities."""
     tips, sure = lines.tips_towards(np.arange(len(lines)), ahead, head=head)
     return tips + ((lines.start - node) * np.conj(lines.along)).real[:, None], sure
 
 
-def _marked(off: FloatArray, sure: FloatArray, variance: FloatArray) -> FloatArray:
-    """Density per mm of tips `off` (n, t) mm from a node, with their probabilities."""
+def _tip_density(tips: FloatArray, sure: FloatArray, variance: FloatArray) -> FloatArray:
+    """Density per mm of tips (n, t) mm from a node, with their probabilities."""
     spread = (variance + TIP_MM**2)[:, None]
-    each = sure * np.exp(-0.5 * off**2 / spread) / np.sqrt(2.0 * np.pi * spread)
+    each = sure * np.exp(-0.5 * tips**2 / spread) / np.sqrt(2.0 * np.pi * spread)
     return np.asarray(each.sum(axis=1))
 
 
 def _end_score(
-    gap: FloatArray, variance: FloatArray, ends: Ends, marked: FloatArray
+    gap: FloatArray, variance: FloatArray, prior: EndPrior, marked: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Log density per mm of an end `gap` mm beyond its node, with that of tips there."""
+    """Log density per mm of an end `gap` mm beyond its node, and whether it is likely the node's.
+
+    Arguments: `marked` is the density of tips there.
+    """
     sigma = np.sqrt(variance)
-    at = ends.at_share * np.exp(-0.5 * gap**2 / variance) / (sigma * np.sqrt(2 * np.pi))
-    # Beyond and short, smeared by what is not known of the node.
-    reach = np.where(gap > 0, ends.beyond_mm, ends.short_mm)
-    share = np.where(gap > 0, ends.beyond_share, ends.short_share)
-    off = share * np.exp(-np.maximum(np.abs(gap) - sigma, 0.0) / reach) / (reach + sigma)
-    return np.asarray(np.log(at + off + marked + RUN_ON_FAR)), np.asarray(at + marked > 2.0 * off)
+    at = prior.at_share * np.exp(-0.5 * gap**2 / variance) / (sigma * np.sqrt(2 * np.pi))
+    # Beyond and short, smeared by the node's own error.
+    reach = np.where(gap > 0, prior.beyond_mm, prior.short_mm)
+    share = np.where(gap > 0, prior.beyond_share, prior.short_share)
+    elsewhere = share * np.exp(-np.maximum(np.abs(gap) - sigma, 0.0) / reach) / (reach + sigma)
+    score = np.log(at + elsewhere + marked + RUN_ON_FAR)
+    return np.asarray(score), np.asarray(at + marked > 2.0 * elsewhere)
 
 
-def _seen_ends(spans: Spans, lines: Lines, slot: int) -> tuple[FloatArray, FloatArray]:
-    """How far off its node a vector ends on its stroke (s,), with the standard error.
+def _vector_ends(spans: Spans, lines: Lines, slot: int) -> tuple[FloatArray, FloatArray]:
+    """How far from its node a vector ends on its stroke (s,), mm, with the standard error.
 
-    It is the likelier of the ink's end and of tips.
+    The end is the likeliest of the ink's end and of tips. `slot` is 0 for the tail, 1 for the head.
     """
     node, other = (spans.head, spans.tail) if slot else (spans.tail, spans.head)
     back = np.conj(lines.along)
@@ -174,60 +179,52 @@ def _seen_ends(spans: Spans, lines: Lines, slot: int) -> tuple[FloatArray, Float
     nearer = np.abs(ink).argmin(axis=1)
     rows = np.arange(len(lines))
     error = lines.se_end[rows, nearer]
-    off, sure = _tips_off(lines, node, ((node - other) * back).real > 0, head=slot == 1)
+    tips, sure = _tips_from(lines, node, ((node - other) * back).real > 0, head=slot == 1)
     # Rounding may leave a settled node a variance just below zero.
     around = np.maximum((spans.cov[2 * slot] * _squares(lines.along)).sum(axis=1), 0.0)
-    off = np.column_stack([(ink[rows, nearer] * back).real, off])
-    spread = around[:, None] + np.full(off.shape, TIP_MM**2)
+    gap = np.column_stack([(ink[rows, nearer] * back).real, tips])
+    spread = around[:, None] + np.full(gap.shape, TIP_MM**2)
     spread[:, 0] = around + error**2 + END_MM**2
     sure = np.column_stack([np.full(len(lines), END_SHARE), sure])
-    best = (sure * np.exp(-0.5 * off**2 / spread) / np.sqrt(spread)).argmax(axis=1)
-    return off[rows, best], np.where(best == 0, error, TIP_MM)
+    best = (sure * np.exp(-0.5 * gap**2 / spread) / np.sqrt(spread)).argmax(axis=1)
+    return gap[rows, best], np.where(best == 0, error, TIP_MM)
 
 
-@dataclass(frozen=True, slots=True)
-class Taken:
-    """Strokes taken for one edge, one for each belief.
+def updated(
+    beliefs: Beliefs, edge: tuple[int, int], lines: Lines, shared: BoolArray, ended: BoolArray, at_mm: float
+) -> Beliefs:
+    """The beliefs after a stroke was taken for an edge, one for each belief (a Kalman update).
 
-    Attributes
-    ----------
-    lines : the strokes, a row each
-    shared : (s,) whether it serves another edge already
-    ended : (s, 2) whether it ends at the edge's tail and at its head
+    Arguments
+    ---------
+    edge : its tail and head, as indices of nodes
+    lines, shared : (s,) the strokes, and whether each serves another edge already
+    ended : (s, 2) whether the stroke ends at the edge's tail and at its head
+    at_mm : standard error of such an end beside that of the ink
     """
-
-    lines: Lines
-    shared: BoolArray
-    ended: BoolArray
-
-
-def updated(beliefs: Beliefs, edge: tuple[int, int], taken: Taken, ends: Ends) -> Beliefs:
-    """The beliefs after a stroke was seen for an edge, given by its nodes (Kalman)."""
-    lines, (tail, head) = taken.lines, edge
-    along = lines.along
-    spans = beliefs.spans(tail, head)
+    along, spans = lines.along, beliefs.spans(*edge)
     nodes = np.column_stack([spans.tail, spans.head])
     from_middle = (nodes - lines.middle[:, None]) * np.conj(along)[:, None]
-    seen = [_seen_ends(spans, lines, slot) for slot in (0, 1)]
-    innovation = np.column_stack([-from_middle.imag, *(off for off, _ in seen)])
+    observed = [_vector_ends(spans, lines, slot) for slot in (0, 1)]
+    innovation = np.column_stack([-from_middle.imag, *(gap for gap, _ in observed)])
     noise = np.zeros((len(lines), 4, 4))
     arms = from_middle.real
     noise[:, :2, :2] = (lines.se_angle**2)[:, None, None] * arms[:, :, None] * arms[:, None, :]
     noise[:, :2, :2] += (lines.se_offset**2)[:, None, None]
-    for slot, (_, error) in enumerate(seen):
-        noise[:, slot, slot] += (REDRAW_MM + SHARED_MM * taken.shared) ** 2
-        told = np.sqrt(error**2 + ends.at_mm**2)
-        noise[:, 2 + slot, 2 + slot] = np.where(taken.ended[:, slot], told, UNTOLD_MM) ** 2
+    for slot, (_, error) in enumerate(observed):
+        noise[:, slot, slot] += (REDRAW_MM + SHARED_MM * shared) ** 2
+        known = np.sqrt(error**2 + at_mm**2)
+        noise[:, 2 + slot, 2 + slot] = np.where(ended[:, slot], known, UNKNOWN_MM) ** 2
     return _corrected(beliefs, edge, _design(along), innovation, noise)
 
 
 def _design(along: ComplexArray) -> FloatArray:
     """(s, 4, 4): tail and head (x, y each) across the line, then along it."""
     design = np.zeros((len(along), 4, 4))
-    for first, way in ((0, 1j * along), (2, along)):
+    for first, direction in ((0, 1j * along), (2, along)):
         for slot in (0, 1):
-            design[:, first + slot, 2 * slot] = way.real
-            design[:, first + slot, 2 * slot + 1] = way.imag
+            design[:, first + slot, 2 * slot] = direction.real
+            design[:, first + slot, 2 * slot + 1] = direction.imag
     return design
 
 
@@ -244,34 +241,40 @@ def _corrected(
 
 
 BEAM = 10
+"""Partial assignments of a figure that are continued."""
 GATE = 18.0
 """Squared Mahalanobis distance (two degrees of freedom) beyond which a stroke is not the edge."""
 FIRST_GATE = 60.0
-"""The same before anything was seen: what is seen of other edges moves what is expected of this one."""
+"""The same before any stroke is assigned: those of other edges move what is expected of this one."""
 TURN_SINE, FIRST_TURN_SINE = 0.7, 0.85
-"""Of the angle at which a stroke is not the edge."""
+"""Sine of the angle to the edge at which a stroke is not the edge, later and at first."""
 PENALTY_OF_THIN = 2.0
 """Nats against a line drawn thinner than vectors are: it is likelier one that they were constructed by."""
 INVISIBLE_MM = 0.8
+"""A shorter edge is a dot under its nodes."""
 COST_OF_SHARING = 0.3
+"""Nats for an edge on a stroke that serves another: two vectors in line are not rare."""
 COST_OF_BARENESS = 1e3
-"""Of leaving an edge without the stroke that is settled to be its own."""
+"""Nats for leaving an edge without the stroke that is fixed to be its own: more than any evidence."""
 RUN_ON_EXPLAINED = 3.0
 """Nats given back when a second edge explains why a stroke runs on past the first."""
 LITTLE_COMMON = 0.4
+"""Share of an edge that may lie on what its stroke already serves, where it explains the rest."""
 BAND_MM = 0.3
 """How far from the middle of a band of ink either of two lines in it may lie."""
 SHARED_RADIUS2_MM2 = 1.0
 """Two edges share one stroke where their lines lie within about half a millimetre of each other."""
+CHANCE_RADIUS_MM = 8.0
+"""Strokes are counted at least this far about an edge: letters and arrowheads crowd about nodes."""
 
 
 @dataclass(frozen=True, slots=True)
-class Explanation:
-    """One explanation of a figure by strokes.
+class StrokeAssignment:
+    """An explanation of a figure by strokes.
 
     Attributes
     ----------
-    expected : the figure with nodes and covariance as seen so far
+    expected : the figure, its nodes and covariance corrected by the strokes
     stroke : (edges,) row of `Lines` taken for each edge, -1 for none
     shared : (edges,) whether the stroke serves another edge as well
     score : log likelihood ratio, nats
@@ -284,25 +287,26 @@ class Explanation:
 
 
 @dataclass(frozen=True, slots=True)
-class Settled:
-    """What is not open any more.
+class Constraint:
+    """What is known before the search.
 
     Attributes
     ----------
-    kept : the stroke of an edge (a row of `Lines`, -1 for none) by the edge's place
+    fixed : the stroke of an edge (a row of `Lines`, -1 for none) by the edge's index
     barred : an edge and a row that it must not take
     """
 
-    kept: Mapping[int, int] = field(default_factory=dict)
+    fixed: Mapping[int, int] = field(default_factory=dict)
     barred: tuple[int, int] | None = None
 
 
-OPEN = Settled()
+UNCONSTRAINED = Constraint()
+"""Nothing is known before."""
 
 
 @dataclass(frozen=True, slots=True)
 class _States:
-    """Partial explanations, a row each; `figure` says of which figure, else as in `Explanation`."""
+    """Partial assignments, a row each; `figure` is the index of their figure."""
 
     figure: IntArray
     beliefs: Beliefs
@@ -313,7 +317,7 @@ class _States:
 
 @dataclass(frozen=True, slots=True)
 class _Choices:
-    """Ways on from states, a row each: the state, the row of `Lines` taken (-1 for none), and how."""
+    """Continuations of states, a row each: the state, the row of `Lines` taken (-1 for none), and how."""
 
     state: IntArray
     row: IntArray
@@ -332,133 +336,162 @@ class _Choices:
 
 
 @dataclass(frozen=True, slots=True)
-class _Scene:
-    """What does not change while edges are matched.
+class _AssignmentProblem:
+    """What does not change during the search.
 
     Attributes
     ----------
-    edges, lines, ends : common to all figures
-    may_be : (figures, edges, lines) whether a stroke may be an edge at all
-    bare : (figures, edges) whether an edge may be left without a stroke
+    edges, lines, prior : common to all figures
+    allowed : (figures, edges, lines) whether a stroke may be an edge at all
+    may_be_bare : (figures, edges) whether an edge may be left without a stroke
     """
 
     edges: tuple[Edge, ...]
     lines: Lines
-    ends: Ends
-    may_be: BoolArray
-    bare: BoolArray
+    prior: EndPrior
+    allowed: BoolArray
+    may_be_bare: BoolArray
 
 
-def explain(expected: Expected, lines: Lines, ends: Ends, beam: int = BEAM) -> list[Explanation]:
-    """The best explanations of a placed figure, best first."""
-    return explain_each([expected], lines, ends, beam)[0]
-
-
-def explain_each(
+def assign_strokes(
     figures: Sequence[Expected],
     lines: Lines,
-    ends: Ends,
+    prior: EndPrior,
     beam: int = BEAM,
-    settled: Sequence[Settled] | None = None,
-) -> list[list[Explanation]]:
-    """The best explanations of each of several figures of the same edges, best first.
+    constraints: Sequence[Constraint] | None = None,
+) -> list[list[StrokeAssignment]]:
+    """The best assignments of each of several placed figures with the same edges, best first.
 
-    They are looked for side by side, not against one another: each has `beam` of its own.
+    The figures are searched side by side, not against one another: each has `beam` of its own.
+
+    Arguments: `constraints`, one for each figure.
     """
-    told = [OPEN] * len(figures) if settled is None else settled
+    constraints = constraints or [UNCONSTRAINED] * len(figures)
     edges = figures[0].edges
-    beliefs = Beliefs(np.array([one.at for one in figures]), np.array([one.cov for one in figures]))
-    scene = _Scene(edges, lines, ends, *_open_ways(beliefs, edges, lines, told))
+    beliefs = Beliefs(
+        np.array([figure.at for figure in figures]), np.array([figure.cov for figure in figures])
+    )
+    problem = _AssignmentProblem(edges, lines, prior, *_allowed(beliefs, edges, lines, constraints))
     shape = (len(figures), len(edges))
     states = _States(
         np.arange(len(figures)), beliefs, np.full(shape, -1), np.zeros(shape, bool), np.zeros(len(figures))
     )
-    for edge in _most_telling_first(beliefs, edges, told):
-        choices = _nothing_taken(states, edge, scene) + _strokes_taken(states, edge, scene)
-        states = _after(states, edge, choices, beam, scene)
-    found: list[list[Explanation]] = [[] for _ in figures]
+    for edge in _most_certain_first(beliefs, edges, constraints):
+        choices = _nothing_taken(states, edge, problem) + _strokes_taken(states, edge, problem)
+        states = _after(states, edge, choices, beam, problem)
+    assignments: list[list[StrokeAssignment]] = [[] for _ in figures]
     for row, figure in enumerate(states.figure.tolist()):
-        seen = replace(figures[figure], at=states.beliefs.at[row], cov=states.beliefs.cov[row])
-        found[figure].append(
-            Explanation(seen, states.stroke[row], states.shared[row], float(states.score[row]))
-        )
-    return found
+        corrected = replace(figures[figure], at=states.beliefs.at[row], cov=states.beliefs.cov[row])
+        score = float(states.score[row])
+        assignments[figure].append(StrokeAssignment(corrected, states.stroke[row], states.shared[row], score))
+    return assignments
 
 
-def _most_telling_first(beliefs: Beliefs, edges: Sequence[Edge], told: Sequence[Settled]) -> list[int]:
-    """What is settled, then long edges: they are mistaken for others least."""
+def assign_groups(
+    figures: Sequence[Expected],
+    lines: Lines,
+    near: Callable[[Lines, Sequence[Expected]], BoolArray],
+    prior: EndPrior,
+    beam: int = BEAM,
+    constrain: Callable[[Sequence[int], Lines], list[Constraint]] | None = None,
+) -> Iterator[tuple[int, list[StrokeAssignment], Lines]]:
+    """As `assign_strokes`, of figures with different edges: those with the same are searched together.
+
+    Arguments
+    ---------
+    near : which lines lie about any of some figures
+    constrain : what is known before of some figures (by index) among some of the lines
+
+    Yields each figure's index, its assignments, and the lines whose rows they name.
+    """
+    groups: dict[tuple[Edge, ...], list[int]] = {}
+    for index, figure in enumerate(figures):
+        groups.setdefault(figure.edges, []).append(index)
+    for group in groups.values():
+        members = [figures[index] for index in group]
+        around = lines.take(near(lines, members))
+        constraints = constrain and constrain(group, around)
+        assignments = assign_strokes(members, around, prior, beam, constraints)
+        for index, best in zip(group, assignments, strict=True):
+            yield index, best, around
+
+
+def _most_certain_first(
+    beliefs: Beliefs, edges: Sequence[Edge], constraints: Sequence[Constraint]
+) -> list[int]:
+    """Order of the edges: fixed ones, then long ones, which are mistaken for others least."""
     size = [np.nan_to_num(abs(beliefs.at[:, edge.head] - beliefs.at[:, edge.tail])).mean() for edge in edges]
-    kept = [sum(edge in one.kept for one in told) for edge in range(len(edges))]
-    return sorted(range(len(edges)), key=lambda edge: (-kept[edge], -size[edge]))
+    fixed = [sum(index in constraint.fixed for constraint in constraints) for index in range(len(edges))]
+    return sorted(range(len(edges)), key=lambda index: (-fixed[index], -size[index]))
 
 
-def _open_ways(
-    beliefs: Beliefs, edges: Sequence[Edge], lines: Lines, told: Sequence[Settled]
+def _allowed(
+    beliefs: Beliefs, edges: Sequence[Edge], lines: Lines, constraints: Sequence[Constraint]
 ) -> tuple[BoolArray, BoolArray]:
-    """`may_be` and `bare` of a scene: strokes within reach, as far as nothing is settled."""
-    may_be = np.zeros((len(told), len(edges), len(lines)), dtype=bool)
-    bare = np.ones((len(told), len(edges)), dtype=bool)
-    for place, edge in enumerate(edges):
+    """`allowed` and `may_be_bare` of a problem: strokes within reach that the constraints leave."""
+    allowed = np.zeros((len(constraints), len(edges), len(lines)), dtype=bool)
+    bare = np.ones((len(constraints), len(edges)), dtype=bool)
+    for index, edge in enumerate(edges):
         spans = beliefs.spans(edge.tail, edge.head)
-        distance = mahalanobis(*offsets(spans, lines))[0]
-        may_be[:, place] = _along(spans, lines, FIRST_TURN_SINE) & (distance < FIRST_GATE)
-    for figure, one in enumerate(told):
-        for place, row in one.kept.items():
-            reached = row >= 0 and bool(may_be[figure, place, row])
+        distance = mahalanobis(*line_residuals(spans, lines))[0]
+        allowed[:, index] = _along(spans, lines, FIRST_TURN_SINE) & (distance < FIRST_GATE)
+    for figure, constraint in enumerate(constraints):
+        for index, row in constraint.fixed.items():
+            reached = row >= 0 and bool(allowed[figure, index, row])
             if row < 0 or reached:
-                may_be[figure, place] = np.arange(len(lines)) == row
-                bare[figure, place] = not reached
-        if one.barred is not None:
-            may_be[figure, one.barred[0], one.barred[1]] = False
-    return may_be, bare
+                allowed[figure, index] = np.arange(len(lines)) == row
+                bare[figure, index] = not reached
+        if constraint.barred is not None:
+            allowed[figure, constraint.barred[0], constraint.barred[1]] = False
+    return allowed, bare
 
 
 def _along(spans: Spans, lines: Lines, turn_sine: float) -> BoolArray:
-    """Which lines go about the way of each edge (s, lines); none that of an edge too short to be seen."""
+    """(s, lines) which lines run about along each edge; none along an edge too short to be visible."""
     span = (spans.head - spans.tail)[:, None]
     size = np.abs(span)
     turned = np.abs((lines.along * np.conj(span)).imag)
     return np.asarray((turned < turn_sine * size) & (size >= INVISIBLE_MM))
 
 
-def _nothing_taken(states: _States, edge: int, scene: _Scene) -> _Choices:
+def _nothing_taken(states: _States, edge: int, problem: _AssignmentProblem) -> _Choices:
     """Every state with no stroke for the edge."""
     count = len(states.score)
-    tail, head = scene.edges[edge].tail, scene.edges[edge].head
+    tail, head = problem.edges[edge].tail, problem.edges[edge].head
     size = np.abs(states.beliefs.at[:, head] - states.beliefs.at[:, tail])
-    seen = size >= INVISIBLE_MM
-    cost = np.where(seen, -np.log(_missed(size)), 0.0)
-    cost += np.where(scene.bare[states.figure, edge], 0.0, COST_OF_BARENESS)
+    cost = np.where(size >= INVISIBLE_MM, -np.log(_missed(size)), 0.0)
+    cost += np.where(problem.may_be_bare[states.figure, edge], 0.0, COST_OF_BARENESS)
     free = np.zeros((count, 2), dtype=bool)
     return _Choices(np.arange(count), np.full(count, -1), free[:, 0], free, states.score - cost)
 
 
-def _strokes_taken(states: _States, edge: int, scene: _Scene) -> _Choices:
+def _strokes_taken(states: _States, edge: int, problem: _AssignmentProblem) -> _Choices:
     """Every state with each of the strokes that the edge may be in it."""
-    may_be = scene.may_be[states.figure, edge]
-    rows = np.flatnonzero(may_be.any(axis=0))
-    spans = states.beliefs.spans(scene.edges[edge].tail, scene.edges[edge].head)
-    chance = _log_chance(spans, scene.lines)
-    lines = scene.lines.take(rows)
-    off, spread = offsets(spans, lines)
-    distance, log_det = mahalanobis(off, spread)
-    state, place = np.nonzero((distance < GATE) & _along(spans, lines, TURN_SINE) & may_be[:, rows])
+    allowed = problem.allowed[states.figure, edge]
+    rows = np.flatnonzero(allowed.any(axis=0))
+    spans = states.beliefs.spans(problem.edges[edge].tail, problem.edges[edge].head)
+    chance = _log_chance(spans, problem.lines)
+    lines = problem.lines.take(rows)
+    residual, spread = line_residuals(spans, lines)
+    distance, log_det = mahalanobis(residual, spread)
+    state, place = np.nonzero((distance < GATE) & _along(spans, lines, TURN_SINE) & allowed[:, rows])
     lines, spans = lines.take(place), spans.take(state)
     size = np.abs(spans.head - spans.tail)
-    gains, ended, covers = ends_at(spans, lines, scene.ends)
-    shared = np.asarray(_in_use(states, scene.lines)[state[:, None], lines.members].any(axis=1))
-    own = -0.5 * (distance + log_det)[state, place] - np.log(2 * np.pi) + np.log(size) + gains - chance[state]
-    own -= PENALTY_OF_THIN * lines.thin
-    both = _log_of_sharing(off[:, state, place], spread[:, state, place])
-    for one in np.flatnonzero(shared & covers):
-        both[one] += RUN_ON_EXPLAINED * _explains_run_on(states, state[one], edge, rows[place[one]], scene)
-    score = states.score[state] + np.where(shared, both, own)
+    gains, ended, covers = ends_at(spans, lines, problem.prior)
+    shared = np.asarray(_in_use(states, problem.lines)[state[:, None], lines.members].any(axis=1))
+    alone = -0.5 * (distance + log_det)[state, place] - np.log(2 * np.pi) + np.log(size) + gains
+    alone -= chance[state] + PENALTY_OF_THIN * lines.thin
+    both = _log_of_sharing(residual[:, state, place], spread[:, state, place])
+    for choice in np.flatnonzero(shared & covers):
+        explains = _explains_run_on(states, state[choice], edge, rows[place[choice]], problem)
+        both[choice] += RUN_ON_EXPLAINED * explains
+    score = states.score[state] + np.where(shared, both, alone)
     return _Choices(state, rows[place], shared, ended & ~shared[:, None], score).take(covers)
 
 
-def _log_of_sharing(off: FloatArray, spread: FloatArray) -> FloatArray:
+def _log_of_sharing(residual: FloatArray, spread: FloatArray) -> FloatArray:
     """Log likelihood of edges lying on strokes that serve others already."""
-    distance, log_det = mahalanobis(off, spread + np.array([BAND_MM**2, 0.0, BAND_MM**2])[:, None])
+    distance, log_det = mahalanobis(residual, spread + np.array([BAND_MM**2, 0.0, BAND_MM**2])[:, None])
     density = np.exp(-0.5 * (distance + log_det)) / (2 * np.pi)
     return np.asarray(np.log(np.minimum(1.0, density * SHARED_RADIUS2_MM2) + 1e-12) - COST_OF_SHARING)
 
@@ -471,13 +504,13 @@ def _in_use(states: _States, lines: Lines) -> BoolArray:
     return used
 
 
-def _explains_run_on(states: _States, state: int, edge: int, row: int, scene: _Scene) -> bool:
+def _explains_run_on(states: _States, state: int, edge: int, row: int, problem: _AssignmentProblem) -> bool:
     """Whether the edge lies where a stroke runs on past the edges that it was taken for."""
-    place = (states.beliefs.at[state] * np.conj(scene.lines.along[row])).real.tolist()
-    stroke, own = states.stroke[state].tolist(), set(scene.lines.members[row].tolist())
-    low, high = sorted((place[scene.edges[edge].tail], place[scene.edges[edge].head]))
-    for other, taken in zip(scene.edges, stroke, strict=True):
-        if taken >= 0 and own & set(scene.lines.members[taken].tolist()):
+    place = (states.beliefs.at[state] * np.conj(problem.lines.along[row])).real.tolist()
+    stroke, pieces = states.stroke[state].tolist(), set(problem.lines.members[row].tolist())
+    low, high = sorted((place[problem.edges[edge].tail], place[problem.edges[edge].head]))
+    for other, taken in zip(problem.edges, stroke, strict=True):
+        if taken >= 0 and pieces & set(problem.lines.members[taken].tolist()):
             first, last = sorted((place[other.tail], place[other.head]))
             if min(high, last) - max(low, first) > LITTLE_COMMON * (high - low):
                 return False
@@ -485,27 +518,27 @@ def _explains_run_on(states: _States, state: int, edge: int, row: int, scene: _S
 
 
 def _log_chance(spans: Spans, lines: Lines) -> FloatArray:
-    """Log density of strokes of about an edge's length that lie there for other reasons (s,).
+    """(s,) log density of strokes of about an edge's length that lie there for other reasons.
 
     Per mm across, per mm along, per radian and per mm of length: letters and arrowheads crowd about
-    nodes, so that a short stroke in the right place tells little.
+    nodes, so that a short stroke in the right place is weak evidence.
     """
     size = np.abs(spans.head - spans.tail)
     middle = (spans.head + spans.tail) / 2.0
-    radius = np.maximum(8.0, 1.5 * size)
+    radius = np.maximum(CHANCE_RADIUS_MM, 1.5 * size)
     shortest, longest = 0.4 * size, 2.5 * size + 4.0
-    alike = (lines.length > shortest[:, None]) & (lines.length < longest[:, None])
-    alike &= np.abs(lines.middle - middle[:, None]) < radius[:, None]
-    count = np.count_nonzero(alike, axis=1) + 1.0
+    similar = (lines.length > shortest[:, None]) & (lines.length < longest[:, None])
+    similar &= np.abs(lines.middle - middle[:, None]) < radius[:, None]
+    count = np.count_nonzero(similar, axis=1) + 1.0
     return np.asarray(np.log(count / (np.pi * radius**2 * np.pi * (longest - shortest))))
 
 
 def _missed(size_mm: FloatArray) -> FloatArray:
-    """Probability that a drawn edge has no stroke of its own."""
+    """Probability that a drawn edge of this length has no stroke of its own."""
     return np.interp(size_mm, [1.0, 2.0, 4.0, 8.0], [0.7, 0.4, 0.12, 0.04])
 
 
-def _after(states: _States, edge: int, choices: _Choices, beam: int, scene: _Scene) -> _States:
+def _after(states: _States, edge: int, choices: _Choices, beam: int, problem: _AssignmentProblem) -> _States:
     """The best states of each figure after the choices, best first, each set of strokes once."""
     figure = states.figure[choices.state]
     order = np.lexsort((-choices.score, figure))
@@ -519,10 +552,11 @@ def _after(states: _States, edge: int, choices: _Choices, beam: int, scene: _Sce
     beliefs = states.beliefs.take(choices.state)
     taken = np.flatnonzero(choices.row >= 0)
     if len(taken):
-        seen = Taken(scene.lines.take(choices.row[taken]), choices.shared[taken], choices.ended[taken])
-        joined = (scene.edges[edge].tail, scene.edges[edge].head)
-        moved = updated(beliefs.take(taken), joined, seen, scene.ends)
-        beliefs.at[taken], beliefs.cov[taken] = moved.at, moved.cov
+        ends = (problem.edges[edge].tail, problem.edges[edge].head)
+        lines = problem.lines.take(choices.row[taken])
+        how = (choices.shared[taken], choices.ended[taken])
+        corrected = updated(beliefs.take(taken), ends, lines, *how, problem.prior.at_mm)
+        beliefs.at[taken], beliefs.cov[taken] = corrected.at, corrected.cov
     return _States(figure[rows], beliefs, stroke[rows], shared[rows], choices.score)
 
 

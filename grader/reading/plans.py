@@ -1,4 +1,4 @@
-"""A velocity or acceleration plan: the hypotheses of how it was drawn, held against the strokes."""
+"""A velocity or acceleration plan: each hypothesis of how it was drawn is compared with the strokes."""
 
 import math
 from collections.abc import Collection, Hashable, Mapping, Sequence
@@ -8,356 +8,369 @@ import numpy as np
 
 from grader.reading.expected import (
     REGULAR,
-    Edge,
+    DraftingErrors,
     Expected,
-    Hand,
-    Hypothesis,
-    Place,
+    PlanHypothesis,
+    Pose,
     Search,
     Slack,
     expect,
     mistaken,
-    places,
+    poses,
     regular,
     resized,
     tied,
     vectors_of,
 )
 from grader.reading.lines import BoolArray, Lines
-from grader.reading.matching import BEAM, Ends, Explanation, Settled, explain_each
-from grader.reading.nodes import Fit, fit_nodes
+from grader.reading.matching import (
+    BEAM,
+    UNCONSTRAINED,
+    Constraint,
+    EndPrior,
+    StrokeAssignment,
+    assign_groups,
+    assign_strokes,
+)
+from grader.reading.nodes import NodeFit, fit_nodes
 from reference.construction.graph import ancestors
 from reference.construction.mistakes import Drawing, affected
 from reference.geometry import ComplexArray
 
-HAND = Hand()
-PLAN_ENDS = Ends()
+DRAFTING_ERRORS = DraftingErrors()
+END_PRIOR = EndPrior()
 QUARTERS = (np.pi / 2, -np.pi / 2, np.pi)
+"""A plan may be turned as a whole: velocities are perpendicular to links."""
 COST_OF_TURN = 6.0
 COST_OF_SIZE = 4.0
+"""Nats for a plan turned by quarters, and for one at a scale that was not declared."""
 SAME_SIZE = 0.06
+"""Of a size's logarithm: a drawn crank and a ruler agree no better."""
 POOR = 0.7
 """A plan supported over less of its length may be another one, drawn with a mistake."""
 CLEARLY = 0.08
+"""Share of the length by which a mistaken plan must be supported better to be laid elsewhere."""
 BEAM_OF_MISTAKES = 4
+"""Enough where all that the mistake does not touch is fixed."""
 SMALLEST_MM, LARGEST_MM = 20.0, 280.0
 LEAST_FIRST_MM = 15.0
-"""Of a plan's longest vector: what fits on a sheet and can be measured."""
+"""Of a plan's longest vector, and of its first one: what fits on a sheet and can be measured."""
 LEAST_LAID_MM = 4.0
+"""A plan is not laid on shorter strokes: they are letters."""
 SPECK_MM = 1e-6
+"""A plan no larger is a point: there is nothing to lay."""
 FARTHEST_MM = 2000.0
-VAGUE_MM = 500.0
-"""Nodes that a hand's errors move this far are not to be found: lines meet there at next to no angle."""
 """Nodes farther off are on no sheet, at any scale: with a mistake made, lines may be nearly parallel."""
+VAGUE_MM = 500.0
+"""Nodes that drafting errors move this far cannot be found: lines meet there at next to no angle."""
 WORSE = 0.3
-"""Places supported by this much less of the plan's length are not looked at."""
-LEAST_SEEN_MM = 2.5
+"""Poses supported by this much less of the plan's length are not examined."""
+LEAST_VISIBLE_MM = 2.5
+"""A shorter vector has no stroke that could be missed."""
 LONG_MM = 8.0
+"""A vector that is too long to be overlooked."""
 RIVALS = 25
+"""Explanations that the confidences are computed from; the others weigh next to nothing."""
 BEAM_OF_DOUBTS = 3
 LEAST_DOUBT = 15.0
+"""Nats: an explanation without a stroke that is worse by more is no rival."""
 SURE_MM = 30.0
 """Longer vectors are not taken for others when a neighbour's stroke is doubted."""
 ALTERNATIVES = 4
 NEARLY = 8.0
-"""Nats: explanations of one place that are worse by more are no rivals."""
+"""So many explanations of one pose are rivals, and none that is worse by more nats."""
 ASTRAY_MM = 0.8
+"""A node this far off its stroke may be another node."""
+MARGIN_MM = 12.0
+"""Lines whose middle is farther from a plan's box are not its strokes."""
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
-    """A plan as read under its best hypothesis.
+class PlanProblem:
+    """What a plan is read from.
 
     Attributes
     ----------
-    hypothesis, place : how it was drawn and where
-    placed : what was expected there before strokes were looked at
-    found, fit : strokes by vector, and nodes
-    score : log likelihood ratio less costs
-    rivals : other explanations, best first
-    lines : the strokes that `found` counts in
+    lines : of the sheet
+    figure : which plan
+    given : nodes already read (mechanism, velocity plan), complex mm, y up
     """
 
-    hypothesis: Hypothesis
-    place: Place
+    lines: Lines
+    figure: str
+    given: Mapping[str, ComplexArray]
+
+    def expected(self, hypothesis: PlanHypothesis) -> Expected | None:
+        """The plan about its own pole; None where it cannot be drawn."""
+        edges = vectors_of(tied(hypothesis), self.figure, hypothesis.absent)
+        expected = expect(hypothesis.drawing, self.figure, self.given, DRAFTING_ERRORS, edges)
+        known = np.abs(expected.at).max() < FARTHEST_MM and expected.cov.max() < VAGUE_MM**2
+        return expected if known else None
+
+
+@dataclass(frozen=True, slots=True)
+class PlanReading:
+    """A plan as read under one hypothesis.
+
+    Attributes
+    ----------
+    hypothesis, pose : how it was drawn and where
+    placed : what was expected there before strokes were assigned
+    assignment, lines : strokes by vector, and the lines whose rows it names
+    score : log likelihood ratio less costs, nats
+    rivals : other explanations, best first
+    """
+
+    hypothesis: PlanHypothesis
+    pose: Pose
     placed: Expected
-    found: Explanation
+    assignment: StrokeAssignment
     score: float
     lines: Lines
-    rivals: tuple["Plan", ...] = ()
+    rivals: tuple["PlanReading", ...] = ()
 
-    @property
-    def fit(self) -> Fit:
+    def fit(self) -> NodeFit:
         """The nodes by the strokes alone."""
-        return fit_nodes(self.found, self.lines)
+        return fit_nodes(self.assignment, self.lines)
 
     @property
     def strokes(self) -> Hashable:
         """Which stroke it takes for which vector."""
-        found = self.found
-        taken = np.where(found.stroke[:, None] < 0, -1, self.lines.members[found.stroke])
-        return found.expected.edges, taken.tobytes(), found.shared.tobytes()
-
-    @property
-    def refined(self) -> Place:
-        """Where the plan lies by its strokes: pole as fitted; size and turn of all nodes together."""
-        return replace(self.place, at=complex(self.found.expected.at[0]))
+        stroke = self.assignment.stroke
+        taken = np.where(stroke[:, None] < 0, -1, self.lines.members[stroke])
+        return self.placed.edges, taken.tobytes(), self.assignment.shared.tobytes()
 
 
-def regular_plans(
-    lines: Lines, drawing: Drawing, figure: str, given: Mapping[str, ComplexArray]
-) -> list[Plan]:
-    """The plan of one figure among the strokes of a sheet as it should be drawn, best first.
+def regular_plans(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
+    """Readings of a plan as it should be drawn, best first.
 
-    Arguments
-    ---------
-    drawing : construction and parameters of the student's variant
-    given : nodes already read (mechanism, velocity plan), complex mm, y up
+    Arguments: `drawing` has the construction and the parameters of the student's variant.
     """
-    plans = _as_regular(regular(drawing, figure), lines, figure, given)
-    sizes = {round(math.log(plan.place.size), 1): plan.place.size for plan in plans[:3]}
-    for size in (one for one in sizes.values() if abs(math.log(one)) > SAME_SIZE):
-        # The hand's errors are millimetres on paper: expect the plan again at the size it has there.
-        larger = Drawing(drawing.construction, resized(drawing, figure, size))
-        bases = [replace(one, cost=one.cost + COST_OF_SIZE) for one in regular(larger, figure)]
-        plans.extend(_as_regular(bases, lines, figure, given))
+    plans = _anywhere(problem, regular(drawing, problem.figure))
+    sizes = {round(math.log(plan.pose.size), 1): plan.pose.size for plan in plans[:3]}
+    for size in sizes.values():
+        if abs(math.log(size)) <= SAME_SIZE:
+            continue
+        # Drafting errors are millimetres on paper: expect the plan again at the size it has there.
+        larger = Drawing(drawing.construction, resized(drawing, problem.figure, size))
+        bases = [replace(base, cost=base.cost + COST_OF_SIZE) for base in regular(larger, problem.figure)]
+        plans.extend(_anywhere(problem, bases))
     return sorted(plans, key=lambda plan: -plan.score)
 
 
-def _as_regular(
-    bases: list[Hypothesis], lines: Lines, figure: str, given: Mapping[str, ComplexArray]
-) -> list[Plan]:
-    cases: list[_Case] = []
-    for hypothesis in bases:
-        expected = _expected(hypothesis, figure, given)
-        if expected is not None:
-            cases.extend(_Case(hypothesis, expected, place) for place in _laid(expected, lines))
-    return sorted(_read(cases, lines), key=lambda plan: -plan.score)
-
-
-def best_plan(plans: list[Plan], lines: Lines, figure: str, given: Mapping[str, ComplexArray]) -> Plan | None:
+def best_plan(problem: PlanProblem, plans: list[PlanReading]) -> PlanReading | None:
     """The best of the regular plans and of the same with mistakes made; the others are its rivals."""
     if not plans:
         return None
-    first = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
-    bases = list(first.values())
-    everything = [*plans, *_with_mistakes(plans[0], bases, figure, lines, given)]
+    bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
+    everything = [*plans, *_with_mistakes(problem, plans[0], list(bases.values()))]
     best = max(everything, key=lambda plan: plan.score)
     if best.hypothesis.label not in REGULAR and _leaves_long_ones(best):
-        everything.extend(_with_mistakes(best, [best.hypothesis], figure, lines, given))
+        everything.extend(_with_mistakes(problem, best, [best.hypothesis]))
     everything.sort(key=lambda plan: -plan.score)
     best = everything[0]
     return replace(best, rivals=(*everything[1:RIVALS], *_without_each_stroke(best)))
 
 
-def _leaves_long_ones(plan: Plan) -> bool:
-    """Whether a vector too long to be overlooked has no stroke."""
-    at = plan.found.expected.at
-    return any(
-        row < 0 and abs(at[edge.head] - at[edge.tail]) > LONG_MM
-        for edge, row in zip(plan.found.expected.edges, plan.found.stroke, strict=True)
-    )
+# Where a plan may lie -----------------------------------------------------------------------------
 
 
-def _without_each_stroke(plan: Plan) -> list[Plan]:
-    """For every edge the best explanation in which the stroke taken for it is not it."""
-    edges = plan.found.expected.edges
-    size = [abs(plan.found.expected.at[edge.head] - plan.found.expected.at[edge.tail]) for edge in edges]
-    cost = plan.found.score - plan.score
-    doubted, settled = [], []
-    for index, edge in enumerate(edges):
-        row = int(plan.found.stroke[index])
-        if row < 0:
-            continue
-        ends = {edge.tail, edge.head}
-        kept = {
-            other: int(plan.found.stroke[other])
-            for other, one in enumerate(edges)
-            if other != index and (size[other] > SURE_MM or not {one.tail, one.head} & ends)
-        }
-        doubted.append(plan.placed)
-        settled.append(Settled(kept, (index, row)))
-    if not doubted:
+def _anywhere(problem: PlanProblem, hypotheses: Sequence[PlanHypothesis]) -> list[PlanReading]:
+    """Readings of some hypotheses wherever they may lie, best first."""
+    cases: list[_PlanCase] = []
+    for hypothesis in hypotheses:
+        expected = problem.expected(hypothesis)
+        if expected is not None:
+            cases.extend(_PlanCase(hypothesis, expected, pose) for pose in _poses(expected, problem.lines))
+    return sorted(_read(cases, problem.lines), key=lambda plan: -plan.score)
+
+
+def _poses(expected: Expected, lines: Lines, count: int = 2) -> list[Pose]:
+    """Where the plan may lie: upright at the size expected, upright at any size, turned by quarters.
+
+    Each search has poses of its own: a plan of nearly parallel vectors fits a bundle at any size.
+    """
+    largest = max(expected.length_mm(edge) for edge in expected.edges)
+    if largest < SPECK_MM:
         return []
-    best = [each[0] for each in explain_each(doubted, plan.lines, PLAN_ENDS, BEAM_OF_DOUBTS, settled)]
-    return [
-        replace(plan, found=found, score=found.score - cost)
-        for found in best
-        if found.score > plan.found.score - LEAST_DOUBT
-    ]
+    # The student chose the length of the first vector so that it can be measured.
+    first = min((edge for edge in expected.edges if edge.tail == 0), key=lambda edge: edge.head)
+    smallest = max(SMALLEST_MM / largest, LEAST_FIRST_MM / max(expected.length_mm(first), SPECK_MM))
+    any_size = Search(sizes=(0.0,), smallest=smallest, largest=max(smallest, LARGEST_MM / largest))
+    turned = replace(any_size, turns_rad=QUARTERS, sizes=(1.0, 0.0))
+    searches = (Search(), any_size, turned)
+    long = lines.take(lines.length > LEAST_LAID_MM)
+    laid = [pose for search in searches for pose in poses(expected, long, search, count=count)]
+    best = max((pose.score for pose in laid), default=0.0)
+    return [pose for pose in laid if pose.score > best - WORSE]
+
+
+def _better_poses(expected: Expected, lines: Lines, than: Pose) -> list[Pose]:
+    """Where a mistaken plan finds clearly more of its length drawn than the regular one did."""
+    search = Search(turns_rad=tuple({0.0, than.turn_rad}), sizes=tuple({1.0, than.size}))
+    laid = poses(expected, lines.take(lines.length > LEAST_LAID_MM), search, count=2)
+    return [pose for pose in laid if pose.score > than.score + CLEARLY]
+
+
+# Mistakes and doubts ------------------------------------------------------------------------------
+
+
+def _leaves_long_ones(plan: PlanReading) -> bool:
+    """Whether a vector too long to be overlooked has no stroke."""
+    expected = plan.assignment.expected
+    return any(
+        row < 0 and expected.length_mm(edge) > LONG_MM
+        for edge, row in zip(expected.edges, plan.assignment.stroke, strict=True)
+    )
 
 
 def _with_mistakes(
-    best: Plan, bases: list[Hypothesis], figure: str, lines: Lines, given: Mapping[str, ComplexArray]
-) -> list[Plan]:
-    """The same plan with a mistake made, where it was found; elsewhere too if that is poor."""
-    poor = best.place.score < POOR and best.hypothesis.label in REGULAR
-    suspect = None if poor else _suspects(best, best.fit)
-    here: list[_Case] = []
-    elsewhere: list[_Case] = []
-    for hypothesis, mistake in (one for base in bases for one in mistaken(base, figure)):
+    problem: PlanProblem, best: PlanReading, bases: Sequence[PlanHypothesis]
+) -> list[PlanReading]:
+    """The same plan with a mistake made, where the best one lies; elsewhere too if that is poor."""
+    poor = best.pose.score < POOR and best.hypothesis.label in REGULAR
+    suspect = None if poor else _suspects(best)
+    # By its strokes the plan's pole is known better than by its pose.
+    here = replace(best.pose, at=complex(best.assignment.expected.at[0]))
+    in_place: list[_PlanCase] = []
+    elsewhere: list[_PlanCase] = []
+    for hypothesis, mistake in (pair for base in bases for pair in mistaken(base, problem.figure)):
         if suspect is not None and mistake.at not in suspect:
             continue
-        expected = _expected(hypothesis, figure, given)
+        expected = problem.expected(hypothesis)
         if expected is None:
             continue
         if poor:
-            laid = _better_laid(expected, lines, best.place)
-            elsewhere.extend(_Case(hypothesis, expected, place) for place in laid)
-        moved = affected(mistake, hypothesis.drawing.construction)
-        here.append(_Case(hypothesis, expected, best.refined, moved))
-    return [*_read(elsewhere, lines), *_read(here, lines, best)]
+            laid = _better_poses(expected, problem.lines, best.pose)
+            elsewhere.extend(_PlanCase(hypothesis, expected, pose) for pose in laid)
+        touched = affected(mistake, hypothesis.drawing.construction)
+        in_place.append(_PlanCase(hypothesis, expected, here, touched))
+    return [*_read(elsewhere, problem.lines), *_read(in_place, problem.lines, best)]
 
 
-def _suspects(plan: Plan, fit: Fit) -> frozenset[str]:
-    """The nodes at which a mistake could explain what the regular form does not."""
-    names = plan.found.expected.names
+def _suspects(plan: PlanReading) -> frozenset[str]:
+    """The nodes at which a mistake could explain what the plan's hypothesis does not."""
+    fit, expected = plan.fit(), plan.assignment.expected
     odd: set[str] = set()
-    for index, edge in enumerate(plan.found.expected.edges):
+    for index, edge in enumerate(expected.edges):
         size = abs(fit.at[edge.head] - fit.at[edge.tail])
-        unseen = size > LEAST_SEEN_MM and (plan.found.stroke[index] < 0 or plan.found.shared[index])
-        off = fit.residual_mm[index]
-        astray = bool(np.isfinite(off).all() and np.abs(off).max() > ASTRAY_MM)
-        if unseen or astray:
-            odd.update((names[edge.tail], names[edge.head]))
+        bare = plan.assignment.stroke[index] < 0 or plan.assignment.shared[index]
+        residual = fit.residual_mm[index]
+        astray = bool(np.isfinite(residual).all() and np.abs(residual).max() > ASTRAY_MM)
+        if (bare and size > LEAST_VISIBLE_MM) or astray:
+            odd.update((expected.names[edge.tail], expected.names[edge.head]))
     return ancestors(plan.hypothesis.drawing.construction, odd)
 
 
-def _expected(hypothesis: Hypothesis, figure: str, given: Mapping[str, ComplexArray]) -> Expected | None:
-    """What is expected of the plan about its own pole; None where that cannot be drawn."""
-    edges = vectors_of(tied(hypothesis), figure, hypothesis.absent)
-    expected = expect(hypothesis.drawing, figure, given, HAND, edges)
-    known = np.abs(expected.at).max() < FARTHEST_MM and expected.cov.max() < VAGUE_MM**2
-    return expected if known else None
-
-
-def _better_laid(expected: Expected, lines: Lines, than: Place) -> list[Place]:
-    """Where a mistaken plan finds clearly more of its length drawn than the regular one did."""
-    search = Search(turns_rad=tuple({0.0, than.turn_rad}), sizes=tuple({1.0, than.size}))
-    found = places(expected, lines.take(lines.length > LEAST_LAID_MM), search, count=2)
-    return [place for place in found if place.score > than.score + CLEARLY]
-
-
-def _laid(expected: Expected, lines: Lines, count: int = 2) -> list[Place]:
-    """Where the plan may lie: upright at the size expected, upright at any size, turned by quarters.
-
-    Each way has places of its own: a plan of nearly parallel vectors fits a bundle at any size.
-    """
-    largest = max(abs(expected.at[edge.head] - expected.at[edge.tail]) for edge in expected.edges)
-    if largest < SPECK_MM:
+def _without_each_stroke(plan: PlanReading) -> list[PlanReading]:
+    """For every edge the best explanation in which the stroke taken for it is not it."""
+    assignment = plan.assignment
+    edges = assignment.expected.edges
+    size = [assignment.expected.length_mm(edge) for edge in edges]
+    constraints = []
+    for index in np.flatnonzero(assignment.stroke >= 0).tolist():
+        ends = {edges[index].tail, edges[index].head}
+        fixed = {
+            other: int(assignment.stroke[other])
+            for other, edge in enumerate(edges)
+            if other != index and (size[other] > SURE_MM or not {edge.tail, edge.head} & ends)
+        }
+        constraints.append(Constraint(fixed, (index, int(assignment.stroke[index]))))
+    if not constraints:
         return []
-    long = lines.take(lines.length > LEAST_LAID_MM)
-    first = _first_length(expected)
-    smallest = max(SMALLEST_MM / largest, LEAST_FIRST_MM / first)
-    bounds = {"smallest": smallest, "largest": max(smallest, LARGEST_MM / largest)}
-    ways = (
-        Search(sizes=(1.0,)),
-        Search(sizes=(0.0,), **bounds),
-        Search(turns_rad=QUARTERS, sizes=(1.0, 0.0), **bounds),
-    )
-    found = [place for way in ways for place in places(expected, long, way, count=count)]
-    best = max((place.score for place in found), default=0.0)
-    return [place for place in found if place.score > best - WORSE]
+    doubted = [plan.placed] * len(constraints)
+    best = assign_strokes(doubted, plan.lines, END_PRIOR, BEAM_OF_DOUBTS, constraints)
+    cost = assignment.score - plan.score
+    return [
+        replace(plan, assignment=rival, score=rival.score - cost)
+        for rival, *_ in best
+        if rival.score > assignment.score - LEAST_DOUBT
+    ]
 
 
-def _first_length(expected: Expected) -> float:
-    """The length of the plan's first vector, which the student chose so that it can be measured."""
-    edge = min((one for one in expected.edges if one.tail == 0), key=lambda one: one.head)
-    return max(float(abs(expected.at[edge.head] - expected.at[edge.tail])), SPECK_MM)
+# Strokes of a plan --------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
-class _Case:
-    """A plan to be read at a place: how it was drawn, what is expected then, which nodes a mistake moved."""
+class _PlanCase:
+    """A hypothesis at a pose: what is expected of the plan, and the nodes that a mistake affects."""
 
-    hypothesis: Hypothesis
+    hypothesis: PlanHypothesis
     expected: Expected
-    place: Place
-    moved: Collection[str] = ()
+    pose: Pose
+    affected: Collection[str] = ()
 
     @property
-    def as_expected(self) -> bool:
-        """Whether the place has the size that is expected."""
-        return abs(math.log(self.place.size)) < SAME_SIZE
+    def has_expected_size(self) -> bool:
+        """Whether the pose has the size that is expected."""
+        return abs(math.log(self.pose.size)) < SAME_SIZE
 
     @property
     def cost(self) -> float:
-        """Nats, how unlikely it is before looking."""
-        cost = self.hypothesis.cost + (0.0 if self.as_expected else COST_OF_SIZE)
-        return cost + (0.0 if abs(self.place.turn_rad) < np.pi / 4 else COST_OF_TURN)
+        """Nats, how unlikely it is before strokes are considered."""
+        cost = self.hypothesis.cost + (0.0 if self.has_expected_size else COST_OF_SIZE)
+        return cost + (0.0 if abs(self.pose.turn_rad) < np.pi / 4 else COST_OF_TURN)
 
     def placed(self) -> Expected:
-        """What is expected there, with the freedom left to it."""
-        relative = 0.03 if self.as_expected else 0.08
-        slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=relative)
-        return self.expected.placed(self.place.at, self.place.size, self.place.turn_rad, slack)
+        """What is expected there, with the errors that the pose may have."""
+        return self.expected.placed(self.pose, Slack(relative=0.03 if self.has_expected_size else 0.08))
 
 
-def _read(cases: Sequence[_Case], lines: Lines, known_before: Plan | None = None) -> list[Plan]:
-    """The best explanations of plans laid at places: several of each, where they are nearly as good.
+def _read(cases: Sequence[_PlanCase], lines: Lines, base: PlanReading | None = None) -> list[PlanReading]:
+    """The best explanations of plans at their poses: several of each, where they are nearly as good.
 
-    Plans of the same vectors are read side by side. `known_before` is the plan that mistakes were made
-    in: what they do not touch is settled.
+    Arguments: `base` is the plan that mistakes were made in; its strokes stay where they do not affect it.
     """
-    groups: dict[tuple[Edge, ...], list[_Case]] = {}
-    for case in cases:
-        groups.setdefault(case.expected.edges, []).append(case)
-    plans: list[Plan] = []
-    for group in groups.values():
-        placed = [case.placed() for case in group]
-        around = lines.take(_near(lines, placed))
-        beam, settled = BEAM, None
-        if known_before is not None:
-            beam = BEAM_OF_MISTAKES
-            kept = _kept(known_before, placed[0], around)
-            settled = [
-                Settled(_untouched(kept, one, case.moved)) for one, case in zip(placed, group, strict=True)
-            ]
-        each = explain_each(placed, around, PLAN_ENDS, beam, settled)
-        for case, at, explained in zip(group, placed, each, strict=True):
-            plans.extend(
-                Plan(case.hypothesis, case.place, at, found, found.score - case.cost, around)
-                for found in explained[:ALTERNATIVES]
-                if found.score > explained[0].score - NEARLY
-            )
+    placed = [case.placed() for case in cases]
+
+    def constrain(group: Sequence[int], around: Lines) -> list[Constraint]:
+        if base is None:
+            return [UNCONSTRAINED] * len(group)
+        strokes = _strokes_among(around, base)
+        return [_unaffected(strokes, placed[index], cases[index].affected) for index in group]
+
+    beam = BEAM if base is None else BEAM_OF_MISTAKES
+    plans: list[PlanReading] = []
+    for index, best, around in assign_groups(placed, lines, _near, END_PRIOR, beam, constrain):
+        case = cases[index]
+        plans.extend(
+            PlanReading(case.hypothesis, case.pose, placed[index], one, one.score - case.cost, around)
+            for one in best[:ALTERNATIVES]
+            if one.score > best[0].score - NEARLY
+        )
     return plans
 
 
-def _kept(base: Plan, placed: Expected, lines: Lines) -> dict[int, int]:
-    """The strokes of vectors as rows of `lines`, by the place of their edge."""
-    row_of = {tuple(pair): row for row, pair in enumerate(lines.members.tolist())}
-    by_name = {edge.name: index for index, edge in enumerate(base.found.expected.edges)}
-    kept = {}
-    for index, edge in enumerate(placed.edges):
-        known = by_name.get(edge.name)
-        if known is None:
-            continue
-        row = int(base.found.stroke[known])
-        if row < 0:
-            kept[index] = -1
-        elif tuple(base.lines.members[row]) in row_of:
-            kept[index] = row_of[tuple(base.lines.members[row])]
-    return kept
+def _strokes_among(lines: Lines, plan: PlanReading) -> dict[str, int]:
+    """The strokes of a plan's vectors, by name, as rows of other lines; -1 for none."""
+    row_of = {tuple(pieces): row for row, pieces in enumerate(lines.members.tolist())}
+    strokes = {}
+    for edge, row in zip(plan.placed.edges, plan.assignment.stroke.tolist(), strict=True):
+        known = -1 if row < 0 else row_of.get(tuple(plan.lines.members[row].tolist()))
+        if known is not None:
+            strokes[edge.name] = known
+    return strokes
 
 
-def _untouched(kept: Mapping[int, int], placed: Expected, moved: Collection[str]) -> dict[int, int]:
-    """Those of them that a mistake does not touch."""
-    nodes = {index for index, name in enumerate(placed.names) if name in moved}
-    return {
-        index: row
-        for index, row in kept.items()
-        if not {placed.edges[index].tail, placed.edges[index].head} & nodes
-    }
+def _unaffected(strokes: Mapping[str, int], placed: Expected, affected_: Collection[str]) -> Constraint:
+    """The strokes of the vectors that a mistake does not affect stay theirs."""
+    return Constraint(
+        {
+            index: strokes[edge.name]
+            for index, edge in enumerate(placed.edges)
+            if edge.name in strokes
+            and placed.names[edge.tail] not in affected_
+            and placed.names[edge.head] not in affected_
+        }
+    )
 
 
 def _near(lines: Lines, placed: Sequence[Expected]) -> BoolArray:
     """Which lines lie about any of the figures."""
-    margin = 12.0
     middle = lines.middle
     near = np.zeros(len(lines), dtype=bool)
-    for one in placed:
-        low = complex(one.at.real.min() - margin, one.at.imag.min() - margin)
-        high = complex(one.at.real.max() + margin, one.at.imag.max() + margin)
-        across = (middle.real > low.real) & (middle.real < high.real)
-        near |= across & (middle.imag > low.imag) & (middle.imag < high.imag)
+    for figure in placed:
+        x, y = figure.at.real, figure.at.imag
+        across = (middle.real > x.min() - MARGIN_MM) & (middle.real < x.max() + MARGIN_MM)
+        near |= across & (middle.imag > y.min() - MARGIN_MM) & (middle.imag < y.max() + MARGIN_MM)
     return near

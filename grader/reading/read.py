@@ -2,19 +2,18 @@
 
 import cmath
 import math
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
-from grader.reading import nodes as confidence
 from grader.reading.expected import REGULAR, Edge
 from grader.reading.lettering import lettered, support
 from grader.reading.lines import Lines, lines_of
-from grader.reading.nodes import Fit, Signs, sureness
-from grader.reading.plans import Plan, best_plan, regular_plans
-from grader.reading.sketch import Sketch, drawings, find_sketch
+from grader.reading.nodes import NodeFit
+from grader.reading.plans import PlanProblem, PlanReading, best_plan, regular_plans
+from grader.reading.sketch import SketchReading, drawings, find_sketch
 from grader.records import (
     ACCELERATION_PLAN,
     MECHANISM,
@@ -38,41 +37,109 @@ MARKED_MM = 0.5
 """A tip within this of a node marks it."""
 ELSEWHERE_MM = (0.8, 15.0)
 """A tip as far off as this may be the one that was meant."""
+NEAR_MM = 0.5
+"""A node is right within this of what was drawn: a pencil stroke's width."""
+RIVAL_NATS = 12.0
+"""Rivals worse by more weigh nothing."""
+TEMPERATURE = 3.0
+"""Scores are this much too certain: strokes of one student err in the same way."""
+
+WEIGHTS = {
+    "placed": 0.34,
+    "named": 0.34,
+    "off_mm": -1.73,
+    "mistaken": -0.23,
+    "thin": -0.4,
+    "marked": 1.47,
+    "elsewhere": -1.86,
+}
+CONSTANT = -0.8
+"""Of a logistic regression on sheets drawn by two simulations, the constant lowered by 0.1."""
+PLACED_AND = 0.1
+"""A confidence exceeds the geometric probability by no more than this."""
+HIGHEST = 0.995
+"""Of confidences: one vector of 200 may be wrong for a reason that no sheet of the regression had."""
+WORST_MM = 1.5
+"""Larger residuals lower the confidence no further."""
 
 
-def figure_of_sketch(sketch: Sketch) -> Figure:
+@dataclass(frozen=True, slots=True)
+class Signs:
+    """What the confidence in a vector (or node) is computed from.
+
+    Attributes
+    ----------
+    placed : geometric probability of lying within half a millimetre, from the fit's covariance
+    named : share of the explanations that have it there
+    off_mm : largest distance of its nodes from its stroke
+    thin, mistaken : on a line thin as a construction line; in a plan explained by a mistake
+    marked : probability of the less likely of the tips that mark the vector's two ends on its stroke
+    elsewhere : probability of the likeliest other tip near by that might be meant
+    """
+
+    placed: float
+    named: float
+    off_mm: float = 0.1
+    thin: bool = False
+    mistaken: bool = False
+    marked: float = 0.4
+    elsewhere: float = 0.0
+
+    def confidence(self) -> float:
+        """Probability that the name is right and the vector read within half a millimetre."""
+        inputs = asdict(self) | {
+            "placed": _log_odds(self.placed),
+            "named": _log_odds(self.named),
+            "off_mm": min(self.off_mm, WORST_MM),
+        }
+        score = CONSTANT + sum(weight * inputs[name] for name, weight in WEIGHTS.items())
+        return min(1.0 / (1.0 + math.exp(-score)), self.placed + PLACED_AND, HIGHEST)
+
+
+def _log_odds(probability: float) -> float:
+    return math.log((probability + 0.002) / (1.002 - probability))
+
+
+def within(cov: FloatArray, radius_mm: float = NEAR_MM) -> float:
+    """Probability that a Gaussian error of this covariance (2, 2) is shorter than the radius."""
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(cov), 1e-12))
+    first, second = (math.erf(radius_mm / (s * math.sqrt(2.0))) for s in spread)
+    return float(first * second)
+
+
+def figure_of_sketch(sketch: SketchReading) -> Figure:
     """Joints of the mechanism."""
-    places = confidence.of_places(sketch.fit)
-    names = sketch.found.expected.names
-    nodes = {name: _node(sketch.fit, index, float(places[index])) for index, name in enumerate(names)}
+    fit = sketch.fit
+    names = sketch.assignment.expected.names
+    nodes = {name: _node(fit, row, within(_node_cov(fit, row))) for row, name in enumerate(names)}
     return Figure(nodes, {})
 
 
-def figure_of_plan(plan: Plan, scale_se: float) -> tuple[Figure, list[Unread]]:
+def figure_of_plan(plan: PlanReading, scale_se: float) -> tuple[Figure, list[Unread]]:
     """Nodes and vectors of a plan; what is not drawn, with the reason.
 
     Arguments: `scale_se` is the sheet's relative standard error of lengths.
     """
-    fit, names = plan.fit, plan.found.expected.names
+    fit, names = plan.fit(), plan.assignment.expected.names
     named = _named(plan, fit)
-    placed = confidence.of_places(fit)
     absent = dict(plan.hypothesis.absent)
     nodes = {
-        name: _node(fit, index, sureness(Signs(float(placed[index]), float(named[index]))))
-        for index, name in enumerate(names)
-        if name not in absent and np.isfinite(fit.at[index])
+        name: _node(fit, row, Signs(within(_node_cov(fit, row)), float(named[row])).confidence())
+        for row, name in enumerate(names)
+        if name not in absent and np.isfinite(fit.at[row])
     }
     vectors, unread = _vectors(plan, fit, named, scale_se)
     unread.extend(Unread(name, reason) for name, reason in absent.items())
-    for vector in plan.hypothesis.drawing.construction.vectors_of(figure_name(plan)):
-        gone = next((absent[end] for end in (vector.head, vector.tail) if end in absent), None)
-        if gone is not None and vector.name not in vectors:
-            unread.append(Unread(vector.name, gone))
+    construction = plan.hypothesis.drawing.construction
+    for vector in construction.vectors_of(construction.figure_of(names[0])):
+        reason = absent.get(vector.head, absent.get(vector.tail))
+        if reason is not None and vector.name not in vectors:
+            unread.append(Unread(vector.name, reason))
     return Figure(_no_surer(nodes, vectors, plan), vectors), unread
 
 
 def _no_surer(
-    nodes: Mapping[str, ReadNode], vectors: Mapping[str, ReadVector], plan: Plan
+    nodes: Mapping[str, ReadNode], vectors: Mapping[str, ReadVector], plan: PlanReading
 ) -> dict[str, ReadNode]:
     """A node is no surer than the surest vector that starts or ends there: else its plan may be another."""
     best = dict.fromkeys(nodes, 0.0)
@@ -83,75 +150,80 @@ def _no_surer(
     return {name: replace(node, confidence=min(node.confidence, best[name])) for name, node in nodes.items()}
 
 
-def figure_name(plan: Plan) -> str:
-    """Which plan it is."""
-    return plan.hypothesis.drawing.construction.figure_of(plan.found.expected.names[0])
-
-
-def _node(fit: Fit, index: int, sure: float) -> ReadNode:
+def _node_cov(fit: NodeFit, index: int) -> FloatArray:
+    """(2, 2) covariance of one node."""
     rows = slice(2 * index, 2 * index + 2)
-    return ReadNode(complex(fit.at[index]), fit.cov[rows, rows], sure)
+    return fit.cov[rows, rows]
 
 
-def _named(plan: Plan, fit: Fit) -> FloatArray:
-    """How many of the explanations, by weight, have each node where it is read."""
-    near = [other for other in plan.rivals if other.score > plan.score - confidence.FARTHEST]
+def _node(fit: NodeFit, index: int, confidence: float) -> ReadNode:
+    return ReadNode(complex(fit.at[index]), _node_cov(fit, index), confidence)
+
+
+def _named(plan: PlanReading, fit: NodeFit) -> FloatArray:
+    """(n,) share of the explanations, by their scores, that have each node where it is read."""
+    names = plan.assignment.expected.names
     # Many hypotheses name the same strokes, and so have their nodes in the same places.
-    places = {plan.strokes: fit.at}
-    for other in near:
-        if other.strokes not in places:
-            places[other.strokes] = other.fit.at
-    rivals = [
-        confidence.Rival(
-            dict(zip(other.found.expected.names, places[other.strokes], strict=True)), other.score
-        )
-        for other in near
-    ]
-    return confidence.of_names(plan.found.expected.names, fit.at, plan.score, rivals)
+    nodes_by_strokes = {plan.strokes: fit.at}
+    agree, total = np.ones(len(names)), np.ones(len(names))
+    for rival in plan.rivals:
+        if rival.score <= plan.score - RIVAL_NATS:
+            continue
+        if rival.strokes not in nodes_by_strokes:
+            nodes_by_strokes[rival.strokes] = rival.fit().at
+        at = dict(zip(rival.assignment.expected.names, nodes_by_strokes[rival.strokes], strict=True))
+        apart = np.abs(np.array([at.get(name, np.nan) for name in names]) - fit.at)
+        weight = math.exp(min(0.0, rival.score - plan.score) / TEMPERATURE)
+        total += weight * np.isfinite(apart)
+        agree += weight * (apart < NEAR_MM)
+    return np.asarray(agree / total)
 
 
 def _vectors(
-    plan: Plan, fit: Fit, named: FloatArray, scale_se: float
+    plan: PlanReading, fit: NodeFit, named: FloatArray, scale_se: float
 ) -> tuple[dict[str, ReadVector], list[Unread]]:
+    expected = plan.assignment.expected
     vectors: dict[str, ReadVector] = {}
     unread: list[Unread] = []
-    for index, edge in enumerate(plan.found.expected.edges):
+    for index, edge in enumerate(expected.edges):
         span = complex(fit.at[edge.head] - fit.at[edge.tail])
-        row = int(plan.found.stroke[index])
-        ends = f"{plan.found.expected.names[edge.tail]} and {plan.found.expected.names[edge.head]}"
+        row = int(plan.assignment.stroke[index])
         if row < 0 and abs(span) > LEAST_VECTOR_MM:
+            ends = f"{expected.names[edge.tail]} and {expected.names[edge.head]}"
             unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
             continue
         cov = _difference_cov(fit, edge, span, scale_se)
         signs = Signs(
-            placed=confidence.within(cov),
+            placed=within(cov),
             named=float(min(named[edge.tail], named[edge.head])),
-            off_mm=float(np.abs(fit.residual_mm[index]).max()) if row >= 0 else 0.0,
-            thin=row >= 0 and bool(plan.lines.thin[row]),
+            off_mm=0.0,
             mistaken=plan.hypothesis.label not in REGULAR,
         )
         if row >= 0:
+            off_mm = float(np.abs(fit.residual_mm[index]).max())
             marked, elsewhere = _marks(plan, fit, edge, row)
-            signs = replace(signs, marked=marked, elsewhere=elsewhere)
-        vectors[edge.name] = _vector(span, cov, sureness(signs))
+            signs = replace(
+                signs, off_mm=off_mm, thin=bool(plan.lines.thin[row]), marked=marked, elsewhere=elsewhere
+            )
+        vectors[edge.name] = _vector(span, cov, signs.confidence())
     return vectors, unread
 
 
-def _marks(plan: Plan, fit: Fit, edge: Edge, row: int) -> tuple[float, float]:
+def _marks(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> tuple[float, float]:
     """How clearly tips mark a vector's two ends on its stroke, and whether others might be meant."""
     marked, elsewhere = [], []
     along = complex(plan.lines.along[row])
     for node, other in ((edge.tail, edge.head), (edge.head, edge.tail)):
         forward = np.array([((fit.at[node] - fit.at[other]) * np.conj(along)).real > 0])
         tips, sure = plan.lines.tips_towards(np.array([row]), forward, head=node == edge.head)
-        off = np.abs(tips[0] - ((fit.at[node] - plan.lines.start[row]) * np.conj(along)).real)
-        near, far = off < MARKED_MM, (off >= ELSEWHERE_MM[0]) & (off < ELSEWHERE_MM[1])
+        apart = np.abs(tips[0] - ((fit.at[node] - plan.lines.start[row]) * np.conj(along)).real)
+        near, far = apart < MARKED_MM, (apart >= ELSEWHERE_MM[0]) & (apart < ELSEWHERE_MM[1])
         marked.append(float(sure[0, near].max(initial=0.0)))
         elsewhere.append(float(sure[0, far].max(initial=0.0)))
     return min(marked), max(elsewhere)
 
 
-def _difference_cov(fit: Fit, edge: Edge, span: complex, scale_se: float) -> FloatArray:
+def _difference_cov(fit: NodeFit, edge: Edge, span: complex, scale_se: float) -> FloatArray:
     """Covariance (2, 2) of a vector, from both its nodes and the sheet's scale."""
     difference = np.zeros((2, fit.cov.shape[0]))
     for axis in (0, 1):
@@ -160,7 +232,7 @@ def _difference_cov(fit: Fit, edge: Edge, span: complex, scale_se: float) -> Flo
     return np.asarray(difference @ fit.cov @ difference.T + np.outer(scaled, scaled))
 
 
-def _vector(span: complex, cov: FloatArray, sure: float) -> ReadVector:
+def _vector(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
     """Length and direction with their standard errors."""
     length = float(abs(span))
     along = np.array([span.real, span.imag]) / max(length, 1e-9)
@@ -168,32 +240,36 @@ def _vector(span: complex, cov: FloatArray, sure: float) -> ReadVector:
     se_along, se_across = (math.sqrt(max(float(axis @ cov @ axis), 0.0)) for axis in (along, across))
     se_deg = math.degrees(math.atan2(se_across, max(length, 1e-9)))
     direction = math.degrees(cmath.phase(span)) % 360.0 if length > se_across else None
-    return ReadVector(length, se_along, direction, se_deg, sure)
+    return ReadVector(length, se_along, direction, se_deg, confidence)
 
 
 LEAST_SKETCH = 15.0
 LEAST_PLAN = 12.0
 """Nats: what less is explained by may be chance."""
-
 SURE_PLAN = 40.0
+"""Nats from which a plan's strokes are no other plan's."""
 CLEAR = 0.85
+"""A regular plan supported over more of its length is on that sheet, and on no other."""
 LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
-"""Of the vectors given at the start of a plan."""
+"""Of the vectors given at the start of a plan: what fits on a sheet and can be measured."""
 SAME_SCALE = 0.95
+"""Ratio of the declared scale and the drawn one from which they are the same."""
 WILD = 3.0
+"""Where the drawn scale differs by more than this factor, the declared one was surely not followed."""
 
-Given = dict[str, ComplexArray]
+Nodes = dict[str, ComplexArray]
+"""Nodes already read, complex mm on the sheet, by name."""
 
 
 @dataclass(slots=True)
-class _Page:
-    """What is found on one sheet so far."""
+class _PageReading:
+    """What is read on one sheet so far."""
 
     lines: Lines
     ink: Ink
     sheet: Sheet
-    sketch: Sketch | None = None
-    plans: dict[str, Plan] = field(default_factory=dict)
+    sketch: SketchReading | None = None
+    plans: dict[str, PlanReading] = field(default_factory=dict)
 
 
 def read_figures(
@@ -215,25 +291,28 @@ def read_figures(
 
     Returns one Reading per sheet.
     """
-    pages = [_Page(lines_of(ink), ink, sheet) for ink, sheet in zip(inks, sheets, strict=True)]
+    pages = [_PageReading(lines_of(ink), ink, sheet) for ink, sheet in zip(inks, sheets, strict=True)]
     own, others = _drawings(assignment, variant, scales)
     for page in pages:
-        told = partial(support, letters=page.ink.letters, renamed=assignment.file.names)
-        sketch = find_sketch(page.lines, page.ink.circles, own, others, told)
+        letters_nats = partial(support, letters=page.ink.letters, renamed=assignment.file.names)
+        sketch = find_sketch(page.lines, page.ink.circles, own, others, letters_nats)
         if sketch is not None and sketch.score >= LEAST_SKETCH:
             page.sketch = sketch
     followed = [page.sketch.drawing for page in pages if page.sketch is not None] if variant is None else []
     drawing = _measurable((followed or own)[0], assignment, variant)
-    velocity = _find(pages, [drawing], VELOCITY_PLAN, {})
-    known = {} if velocity is None else _nodes(velocity)
-    paced = [drawing] if velocity is None else _paced(drawing, known)
+    velocity = _find_plan(pages, [drawing], VELOCITY_PLAN, {})
+    velocities = {} if velocity is None else _nodes(velocity)
     if _asks_accelerations(wanted, drawing):
         _set_apart(pages, velocity)
-        _find(pages, paced, ACCELERATION_PLAN, known)
+        at_scales = [drawing] if velocity is None else _at_velocity_scales(drawing, velocities)
+        _find_plan(pages, at_scales, ACCELERATION_PLAN, velocities)
     return [
         lettered(reading, page.ink.letters, drawing.construction, assignment.file.names)
         for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
     ]
+
+
+# What is to be drawn ------------------------------------------------------------------------------
 
 
 def _drawings(
@@ -243,7 +322,7 @@ def _drawings(
     everybody = assignment.variants()
     if variant is None:
         return drawings(assignment, everybody, scales), []
-    others = [one for one in everybody if one != variant]
+    others = [other for other in everybody if other != variant]
     return drawings(assignment, [variant], scales), drawings(assignment, others, None)
 
 
@@ -255,8 +334,8 @@ def _measurable(drawing: Drawing, assignment: Assignment, variant: Variant | Non
         real = parameters.get(vector.name, parameters.get(f"{vector.name}_n"))
         if real is None:
             continue
-        drawn = abs(float(np.ravel(real)[0]) / float(np.ravel(parameters[vector.scale])[0]))
-        if drawn and not LEAST_DRAWN_MM < drawn < MOST_DRAWN_MM:
+        drawn_mm = abs(float(np.ravel(real)[0]) / float(np.ravel(parameters[vector.scale])[0]))
+        if drawn_mm and not LEAST_DRAWN_MM < drawn_mm < MOST_DRAWN_MM:
             parameters[vector.scale] = getattr(usual, vector.scale)
     return Drawing(drawing.construction, parameters)
 
@@ -266,61 +345,7 @@ def _asks_accelerations(wanted: Collection[str], drawing: Drawing) -> bool:
     return not wanted or any(name in vectors and vectors[name].scale == "ka" for name in wanted)
 
 
-def _given(page: _Page, pages: Sequence[_Page]) -> Given:
-    """The joints as drawn: on the same sheet, else on the student's other one; none to take the exact."""
-    for one in (page, *pages):
-        if one.sketch is not None:
-            names = one.sketch.found.expected.names
-            return {name: np.asarray(at) for name, at in zip(names, one.sketch.fit.at, strict=True)}
-    return {}
-
-
-def _turned(page: _Page, pages: Sequence[_Page], drawing: Drawing) -> Drawing:
-    """The drawing with guides turned as the sketch is."""
-    turn = next((one.sketch.guide_turn_rad for one in (page, *pages) if one.sketch is not None), 0.0)
-    return Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(turn)})
-
-
-def _find(
-    pages: Sequence[_Page], paced: Sequence[Drawing], figure: str, known: Mapping[str, ComplexArray]
-) -> Plan | None:
-    """The plan on the sheet that explains it best, kept there. `paced`: the drawing at likely scales."""
-    laid = []
-    for page in pages:
-        given = {**_given(page, pages), **known}
-        for drawing in paced:
-            plans = regular_plans(page.lines, _turned(page, pages, drawing), figure, given)
-            if plans:
-                laid.append((page, given, plans))
-    laid.sort(key=lambda one: -one[2][0].score)
-    # Where no sheet shows the plan as it should be, a mistaken one may be on either.
-    clear = bool(laid) and laid[0][2][0].place.score > CLEAR
-    best: tuple[_Page, Plan] | None = None
-    for page, given, plans in laid[:1] if clear else laid:
-        plan = best_plan(plans, page.lines, figure, given)
-        if plan is not None and (best is None or plan.score > best[1].score):
-            best = page, plan
-    if best is None or best[1].score < LEAST_PLAN:
-        return None
-    best[0].plans[figure] = best[1]
-    return best[1]
-
-
-def _set_apart(pages: Sequence[_Page], plan: Plan | None) -> None:
-    """One stroke of ink cannot be in two figures: what surely is this plan's is no other's."""
-    page = next((page for page in pages if plan is not None and plan in page.plans.values()), None)
-    if plan is None or page is None or plan.score < SURE_PLAN:
-        return
-    used = {int(one) for row in plan.found.stroke if row >= 0 for one in plan.lines.members[row]}
-    own = np.isin(page.lines.members, list(used)).any(axis=1)
-    page.lines = page.lines.take(np.flatnonzero(~own))
-
-
-def _nodes(plan: Plan) -> Given:
-    return {name: np.asarray(at) for name, at in zip(plan.found.expected.names, plan.fit.at, strict=True)}
-
-
-def _paced(drawing: Drawing, at: Given) -> list[Drawing]:
+def _at_velocity_scales(drawing: Drawing, at: Nodes) -> list[Drawing]:
     """The drawing at the velocity scale that the drawn plan follows, and at the one declared.
 
     Normal components are taken from drawn velocities: with a wrong scale they come out wrong.
@@ -329,9 +354,9 @@ def _paced(drawing: Drawing, at: Given) -> list[Drawing]:
     declared = float(np.ravel(drawing.parameters["kv"])[0])
     for vector in vectors:
         real = float(np.ravel(drawing.parameters[vector.name])[0])
-        drawn = abs(complex(at[vector.head] - at[vector.tail]))
-        if drawn > 1.0 and real:
-            followed = abs(real) / drawn
+        drawn_mm = abs(complex(at[vector.head] - at[vector.tail]))
+        if drawn_mm > 1.0 and real:
+            followed = abs(real) / drawn_mm
             if SAME_SCALE < followed / declared < 1.0 / SAME_SCALE:
                 return [drawing]
             own = Drawing(drawing.construction, {**drawing.parameters, "kv": np.array([followed])})
@@ -339,10 +364,74 @@ def _paced(drawing: Drawing, at: Given) -> list[Drawing]:
     return [drawing]
 
 
-def _readings(pages: Sequence[_Page], drawing: Drawing, wanted: Collection[str]) -> list[Reading]:
-    """One Reading per sheet; what is nowhere is unread on the sheet where its figure is, else on the last."""
+# Plans --------------------------------------------------------------------------------------------
+
+
+def _find_plan(
+    pages: Sequence[_PageReading], at_scales: Sequence[Drawing], figure: str, known: Nodes
+) -> PlanReading | None:
+    """The plan on the sheet that explains it best; it is kept with its page.
+
+    Arguments: `at_scales`, the drawing at likely scales; `known`, nodes of the plan before.
+    """
+    laid: list[tuple[_PageReading, PlanProblem, list[PlanReading]]] = []
+    for page in pages:
+        joints, guide_turn = _sketched(page, pages)
+        problem = PlanProblem(page.lines, figure, {**joints, **known})
+        for drawing in at_scales:
+            parameters = {**drawing.parameters, "turn": np.asarray(guide_turn)}
+            plans = regular_plans(problem, Drawing(drawing.construction, parameters))
+            if plans:
+                laid.append((page, problem, plans))
+    laid.sort(key=lambda entry: -entry[2][0].score)
+    # Where no sheet shows the plan as it should be, a mistaken one may be on either.
+    clear = bool(laid) and laid[0][2][0].pose.score > CLEAR
+    best: tuple[_PageReading, PlanReading] | None = None
+    for page, problem, plans in laid[:1] if clear else laid:
+        plan = best_plan(problem, plans)
+        if plan is not None and (best is None or plan.score > best[1].score):
+            best = page, plan
+    if best is None or best[1].score < LEAST_PLAN:
+        return None
+    best[0].plans[figure] = best[1]
+    return best[1]
+
+
+def _sketched(page: _PageReading, pages: Sequence[_PageReading]) -> tuple[Nodes, float]:
+    """The joints as drawn and the turn of the guides: of the same sheet's sketch, else of another sheet's.
+
+    Without a sketch there are no joints, so that the exact ones are taken.
+    """
+    sketch = next((other.sketch for other in (page, *pages) if other.sketch is not None), None)
+    if sketch is None:
+        return {}, 0.0
+    names = sketch.assignment.expected.names
+    return {
+        name: np.asarray(at) for name, at in zip(names, sketch.fit.at, strict=True)
+    }, sketch.guide_turn_rad
+
+
+def _set_apart(pages: Sequence[_PageReading], plan: PlanReading | None) -> None:
+    """One stroke of ink cannot be in two figures: what surely is this plan's is no other's."""
+    page = next((page for page in pages if plan is not None and plan in page.plans.values()), None)
+    if plan is None or page is None or plan.score < SURE_PLAN:
+        return
+    stroke = plan.assignment.stroke
+    used = np.isin(page.lines.members, plan.lines.members[stroke[stroke >= 0]])
+    page.lines = page.lines.take(np.flatnonzero(~used.any(axis=1)))
+
+
+def _nodes(plan: PlanReading) -> Nodes:
+    names = plan.assignment.expected.names
+    return {name: np.asarray(at) for name, at in zip(names, plan.fit().at, strict=True)}
+
+
+# Readings -----------------------------------------------------------------------------------------
+
+
+def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collection[str]) -> list[Reading]:
+    """One Reading per sheet; what is nowhere is unread on the last sheet."""
     readings = []
-    named: set[str] = set()
     for page in pages:
         figures: dict[str, Figure] = {}
         unread: list[Unread] = []
@@ -350,27 +439,22 @@ def _readings(pages: Sequence[_Page], drawing: Drawing, wanted: Collection[str])
             figures[MECHANISM] = figure_of_sketch(page.sketch)
         for figure, plan in page.plans.items():
             figures[figure], missing = figure_of_plan(plan, page.sheet.scale_se)
-            unread.extend(one for one in missing if not wanted or one.name in wanted)
-        named.update(name for one in figures.values() for name in (*one.nodes, *one.vectors))
-        named.update(one.name for one in unread)
+            unread.extend(gap for gap in missing if not wanted or gap.name in wanted)
         readings.append(Reading(figures, tuple(unread)))
-    nowhere = _nowhere(drawing, wanted, named)
-    if nowhere and readings:
-        last = readings[-1]
-        readings[-1] = Reading(last.figures, (*last.unread, *nowhere), last.problems)
+    named = {gap.name for reading in readings for gap in reading.unread}
+    for figure_read in (figure for reading in readings for figure in reading.figures.values()):
+        named.update((*figure_read.nodes, *figure_read.vectors))
+    nowhere = tuple(_nowhere(drawing, [name for name in wanted if name not in named]))
+    if readings:
+        readings[-1] = replace(readings[-1], unread=(*readings[-1].unread, *nowhere))
     return readings
 
 
-def _nowhere(drawing: Drawing, wanted: Collection[str], named: set[str]) -> list[Unread]:
-    told = {VELOCITY_PLAN: "velocity plan", ACCELERATION_PLAN: "acceleration plan"}
-    missing = []
-    for name in wanted:
-        if name in named:
-            continue
+def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
+    for name in names:
         vector = drawing.construction.vectors.get(name)
         if vector is None:
-            missing.append(Unread(name, "it is no vector or node of this assignment"))
-            continue
-        figure = VELOCITY_PLAN if vector.scale == "kv" else ACCELERATION_PLAN
-        missing.append(Unread(name, f"no {told[figure]} was found on the sheets"))
-    return missing
+            yield Unread(name, "it is no vector or node of this assignment")
+        else:
+            plan = "velocity plan" if vector.scale == "kv" else "acceleration plan"
+            yield Unread(name, f"no {plan} was found on the sheets")

@@ -5,64 +5,75 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grader.reading.expected import Edge, Expected, Hand, Place, Search, Slack, expect, links_of, places
+from grader.reading.expected import DraftingErrors, Expected, Pose, Search, Slack, expect, links_of, poses
 from grader.reading.lines import BoolArray, Lines
-from grader.reading.matching import Ends, Explanation, explain_each
-from grader.reading.nodes import LINK_ENDS as LINKS_END
-from grader.reading.nodes import Fit, fit_nodes
-from grader.records import FloatArray
+from grader.reading.matching import EndPrior, StrokeAssignment, assign_groups
+from grader.reading.nodes import LINK_ENDS, NodeFit, fit_nodes
+from grader.records import MECHANISM, FloatArray
 from reference.authored.assignment import Assignment, Scales, Variant
 from reference.construction.derive import construction_of
 from reference.construction.elements import FixedLine
-from reference.construction.graph import parameters_of
+from reference.construction.graph import Construction, parameters_of
 from reference.construction.mistakes import Drawing, commit, single_mistakes
 from reference.construction.steps import ArcAndLine, OnGuide, Step, TwoLines
-from reference.geometry import ComplexArray
 
 LEAST_LINK_MM = 6.0
+"""A sketch is not laid on shorter strokes: they are letters and hatching."""
 HARDLY = 0.4
-SHORT_LIST = 8
-COST_IN_SUPPORT = 0.05
-WEIGHT_OF_CIRCLES = 0.25
-ROUGHLY_MM = 4.0
+"""A sketch supported over less of its length may be turned on the sheet."""
 SURE = 0.7
 """A sketch supported so well over its length ends the search among other students' variants."""
-LINK_ENDS = Ends(at_mm=1.5, at_share=0.7, beyond_mm=4.0, beyond_share=0.15, short_mm=3.0, short_share=0.15)
+SHORT_LIST = 8
+"""Sketches whose strokes are assigned, by their support."""
+COST_IN_SUPPORT = 0.05
+"""For another assembly, another student's variant, a turn: an edge more must be there."""
+WEIGHT_OF_CIRCLES = 0.25
+ROUGHLY_MM = 4.0
+"""Share of the support that hangs on joint circles, and how near to a joint a circle is its own."""
+END_PRIOR = EndPrior(
+    at_mm=1.5, at_share=0.7, beyond_mm=4.0, beyond_share=0.15, short_mm=3.0, short_share=0.15
+)
 """Links stop at joint circles, short of the joint by the circle's radius."""
-HAND = Hand(angle_rad=float(np.radians(0.6)), length_mm=0.8, shift_mm=0.5)
+DRAFTING_ERRORS = DraftingErrors(angle_rad=float(np.radians(0.6)), length_mm=0.8, shift_mm=0.5)
+"""A sketch is drawn from lengths, a plan from directions."""
 COST_OF_OTHER = 8.0
+"""Nats for a construction that is not the student's: as for a mistake in a plan."""
 WORTH_OF_CIRCLE = 3.0
+"""Nats for a circle where a joint is expected."""
 UPRIGHT_RAD = float(np.radians(2.0))
+"""A sketch turned by less is meant to be upright."""
 GUIDE_DOUBT_MM = 8.0
-GUIDE_REACH_MM = 8.0
-GUIDE_LEAST_MM = 12.0
+"""Weight of the sketch's own turn among strokes along guides, as a length of stroke."""
+GUIDE_REACH_MM, GUIDE_LEAST_MM = 8.0, 12.0
+"""A stroke along a guide passes its joint within this, and is no shorter than this."""
 GUIDE_TILT_RAD = float(np.radians(2.5))
+"""Strokes that are turned further are no guides."""
 LEAST_RADIUS_MM, LARGEST_RADIUS_MM = 0.4, 4.0
+"""Of joint circles: smaller ones are dots of letters, larger ones wheels."""
 NEAR_CIRCLE_MM = 1.5
-LEAST_SEEN_MM, REACH_MM = 4.0, 30.0
+"""How far a joint's circle may lie from where its links say, beside two standard errors."""
+LEAST_VISIBLE_MM, REACH_MM = 4.0, 30.0
+"""Lines that may be links: their least length, and how far they may lie outside the sketch."""
 ANY_TURN = tuple(float(np.radians(angle)) for angle in range(0, 360, 5))
+"""Turns at twice the freedom about each, so that none is left out."""
 
 
 @dataclass(frozen=True, slots=True)
-class Sketch:
+class SketchReading:
     """A mechanism sketch as read.
 
     Attributes
     ----------
     drawing : the construction and parameters of the variant that the sketch follows
-    found, fit : its strokes and its joints
-    turn_rad : how the sketch as a whole is turned, by its joints
+    assignment, fit : its strokes and its joints
     guide_turn_rad : how its guides are turned, by the guides where they are drawn
-    place : where it was laid
     score : nats for it: strokes, circles, less what is unlikely beforehand
     """
 
     drawing: Drawing
-    found: Explanation
-    fit: Fit
-    turn_rad: float
+    assignment: StrokeAssignment
+    fit: NodeFit
     guide_turn_rad: float
-    place: Place
     score: float
 
 
@@ -71,10 +82,9 @@ def drawings(assignment: Assignment, variants: list[Variant], scales: Scales | N
     result = []
     for variant in variants:
         mechanism = assignment.mechanism([variant])
-        own = scales or assignment.scales([variant])
-        parameters = parameters_of(mechanism, own.kL, own.kv, own.ka)
+        used = scales or assignment.scales([variant])
         construction = construction_of(mechanism, plate_by_similarity=False)
-        result.append(Drawing(construction, parameters))
+        result.append(Drawing(construction, parameters_of(mechanism, used.kL, used.kv, used.ka)))
     return result
 
 
@@ -83,77 +93,60 @@ def find_sketch(
     circles: FloatArray,
     own: list[Drawing],
     others: list[Drawing],
-    told: Callable[[Mapping[str, complex]], float],
-) -> Sketch | None:
+    letters_nats: Callable[[Mapping[str, complex]], float],
+) -> SketchReading | None:
     """The sketch that explains most strokes: the student's own variant first, then others.
 
-    Arguments: `told` gives what letters say of joints by name, nats: it decides among near ties.
+    Arguments: `circles` (k, 3) as in `records.Ink`; `letters_nats` says how well letters fit joints by
+    name: it decides among near ties.
     """
     upright = Search(sizes=(1.0, 0.0), smallest=0.4, largest=2.0)
-    long = lines.take(lines.length > LEAST_LINK_MM)
-    laid = [one for drawing, cost in _candidates(own) for one in _laid(drawing, long, circles, upright, cost)]
-    if _top(laid) < SURE:
+    sheet = _SketchSearch(lines, lines.take(lines.length > LEAST_LINK_MM), circles)
+    cases = [case for drawing, cost in _candidates(own) for case in sheet.laid(drawing, upright, cost)]
+    if _best_support(cases) < SURE:
         for drawing in others:
-            laid.extend(_laid(drawing, long, circles, upright, COST_IN_SUPPORT))
-    if _top(laid) < HARDLY and own:
+            cases.extend(sheet.laid(drawing, upright, COST_IN_SUPPORT))
+    if _best_support(cases) < HARDLY and own:
         turned = Search(turns_rad=ANY_TURN, give_rad=float(np.radians(2.5)), sizes=(1.0,))
-        laid.extend(_laid(own[0], long, circles, turned, COST_IN_SUPPORT))
-    laid.sort(key=lambda one: -one[0])
-    regular = {id(drawing.construction) for drawing in own}
-    best = [
-        _Case(drawing, place, id(drawing.construction) in regular) for _, drawing, place in laid[:SHORT_LIST]
-    ]
-    read = max(_read(best, lines, circles), key=lambda one: one.score + told(one.joints), default=None)
-    return None if read is None else _sketch(read, lines)
-
-
-def _top(best: list[tuple[float, Drawing, Place]]) -> float:
-    return max((score for score, _, _ in best), default=0.0)
+        cases.extend(sheet.laid(own[0], turned, COST_IN_SUPPORT))
+    cases.sort(key=lambda case: -case.support)
+    assigned = sheet.assigned(cases[:SHORT_LIST], [drawing.construction for drawing in own])
+    best = max(assigned, key=lambda sketch: sketch.score + letters_nats(sketch.joints), default=None)
+    return None if best is None else _fitted(best, lines)
 
 
 def _candidates(own: list[Drawing]) -> Iterator[tuple[Drawing, float]]:
-    """Each drawing, and each with one group assembled the other way."""
+    """Each drawing, and each with one group assembled the other way; with the cost in support."""
     for drawing in own:
         yield drawing, 0.0
-        for mistake in single_mistakes(drawing, "mechanism"):
+        for mistake in single_mistakes(drawing, MECHANISM):
             if mistake.code == "other_assembly":
-                yield commit(mistake, drawing), 0.05
+                yield commit(mistake, drawing), COST_IN_SUPPORT
 
 
 def _expected(drawing: Drawing) -> Expected:
-    return expect(drawing, "mechanism", {}, HAND, links_of(drawing.construction))
-
-
-def _laid(
-    drawing: Drawing, lines: Lines, circles: FloatArray, search: Search, cost: float
-) -> list[tuple[float, Drawing, Place]]:
-    """Places with their support by strokes and by joint circles, less the cost."""
-    expected = _expected(drawing)
-    centres = circles[:, 0] - 1j * circles[:, 1]
-    laid = []
-    for place in places(expected, lines, search, count=4):
-        joints = place.at + place.size * np.exp(1j * place.turn_rad) * expected.at
-        off = np.abs(joints[:, None] - centres).min(axis=1) if len(centres) else np.full(len(joints), np.inf)
-        circled = float(np.mean(off < ROUGHLY_MM))
-        laid.append((place.score + WEIGHT_OF_CIRCLES * (circled - 1.0) - cost, drawing, place))
-    return laid
+    return expect(drawing, MECHANISM, {}, DRAFTING_ERRORS, links_of(drawing.construction))
 
 
 @dataclass(frozen=True, slots=True)
-class _Case:
-    """A drawing laid at a place; whether it is one that is to be expected."""
+class _SketchCase:
+    """A drawing laid at a pose; its support by strokes and by joint circles, less its cost."""
 
     drawing: Drawing
-    place: Place
-    regular: bool
+    pose: Pose
+    support: float
+
+
+def _best_support(cases: Sequence[_SketchCase]) -> float:
+    return max((case.support for case in cases), default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class _Read:
-    """The best explanation of a case by `lines`, with the circles that stand for joints, and its score."""
+class _Assigned:
+    """A drawing's best assignment to `lines`, the circles that stand for joints, and the score in nats."""
 
-    case: _Case
-    found: Explanation
+    drawing: Drawing
+    assignment: StrokeAssignment
     lines: Lines
     centres: dict[int, complex]
     score: float
@@ -161,61 +154,94 @@ class _Read:
     @property
     def joints(self) -> dict[str, complex]:
         """Where the joints are to be expected, by name."""
-        names, at = self.found.expected.names, self.found.expected.at
-        return {name: self.centres.get(row, complex(at[row])) for row, name in enumerate(names)}
+        expected = self.assignment.expected
+        return {
+            name: self.centres.get(row, complex(expected.at[row])) for row, name in enumerate(expected.names)
+        }
 
 
-def _read(cases: Sequence[_Case], lines: Lines, circles: FloatArray) -> Iterator[_Read]:
-    groups: dict[tuple[Edge, ...], list[tuple[_Case, Expected]]] = {}
-    for case in cases:
-        slack = Slack(shift_mm=2.0, turn_rad=float(np.radians(1.0)), relative=0.03)
-        expected = _expected(case.drawing).placed(case.place.at, case.place.size, case.place.turn_rad, slack)
-        groups.setdefault(expected.edges, []).append((case, expected))
-    for group in groups.values():
-        placed = [expected for _, expected in group]
-        around = lines.take(_near(lines, placed) & (lines.length > LEAST_SEEN_MM))
-        for (case, _), (found, *_) in zip(group, explain_each(placed, around, LINK_ENDS), strict=True):
-            centres = _centres(found.expected.at, found.expected.cov, circles)
-            cost = 0.0 if case.regular else COST_OF_OTHER
-            yield _Read(case, found, around, centres, found.score + WORTH_OF_CIRCLE * len(centres) - cost)
+@dataclass(frozen=True, slots=True)
+class _SketchSearch:
+    """What a sketch is looked for in: all lines, the long ones, circles (k, 3)."""
+
+    lines: Lines
+    long: Lines
+    circles: FloatArray
+
+    def laid(self, drawing: Drawing, search: Search, cost: float) -> list[_SketchCase]:
+        """The poses of a drawing."""
+        expected = _expected(drawing)
+        centres = self.circles[:, 0] - 1j * self.circles[:, 1]
+        cases = []
+        for pose in poses(expected, self.long, search, count=4):
+            joints = pose.at + pose.size * np.exp(1j * pose.turn_rad) * expected.at
+            nearest = np.abs(joints[:, None] - centres).min(axis=1, initial=np.inf)
+            circled = float(np.mean(nearest < ROUGHLY_MM))
+            cases.append(_SketchCase(drawing, pose, pose.score + WEIGHT_OF_CIRCLES * (circled - 1.0) - cost))
+        return cases
+
+    def assigned(self, cases: Sequence[_SketchCase], usual: Sequence[Construction]) -> Iterator[_Assigned]:
+        """Each case with its strokes; constructions other than the usual ones cost more."""
+        slack = Slack(relative=0.03)
+        placed = [_expected(case.drawing).placed(case.pose, slack) for case in cases]
+        for index, (best, *_), around in assign_groups(placed, self.lines, _near, END_PRIOR):
+            drawing = cases[index].drawing
+            centres = self.centres(best.expected)
+            cost = 0.0 if drawing.construction in usual else COST_OF_OTHER
+            score = best.score + WORTH_OF_CIRCLE * len(centres) - cost
+            yield _Assigned(drawing, best, around, centres, score)
+
+    def centres(self, joints: Expected) -> dict[int, complex]:
+        """Circles that stand for joints, by the joint's index: the nearest one, where it is near enough."""
+        radius = self.circles[:, 2]
+        circles = self.circles[(radius > LEAST_RADIUS_MM) & (radius < LARGEST_RADIUS_MM)]
+        at = circles[:, 0] - 1j * circles[:, 1]
+        centres: dict[int, complex] = {}
+        for node, joint in enumerate(joints.at if len(at) else ()):
+            nearest = int(np.argmin(np.abs(at - joint)))
+            spread = float(np.sqrt(np.trace(joints.cov[2 * node : 2 * node + 2, 2 * node : 2 * node + 2])))
+            if abs(at[nearest] - joint) < NEAR_CIRCLE_MM + 2.0 * min(spread, 1.0):
+                centres[node] = complex(at[nearest])
+        return centres
 
 
 def _near(lines: Lines, placed: Sequence[Expected]) -> BoolArray:
-    """Which lines lie about any of the figures."""
+    """Which lines are long enough for a link and lie about any of the figures."""
     near = np.zeros(len(lines), dtype=bool)
-    for one in placed:
-        reach = np.ptp(one.at.real) + np.ptp(one.at.imag) + REACH_MM
-        near |= np.abs(lines.middle - one.at.mean()) < reach
-    return near
+    for figure in placed:
+        reach = np.ptp(figure.at.real) + np.ptp(figure.at.imag) + REACH_MM
+        near |= np.abs(lines.middle - figure.at.mean()) < reach
+    return near & (lines.length > LEAST_VISIBLE_MM)
 
 
-def _sketch(read: _Read, lines: Lines) -> Sketch:
+def _fitted(sketch: _Assigned, lines: Lines) -> SketchReading:
     """The sketch with its joints fitted."""
-    drawing, found = read.case.drawing, read.found
-    fit = fit_nodes(found, read.lines, LINKS_END, read.centres)
+    fit = fit_nodes(sketch.assignment, sketch.lines, LINK_ENDS, sketch.centres)
+    guide_turn = _guide_turn(sketch.drawing, fit, lines)
+    return SketchReading(sketch.drawing, sketch.assignment, fit, guide_turn, sketch.score)
+
+
+def _guide_turn(drawing: Drawing, fit: NodeFit, lines: Lines) -> float:
+    """The mean turn (rad) of strokes along the guides near their joints.
+
+    Where no such stroke is visible: the turn of all joints together, or none where that is small.
+    """
     exact = _expected(drawing).at
     turn = float(np.angle(np.sum((fit.at - fit.at.mean()) * np.conj(exact - exact.mean()))))
-    guide_turn = _guide_turn(drawing, found, fit, lines, turn)
-    return Sketch(drawing, found, fit, turn, guide_turn, read.case.place, read.score)
-
-
-def _guide_turn(drawing: Drawing, found: Explanation, fit: Fit, lines: Lines, turn: float) -> float:
-    """The mean turn of strokes along the guides near their joints; upright where none is seen."""
-    turns, weights = [0.0 if abs(turn) < UPRIGHT_RAD else turn], [GUIDE_DOUBT_MM]
-    for node, step in zip(found.expected.names, drawing.construction.figures["mechanism"], strict=True):
+    usual = 0.0 if abs(turn) < UPRIGHT_RAD else turn
+    turns, weights = [usual], [GUIDE_DOUBT_MM]
+    for joint, step in zip(fit.at.tolist(), drawing.construction.figures[MECHANISM], strict=True):
         guide = _fixed_guide(step)
         if guide is None:
             continue
-        joint = complex(fit.at[found.expected.names.index(node)])
-        angle = float(np.ravel(drawing.parameters[f"angle {guide.guide}"])[0]) + turns[0]
-        off = (lines.along * np.exp(-1j * angle)) ** 2
-        tilt = np.angle(off) / 2.0
-        from_joint = (joint - lines.start) * np.conj(lines.along)
-        near = (np.abs(from_joint.imag) < GUIDE_REACH_MM) & (lines.length > GUIDE_LEAST_MM)
-        near &= (from_joint.real > -GUIDE_REACH_MM) & (from_joint.real < lines.length + GUIDE_REACH_MM)
-        for row in np.flatnonzero(near & (np.abs(tilt) < GUIDE_TILT_RAD)):
-            turns.append(turns[0] + float(tilt[row]))
-            weights.append(float(lines.length[row]))
+        angle = float(np.ravel(drawing.parameters[f"angle {guide.guide}"])[0]) + usual
+        tilt = np.angle((lines.along * np.exp(-1j * angle)) ** 2) / 2.0
+        from_start = (joint - lines.start) * np.conj(lines.along)
+        near = (np.abs(from_start.imag) < GUIDE_REACH_MM) & (lines.length > GUIDE_LEAST_MM)
+        near &= (from_start.real > -GUIDE_REACH_MM) & (from_start.real < lines.length + GUIDE_REACH_MM)
+        rows = np.flatnonzero(near & (np.abs(tilt) < GUIDE_TILT_RAD))
+        turns.extend(usual + tilt[rows])
+        weights.extend(lines.length[rows])
     return float(np.average(turns, weights=weights))
 
 
@@ -227,18 +253,3 @@ def _fixed_guide(step: Step) -> FixedLine | None:
         case TwoLines(first=FixedLine() as guide) | TwoLines(second=FixedLine() as guide):
             return guide
     return None
-
-
-def _centres(joints: ComplexArray, cov: FloatArray, circles: FloatArray) -> dict[int, complex]:
-    """Circles that stand for joints: the nearest one to each, where it is near enough."""
-    centres: dict[int, complex] = {}
-    round_ones = circles[(circles[:, 2] > LEAST_RADIUS_MM) & (circles[:, 2] < LARGEST_RADIUS_MM)]
-    at = round_ones[:, 0] - 1j * round_ones[:, 1]
-    for node, joint in enumerate(joints):
-        if not len(at):
-            break
-        nearest = int(np.argmin(np.abs(at - joint)))
-        spread = float(np.sqrt(np.trace(cov[2 * node : 2 * node + 2, 2 * node : 2 * node + 2])))
-        if abs(at[nearest] - joint) < NEAR_CIRCLE_MM + 2.0 * min(spread, 1.0):
-            centres[node] = complex(at[nearest])
-    return centres

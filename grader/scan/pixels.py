@@ -65,6 +65,12 @@ def at_full_size(points: FloatArray, scale: float | FloatArray) -> FloatArray:
     return (points + 0.5) / scale - 0.5
 
 
+def reduction(scale: float) -> FloatArray:
+    """The homography from full pixels to those of the picture reduced by `scale`."""
+    shift = 0.5 * scale - 0.5
+    return np.array([[scale, 0.0, shift], [0.0, scale, shift], [0.0, 0.0, 1.0]])
+
+
 def cut_out(
     grey: GreyImage, mm_to_px: FloatArray, box: Box, px_per_mm: float, outside: int | None = None
 ) -> GreyImage:
@@ -245,7 +251,7 @@ def cut_across(
     return (
         cuts[0]
         if len(cuts) == 1
-        else Cuts(*(np.concatenate([getattr(one, name.name) for one in cuts]) for name in fields(Cuts)))
+        else Cuts(*(np.concatenate([getattr(part, name.name) for part in cuts]) for name in fields(Cuts)))
     )
 
 
@@ -308,15 +314,15 @@ def _borders(
     outward = np.argsort(np.abs(across), kind="stable")
     nearest = (inked & near)[:, outward]
     first = nearest.argmax(axis=1)
-    found, middle = nearest[rows, first], outward[first]
+    inked_there, middle = nearest[rows, first], outward[first]
     # The run reaches from the last paper before its middle to the first paper after it.
     column = np.arange(count, dtype=np.int16)
     before = np.maximum.accumulate(np.where(inked, np.int16(-1), column), axis=1)[rows, middle]
     after = np.minimum.accumulate(np.where(inked, np.int16(count), column)[:, ::-1], axis=1)
     behind = after[rows, count - 1 - middle]
-    left = np.where(found, _crossing(contrast, across, before, 1, level32), np.nan)
-    right = np.where(found, _crossing(contrast, across, behind, -1, level32), np.nan)
-    dark = np.where(found, contrast[rows, middle], 0.0).astype(np.float64)
+    left = np.where(inked_there, _crossing(contrast, across, before, 1, level32), np.nan)
+    right = np.where(inked_there, _crossing(contrast, across, behind, -1, level32), np.nan)
+    dark = np.where(inked_there, contrast[rows, middle], 0.0).astype(np.float64)
     return left, right, dark
 
 

@@ -2,7 +2,7 @@
 
 Each node is held against the one that a perfect hand would have made of the student's *own* earlier
 nodes, so that an error counts where it was made and nowhere after. What an act may miss by, from the
-construction's derivative with a usual hand's errors, makes the misses of all acts comparable: for hands
+construction's derivative with a usual hand's errors, makes the errors of all acts comparable: for hands
 that do not know of each other they are independent and of one spread. A mistake is no error of a hand:
 acts that miss by much more than the student's others are left out.
 
@@ -22,7 +22,15 @@ from numpy.typing import NDArray
 from scipy.special import betainc, gammaincc
 
 from grader.records import MECHANISM, FloatArray, IntArray
-from grader.similarity.submission import USUAL, ComparedSubmission, Drawn, drawn_of, fitting, scales_used
+from grader.similarity.submission import (
+    UNKNOWN,
+    USUAL,
+    ComparedSubmission,
+    Drawn,
+    drawn_of,
+    fitting,
+    scales_used,
+)
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.derive import construction_of
 from reference.construction.elements import View
@@ -33,16 +41,18 @@ from reference.geometry import ComplexArray
 from reference.plan import exact_plan
 
 USUAL_SHARE = 0.45
+"""Drafting errors that count as independent, as a share of all; a large class shows its own share,"""
 LARGEST_SHARE = 0.7
-"""Drafting errors that count as independent, as a share of all; a large class shows its own."""
+"""which is taken up to this."""
 RARE = -9.0
 """Log of the chance below which two placements make it worth to hold each against the other's variant."""
 SCALES = ("kL", "kv", "ka")
 GROSS = 4.0
-"""A miss so many times as large as the student's usual one is a mistake or a misreading."""
+"""An error so many times as large as the student's usual one is a mistake or a misreading."""
 TAIL = 2.5
-"""Larger misses count as this: one bad slip does not make two drawings alike."""
+"""Larger errors count as this: one bad slip does not make two drawings similar."""
 LEAST_SPREAD = 0.1
+"""A student's usual error is not taken for less than this share of a usual hand's."""
 LEAST_CLASS = 10
 """So many of one variant tell what they have in common (a copier's scale, a table's rounding)."""
 NEAR_MM = 0.5
@@ -54,6 +64,7 @@ LAYOUT_MM, LAYOUT_SHARE = 16.0, 0.15
 variants on the same poles have it (0.28), free ones do not (0.003), nor does one copy among ten pairs.
 """
 LEAST_PAIRS = 10
+"""Fewer pairs do not show what a class has in common."""
 TRUSTED = 3000.0
 """So many times the class's pairs the rarest placement may be: rarer ones no class can vouch for."""
 
@@ -97,30 +108,27 @@ def compare_drawings(assignment: Assignment, submissions: Sequence[ComparedSubmi
         plate_by_similarity=assignment.file.plate_images == "similarity",
     )
     figures = (MECHANISM, *construction.poles)
-    drawn = drawn_of(submissions, {one: [step.node for step in construction.figures[one]] for one in figures})
+    nodes = {figure: [step.node for step in construction.figures[figure]] for figure in figures}
+    drawn = drawn_of(submissions, nodes)
     fits = fitting(assignment, submissions, drawn)
-    variants = list(dict.fromkeys(one.variant for one in submissions))
-    printed = np.array([one.printed for one in submissions])
-    places, layout = place_chance(
-        drawn, printed, np.array([variants.index(one.variant) for one in submissions])
-    )
+    variants = list(dict.fromkeys(each.variant for each in submissions))
+    variant = np.array([variants.index(each.variant) for each in submissions])
+    printed = np.array([each.printed for each in submissions])
+    places, layout = place_chance(drawn, printed, variant)
     rows = _rows(submissions, fits, places)
     together = _together(rows, submissions)
     cosines, counts, log_agreement = _agreement(
         drafting_errors(assignment, submissions, drawn, rows), together
     )
     log_errors, cosine, count = _by_student(
-        rows,
-        len(submissions),
-        np.asarray(np.where(together, log_agreement, 0.0), np.float64),
-        (cosines, counts),
+        rows, len(submissions), np.where(together, log_agreement, 0.0), cosines, counts
     )
-    compared = _by_student(rows, len(submissions), np.where(together, -1.0, 0.0), ())[0] < 0.0
-    people = np.array([one.student_id for one in submissions])
+    (compared,) = _by_student(rows, len(submissions), np.where(together, -1.0, 0.0))
+    people = np.array([each.student_id for each in submissions])
     return DrawingSimilarity(
-        log_chance=np.where(compared, _both(log_errors, places), 0.0),
+        log_chance=np.where(compared < 0.0, _both(log_errors, places), 0.0),
         log_errors=log_errors,
-        log_places=np.where(compared, places, 0.0),
+        log_places=np.where(compared < 0.0, places, 0.0),
         log_layout=layout,
         cosine=cosine,
         count=count,
@@ -135,42 +143,38 @@ def _rows(
     places: FloatArray,
 ) -> list[Row]:
     """Each drawing against its own variant, against those that it fits, and that of whose places it has."""
-    rows = dict.fromkeys(Row(k, one.variant) for k, one in enumerate(submissions))
-    rows |= dict.fromkeys(Row(k, found[0]) for k, found in enumerate(fits) if found is not None)
-    known = {one.variant for one in submissions}
-    rows |= dict.fromkeys(
-        Row(k, one.fits[0])
-        for k, one in enumerate(submissions)
-        if one.fits is not None and one.fits[0] in known
-    )
+    known = {each.variant for each in submissions}
+    rows = [Row(k, each.variant) for k, each in enumerate(submissions)]
+    rows += [Row(k, fit[0]) for k, fit in enumerate(fits) if fit is not None]
+    diagnosed = [(k, each.fits[0]) for k, each in enumerate(submissions) if each.fits is not None]
+    rows += [Row(k, variant) for k, variant in diagnosed if variant in known]
     if len(submissions) > 1:
-        rows |= dict.fromkeys(Row(int(j), submissions[i].variant) for i, j in np.argwhere(places < RARE))
-    return list(rows)
+        rows += [Row(int(j), submissions[i].variant) for i, j in np.argwhere(places < RARE)]
+    return list(dict.fromkeys(rows))
 
 
 def _together(rows: Sequence[Row], submissions: Sequence[ComparedSubmission]) -> NDArray[np.bool_]:
     """(rows, rows) which rows are compared: of one variant, and of two people."""
-    variants = {one: k for k, one in enumerate(dict.fromkeys(row.variant for row in rows))}
-    people = {one: k for k, one in enumerate(dict.fromkeys(one.student_id for one in submissions))}
-    variant = np.array([variants[row.variant] for row in rows])
-    person = np.array([people[submissions[row.owner].student_id] for row in rows])
+    variants = list(dict.fromkeys(row.variant for row in rows))
+    variant = np.array([variants.index(row.variant) for row in rows])
+    person = np.array([submissions[row.owner].student_id for row in rows])
     return np.asarray((variant[:, None] == variant[None, :]) & (person[:, None] != person[None, :]))
 
 
 def _by_student(
-    rows: Sequence[Row], students: int, log_chance: FloatArray, others: Sequence[FloatArray]
+    rows: Sequence[Row], students: int, log_chance: FloatArray, *others: FloatArray
 ) -> list[FloatArray]:
-    """For every two students the rows that agree best, and what else is known of those."""
+    """For every two students the least chance of their rows, and the other values of those rows."""
     owner = np.array([row.owner for row in rows])
     pair = owner[:, None] * students + owner[None, :]
     order = np.argsort(-log_chance, axis=None, kind="stable")
-    found = []
+    by_student = []
     for values in (log_chance, *others):
         best = np.zeros(students * students)
-        # The last one written is the least chance.
+        # The value written last is that of the least chance.
         best[pair.ravel()[order]] = values.ravel()[order]
-        found.append(best.reshape(students, students))
-    return found
+        by_student.append(best.reshape(students, students))
+    return by_student
 
 
 def _both(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -196,22 +200,21 @@ def drafting_errors(
     owner = np.array([row.owner for row in rows], np.int64)
     variants = [row.variant for row in rows]
     chosen = [submissions[row.owner] for row in rows]
-    placed = {figure: one.at[owner] for figure, one in drawn.items()}
-    misses, by_scale = _misses(assignment, chosen, variants, placed)
-    errors = _normed(misses - _scale(misses, by_scale) * by_scale)
+    placed = {figure: nodes.at[owner] for figure, nodes in drawn.items()}
+    raw, by_scale = _raw_errors(assignment, chosen, variants, placed)
+    errors = _normed(raw - _enlargement(raw, by_scale) * by_scale)
     return _centred(_without(errors, by_scale), variants)
 
 
-def _misses(
+def _raw_errors(
     assignment: Assignment,
     chosen: Sequence[ComparedSubmission],
     variants: list[Variant],
     drawn: Mapping[str, ComplexArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """What each node is off from the student's own earlier ones, in usual errors; both (rows, 2 nodes).
+    """Errors of each node against the student's own earlier nodes, in usual errors; both (rows, 2 nodes).
 
-    The second array is what it would be off if everything came out larger by its own size, as printers
-    and copiers do it.
+    The second array is the error that an enlargement by 1 would give, as printers and copiers enlarge.
     """
     plan = exact_plan(assignment, variants, scales_used(assignment, chosen, variants))
     own = _own_nodes(plan.construction, plan.nodes_mm, drawn)
@@ -219,17 +222,17 @@ def _misses(
     known = plan.drawing.parameters
     view = View(nodes, known)
     copied = View(nodes, {**known, **{name: np.asarray(known[name] / (1.0 + SMALL)) for name in SCALES}})
-    found, by_scale = [], []
+    errors, by_scale = [], []
     with np.errstate(invalid="ignore", divide="ignore"):
         for step in plan.construction.steps:
             expected = np.broadcast_to(step.place(view), (len(chosen),))
             placed = own[step.node]
             if not isinstance(step, Coincide | Pivot | Pole):
-                reach = _reach(step, view, expected)
-                found.append(_whitened(placed - expected, reach))
-                by_scale.append(_whitened((step.place(copied) - expected) / SMALL, reach))
+                covariance = _covariance(step, view, expected)
+                errors.append(_whitened(placed - expected, covariance))
+                by_scale.append(_whitened((step.place(copied) - expected) / SMALL, covariance))
             nodes[step.node] = np.where(np.isfinite(placed), placed, expected)
-    return _finite(np.concatenate(found, axis=1)), _finite(np.concatenate(by_scale, axis=1))
+    return _finite(np.concatenate(errors, axis=1)), _finite(np.concatenate(by_scale, axis=1))
 
 
 def _finite(values: FloatArray) -> FloatArray:
@@ -271,39 +274,40 @@ def _laid_over(drawn: ComplexArray, proper: ComplexArray) -> tuple[ComplexArray,
     return (drawn - middle) * turn[:, None].conj() + centre, turn
 
 
-def _reach(step: Step, view: View, expected: ComplexArray) -> FloatArray:
+def _covariance(step: Step, view: View, expected: ComplexArray) -> FloatArray:
     """(rows, 2, 2) covariance of a node under a usual hand's errors in the acts that make it, mm^2."""
     errors = hand_errors(step, USUAL)
     placed = np.asarray(step.place(View(view.nodes, view.parameters, errors)))
-    moved = (np.broadcast_to(placed, (len(next(iter(errors.values()))), len(expected))) - expected) / SMALL
-    by = np.nan_to_num(np.stack([moved.real, moved.imag], axis=-1))
+    count = len(next(iter(errors.values())))
+    change = (np.broadcast_to(placed, (count, len(expected))) - expected) / SMALL
+    by = np.nan_to_num(np.stack([change.real, change.imag], axis=-1))
     return np.asarray(np.einsum("ari,arj->rij", by, by) + USUAL.mark_mm**2 * np.eye(2))
 
 
-def _whitened(off: ComplexArray, covariance: FloatArray) -> FloatArray:
-    """(rows, 2) an offset in units of its spread."""
+def _whitened(error: ComplexArray, covariance: FloatArray) -> FloatArray:
+    """(rows, 2) an error in units of its spread."""
     root = np.linalg.cholesky(covariance)
-    return np.linalg.solve(root, np.stack([off.real, off.imag], axis=-1)[..., None])[..., 0]
+    return np.linalg.solve(root, np.stack([error.real, error.imag], axis=-1)[..., None])[..., 0]
 
 
-def _normed(misses: FloatArray) -> FloatArray:
-    """Misses in units of the student's usual one; mistakes out, bad slips cut to size."""
+def _normed(errors: FloatArray) -> FloatArray:
+    """Errors in units of the student's usual one; mistakes out, bad slips cut to size."""
     with np.errstate(invalid="ignore"):
-        usual = _middle(np.abs(misses)) / 0.6745
-        scaled = misses / np.maximum(usual, LEAST_SPREAD)
+        usual = _median(np.abs(errors))[:, None] / 0.6745
+        scaled = errors / np.maximum(usual, LEAST_SPREAD)
         scaled[np.abs(scaled) > GROSS] = np.nan
         return np.clip(scaled, -TAIL, TAIL)
 
 
-def _scale(misses: FloatArray, by_scale: FloatArray) -> FloatArray:
-    """(rows, 1) the common enlargement, the median of what each length tells, by its weight."""
-    weight = np.where(np.isfinite(misses) & np.isfinite(by_scale), np.abs(by_scale), 0.0)
+def _enlargement(errors: FloatArray, by_scale: FloatArray) -> FloatArray:
+    """(rows, 1) the common enlargement: the median of the enlargements of all lengths, by their weight."""
+    weight = np.where(np.isfinite(errors) & np.isfinite(by_scale), np.abs(by_scale), 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        told = np.where(weight > 0.0, misses / by_scale, 0.0)
-    order = np.argsort(told, axis=1)
+        each = np.where(weight > 0.0, errors / by_scale, 0.0)
+    order = np.argsort(each, axis=1)
     reached = np.cumsum(np.take_along_axis(weight, order, axis=1), axis=1)
     middle = (reached >= reached[:, -1:] / 2.0).argmax(axis=1)[:, None]
-    return np.take_along_axis(np.take_along_axis(told, order, axis=1), middle, axis=1)
+    return np.take_along_axis(np.take_along_axis(each, order, axis=1), middle, axis=1)
 
 
 def _without(errors: FloatArray, by_scale: FloatArray) -> FloatArray:
@@ -315,25 +319,24 @@ def _without(errors: FloatArray, by_scale: FloatArray) -> FloatArray:
     return np.asarray(errors - share * along)
 
 
-def _middle(values: FloatArray) -> FloatArray:
-    """Medians of rows, of what is known; nan-free (0 for empty rows)."""
+def _median(values: FloatArray) -> FloatArray:
+    """Lower medians of the finite values along the last axis; 0 where there are none."""
     known = np.isfinite(values)
-    ordered = np.sort(np.where(known, values, np.inf), axis=1)
-    count = known.sum(axis=1)
-    middle = (
-        ordered[np.arange(len(values)), np.maximum(count - 1, 0) // 2] if values.shape[1] else count * 0.0
-    )
-    return np.where(count > 0, middle, 0.0)[:, None]
+    count = known.sum(axis=-1)
+    if not values.shape[-1]:
+        return np.zeros(count.shape)
+    ordered = np.sort(np.where(known, values, np.inf), axis=-1)
+    middle = np.take_along_axis(ordered, np.maximum(count - 1, 0)[..., None] // 2, axis=-1)[..., 0]
+    return np.where(count > 0, middle, 0.0)
 
 
 def _centred(errors: FloatArray, variants: Sequence[Variant]) -> FloatArray:
     """Errors less what all of a variant have in common, where they are many enough to tell."""
     errors = errors.copy()
     for variant in set(variants):
-        same = np.array([one == variant for one in variants])
+        same = np.array([each == variant for each in variants])
         if same.sum() >= LEAST_CLASS:
-            common = _middle(errors[same].T)
-            errors[same] -= common.T
+            errors[same] -= _median(errors[same].T)
     return errors
 
 
@@ -395,7 +398,7 @@ def place_chance(
     What one figure is shifted by, from one student's sheet to another's, is held against the shift of
     the next: it does not matter how the sheets lay in the scanner.
     """
-    shifts = {figure: _shift(one.at) for figure, one in drawn.items()}
+    shifts = {figure: _shift(nodes.at) for figure, nodes in drawn.items()}
     count = len(next(iter(drawn.values())).at)
     apart, freedom = np.zeros((count, count)), np.zeros((count, count), np.int64)
     for first, second in combinations(drawn, 2):
@@ -425,16 +428,8 @@ def place_chance(
 def _shift(at: ComplexArray) -> ComplexArray:
     """(students, students) by how much a figure is shifted, the median over the nodes that both have."""
     between = at[None, :, :] - at[:, None, :]
-    known = np.isfinite(between)
-    last = np.maximum(known.sum(axis=2) - 1, 0)[..., None] // 2
-    x, y = (
-        np.take_along_axis(np.sort(np.where(known, part, np.inf), axis=2), last, axis=2)[..., 0]
-        for part in (between.real, between.imag)
-    )
-    shift = np.full(x.shape, complex(np.nan, np.nan))
-    some = np.isfinite(x) & np.isfinite(y)
-    shift[some] = x[some] + 1j * y[some]
-    return shift
+    shift = _median(between.real) + 1j * _median(between.imag)
+    return np.asarray(np.where(np.isfinite(between).any(axis=2), shift, UNKNOWN))
 
 
 def _chance(apart: FloatArray, freedom: IntArray, among: NDArray[np.bool_] | None = None) -> FloatArray:
@@ -449,16 +444,16 @@ def _chance(apart: FloatArray, freedom: IntArray, among: NDArray[np.bool_] | Non
         if of_these.sum() < 2 * LEAST_PAIRS:
             continue
         pairs = np.maximum(_without_both(of_these), 1.0)
-        found = np.full(apart.shape, -np.inf)
+        densest = np.full(apart.shape, -np.inf)
         for ring in RINGS_MM:
             others = _without_both(of_these & (apart <= ring))
             if ring == RINGS_MM[-1]:
                 others = np.maximum(others, 1.0)
             nearer = dimensions * np.log(np.minimum(apart / ring, 1.0))
             with np.errstate(divide="ignore"):
-                found = np.maximum(found, np.log(others / pairs) + nearer)
+                densest = np.maximum(densest, np.log(others / pairs) + nearer)
         least = -np.log(TRUSTED * pairs) if among is None else -np.inf
-        chance = np.where(of_these, np.clip(found, least, 0.0), chance)
+        chance = np.where(of_these, np.clip(densest, least, 0.0), chance)
     return chance
 
 

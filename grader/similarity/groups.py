@@ -1,12 +1,12 @@
-"""Sheets that look alike, more than independent hands come to. Never an accusation: look at both.
+"""Similar sheets: pairs that are nearer to each other than independent hands come by chance.
 
-Well-drawn plans of one variant are alike anyway, and so are the values of all who work exactly. What
-tells are the errors: two hands miss differently. Each kind of evidence gives the chance that two
-students who work apart come so near; times the number of pairs it is the measure, how many such pairs
-a class of this size would show by chance.
+No accusation: a person should look at both. Well-drawn plans of one variant are similar anyway, and so
+are the values of all who work exactly. The evidence is in the errors, which differ between two hands.
+Each kind of evidence gives the chance that two students who work apart come so near; times the number
+of pairs it is the measure: how many such pairs a class of this size would show by chance.
 
-The ink of two sheets is laid over each other as well: the very same drawing, scanned twice, nearly
-covers itself. A small map of each sheet tells where its ink lies. What many sheets have in common (frame,
+The ink of two sheets is compared as well: the same drawing, scanned twice, nearly covers itself. A
+small map of each sheet says where its ink is. What many sheets have in common (frame,
 title block, a printed sheet's lines) is left out, and how much independent drawings of this class
 resemble each other is measured on the class itself.
 """
@@ -33,6 +33,7 @@ MOST_OWNERS = 3
 """A number that more students have does not tell whose drawing it is."""
 
 CELL_MM = 2.5
+"""Side of a map's cell."""
 CELLS = (118, 168)
 """Rows and columns of an A3 sheet's map; what lies outside is left out."""
 COMMON = 0.3
@@ -54,9 +55,11 @@ LEAST_SHEETS = 7
 LEAST_OVERLAP = 0.5
 """Mean correlation of the parts below which two sheets are never the same drawing."""
 LEAST_SPREAD = 0.015
+"""Least scale of the tail, in inverse hyperbolic tangents: where all pairs are equal there is none."""
 QUANTILES = 0.84, 0.95
 """The upper one leaves a copied pair out in a class of seven."""
 TAIL_DROP = float(np.log((1.0 - QUANTILES[0]) / (1.0 - QUANTILES[1])))
+"""How far the logarithm of an exponential tail falls between the two quantiles."""
 
 Maps = Sequence[Sequence[NDArray[np.uint8]]]
 
@@ -79,7 +82,7 @@ class PictureSimilarity:
 
 @dataclass(slots=True)
 class _Pair:
-    """What speaks for two students' sheets being alike."""
+    """The evidence that two students' sheets are similar."""
 
     why: list[Sign] = field(default_factory=list)
     measure: float | None = None
@@ -87,7 +90,7 @@ class _Pair:
     compared: int = 0
 
     def add(self, why: Sequence[Sign], measure: float | None, share: float | None, compared: int) -> None:
-        """One more kind of evidence; the rarest coincidence is the one that is told."""
+        """Add a kind of evidence; the measure is that of the rarest coincidence."""
         self.why += [sign for sign in why if sign not in self.why]
         if measure is not None and (self.measure is None or measure < self.measure):
             self.measure, self.share, self.compared = measure, share, compared
@@ -107,7 +110,7 @@ def find_similar(
     _add_drawings(pairs, drawings)
     _add_numbers(pairs, compare_numbers(assignment, submissions))
     owners = [k for k, of_student in enumerate(maps) for _ in of_student]
-    printed = np.array([one.printed for one in submissions])
+    printed = np.array([each.printed for each in submissions])
     pictures = compare_pictures(owners, [sheet for of_student in maps for sheet in of_student], printed)
     _add_pictures(pairs, pictures, drawings)
     _add_other_numbers(pairs, submissions, drawings)
@@ -160,15 +163,18 @@ def _add_other_numbers(
     drawings: DrawingSimilarity,
 ) -> None:
     """Whose number it is that somebody drew with."""
-    for k, one in enumerate(submissions):
-        if one.fits is not None:
-            owners = [other for other, its in enumerate(submissions) if its.variant == one.fits[0]]
-            owners = [other for other in owners if submissions[other].student_id != one.student_id]
-            if len(owners) <= MOST_OWNERS:
-                for other in owners:
-                    pairs.setdefault((min(k, other), max(k, other)), _Pair()).add(
-                        ["other_number"], None, None, 0
-                    )
+    for k, submission in enumerate(submissions):
+        owners = [
+            other
+            for other, owner in enumerate(submissions)
+            if submission.fits is not None
+            and owner.variant == submission.fits[0]
+            and owner.student_id != submission.student_id
+        ]
+        if len(owners) <= MOST_OWNERS:
+            for other in owners:
+                pair = pairs.setdefault((min(k, other), max(k, other)), _Pair())
+                pair.add(["other_number"], None, None, 0)
     for (i, j), pair in pairs.items():
         fits = {k: drawings.fits[k] for k in (i, j)}
         crossed = [(fits[i], submissions[j].variant), (fits[j], submissions[i].variant)]
@@ -177,20 +183,21 @@ def _add_other_numbers(
 
 
 def _groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
-    """Those who hang together by pairs."""
-    group: dict[int, set[int]] = {}
-    for i, j in pairs:
-        joined = group.get(i, {i}) | group.get(j, {j})
-        for one in joined:
-            group[one] = joined
-    return [sorted(members) for members in {id(one): one for one in group.values()}.values()]
+    """The students who are connected by pairs."""
+    groups: list[set[int]] = []
+    for pair in pairs:
+        joined = set(pair).union(*(group for group in groups if not group.isdisjoint(pair)))
+        groups = [group for group in groups if group.isdisjoint(joined)] + [joined]
+    return [sorted(group) for group in groups]
 
 
 def _document(
-    submissions: Sequence[ComparedSubmission], members: Sequence[int], told: Sequence[tuple[int, int, _Pair]]
+    submissions: Sequence[ComparedSubmission],
+    members: Sequence[int],
+    strangers: Sequence[tuple[int, int, _Pair]],
 ) -> AlikeDocument:
-    """One entry for all who hang together, with the measure of the weakest link that has one."""
-    of_these = [pair for i, j, pair in told if i in members and j in members]
+    """An entry for a group of students, with the measure of its weakest pair that has a measure."""
+    of_these = [pair for i, j, pair in strangers if i in members and j in members]
     weakest = max(of_these, key=lambda pair: -1.0 if pair.measure is None else pair.measure)
     return AlikeDocument(
         students=[submissions[k].student_id for k in members],
@@ -210,10 +217,10 @@ def ink_map(scan: GreyImage, page_mm: tuple[float, float]) -> NDArray[np.uint8]:
 
     Arguments: `scan` (h, w) uint8, 255 = paper, that shows the whole page of `page_mm`.
     """
-    found = np.zeros(CELLS, np.uint8)
+    ink = np.zeros(CELLS, np.uint8)
     high, wide = scan.shape
     if high < CELLS[0] or wide < CELLS[1]:
-        return found
+        return ink
     edges = [
         np.minimum((np.arange(cells + 1) * CELL_MM / size * pixels).astype(np.int64), pixels)
         for cells, size, pixels in ((CELLS[0], page_mm[1], high), (CELLS[1], page_mm[0], wide))
@@ -223,8 +230,8 @@ def ink_map(scan: GreyImage, page_mm: tuple[float, float]) -> NDArray[np.uint8]:
     dark = 255 - scan[: last[0], : last[1]]
     sums = np.add.reduceat(np.add.reduceat(dark, rows, axis=0, dtype=np.int64), columns, axis=1)
     area = np.diff([*rows, last[0]])[:, None] * np.diff([*columns, last[1]])
-    found[: len(rows), : len(columns)] = sums / area
-    return found
+    ink[: len(rows), : len(columns)] = sums / area
+    return ink
 
 
 def compare_pictures(
@@ -272,8 +279,8 @@ def _agreement(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> FloatArra
     size = np.sqrt((parts**2).sum(axis=2))
     parts /= np.maximum(size, FAINT)[..., None]
     total, count = np.zeros((2, len(maps), len(maps)))
-    for part, its_size in zip(parts, size, strict=True):
-        having = (its_size[:, None] > FAINT) | (its_size[None, :] > FAINT)
+    for part, norm in zip(parts, size, strict=True):
+        having = (norm[:, None] > FAINT) | (norm[None, :] > FAINT)
         total += having * (part @ part.T)
         count += having
     return np.asarray(total / np.maximum(count, LEAST_PARTS))

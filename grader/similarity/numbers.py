@@ -30,15 +30,19 @@ GRAINS = (1.0, 0.5, 0.1)
 """Steps of rulers and protractors, mm and degrees. Finer ones are calculated, not measured: no finer
 coincidence counts."""
 NEARLY_ALL = 0.75
+"""Share of the values that must be multiples of a step."""
 LEAST_MM = 8.0
 """Directions of shorter vectors are not compared."""
 GROSS = 4.0
+"""An error of more standard deviations is a mistake, not a hand's error."""
 ROUNDED_MM = 0.05
 """As good as exact, beside the step of the values."""
 OWN_SHARE = 0.6
 """Of a student's values that must be near the exact ones: others are of another drawing."""
 LEAST_EQUAL = 5
+"""Fewer equal values are not examined,"""
 LEAST_TELLING = 3
+"""nor are values of which fewer differ from the exact ones by more than rounding."""
 SKILLS = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0)
 """Drafting errors tried, as multiples of the usual one's errors."""
 
@@ -87,7 +91,7 @@ def compare_numbers(assignment: Assignment, submissions: Sequence[ComparedSubmis
     """Compare the entered values of a class, each against the variant that was drawn."""
     count = len(submissions)
     chance, equal, compared = np.zeros((count, count)), np.zeros((count, count)), np.zeros((count, count))
-    having = [k for k, one in enumerate(submissions) if len(one.numbers) >= LEAST_EQUAL]
+    having = [k for k, each in enumerate(submissions) if len(each.numbers) >= LEAST_EQUAL]
     if len(having) < 2:
         return NumberSimilarity(chance, equal, compared, 0)
     table = _table(assignment, [submissions[k] for k in having])
@@ -139,12 +143,14 @@ def _choices(both: FloatArray, equal: FloatArray) -> FloatArray:
 
 
 def _table(assignment: Assignment, submissions: Sequence[ComparedSubmission]) -> _Table:
-    known = {one.variant for one in submissions}
-    variants = [one.fits[0] if one.fits and one.fits[0] in known else one.variant for one in submissions]
+    known = {each.variant for each in submissions}
+    variants = [each.fits[0] if each.fits and each.fits[0] in known else each.variant for each in submissions]
     exact, added = _exact(assignment, submissions, variants)
     names = list(exact)
-    lengths = np.array([[one.numbers.get(name, np.nan) for name in names] for one in submissions])
-    turns = np.array([[one.numbers.get(f"{name}_deg", np.nan) for name in names] for one in submissions])
+    lengths, turns = (
+        np.array([[each.numbers.get(f"{name}{part}", np.nan) for name in names] for each in submissions])
+        for part in ("", "_deg")
+    )
     drawn = np.array([exact[name] for name in names]).T
     size = np.abs(drawn)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -156,17 +162,21 @@ def _table(assignment: Assignment, submissions: Sequence[ComparedSubmission]) ->
     grain = np.concatenate([known_mm * np.ones_like(size), np.radians(known_deg) * size], axis=1)
     off_mm = np.concatenate([lengths - size, np.radians(off) * size], axis=1)
     by_act = np.concatenate([acts.real, acts.imag], axis=1)
-    spread = np.sqrt((by_act**2).sum(axis=2) + READ_OFF_MM**2 + grain**2 / 12.0)
-    excused = np.tile([[name in one.excused for name in names] for one in submissions], 2)
+    spread = _spread(by_act, grain)
+    excused = np.tile([[name in each.excused for name in names] for each in submissions], 2)
     entered = np.concatenate([lengths, turns], axis=1)
     with np.errstate(invalid="ignore"):
         usable = np.isfinite(entered) & (np.abs(off_mm) < GROSS * spread) & ~excused
-        usable &= usable.sum(axis=1, keepdims=True) >= OWN_SHARE * np.isfinite(entered).sum(
-            axis=1, keepdims=True
-        )
+        count = np.isfinite(entered).sum(axis=1, keepdims=True)
+        usable &= usable.sum(axis=1, keepdims=True) >= OWN_SHARE * count
         off_mm = off_mm - _common(np.where(usable, off_mm, np.nan), variants)
         telling = usable & (np.abs(off_mm) > 0.5 * grain + ROUNDED_MM)
     return _Table(entered, usable, telling, off_mm, grain, by_act)
+
+
+def _spread(by_act: FloatArray, grain_mm: FloatArray) -> FloatArray:
+    """(students, fields) standard deviation of a usual hand's values, mm."""
+    return np.asarray(np.sqrt((by_act**2).sum(axis=2) + READ_OFF_MM**2 + grain_mm**2 / 12.0))
 
 
 def _exact(
@@ -177,7 +187,7 @@ def _exact(
     vectors = {
         name: np.broadcast_to(plan.drawn_mm(name), len(submissions)) for name in plan.construction.vectors
     }
-    moved: dict[str, list[ComplexArray]] = {name: [] for name in vectors}
+    changes: dict[str, list[ComplexArray]] = {name: [] for name in vectors}
     for step in plan.construction.steps:
         errors = hand_errors(step, USUAL)
         if not errors:
@@ -186,12 +196,12 @@ def _exact(
         for name, vector in plan.construction.vectors.items():
             ends = np.atleast_2d(nodes[vector.head] - nodes[vector.tail])
             change = (ends[1:] - ends[:1]) / SMALL if len(ends) > 1 else np.zeros((len(errors), 1))
-            moved[name].append(np.asarray(np.broadcast_to(change, (len(errors), len(submissions))).T))
+            changes[name].append(np.asarray(np.broadcast_to(change, (len(errors), len(submissions))).T))
     for plan_name in plan.construction.poles:
         of_plan = {vector.name for vector in plan.construction.vectors_of(plan_name)}
         for name, drawn in vectors.items():
-            moved[name].append((SCALE_OFF * drawn * (name in of_plan))[:, None])
-    return vectors, {name: np.nan_to_num(np.concatenate(parts, axis=1)) for name, parts in moved.items()}
+            changes[name].append((SCALE_OFF * drawn * (name in of_plan))[:, None])
+    return vectors, {name: np.nan_to_num(np.concatenate(parts, axis=1)) for name, parts in changes.items()}
 
 
 def _common(off_mm: FloatArray, variants: Sequence[Variant]) -> FloatArray:
@@ -202,7 +212,7 @@ def _common(off_mm: FloatArray, variants: Sequence[Variant]) -> FloatArray:
     """
     common = np.zeros_like(off_mm)
     for variant in set(variants):
-        same = np.array([one == variant for one in variants])
+        same = np.array([each == variant for each in variants])
         known = np.isfinite(off_mm[same])
         count = known.sum(axis=0)
         mean = np.where(known, off_mm[same], 0.0).sum(axis=0) / np.maximum(count, 1)
@@ -213,12 +223,12 @@ def _common(off_mm: FloatArray, variants: Sequence[Variant]) -> FloatArray:
 def _grain(values: FloatArray) -> FloatArray:
     """(students, 1) the coarsest step of which nearly all the values are multiples, the finest for none."""
     count = np.isfinite(values).sum(axis=1, keepdims=True)
-    found = np.full((len(values), 1), GRAINS[-1])
+    coarsest = np.full((len(values), 1), GRAINS[-1])
     for grain in sorted(GRAINS[:-1]):
         with np.errstate(invalid="ignore"):
             whole = (np.abs(values / grain - np.round(values / grain)) < 1e-6).sum(axis=1, keepdims=True)
-        found = np.where(whole >= NEARLY_ALL * count, grain, found)
-    return found
+        coarsest = np.where(whole >= NEARLY_ALL * count, grain, coarsest)
+    return coarsest
 
 
 # Chances ------------------------------------------------------------------------------------------
@@ -226,7 +236,7 @@ def _grain(values: FloatArray) -> FloatArray:
 
 def _single(table: _Table) -> FloatArray:
     """Log chance of each value by itself: an upper bound of the evidence, roughly, and quick."""
-    spread = np.sqrt((table.by_act**2).sum(axis=2) + READ_OFF_MM**2 + table.grain_mm**2 / 12.0)
+    spread = _spread(table.by_act, table.grain_mm)
     with np.errstate(divide="ignore", invalid="ignore"):
         log = np.log(table.grain_mm / spread / np.sqrt(2.0 * np.pi)) - 0.5 * (table.off_mm / spread) ** 2
     return np.asarray(np.nan_to_num(np.minimum(log, 0.0)))
@@ -244,7 +254,7 @@ def _chance(table: _Table, student: int, chosen: np.ndarray) -> float:
     for skill in SKILLS:
         noise = (skill * READ_OFF_MM) ** 2 + grain**2 / 12.0
         root = np.linalg.cholesky(skill**2 * acts @ acts.T + np.diag(noise))
-        moved = np.linalg.solve(root, off)
+        whitened = np.linalg.solve(root, off)
         spread = np.log(2.0 * np.pi) * len(off) / 2.0 + np.log(np.diag(root)).sum()
-        best = max(best, float(-0.5 * moved @ moved - spread))
+        best = max(best, float(-0.5 * whitened @ whitened - spread))
     return min(best + float(np.log(grain).sum()), 0.0)

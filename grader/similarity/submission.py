@@ -21,6 +21,7 @@ FITS_MM = 2.0
 FITS_BETTER = 0.5
 """and how many times nearer than to those of the own one it must be."""
 LEAST_NODES = 6
+"""A drawing of fewer nodes is not compared with other variants."""
 USUAL = Skill(angle_deg=0.3, place_mm=0.3, mark_mm=0.15)
 """Drafting errors of a usual student, and of reading the marks."""
 
@@ -70,10 +71,12 @@ def compared_submission(
             if sheet.figures
         ),
         numbers={} if measured is None else measured.numbers,
-        used={name: one.used for name, one in report.scales.items() if one.used},
+        used={name: scale.used for name, scale in report.scales.items() if scale.used},
         fits=_fits(variant, report),
         excused=frozenset(mistake.at for mistake in report.mistakes),
-        printed=any(one.sheet is not None and one.sheet.method == "markers" for one in report.reading.sheets),
+        printed=any(
+            read.sheet is not None and read.sheet.method == "markers" for read in report.reading.sheets
+        ),
     )
 
 
@@ -81,8 +84,8 @@ def _fits(variant: Variant, report: ReportDocument) -> tuple[Variant, float] | N
     """The other variant that diagnosis names."""
     for mistake in report.mistakes:
         if mistake.code == "other_variant":
-            told = dict(part.split(" = ", 1) for part in mistake.detail.split(", ") if " = " in part)
-            n, position = told.get("n"), told.get("position")
+            named = dict(part.split(" = ", 1) for part in mistake.detail.split(", ") if " = " in part)
+            n, position = named.get("n"), named.get("position")
             drawn = Variant(
                 n=variant.n if n is None else int(n),
                 position=variant.position if position is None else int(position),
@@ -111,15 +114,15 @@ def drawn_of(
     submissions: Sequence[ComparedSubmission], nodes: Mapping[str, Sequence[str]]
 ) -> dict[str, Drawn]:
     """Each figure's nodes, of the sheet that shows most of them; a student may hand in two sketches."""
-    found = {}
+    drawn = {}
     for figure, names in nodes.items():
-        chosen = [_fullest(one, figure) for one in submissions]
+        chosen = [_fullest(each, figure) for each in submissions]
         at = [
-            [UNKNOWN if k < 0 else one.sheets[k][figure].get(name, UNKNOWN) for name in names]
-            for one, k in zip(submissions, chosen, strict=True)
+            [UNKNOWN if k < 0 else each.sheets[k][figure].get(name, UNKNOWN) for name in names]
+            for each, k in zip(submissions, chosen, strict=True)
         ]
-        found[figure] = Drawn(tuple(names), np.array(at).reshape(len(submissions), -1), np.array(chosen))
-    return found
+        drawn[figure] = Drawn(tuple(names), np.array(at).reshape(len(submissions), -1), np.array(chosen))
+    return drawn
 
 
 def _fullest(submission: ComparedSubmission, figure: str) -> int:
@@ -130,21 +133,20 @@ def _fullest(submission: ComparedSubmission, figure: str) -> int:
 def fitting(
     assignment: Assignment, submissions: Sequence[ComparedSubmission], drawn: Mapping[str, Drawn]
 ) -> list[tuple[Variant, float] | None]:
-    """For each student another variant of the class whose exact figures the drawing fits, and how far off."""
-    variants = list(dict.fromkeys(one.variant for one in submissions))
+    """For each student another variant of the class that the drawing fits, and the residual in mm."""
+    variants = list(dict.fromkeys(each.variant for each in submissions))
     plan = exact_plan(assignment, variants)
     square, count = np.zeros((len(submissions), len(variants))), np.zeros((len(submissions), 1))
-    for figure, one in drawn.items():
-        exact = np.array(
-            [np.broadcast_to(plan.nodes_mm[figure][name], len(variants)) for name in one.names]
-        ).T
-        known = np.isfinite(one.at)
-        square += _misfit(np.where(known, one.at, 0.0), known, exact)
+    for figure, nodes in drawn.items():
+        exact = [np.broadcast_to(plan.nodes_mm[figure][name], len(variants)) for name in nodes.names]
+        known = np.isfinite(nodes.at)
+        square += _misfit(np.where(known, nodes.at, 0.0), known, np.array(exact).T)
         count += known.sum(axis=1, keepdims=True)
-    off = np.sqrt(square / np.maximum(count, 1.0))
-    own = off[np.arange(len(submissions)), [variants.index(one.variant) for one in submissions]]
-    best = off.argmin(axis=1)
-    least = off[np.arange(len(submissions)), best]
+    residual = np.sqrt(square / np.maximum(count, 1.0))
+    students = np.arange(len(submissions))
+    own = residual[students, [variants.index(each.variant) for each in submissions]]
+    best = residual.argmin(axis=1)
+    least = residual[students, best]
     fits = (count[:, 0] >= LEAST_NODES) & (least < FITS_MM) & (least < FITS_BETTER * own)
     return [(variants[k], float(mm)) if good else None for k, mm, good in zip(best, least, fits, strict=True)]
 
@@ -167,14 +169,8 @@ def scales_used(
 ) -> Scales:
     """The scales that each submission was marked with, (submissions,); the proposed ones where unknown."""
     proposed = assignment.scales(variants)
-    return Scales(
-        *(
-            np.array(
-                [
-                    entry.used.get(name, usual)
-                    for entry, usual in zip(submissions, getattr(proposed, name), strict=True)
-                ]
-            )
-            for name in ("kL", "kv", "ka")
-        )
-    )
+    scales = {
+        name: [each.used.get(name, usual) for each, usual in zip(submissions, values, strict=True)]
+        for name, values in (("kL", proposed.kL), ("kv", proposed.kv), ("ka", proposed.ka))
+    }
+    return Scales(*map(np.array, scales.values()))

@@ -172,10 +172,10 @@ def _known(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-def _grouped(told: Mapping[str, float]) -> dict[str, float | dict[str, float]]:
+def _grouped(values: Mapping[str, float]) -> dict[str, float | dict[str, float]]:
     """``transmission B`` and its like gathered under ``transmission``."""
     groups: dict[str, float | dict[str, float]] = {}
-    for name, value in told.items():
+    for name, value in values.items():
         kind, _, node = name.partition(" ")
         if not node:
             groups[kind] = value

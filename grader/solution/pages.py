@@ -26,7 +26,7 @@ from reportlab.platypus import (
 
 from grader.language import Tongue
 from grader.printed.pdf import REGULAR, embed_fonts
-from grader.solution.steps import CENTRES, LENGTHS_MM, Explanation, Section, explain
+from grader.solution.steps import CENTRES, LENGTHS_MM, ExplainedStep, PlanSection, explain
 from reference.drawing import sheets
 from reference.drawing.canvas import (
     A3_MM,
@@ -44,7 +44,7 @@ from reference.drawing.canvas import (
     set_pieces,
 )
 from reference.drawing.sheets import figures_of
-from reference.drawing.subject import Figure, Subject
+from reference.drawing.subject import DrawnFigure, Subject
 
 
 def pdf(sheets: Sequence[Sequence[Shape]], title: str, page_mm: tuple[float, float] = A3_MM) -> bytes:
@@ -140,7 +140,7 @@ MODEL_SHARE, MODEL_TALLEST_MM = 0.45, 45.0
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class Cutout:
     """Shapes and the box they are seen in, sheet millimetres."""
 
     shapes: tuple[Shape, ...]
@@ -161,16 +161,16 @@ class Picture:
 class Illustrated:
     """A step's words, its figure so far, and what it takes from the mechanism."""
 
-    told: Explanation
-    picture: Picture | None
-    model: Picture | None
+    explanation: ExplainedStep
+    picture: Cutout | None
+    model: Cutout | None
 
 
 @dataclass(frozen=True, slots=True)
 class Chapter:
     """A section with its pictures."""
 
-    section: Section
+    section: PlanSection
     steps: tuple[Illustrated, ...]
 
 
@@ -183,7 +183,9 @@ def chapters(subject: Subject, tongue: Tongue) -> list[Chapter]:
     ]
 
 
-def _illustrated(subject: Subject, figures: dict[str, Figure], section: Section) -> Iterator[Illustrated]:
+def _illustrated(
+    subject: Subject, figures: dict[str, DrawnFigure], section: PlanSection
+) -> Iterator[Illustrated]:
     if section.figure == CENTRES:
         yield from _centres(subject, figures["mechanism"], section)
         return
@@ -192,22 +194,23 @@ def _illustrated(subject: Subject, figures: dict[str, Figure], section: Section)
     base = sheets.grey(mechanism)
     model_box = _box(base)
     earlier: list[str] = []
-    for told in section.steps:
-        shapes = (*sheets.stage(figure, earlier, told.step.node), *sheets.compasses(told.step, nodes))
-        marked = tuple(sheets.models(subject, told.step)) if section.figure != "mechanism" else ()
-        model = Picture((*base, *marked), model_box) if marked else None
-        yield Illustrated(told, Picture(shapes, _box(shapes)), model)
-        earlier.append(told.step.node)
+    for explanation in section.steps:
+        step = explanation.step
+        shapes = (*sheets.stage(figure, earlier, step.node), *sheets.compasses(step, nodes))
+        marked = tuple(sheets.models(subject, step)) if section.figure != "mechanism" else ()
+        model = Cutout((*base, *marked), model_box) if marked else None
+        yield Illustrated(explanation, Cutout(shapes, _box(shapes)), model)
+        earlier.append(step.node)
 
 
-def _centres(subject: Subject, mechanism: Figure, section: Section) -> Iterator[Illustrated]:
+def _centres(subject: Subject, mechanism: DrawnFigure, section: PlanSection) -> Iterator[Illustrated]:
     """Each centre with its triangle on the finished sketch; one far off the sheet has no picture."""
     base = sheets.grey(mechanism)
-    for told in section.steps:
-        shapes = (*base, *sheets.centre(subject, told.step.node))
+    for explanation in section.steps:
+        shapes = (*base, *sheets.centre(subject, explanation.step.node))
         box = _box(shapes)
         fits = max(box[2] - box[0], box[3] - box[1]) <= A3_MM[0]
-        yield Illustrated(told, Picture(shapes, box) if fits else None, None)
+        yield Illustrated(explanation, Cutout(shapes, box) if fits else None, None)
 
 
 def _box(shapes: Sequence[Shape]) -> Bounds:
@@ -245,7 +248,7 @@ def html_page(subject: Subject, tongue: Tongue) -> str:
 class _Drawn(Flowable):  # type: ignore[misc]  # reportlab has no types
     """A picture on the printed page, true to size unless it is larger than its place."""
 
-    def __init__(self, picture: Picture, share: float = 1.0, tallest_mm: float = TALLEST_MM) -> None:
+    def __init__(self, picture: Cutout, share: float = 1.0, tallest_mm: float = TALLEST_MM) -> None:
         super().__init__()
         width, height = picture.size
         self.picture = picture
@@ -290,10 +293,11 @@ def _printed_chapter(chapter: Chapter) -> Iterator[Flowable]:
 
 
 def _printed_step(step: Illustrated) -> Table:
-    head = Markup("{}. {}").format(step.told.number, step.told.sentence)
-    words: list[Flowable] = [Paragraph(_printed(line), _style(8.5, indent=4)) for line in step.told.before]
+    explanation = step.explanation
+    head = Markup("{}. {}").format(explanation.number, explanation.sentence)
+    words: list[Flowable] = [Paragraph(_printed(line), _style(8.5, indent=4)) for line in explanation.before]
     words += [Paragraph(_printed(head), _style(9.5))]
-    words += [Paragraph(_printed(line), _style(8.5, indent=4)) for line in step.told.after]
+    words += [Paragraph(_printed(line), _style(8.5, indent=4)) for line in explanation.after]
     if step.model is not None:
         words += [Spacer(1, 2 * mm), _Drawn(step.model, MODEL_SHARE, MODEL_TALLEST_MM)]
     widths = ((COLUMN_MM + GAP_MM) * mm, COLUMN_MM * mm)

@@ -186,9 +186,9 @@ class Speaker:
 
     def scale_value(self, scale: str) -> float:
         """A scale, real units per millimetre."""
-        return self.subject.one(getattr(self.subject.plan.scales, scale))
+        return self.subject.number(getattr(self.subject.plan.scales, scale))
 
-    def scale_told(self, scale: str) -> Markup:
+    def scale_with_value(self, scale: str) -> Markup:
         """A scale with its value."""
         value = self.real(self.scale_value(scale), SCALE_UNITS[scale])
         return Markup("{} = {}").format(self.scale(scale), value)
@@ -419,7 +419,7 @@ def _radius(speaker: Speaker, centre: str, node: str, mm: float) -> Markup:
 
 def _side(speaker: Speaker, side: object) -> float:
     """The variant's own side of a group."""
-    return speaker.subject.one(np.asarray(side, dtype=np.float64))
+    return speaker.subject.number(np.asarray(side, dtype=np.float64))
 
 
 def _divide(speaker: Speaker, step: Divide) -> Markup:

@@ -34,7 +34,7 @@ LENGTHS_MM = N_("Directions count counter-clockwise from the horizontal to the r
 
 
 @dataclass(frozen=True, slots=True)
-class Explanation:
+class ExplainedStep:
     """One step: what is computed before, what is drawn, what can be read off afterwards."""
 
     number: int
@@ -50,16 +50,16 @@ class Explanation:
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class PlanSection:
     """The steps of one figure."""
 
     figure: str
     title: str
     introduction: Markup
-    steps: tuple[Explanation, ...]
+    steps: tuple[ExplainedStep, ...]
 
 
-def explain(subject: Subject, tongue: Tongue) -> list[Section]:
+def explain(subject: Subject, tongue: Tongue) -> list[PlanSection]:
     """Every figure's steps, in the order in which they are drawn."""
     speaker = speaker_of(subject, tongue)
     sections, number = [], 0
@@ -68,28 +68,28 @@ def explain(subject: Subject, tongue: Tongue) -> list[Section]:
         for step in steps:
             number += 1
             told.append(_explanation(speaker, number, step))
-        introduction = speaker.say(INTRODUCTIONS[figure], scale=speaker.scale_told(SCALE_OF[figure]))
-        sections.append(Section(figure, tongue.gettext(TITLES[figure]), introduction, tuple(told)))
+        introduction = speaker.say(INTRODUCTIONS[figure], scale=speaker.scale_with_value(SCALE_OF[figure]))
+        sections.append(PlanSection(figure, tongue.gettext(TITLES[figure]), introduction, tuple(told)))
     centres = tuple(
-        Explanation(number + k, step, (), sentences.sentence(speaker, step), ())
-        for k, step in enumerate(_centres_found(speaker), start=1)
+        ExplainedStep(number + k, step, (), sentences.sentence(speaker, step), ())
+        for k, step in enumerate(_centre_steps(speaker), start=1)
     )
     if centres:
         introduction = speaker.say(INTRODUCTIONS[CENTRES])
-        sections.append(Section(CENTRES, tongue.gettext(TITLES[CENTRES]), introduction, centres))
+        sections.append(PlanSection(CENTRES, tongue.gettext(TITLES[CENTRES]), introduction, centres))
     return sections
 
 
-def _centres_found(speaker: Speaker) -> list[Step]:
+def _centre_steps(speaker: Speaker) -> list[Step]:
     """The steps of the centres that lie on any paper at all."""
     found = speaker.subject.centres
     return [step for name, step in speaker.subject.plan.construction.centres.items() if name in found]
 
 
-def _explanation(speaker: Speaker, number: int, step: Step) -> Explanation:
+def _explanation(speaker: Speaker, number: int, step: Step) -> ExplainedStep:
     before = tuple(computed(speaker, step))
     after = tuple(_read_off(speaker, step))
-    return Explanation(number, step, before, sentences.sentence(speaker, step), after)
+    return ExplainedStep(number, step, before, sentences.sentence(speaker, step), after)
 
 
 def computed(speaker: Speaker, step: Step) -> Iterator[Markup]:
@@ -131,7 +131,9 @@ def _crank_formula(speaker: Speaker, length: Scaled) -> Markup | None:
         power = "²"
     symbol = speaker.rate(f"{'epsilon' if turns else 'omega'}_{driver.link}")
     arm = speaker.name(driver.pivot, driver.pin)
-    numbers = (speaker.bare(abs(speaker.subject.one(np.asarray(value)))) for value in (rate, driver.length_m))
+    numbers = (
+        speaker.bare(abs(speaker.subject.number(np.asarray(value)))) for value in (rate, driver.length_m)
+    )
     return Markup("{}{} · {} = {}{} · {}").format(symbol, power, arm, next(numbers), power, next(numbers))
 
 
@@ -152,7 +154,7 @@ def _component(speaker: Speaker, step: Given) -> Iterator[Markup]:
         slide = _speed(speaker, step.length.slide)
         carrier = speaker.carrier_of(step.node)
         rate, turn = f"omega_{carrier}", speaker.subject.plan.motion.omega[carrier]
-        omega = abs(speaker.subject.one(np.asarray(turn)))
+        omega = abs(speaker.subject.number(np.asarray(turn)))
         yield Markup("{} = 2 · {} · {} = 2 · {} · {} = {}").format(
             name, speaker.rate(rate), slide[0], speaker.bare(omega), speaker.bare(slide[1]),
             speaker.real(real, unit),
@@ -209,7 +211,7 @@ def _turning(speaker: Speaker, name: str, vector: Vector) -> Markup:
     rate = plan.construction.rates[name]
     arm = float(speaker.view.parameters[rate.length])
     zero = speaker.subject.is_zero(vector.name)
-    turn = 0.0 if zero else speaker.subject.one(plan.rates[name])
+    turn = 0.0 if zero else speaker.subject.number(plan.rates[name])
     unit = "rad/s" if name.startswith("omega") else "rad/s²"
     told = Markup("{} = {} / {} = {} / {} = {}").format(
         speaker.rate(name), speaker.name(vector.name), speaker.name(*rate.link),

@@ -101,7 +101,7 @@ class _Numbers:
 
 
 @dataclass(slots=True)
-class _Bodies:
+class _LinkAxes:
     """Where each link carries its joints, in the link's own axes, metres; and the slotted links."""
 
     axes: dict[str, dict[str, ComplexArray]] = field(default_factory=dict)
@@ -124,7 +124,7 @@ def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int
     `reference.authored.mechanism.check_mechanism`.
     """
     numbers = _Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
-    bodies = _Bodies()
+    bodies = _LinkAxes()
     driver = _driver(file, numbers)
     if isinstance(driver, Crank):
         bodies.carry(driver.link, driver.pivot, driver.pin, driver.length_m)
@@ -139,7 +139,7 @@ def build_driver(file: MechanismFile, values: Mapping[str, Value], count: int) -
     return with_arrays(_driver(file, numbers), numbers.for_all)
 
 
-def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _Bodies) -> Group:
+def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _LinkAxes) -> Group:
     """One group; a fault of its numbers is told with its place in the file."""
     try:
         return _group(table, numbers, bodies)
@@ -195,14 +195,14 @@ def _fixed(guide: FixedGuideTable | GuideTable, numbers: _Numbers) -> FixedGuide
     return FixedGuide(numbers.point(guide.through), numbers.angle(guide.angle_deg))
 
 
-def _guide(guide: GuideTable, numbers: _Numbers, bodies: _Bodies) -> Guide:
+def _guide(guide: GuideTable, numbers: _Numbers, bodies: _LinkAxes) -> Guide:
     if guide.joints is None or guide.coincident is None:
         return _fixed(guide, numbers)
     base = (guide.joints[0], guide.joints[1])
     return MovingGuide(bodies.link_of(base), base, guide.coincident)
 
 
-def _group(table: AnyGroupTable, numbers: _Numbers, bodies: _Bodies) -> Group:
+def _group(table: AnyGroupTable, numbers: _Numbers, bodies: _LinkAxes) -> Group:
     """One group; `bodies` collects what each link carries."""
     node = table.node
     if isinstance(table, PlateTable | PointOnLineTable | PointTable):
@@ -228,7 +228,7 @@ def _group(table: AnyGroupTable, numbers: _Numbers, bodies: _Bodies) -> Group:
             return Yoke(node, table.pin, numbers.angle(table.slot_deg), _fixed(table.guide, numbers))
 
 
-def _slotted_link(table: SlottedLinkTable, numbers: _Numbers, bodies: _Bodies) -> SlottedLink:
+def _slotted_link(table: SlottedLinkTable, numbers: _Numbers, bodies: _LinkAxes) -> SlottedLink:
     zero = np.zeros(1)
     offset = zero if table.offset is None else numbers.distance(table.offset)
     bodies.axes[table.link] = {table.pivot: np.zeros(1, complex)}
@@ -242,7 +242,7 @@ def _slotted_link(table: SlottedLinkTable, numbers: _Numbers, bodies: _Bodies) -
 
 
 def _link_point(
-    table: PlateTable | PointOnLineTable | PointTable, numbers: _Numbers, bodies: _Bodies
+    table: PlateTable | PointOnLineTable | PointTable, numbers: _Numbers, bodies: _LinkAxes
 ) -> Group:
     """A further point of a link: rigid with its base, however it is given."""
     node, link, (p, q) = table.node, table.link, table.base

@@ -309,14 +309,17 @@ def _check_formulas(assignment: Assignment) -> list[Finding]:
             if not np.all((getattr(scales, name) > 1.0 / LARGEST) & (getattr(scales, name) < LARGEST)):
                 raise FormulaError(f"{name} must be above zero for every variant")
 
-    def told(formula: Formula) -> Callable[[list[Variant]], object]:
+    def evaluated(formula: Formula) -> Callable[[list[Variant]], object]:
         return lambda variants: formula(assignment.values(variants))
 
     for what, path in (
         (assignment.values, "$.variant.values"),
         (assignment.mechanism, "$.mechanism"),
         (proposed_scales, "$.scales"),
-        *((told(one.value), f"$.given[{index}].value") for index, one in enumerate(assignment.file.given)),
+        *(
+            (evaluated(one.value), f"$.given[{index}].value")
+            for index, one in enumerate(assignment.file.given)
+        ),
     ):
         try:
             what(variants)

@@ -223,7 +223,7 @@ Keyed = Iterator[tuple[str, str]]
 """A key of the group's table, and the joint that stands there."""
 
 
-class _Bodies:
+class _CarriedJoints:
     """Which joints each link carries, as far as the file has been read."""
 
     def __init__(self, file: MechanismFile) -> None:
@@ -256,7 +256,7 @@ class _Bodies:
 
 def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
     """Joints not yet placed or placed twice, links named twice, bases and guides that are no one link's."""
-    bodies = _Bodies(file)
+    bodies = _CarriedJoints(file)
     placed = {*file.ground}
     later = [joint for group in file.group for _, joint in _added(group)]
     if file.crank is not None:
@@ -288,7 +288,7 @@ def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
     yield from _check_names(placed)
 
 
-def _check_hinges(group: AnyGroupTable, bodies: _Bodies, where: str) -> Iterator[Finding]:
+def _check_hinges(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
     """A group is hinged to points that stay on their links, and to two bodies that move differently."""
     hinges = {joint for key, joint in _needed(group) if key.startswith(("pin", "pivot"))}
     for joint in sorted(hinges & bodies.moments.keys()):
@@ -360,7 +360,7 @@ def _added(group: AnyGroupTable) -> Keyed:
     yield from ((f"{key}.coincident", guide.coincident) for key, guide in _guides(group) if guide.coincident)
 
 
-def _check_links(group: AnyGroupTable, bodies: _Bodies, where: str) -> Iterator[Finding]:
+def _check_links(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
     """New links have new names; bases and moving guides are carried by one link."""
     for key, guide in _guides(group):
         if guide.joints and (guide.joints[0] == guide.joints[1] or bodies.of(guide.joints) is None):
@@ -392,7 +392,7 @@ def _check_links(group: AnyGroupTable, bodies: _Bodies, where: str) -> Iterator[
 
 
 def _check_base(
-    group: PlateTable | PointOnLineTable | PointTable, bodies: _Bodies, where: str
+    group: PlateTable | PointOnLineTable | PointTable, bodies: _CarriedJoints, where: str
 ) -> Iterator[Finding]:
     held = bodies.links.setdefault(group.link, set())
     on_slot = isinstance(group, PointTable) and set(group.base) == bodies.slots.get(group.link)
@@ -410,7 +410,7 @@ def _check_base(
     held.add(group.node)
 
 
-def _add_link(link: str, joints: set[str], bodies: _Bodies, where: str) -> Iterator[Finding]:
+def _add_link(link: str, joints: set[str], bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
     """A group's links are new bodies: under a name that is taken, two bodies would pass for one."""
     if link in bodies.links:
         yield Finding(where, f"there is a link {link} already: each link needs a name of its own")

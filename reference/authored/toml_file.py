@@ -198,17 +198,17 @@ def _not_known(name: str, model: type[BaseModel]) -> str:
     return "is not known here; check its spelling" + (f" (did you mean {near[0]}?)" if near else "")
 
 
-def _models_in(model: type[BaseModel], seen: set[type[BaseModel]]) -> set[type[BaseModel]]:
+def _models_in(model: type[BaseModel], known: set[type[BaseModel]]) -> set[type[BaseModel]]:
     from typing import get_args  # noqa: PLC0415
 
-    if model in seen:
-        return seen
-    seen.add(model)
+    if model in known:
+        return known
+    known.add(model)
     waiting: list[Any] = [field.annotation for field in model.model_fields.values()]
     while waiting:
         kind = waiting.pop()
         if isinstance(kind, type) and issubclass(kind, BaseModel):
-            _models_in(kind, seen)
+            _models_in(kind, known)
         else:
             waiting.extend(get_args(kind))
-    return seen
+    return known

@@ -9,13 +9,13 @@ plan), ground joints have the pole for their image, a normal component a_BA_n en
 Coriolis component a_B3B_c in ``k_B3B``.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from reference.construction.elements import Along, Coriolis, Fixed, FixedLine, Line, Normal, Scaled
-from reference.construction.graph import AngularRate, Construction, Vector, pair
+from reference.construction.graph import AngularRate, Construction, Part, Vector, pair
 from reference.construction.steps import (
     ArcAndLine,
     Coincide,
@@ -52,6 +52,7 @@ from reference.mechanism import (
 )
 
 VELOCITY_POLE, ACCELERATION_POLE = "o", "o'"
+"""Names of the plans' poles."""
 
 
 @dataclass(slots=True)
@@ -77,10 +78,18 @@ class Draft:
         """The subscript of a vector of `node` about `pin`: B about A is BA, about the ground B."""
         return node if self.mechanism.is_ground(pin) else f"{node}{pin}"
 
-    def vector(self, name: str, tail: str, head: str, **about: object) -> None:
-        """Note a vector; `about` are further attributes of `Vector`."""
+    def vector(
+        self,
+        name: str,
+        tail: str,
+        head: str,
+        link: tuple[str, str] | None = None,
+        part: Part = "",
+        turning: str | None = None,
+    ) -> None:
+        """Note a vector, see `Vector`."""
         scale = "kv" if name.startswith("v") else "ka"
-        self.vectors[name] = Vector(name, tail, head, scale, **about)  # type: ignore[arg-type]
+        self.vectors[name] = Vector(name, tail, head, scale, link, part, turning)
 
 
 def image_name(joint: str, *, primed: bool = False) -> str:
@@ -88,62 +97,87 @@ def image_name(joint: str, *, primed: bool = False) -> str:
     return joint.lower() + ("'" if primed else "")
 
 
-@dataclass(frozen=True, slots=True)
-class Lines:
-    """One condition on a node: a line of each plan, and the vectors that lie along them.
+# Conditions on a joint ----------------------------------------------------------------------------
 
-    `vectors` are names, tails and attributes; their heads are the node's images.
-    """
-
-    velocity: Line
-    acceleration: Line
-    vectors: tuple[tuple[str, str, Mapping[str, object]], ...]
+Condition = tuple[Line, Line]
+"""A line of the velocity plan and one of the acceleration plan, on which the joint's images lie."""
 
 
-def images_at(draft: Draft, node: str, lines: Sequence[Lines]) -> None:
+def images_at(draft: Draft, node: str, conditions: Sequence[Condition]) -> None:
     """Both images of a node, where the two lines of each plan meet."""
-    image, image_primed = draft.image(node), draft.image(node, primed=True)
-    first, second = lines
-    draft.velocity.append(TwoLines(image, first.velocity, second.velocity))
-    draft.acceleration.append(TwoLines(image_primed, first.acceleration, second.acceleration))
-    for line in lines:
-        for name, tail, about in line.vectors:
-            draft.vector(name, tail, image if name.startswith("v") else image_primed, **about)
+    velocity_lines, acceleration_lines = zip(*conditions, strict=True)
+    draft.velocity.append(TwoLines(draft.image(node), *velocity_lines))
+    draft.acceleration.append(TwoLines(draft.image(node, primed=True), *acceleration_lines))
     absolute(draft, node)
 
 
-def rotations(draft: Draft, node: str, links: Mapping[str, str]) -> list[Lines]:
+def rotations(draft: Draft, node: str, links: Mapping[str, str]) -> list[Condition]:
     """A node that turns about each pin: across the link, from the pin's image."""
-    found = []
+    conditions = []
     for pin, link in links.items():
-        across, about = Along(pin, node, 1), draft.relative(node, pin)
-        end = normal_component(draft, node, pin, Normal(draft.image(pin), draft.image(node), pair(pin, node)))
-        found.append(turning(draft, (pin, node), end, across))
-        rates_of(draft, link, about, (pin, node))
-    return found
+        length = Normal(draft.image(pin), draft.image(node), pair(pin, node))
+        conditions.append(turning(draft, (pin, node), length))
+        rates_of(draft, link, draft.relative(node, pin), (pin, node))
+    return conditions
 
 
-def turning(draft: Draft, link: tuple[str, str], end: str, across: Along) -> Lines:
-    """Across a link from a pin's image, and from the end of the normal component."""
+def turning(draft: Draft, link: tuple[str, str], length: Normal) -> Condition:
+    """Across a link from a pin's image, and from the end of the normal component, which is laid off first."""
     pin, node = link
-    about = draft.relative(node, pin)
-    return Lines(
-        Line(draft.image(pin), across),
-        Line(end, across),
-        (
-            (f"v_{about}", draft.image(pin), {"link": link}),
-            (f"a_{about}_t", end, {"link": link, "part": "t"}),
-        ),
-    )
-
-
-def normal_component(draft: Draft, node: str, pin: str, length: Normal) -> str:
-    """Lay off a_(node about pin)^n from the pin's image towards the pin; its end."""
-    about = draft.relative(node, pin)
-    end, start = f"n_{about}", draft.image(pin, primed=True)
+    about, across = draft.relative(node, pin), Along(pin, node, 1)
+    start, end = draft.image(pin, primed=True), f"n_{about}"
     draft.acceleration.append(Given(end, start, length, Along(node, pin)))
-    draft.vector(f"a_{about}_n", start, end, link=(pin, node), part="n")
-    return end
+    draft.vector(f"a_{about}_n", start, end, link, "n")
+    draft.vector(f"a_{about}_t", end, draft.image(node, primed=True), link, "t")
+    draft.vector(f"v_{about}", draft.image(pin), draft.image(node), link)
+    return Line(draft.image(pin), across), Line(end, across)
+
+
+def slides(draft: Draft, node: str, guides: Sequence[Guide]) -> list[Condition]:
+    """A node that slides on guides: along each, from the image of the point under it."""
+    conditions = []
+    for guide in guides:
+        if isinstance(guide, FixedGuide):
+            along = FixedLine(f"guide {node}").along
+            conditions.append((Line(VELOCITY_POLE, along), Line(ACCELERATION_POLE, along)))
+            continue
+        under, (g, h) = guide.coincident, guide.base
+        draft.sketch.append(Coincide(under, node))
+        add_images(draft, *_similar_images(draft, under, (g, h)))
+        absolute(draft, under)
+        turn = (draft.image(g), draft.image(h))
+        conditions.append(sliding(draft, (under, node), Along(g, h), turn, (guide.link, g, h)))
+    return conditions
+
+
+def sliding(
+    draft: Draft, link: tuple[str, str], guide: Along, turn: tuple[str, str], turning_: tuple[str, str, str]
+) -> Condition:
+    """The second joint slides about the first along a turning guide: Coriolis, then along the guide.
+
+    Arguments: `turn`, ends of a velocity that turns the guide's link; `turning_`, that link and the two
+    joints of it that the velocity belongs to.
+    """
+    other, node = link
+    about, name = f"{node}{other}", turning_[0]
+    start, end = draft.image(other, primed=True), f"k_{node}{other}"
+    length = Coriolis((draft.image(other), draft.image(node)), guide, turn, turning_[1:])
+    draft.acceleration.append(Given(end, start, length, replace(guide, quarters=guide.quarters + 1)))
+    draft.vector(f"a_{about}_c", start, end, link, "c", name)
+    draft.vector(f"a_{about}_r", end, draft.image(node, primed=True), link, "r")
+    draft.vector(f"v_{about}", draft.image(other), draft.image(node), link)
+    return Line(draft.image(other), guide), Line(end, guide)
+
+
+def in_slot(draft: Draft, node: str, pin: str, slot: Fixed) -> Condition:
+    """A yoke's point about the block in its slot: along the slot, which does not turn."""
+    image, image_primed = draft.image(pin), draft.image(pin, primed=True)
+    draft.vector(f"v_{node}{pin}", image, draft.image(node), (pin, node))
+    draft.vector(f"a_{node}{pin}_r", image_primed, draft.image(node, primed=True), (pin, node), "r")
+    return Line(image, slot), Line(image_primed, slot)
+
+
+# Points of links ----------------------------------------------------------------------------------
 
 
 def guide_line(node: str, guide: Guide) -> Line | FixedLine:
@@ -153,78 +187,34 @@ def guide_line(node: str, guide: Guide) -> Line | FixedLine:
     return Line(guide.base[0], Along(*guide.base))
 
 
-def slides(draft: Draft, node: str, guides: Sequence[Guide]) -> list[Lines]:
-    """A node that slides on guides: along each, from the image of the point under it."""
-    found = []
-    for guide in guides:
-        if isinstance(guide, FixedGuide):
-            along = FixedLine(f"guide {node}").along
-            found.append(Lines(Line(VELOCITY_POLE, along), Line(ACCELERATION_POLE, along), ()))
-            continue
-        under, (g, h) = guide.coincident, guide.base
-        draft.sketch.append(Coincide(under, node))
-        for primed, steps in ((False, draft.velocity), (True, draft.acceleration)):
-            ends = (draft.image(g, primed=primed), draft.image(h, primed=primed))
-            steps.append(Similar(draft.image(under, primed=primed), ends, (g, h, under)))
-        absolute(draft, under)
-        turn = (draft.image(g), draft.image(h))
-        found.append(sliding(draft, (under, node), Along(g, h), turn, (guide.link, g, h)))
-    return found
+def add_images(draft: Draft, velocity: Step, acceleration: Step) -> None:
+    """A step of each plan."""
+    draft.velocity.append(velocity)
+    draft.acceleration.append(acceleration)
 
 
-def sliding(
-    draft: Draft, link: tuple[str, str], guide: Along, turn: tuple[str, str], turning: tuple[str, str, str]
-) -> Lines:
-    """The second joint slides about the first along a turning guide: Coriolis, then along the guide.
-
-    Arguments: `turn`, ends of a velocity that turns the guide's link; `turning`, that link and the two
-    joints of it that the velocity belongs to.
-    """
-    other, node = link
-    about, name = f"{node}{other}", turning[0]
-    start, end = draft.image(other, primed=True), f"k_{node}{other}"
-    length = Coriolis((draft.image(other), draft.image(node)), guide, turn, turning[1:])
-    draft.acceleration.append(Given(end, start, length, guide.perpendicular))
-    draft.vector(f"a_{about}_c", start, end, link=link, part="c", turning=name)
-    return Lines(
-        Line(draft.image(other), guide),
-        Line(end, guide),
-        (
-            (f"v_{about}", draft.image(other), {"link": link}),
-            (f"a_{about}_r", end, {"link": link, "part": "r"}),
-        ),
-    )
+def _base_images(draft: Draft, base: tuple[str, str], *, primed: bool) -> tuple[str, str]:
+    return draft.image(base[0], primed=primed), draft.image(base[1], primed=primed)
 
 
-def in_slot(draft: Draft, node: str, pin: str, slot: Fixed) -> Lines:
-    """A yoke's point about the block in its slot: along the slot, which does not turn."""
-    image, image_primed = draft.image(pin), draft.image(pin, primed=True)
-    link = (pin, node)
-    return Lines(
-        Line(image, slot),
-        Line(image_primed, slot),
-        (
-            (f"v_{node}{pin}", image, {"link": link}),
-            (f"a_{node}{pin}_r", image_primed, {"link": link, "part": "r"}),
-        ),
-    )
+def _similar_images(draft: Draft, node: str, base: tuple[str, str]) -> list[Similar]:
+    """The similarity steps of a link's third point, for both plans."""
+    return [
+        Similar(draft.image(node, primed=primed), _base_images(draft, base, primed=primed), (*base, node))
+        for primed in (False, True)
+    ]
+
+
+def note_similar_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
+    """How both images of a plate's third point would come by similarity."""
+    draft.images.update({step.node: step for step in _similar_images(draft, node, base)})
 
 
 def rigid_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
     """Both images of a link's point by similarity, without relative vectors."""
     note_similar_images(draft, node, base)
-    draft.velocity.append(draft.images[draft.image(node)])
-    draft.acceleration.append(draft.images[draft.image(node, primed=True)])
+    add_images(draft, *_similar_images(draft, node, base))
     absolute(draft, node)
-
-
-def note_similar_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
-    """The similarity steps of a plate's third point, for both plans."""
-    p, q = base
-    for primed in (False, True):
-        ends = (draft.image(p, primed=primed), draft.image(q, primed=primed))
-        image = draft.image(node, primed=primed)
-        draft.images[image] = Similar(image, ends, (p, q, node))
 
 
 def similar_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
@@ -232,15 +222,20 @@ def similar_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
     rigid_images(draft, node, base)
     for pin in base:
         if not draft.mechanism.is_ground(pin):
-            draft.vector(f"v_{node}{pin}", draft.image(pin), draft.image(node), link=(pin, node))
+            draft.vector(f"v_{node}{pin}", draft.image(pin), draft.image(node), (pin, node))
 
 
 def images_on_line(draft: Draft, node: str, base: tuple[str, str]) -> None:
     """Both images of a point that divides a link."""
-    p, q = base
-    for primed, steps in ((False, draft.velocity), (True, draft.acceleration)):
-        ends = (draft.image(p, primed=primed), draft.image(q, primed=primed))
-        steps.append(Divide(draft.image(node, primed=primed), ends, f"ratio {node}"))
+    add_images(
+        draft,
+        *(
+            Divide(
+                draft.image(node, primed=primed), _base_images(draft, base, primed=primed), f"ratio {node}"
+            )
+            for primed in (False, True)
+        ),
+    )
     absolute(draft, node)
 
 
@@ -252,7 +247,7 @@ def absolute(draft: Draft, node: str) -> None:
 
 
 def rates_of(draft: Draft, link: str, about: str, joints: tuple[str, str]) -> None:
-    """Omega and epsilon of a link, from the first vector found that turns it."""
+    """Omega and epsilon of a link, from the first vector that turns it."""
     for name, vector in ((f"omega_{link}", f"v_{about}"), (f"epsilon_{link}", f"a_{about}_t")):
         draft.rates.setdefault(name, AngularRate(name, vector, joints, pair(*joints)))
 
@@ -269,19 +264,19 @@ def construction_of(
         (collinear plates always are: their perpendiculars coincide)
     """
     form = (_form_of(mechanism), accelerations, plate_by_similarity)
-    if form not in _written:
-        if len(_written) >= KEPT:
-            _written.clear()
-        _written[form] = _write_down(mechanism, accelerations, plate_by_similarity)
-    return _written[form]
+    if form not in _cache:
+        if len(_cache) >= CACHED:
+            _cache.clear()
+        _cache[form] = _write_down(mechanism, accelerations, plate_by_similarity)
+    return _cache[form]
 
 
-KEPT = 256
-"""Constructions that are kept: it is the same for all variants, and for the same mechanism again."""
-_written: dict[tuple[object, ...], Construction] = {}
+CACHED = 256
+"""Constructions in the cache: all variants have the same, and so has the same mechanism again."""
+_cache: dict[Hashable, Construction] = {}
 
 
-def _form_of(mechanism: Mechanism) -> tuple[object, ...]:
+def _form_of(mechanism: Mechanism) -> Hashable:
     """All that the construction depends on: names, kinds, sides, and which points are in line."""
     in_line = tuple(
         (group.is_ever_flat, group.line_ratio is None)
@@ -357,10 +352,9 @@ def _draw_driver(draft: Draft, driver: Driver) -> None:
             guide = FixedLine(f"guide {pin}")
             draft.sketch.append(OnGuide(pin, guide, Scaled(f"s {pin}", "kL")))
             a, a_primed = draft.image(pin), draft.image(pin, primed=True)
-            draft.velocity.append(Given(a, VELOCITY_POLE, Scaled(f"v_{pin}", "kv"), guide.along))
-            draft.acceleration.append(
-                Given(a_primed, ACCELERATION_POLE, Scaled(f"a_{pin}", "ka"), guide.along)
-            )
+            speed, acceleration = Scaled(f"v_{pin}", "kv"), Scaled(f"a_{pin}", "ka")
+            draft.velocity.append(Given(a, VELOCITY_POLE, speed, guide.along))
+            draft.acceleration.append(Given(a_primed, ACCELERATION_POLE, acceleration, guide.along))
             absolute(draft, pin)
 
 
@@ -371,15 +365,15 @@ def _draw_crank(draft: Draft, crank: Crank) -> None:
     a, a_primed = draft.image(pin), draft.image(pin, primed=True)
     across = Along(pivot, pin, 1)
     draft.velocity.append(Given(a, VELOCITY_POLE, Scaled(f"v_{pin}", "kv"), across))
-    draft.vector(f"v_{pin}", VELOCITY_POLE, a, link=(pivot, pin))
+    draft.vector(f"v_{pin}", VELOCITY_POLE, a, (pivot, pin))
     inward = Along(pin, pivot)
     normal = Scaled(f"a_{pin}_n", "ka")
     if crank.accelerated:
         end = f"n_{pin}"
         draft.acceleration.append(Given(end, ACCELERATION_POLE, normal, inward))
         draft.acceleration.append(Given(a_primed, end, Scaled(f"a_{pin}_t", "ka"), across))
-        draft.vector(f"a_{pin}_n", ACCELERATION_POLE, end, link=(pivot, pin), part="n")
-        draft.vector(f"a_{pin}_t", end, a_primed, link=(pivot, pin), part="t")
+        draft.vector(f"a_{pin}_n", ACCELERATION_POLE, end, (pivot, pin), "n")
+        draft.vector(f"a_{pin}_t", end, a_primed, (pivot, pin), "t")
     else:
         draft.acceleration.append(Given(a_primed, ACCELERATION_POLE, normal, inward))
     draft.vector(f"a_{pin}", ACCELERATION_POLE, a_primed)
@@ -441,13 +435,12 @@ def _draw_slotted_link(draft: Draft, group: SlottedLink) -> None:
         draft.sketch.append(Tangent(group.foot, pivot, offset, pin, group.side))
     draft.sketch.append(Coincide(node, pin))
     length = Normal(draft.image(pivot), draft.image(node), pair(pivot, node), measured=(pivot, node))
-    end = normal_component(draft, node, pivot, length)
     turn = (draft.image(pivot), draft.image(node))
-    lines = (
-        turning(draft, (pivot, node), end, Along(pivot, node, 1)),
+    conditions = (
+        turning(draft, (pivot, node), length),
         sliding(draft, (pin, node), _slot_axis(group), turn, (group.link, pivot, node)),
     )
-    images_at(draft, node, lines)
+    images_at(draft, node, conditions)
     rates_of(draft, group.link, draft.relative(node, pivot), (pivot, node))
     if group.foot is not None and _is_used(draft.mechanism, group.foot):
         rigid_images(draft, group.foot, (pivot, node))
@@ -464,7 +457,9 @@ def _is_used(mechanism: Mechanism, joint: str) -> bool:
 def _draw_slot_point(draft: Draft, group: SlotPoint) -> None:
     node = group.node
     slotted = next(
-        one for one in draft.mechanism.groups if isinstance(one, SlottedLink) and one.node == group.slotted
+        link
+        for link in draft.mechanism.groups
+        if isinstance(link, SlottedLink) and link.node == group.slotted
     )
     x, y = Scaled(f"x {node}", "kL"), Scaled(f"y {node}", "kL")
     draft.sketch.append(Local(node, slotted.pivot, _slot_axis(slotted), x, y))

@@ -1,10 +1,12 @@
-"""What a construction is made of: directions, lengths and lines, as a step sees them.
+"""The directions, lengths and lines that a step of a construction is made of.
 
-Everything is in drawn millimetres, complex, y up, and an array over variants.
+Everything is in drawn millimetres, complex, y up, and an array over variants. `at` gives the value in a
+`View`: the nodes so far, the parameters, and the errors of drawing.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,23 +18,23 @@ Parameters = Mapping[str, FloatArray]
 `reference.construction.derive.parameters_of`."""
 Nodes = Mapping[str, ComplexArray]
 Errors = Mapping[tuple[str, int, str], FloatArray]
-"""What the hand does wrong, by (node, which of the step's lines or lengths, kind); kinds are
-``angle`` (radians, of a line), ``shift`` (mm, of a line, to its left), ``length`` (mm, of a
-length transferred), ``x`` and ``y`` (mm, of the node's mark itself)."""
+"""Errors of drawing, by (node, which of the step's lines or lengths, kind); kinds are ``angle`` (radians, of
+a line), ``shift`` (mm, of a line, to its left), ``length`` (mm, of a length transferred), ``x`` and ``y``
+(mm, of the node's mark itself)."""
 
 NO_ERROR: FloatArray = np.asarray(0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What a step sees: the nodes so far, the parameters, and the hand's errors."""
+    """What a step is evaluated with: the nodes so far, the parameters, and the errors of drawing."""
 
     nodes: Nodes
     parameters: Parameters
     errors: Errors = field(default_factory=dict)
 
     def error(self, node: str, slot: int, kind: str) -> FloatArray:
-        """One error of the hand, zero where there is none."""
+        """One error of drawing, zero where there is none."""
         return self.errors.get((node, slot, kind), NO_ERROR)
 
     def real_length(self, tail: str, head: str) -> FloatArray:
@@ -40,35 +42,48 @@ class View:
         return np.asarray(np.abs(self.nodes[head] - self.nodes[tail]) * self.parameters["kL"])
 
 
+class FromNodes:
+    """A part of a construction that is made from earlier nodes."""
+
+    __slots__ = ()
+    reads: ClassVar[tuple[str, ...]] = ()
+    """The fields that hold names of nodes, or parts that are made from nodes themselves."""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The nodes that it is made from."""
+        return _nodes_in(tuple([getattr(self, name) for name in self.reads]))
+
+
+def _nodes_in(value: object) -> tuple[str, ...]:
+    """The nodes that a field of a part names: one, several, those of another part, or none."""
+    if isinstance(value, str):
+        return (value,)
+    if isinstance(value, FromNodes):
+        return value.needs
+    return tuple([node for inner in value for node in _nodes_in(inner)]) if isinstance(value, tuple) else ()
+
+
 # Directions ---------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
-class Along:
+class Along(FromNodes):
     """The direction of a link as drawn, from joint `tail` to joint `head`, turned by quarters ccw."""
 
+    reads = ("tail", "head")
     tail: str
     head: str
     quarters: int = 0
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Nodes it is read from."""
-        return (self.tail, self.head)
 
     def at(self, view: View) -> ComplexArray:
         """The unit vector."""
         link = geometry.unit(view.nodes[self.head] - view.nodes[self.tail])
         return np.asarray(link * 1j**self.quarters)
 
-    @property
-    def perpendicular(self) -> "Along":
-        """A quarter turn further."""
-        return replace(self, quarters=self.quarters + 1)
-
 
 @dataclass(frozen=True, slots=True)
-class Fixed:
+class Fixed(FromNodes):
     """A direction given by an angle in radians among the parameters (crank, guide).
 
     The parameter ``turn`` (radians, 0 when absent) turns all fixed directions alike: a sketch that
@@ -78,20 +93,10 @@ class Fixed:
     angle: str
     quarters: int = 0
 
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """No nodes."""
-        return ()
-
     def at(self, view: View) -> ComplexArray:
         """The unit vector."""
         turn = view.parameters.get("turn", NO_ERROR)
         return np.asarray(geometry.direction(view.parameters[self.angle] + turn) * 1j**self.quarters)
-
-    @property
-    def perpendicular(self) -> "Fixed":
-        """A quarter turn further."""
-        return replace(self, quarters=self.quarters + 1)
 
 
 Direction = Along | Fixed
@@ -100,16 +105,11 @@ Direction = Along | Fixed
 
 
 @dataclass(frozen=True, slots=True)
-class Scaled:
+class Scaled(FromNodes):
     """A real quantity among the parameters, drawn at a scale."""
 
     quantity: str
     scale: str
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """No nodes."""
-        return ()
 
     def at(self, view: View) -> FloatArray:
         """Drawn millimetres."""
@@ -117,22 +117,18 @@ class Scaled:
 
 
 @dataclass(frozen=True, slots=True)
-class Normal:
+class Normal(FromNodes):
     """A normal component v^2 / l, from a velocity as drawn and a real length, at the scale ka.
 
     `measured` are the sketch's joints between which the length is taken where the mechanism's data do
     not give it: the distance of a slotted link's point from its pivot.
     """
 
+    reads = ("tail", "head", "measured")
     tail: str
     head: str
     length: str
     measured: tuple[str, str] | None = None
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The ends of the velocity, and those of a measured length."""
-        return (self.tail, self.head, *(self.measured or ()))
 
     def at(self, view: View) -> FloatArray:
         """Drawn millimetres."""
@@ -143,7 +139,7 @@ class Normal:
 
 
 @dataclass(frozen=True, slots=True)
-class Coriolis:
+class Coriolis(FromNodes):
     """A Coriolis component 2 omega v, from two velocities as drawn, at the scale ka.
 
     Attributes
@@ -158,16 +154,12 @@ class Coriolis:
     the link, with their signs.
     """
 
+    reads = ("slide", "guide", "turn", "link")
     slide: tuple[str, str]
     guide: "Direction"
     turn: tuple[str, str]
     link: tuple[str, str]
     quarters: int = 0
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Both velocities' ends, the guide's and the link's joints."""
-        return (*self.slide, *self.guide.needs, *self.turn, *self.link)
 
     def at(self, view: View) -> FloatArray:
         """Drawn millimetres."""
@@ -181,17 +173,13 @@ class Coriolis:
 
 
 @dataclass(frozen=True, slots=True)
-class Component:
+class Component(FromNodes):
     """The drawn length of a vector between two nodes along a direction, with its sign."""
 
+    reads = ("tail", "head", "along")
     tail: str
     head: str
     along: "Direction"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The vector's ends, and what the direction is read from."""
-        return (self.tail, self.head, *self.along.needs)
 
     def at(self, view: View) -> FloatArray:
         """Drawn millimetres."""
@@ -202,19 +190,15 @@ Length = Scaled | Normal | Coriolis | Component
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class Line(FromNodes):
     """The line through a node along a direction."""
 
+    reads = ("through", "along")
     through: str
     along: Direction
 
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Its foot, and what its direction is read from."""
-        return (self.through, *self.along.needs)
-
     def at(self, view: View, node: str, slot: int) -> tuple[ComplexArray, ComplexArray]:
-        """A point of the line and its unit vector, with the hand's error in drawing it."""
+        """A point of the line and its unit vector, with the errors of drawing it."""
         return drawn(view, node, slot, view.nodes[self.through], self.along.at(view))
 
 
@@ -226,7 +210,7 @@ def fixed_point(view: View, name: str) -> ComplexArray:
 
 
 @dataclass(frozen=True, slots=True)
-class FixedLine:
+class FixedLine(FromNodes):
     """A guide on the ground, by its name: its point and direction are parameters."""
 
     guide: str
@@ -236,13 +220,8 @@ class FixedLine:
         """Its direction."""
         return Fixed(f"angle {self.guide}")
 
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """No nodes."""
-        return ()
-
     def at(self, view: View, node: str, slot: int) -> tuple[ComplexArray, ComplexArray]:
-        """A point of the line and its unit vector, with the hand's error in drawing it."""
+        """A point of the line and its unit vector, with the errors of drawing it."""
         return drawn(view, node, slot, fixed_point(view, self.guide), self.along.at(view))
 
 
@@ -252,6 +231,6 @@ AnyLine = Line | FixedLine
 def drawn(
     view: View, node: str, slot: int, foot: ComplexArray, along: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """A line as the hand draws it: its foot shifted sideways, its direction turned a little."""
+    """A line with the errors of drawing it: its foot shifted sideways, its direction turned a little."""
     tilted = along * geometry.direction(view.error(node, slot, "angle"))
     return np.asarray(foot + 1j * along * view.error(node, slot, "shift")), np.asarray(tilted)

@@ -15,6 +15,7 @@ its pole). It is data, a directed acyclic graph, and one evaluator answers every
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -35,7 +36,6 @@ from reference.construction.steps import (
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import (
     Crank,
-    CrossSlider,
     DrivenSlider,
     Driver,
     Dyad,
@@ -49,6 +49,7 @@ from reference.mechanism import (
     SlotPoint,
     SlottedLink,
     Yoke,
+    guides_of,
 )
 
 
@@ -105,24 +106,25 @@ def _guide_parameters(node: str, guide: Guide) -> dict[str, FloatArray]:
 
 
 def _group_parameters(group: Group) -> dict[str, FloatArray]:
+    known: dict[str, FloatArray] = {}
+    for guide in guides_of(group):
+        known.update(_guide_parameters(group.node, guide))
     match group:
         case Dyad(node=node, pins=pins, lengths_m=lengths) | Plate(node=node, base=pins, lengths_m=lengths):
-            known = {pair(pin, node): length for pin, length in zip(pins, lengths, strict=True)}
+            known |= {pair(pin, node): length for pin, length in zip(pins, lengths, strict=True)}
             if isinstance(group, Plate) and group.line_ratio is not None:
                 known[f"ratio {node}"] = group.line_ratio
-            return known
         case PointOnLine(node=node, ratio=ratio):
-            return {f"ratio {node}": ratio}
-        case Slider(node=node, guide=guide):
-            return {pair(group.pin, node): group.length_m, **_guide_parameters(node, guide)}
-        case CrossSlider(node=node, guides=(first, second)):
-            return {**_guide_parameters(node, first), **_guide_parameters(node, second)}
-        case Yoke(node=node, guide=guide):
-            return {f"angle slot {node}": group.slot_rad, **_guide_parameters(node, guide)}
-        case SlottedLink(node=node):
-            return {f"offset {node}": group.offset_m}
+            known[f"ratio {node}"] = ratio
+        case Slider(node=node, pin=pin, length_m=length):
+            known[pair(pin, node)] = length
+        case Yoke(node=node, slot_rad=slot):
+            known[f"angle slot {node}"] = slot
+        case SlottedLink(node=node, offset_m=offset):
+            known[f"offset {node}"] = offset
         case SlotPoint(node=node, local_m=local):
-            return {f"x {node}": np.asarray(local.real), f"y {node}": np.asarray(local.imag)}
+            known |= {f"x {node}": np.asarray(local.real), f"y {node}": np.asarray(local.imag)}
+    return known
 
 
 Part = Literal["", "n", "t", "c", "r"]
@@ -161,7 +163,7 @@ class AngularRate:
     length: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Construction:
     """Steps in an order in which they can be drawn, with the figure each belongs to.
 
@@ -183,15 +185,24 @@ class Construction:
     rates: Mapping[str, AngularRate]
     images: Mapping[str, Similar] = field(default_factory=dict)
     centres: Mapping[str, Similar] = field(default_factory=dict)
-    steps: tuple[Step, ...] = field(init=False, repr=False, compare=False)
-    """All steps in order."""
-    _by_node: dict[str, tuple[str, Step]] = field(init=False, repr=False, compare=False)
-    _upstream: dict[str, frozenset[str]] = field(init=False, repr=False, compare=False, default_factory=dict)
 
-    def __post_init__(self) -> None:
-        pairs = [(figure, step) for figure, steps in self.figures.items() for step in steps]
-        object.__setattr__(self, "steps", tuple(step for _, step in pairs))
-        object.__setattr__(self, "_by_node", {step.node: (figure, step) for figure, step in pairs})
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """All steps in order."""
+        return tuple(step for steps in self.figures.values() for step in steps)
+
+    @cached_property
+    def _by_node(self) -> dict[str, tuple[str, Step]]:
+        """Figure and step of each node."""
+        return {step.node: (figure, step) for figure, steps in self.figures.items() for step in steps}
+
+    @cached_property
+    def _upstream(self) -> dict[str, frozenset[str]]:
+        """By node: the node and everything that it is made from; steps come after those they need."""
+        upstream: dict[str, frozenset[str]] = {}
+        for step in self.steps:
+            upstream[step.node] = frozenset((step.node,)).union(*[upstream[need] for need in step.needs])
+        return upstream
 
     def step(self, node: str) -> Step:
         """The step that makes a node. Raises KeyError for a node that there is not."""
@@ -201,6 +212,10 @@ class Construction:
         """The figure that a node belongs to. Raises KeyError for a node that there is not."""
         return self._by_node[node][0]
 
+    def upstream(self, node: str) -> frozenset[str]:
+        """A node and everything that it is made from. Raises KeyError for a node that there is not."""
+        return self._upstream[node]
+
     def vectors_of(self, figure: str) -> tuple[Vector, ...]:
         """The vectors of one plan."""
         return tuple(v for v in self.vectors.values() if self._by_node[v.head][0] == figure)
@@ -208,20 +223,13 @@ class Construction:
     @property
     def links(self) -> Mapping[str, tuple[str, str]]:
         """The pairs of joints that are drawn as links of the sketch, by their names run together."""
-        pairs = [one.link for one in self.vectors.values() if one.link and one.part != "r"]
-        apart = {joint.node: joint.other for joint in self.steps if isinstance(joint, Coincide)}
+        pairs = [vector.link for vector in self.vectors.values() if vector.link and vector.part != "r"]
+        place = {joint.node: joint.other for joint in self.steps if isinstance(joint, Coincide)}
         return {
             f"{tail}{head}": (tail, head)
             for tail, head in pairs
-            if apart.get(tail, tail) != apart.get(head, head)
+            if place.get(tail, tail) != place.get(head, head)
         }
-
-    def upstream(self, node: str) -> frozenset[str]:
-        """A node and everything that it is made from."""
-        if node not in self._upstream:
-            further = [self.upstream(need) for need in self.step(node).needs]
-            self._upstream[node] = frozenset({node}).union(*further)
-        return self._upstream[node]
 
     def with_step(self, changed: Step) -> "Construction":
         """The same construction with the step of one node replaced."""
@@ -249,21 +257,22 @@ def evaluate(
 
     Arguments
     ---------
-    parameters : floats or arrays that broadcast, see `Parameters`
+    parameters : floats or arrays that broadcast, see `reference.construction.elements.Parameters`
     given : nodes to take as they are instead of constructing them (millimetres, y up)
-    errors : the hand's errors; `NO_ERROR` where absent
+    errors : of drawing, see `reference.construction.elements.Errors`; zero where absent
     wanted : nodes asked for; all by default
 
     Returns the nodes, complex millimetres; nan where a step has no solution.
     """
     given = given or {}
-    needed = None if wanted is None else ancestors(construction, wanted)
+    steps = construction.steps
+    if wanted is not None:
+        needed = ancestors(construction, wanted)
+        steps = tuple(step for step in steps if step.node in needed)
     nodes: dict[str, ComplexArray] = {}
     view = View(nodes, parameters, errors or {})
     with np.errstate(invalid="ignore", divide="ignore"):
-        for step in construction.steps:
-            if needed is not None and step.node not in needed:
-                continue
+        for step in steps:
             if step.node in given:
                 nodes[step.node] = np.asarray(given[step.node])
             else:

@@ -60,7 +60,7 @@ class Mistake:
     factor : of a length, speed or scale
     quarters : quarter turns of a figure, counter-clockwise
     n, position : the other student's variant
-    parameters : that variant's parameters
+    parameters : that variant's parameters, or those that differ
     """
 
     code: str
@@ -88,7 +88,7 @@ def commit(mistake: Mistake, drawing: Drawing) -> Drawing:
             return Drawing(construction, {**parameters, mistake.at: scaled})
         case "other_variant":
             scales = {name: parameters[name] for name in ("kL", "kv", "ka", "turn") if name in parameters}
-            return Drawing(construction, {**mistake.parameters, **scales})
+            return Drawing(construction, {**parameters, **mistake.parameters, **scales})
         case "vector_missing":
             kept = {name: one for name, one in construction.vectors.items() if name != mistake.at}
             return Drawing(replace(construction, vectors=kept), parameters)

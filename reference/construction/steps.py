@@ -1,4 +1,4 @@
-"""The steps of a construction: what makes one node from earlier nodes.
+"""The steps of a construction, as a student draws them: each makes one node from earlier nodes.
 
 Everything is in drawn millimetres, complex, y up, and an array over variants.
 """
@@ -9,7 +9,16 @@ from typing import Protocol
 import numpy as np
 
 from reference import geometry
-from reference.construction.elements import AnyLine, Direction, FixedLine, Length, View, drawn, fixed_point
+from reference.construction.elements import (
+    AnyLine,
+    Direction,
+    FixedLine,
+    FromNodes,
+    Length,
+    View,
+    drawn,
+    fixed_point,
+)
 from reference.geometry import ComplexArray
 from reference.kinematics import assur
 from reference.mechanism import Side
@@ -31,15 +40,10 @@ class Step(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Pole:
+class Pole(FromNodes):
     """The pole of a plan, its origin."""
 
     node: str
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """No nodes."""
-        return ()
 
     def place(self, view: View) -> ComplexArray:
         """Zero."""
@@ -48,15 +52,10 @@ class Pole:
 
 
 @dataclass(frozen=True, slots=True)
-class Pivot:
+class Pivot(FromNodes):
     """A fixed point of the mechanism, by its real coordinates among the parameters (``x O2``, ``y O2``)."""
 
     node: str
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """No nodes."""
-        return ()
 
     def place(self, view: View) -> ComplexArray:
         """Real place at the scale kL, turned with the sketch."""
@@ -64,22 +63,18 @@ class Pivot:
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class Given(FromNodes):
     """A known vector laid off from a node: a length along a direction (a negative one backwards).
 
     `factor` multiplies the length: 1 for a right one, -1 for a wrong sense, 0 for one left out.
     """
 
+    reads = ("start", "length", "along")
     node: str
     start: str
     length: Length
     along: Direction
     factor: float = 1.0
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Its start, and what its length and direction are read from."""
-        return (self.start, *self.length.needs, *self.along.needs)
 
     def place(self, view: View) -> ComplexArray:
         """The vector's end."""
@@ -89,17 +84,13 @@ class Given:
 
 
 @dataclass(frozen=True, slots=True)
-class OnGuide:
+class OnGuide(FromNodes):
     """The driven slider: a length along a fixed guide from its point (a negative one backwards)."""
 
+    reads = ("length",)
     node: str
     guide: FixedLine
     length: Length
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """No nodes."""
-        return self.length.needs
 
     def place(self, view: View) -> ComplexArray:
         """The slider's place."""
@@ -108,17 +99,13 @@ class OnGuide:
 
 
 @dataclass(frozen=True, slots=True)
-class TwoLines:
+class TwoLines(FromNodes):
     """Where two lines meet."""
 
+    reads = ("first", "second")
     node: str
     first: AnyLine
     second: AnyLine
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The nodes both lines start from, and those their directions are read from."""
-        return (*self.first.needs, *self.second.needs)
 
     def place(self, view: View) -> ComplexArray:
         """The meeting point."""
@@ -128,18 +115,14 @@ class TwoLines:
 
 
 @dataclass(frozen=True, slots=True)
-class TwoArcs:
+class TwoArcs(FromNodes):
     """Where two compass arcs meet, on one side of the line between their centres."""
 
+    reads = ("centres", "radii")
     node: str
     centres: tuple[str, str]
     radii: tuple[Length, Length]
     side: Side
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The centres."""
-        return (*self.centres, *self.radii[0].needs, *self.radii[1].needs)
 
     def place(self, view: View) -> ComplexArray:
         """The meeting point."""
@@ -151,19 +134,15 @@ class TwoArcs:
 
 
 @dataclass(frozen=True, slots=True)
-class ArcAndLine:
+class ArcAndLine(FromNodes):
     """Where a compass arc meets a guide, ahead of (side +1) or behind its centre along the guide."""
 
+    reads = ("centre", "radius", "guide")
     node: str
     centre: str
     radius: Length
     guide: AnyLine
     side: Side
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The arc's centre, and what the guide is drawn from."""
-        return (self.centre, *self.radius.needs, *self.guide.needs)
 
     def place(self, view: View) -> ComplexArray:
         """The meeting point."""
@@ -173,16 +152,12 @@ class ArcAndLine:
 
 
 @dataclass(frozen=True, slots=True)
-class Coincide:
+class Coincide(FromNodes):
     """A point that lies where another does at this instant: on the link under a slider."""
 
+    reads = ("other",)
     node: str
     other: str
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The other point."""
-        return (self.other,)
 
     def place(self, view: View) -> ComplexArray:
         """The same place."""
@@ -190,23 +165,19 @@ class Coincide:
 
 
 @dataclass(frozen=True, slots=True)
-class Tangent:
+class Tangent(FromNodes):
     """Where a line from a point touches a circle.
 
     From the centre the touching point lies a quarter turn to the left (for a positive radius) of the
     line's direction; `side` is +1 where that runs from the touching point to `start`, -1 the other way.
     """
 
+    reads = ("centre", "start", "radius")
     node: str
     centre: str
     radius: Length
     start: str
     side: Side
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Centre and start."""
-        return (self.centre, self.start, *self.radius.needs)
 
     def place(self, view: View) -> ComplexArray:
         """The touching point."""
@@ -217,19 +188,15 @@ class Tangent:
 
 
 @dataclass(frozen=True, slots=True)
-class Local:
+class Local(FromNodes):
     """A point by its coordinates in a link's own axes, x along a direction, y to its left."""
 
+    reads = ("origin", "axis", "x", "y")
     node: str
     origin: str
     axis: Direction
     x: Length
     y: Length
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The origin, and what the axis is read from."""
-        return (self.origin, *self.axis.needs, *self.x.needs, *self.y.needs)
 
     def place(self, view: View) -> ComplexArray:
         """Origin + (x + i y) along the axis."""
@@ -239,17 +206,13 @@ class Local:
 
 
 @dataclass(frozen=True, slots=True)
-class Divide:
+class Divide(FromNodes):
     """A point on the line through two nodes, dividing it in a ratio among the parameters."""
 
+    reads = ("base",)
     node: str
     base: tuple[str, str]
     ratio: str
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The base."""
-        return self.base
 
     def place(self, view: View) -> ComplexArray:
         """base[0] + ratio (base[1] - base[0])."""
@@ -260,21 +223,17 @@ class Divide:
 
 
 @dataclass(frozen=True, slots=True)
-class Similar:
+class Similar(FromNodes):
     """The image of a link's third point: the triangle of the plan similar to that of the mechanism.
 
     `mirrored` for the mistake of a triangle similar but traversed the other way round.
     """
 
+    reads = ("base", "model")
     node: str
     base: tuple[str, str]
     model: tuple[str, str, str]
     mirrored: bool = False
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The base in the plan and the model in the mechanism."""
-        return (*self.base, *self.model)
 
     def place(self, view: View) -> ComplexArray:
         """The third corner."""

@@ -104,7 +104,7 @@ def hand_errors(step: Step, skill: Skill) -> Errors:
 
 
 @dataclass(frozen=True, slots=True)
-class Own:
+class OwnNode:
     """A node as a student has drawn it, or as measurements lead to it.
 
     Attributes
@@ -118,7 +118,7 @@ class Own:
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class TracedNode:
     """A node with all that may move it.
 
     Attributes
@@ -132,7 +132,7 @@ class Drawn:
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class EndSpread:
     """Standard deviations of a vector's end, millimetres, along the vector and across it."""
 
     along: float
@@ -140,7 +140,7 @@ class Spread:
 
 
 @dataclass(frozen=True, slots=True)
-class Trace:
+class TracedDrawing:
     """A drawing traced step by step.
 
     Attributes
@@ -150,8 +150,8 @@ class Trace:
     hand : how many of the errors that may move them are the hand's; those of measuring come after
     """
 
-    made: Mapping[str, Drawn]
-    nodes: Mapping[str, Drawn]
+    made: Mapping[str, TracedNode]
+    nodes: Mapping[str, TracedNode]
     hand: int
 
     def vector(self, tail: str, head: str) -> complex:
@@ -163,15 +163,15 @@ class Trace:
         return np.asarray(self.made[head].moved - self.nodes[tail].moved)
 
 
-NO_OWN: Mapping[str, Mapping[str, Own]] = {}
+NO_OWN: Mapping[str, Mapping[str, OwnNode]] = {}
 
 
 def trace(
     construction: Construction,
     parameters: Parameters,
     skill: Skill,
-    own: Mapping[str, Mapping[str, Own]] = NO_OWN,
-) -> Trace:
+    own: Mapping[str, Mapping[str, OwnNode]] = NO_OWN,
+) -> TracedDrawing:
     """Draw a construction with a hand's errors, from a student's own nodes where they are known.
 
     Arguments
@@ -191,7 +191,7 @@ def trace(
         name: made[name] if place is drawing.made[name] else drawing.told(place)
         for name, place in drawing.nodes.items()
     }
-    return Trace(made, nodes, drawing.hand)
+    return TracedDrawing(made, nodes, drawing.hand)
 
 
 @dataclass(slots=True)
@@ -201,7 +201,7 @@ class _Tracing:
     construction: Construction
     parameters: Parameters
     skill: Skill
-    own: Mapping[str, Mapping[str, Own]]
+    own: Mapping[str, Mapping[str, OwnNode]]
     errors: Errors = field(init=False)
     hand: int = field(init=False)
     measuring: int = field(init=False)
@@ -228,28 +228,28 @@ class _Tracing:
             self.made[node] = np.asarray(step.place(view) + mark)
             seen[node] = self.nodes[node] = own.get(node, self.made[node])
 
-    def placed(self, one: Own) -> ComplexArray:
+    def placed(self, one: OwnNode) -> ComplexArray:
         """An own node, with its errors of measuring."""
         place = np.full(1 + self.hand + self.measuring, one.at)
         if one.moved is not None:
             place[1 + self.hand : 1 + self.hand + len(one.moved)] += SMALL * one.moved
         return place
 
-    def told(self, place: ComplexArray) -> Drawn:
+    def told(self, place: ComplexArray) -> TracedNode:
         """A node's place without errors, and how each moves it."""
         if place.ndim == 0:
-            return Drawn(complex(place), np.zeros(self.hand + self.measuring, np.complex128))
+            return TracedNode(complex(place), np.zeros(self.hand + self.measuring, np.complex128))
         moved = (place[1:] - place[0]) / SMALL
-        return Drawn(complex(place[0]), np.where(np.isfinite(moved), moved, 0.0))
+        return TracedNode(complex(place[0]), np.where(np.isfinite(moved), moved, 0.0))
 
 
-def spread(moved: ComplexArray, along: complex) -> Spread:
+def spread(moved: ComplexArray, along: complex) -> EndSpread:
     """The standard deviations of an end that independent errors move, about a vector's direction.
 
     Arguments: `along` is the vector; for a zero vector both are what the end is off in any direction.
     """
     if along == 0.0:
         whole = float(np.sqrt(np.sum(np.abs(moved) ** 2)))
-        return Spread(whole, whole)
+        return EndSpread(whole, whole)
     turned = moved * np.conj(along / abs(along))
-    return Spread(float(np.sqrt(np.sum(turned.real**2))), float(np.sqrt(np.sum(turned.imag**2))))
+    return EndSpread(float(np.sqrt(np.sum(turned.real**2))), float(np.sqrt(np.sum(turned.imag**2))))

@@ -209,21 +209,21 @@ class Label:
 Shape = Stroke | Ring | Area | Curve | Label
 
 
-def moved(shape: Shape, by: Point) -> Shape:
+def shifted(shape: Shape, by: Point) -> Shape:
     """The shape elsewhere on the sheet."""
 
-    def shifted(point: Point) -> Point:
+    def shift(point: Point) -> Point:
         return (point[0] + by[0], point[1] + by[1])
 
     match shape:
         case Stroke():
-            return replace(shape, start=shifted(shape.start), end=shifted(shape.end))
+            return replace(shape, start=shift(shape.start), end=shift(shape.end))
         case Ring():
-            return replace(shape, centre=shifted(shape.centre))
+            return replace(shape, centre=shift(shape.centre))
         case Area() | Curve():
-            return replace(shape, points=tuple(shifted(point) for point in shape.points))
+            return replace(shape, points=tuple(shift(point) for point in shape.points))
         case _:
-            return replace(shape, at=shifted(shape.at))
+            return replace(shape, at=shift(shape.at))
 
 
 def bounds(shapes: Iterable[Shape]) -> Bounds:

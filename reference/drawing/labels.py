@@ -138,50 +138,50 @@ class _Places:
         return Standing(one, label, Stroke((x0, y0), (x1, y1), HAIR_MM, CONSTRUCTION, LEADER_DASH))
 
 
-def _places_at(one: Wanted, gaps: Sequence[float], segments: FloatArray, points: FloatArray) -> _Places:
+def _places_at(wanted: Wanted, gaps: Sequence[float], segments: FloatArray, points: FloatArray) -> _Places:
     """Places all round a point, at each of some distances from its mark."""
-    boxes, gap, turn = _boxes_around(one, gaps)
-    own, others = _distances(boxes, one, points)
+    boxes, gap, turn = _boxes_around(wanted, gaps)
+    own, others = _distances(boxes, wanted, points)
     doubtful = (gap >= LEADER_FROM_MM) | ((others < own + DOUBT_MM) & (gap >= LEAST_LEADER_MM))
-    aside = 0.0 if one.outward == 0 else 1.0 - np.cos(turn - np.angle(one.outward))
+    aside = 0.0 if wanted.outward == 0 else 1.0 - np.cos(turn - np.angle(wanted.outward))
     touched = lengths_inside(boxes, segments)
     cost = gap + 0.9 * aside + OTHERS_POINT_COST * np.maximum(own + DOUBT_MM - others, 0.0)
     cost += TOUCHING_COST * np.sum(np.where(touched > 0.0, touched + 1.0, 0.0), axis=1)
-    return _Places(one, boxes, _leaders(one, boxes, doubtful), cost)
+    return _Places(wanted, boxes, _leaders(wanted, boxes, doubtful), cost)
 
 
-def _boxes_around(one: Wanted, gaps: Sequence[float]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _boxes_around(wanted: Wanted, gaps: Sequence[float]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Boxes (p, 4), the distance of each from the point's mark (p,), the direction of each (p,)."""
-    rise, fall = rise_and_fall(one.text, one.size)
-    wide = width_of(one.text, one.size) + (SLANT * rise if one.italic else 0.0)
+    rise, fall = rise_and_fall(wanted.text, wanted.size)
+    wide = width_of(wanted.text, wanted.size) + (SLANT * rise if wanted.italic else 0.0)
     half = np.array([wide, rise + fall]) / 2.0
     turns = np.arange(DIRECTIONS) * math.tau / DIRECTIONS
     gap, turn = (grid.ravel() for grid in np.meshgrid(gaps, turns, indexing="ij"))
     along = np.stack([np.cos(turn), -np.sin(turn)], axis=1)
     # So far that the box, not its middle, is the gap away from the mark.
     steep = np.maximum(np.abs(along), TINY_MM)
-    reach = np.minimum(half[0] / steep[:, 0], half[1] / steep[:, 1]) + one.radius + gap
-    middles = np.asarray(one.at) + along * reach[:, None]
+    reach = np.minimum(half[0] / steep[:, 0], half[1] / steep[:, 1]) + wanted.radius + gap
+    middles = np.asarray(wanted.at) + along * reach[:, None]
     return np.hstack([middles - half, middles + half]), gap, turn
 
 
-def _distances(boxes: FloatArray, one: Wanted, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How far each of (p, 4) boxes is from its own point and from the nearest other one, (p,) each."""
+def _distances(boxes: FloatArray, wanted: Wanted, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How far each of (p, 4) boxes is from its own point and from the nearest other point, (p,) each."""
     apart = points[:, None] - np.clip(points[:, None], boxes[:, :2], boxes[:, 2:])
     away = np.hypot(apart[..., 0], apart[..., 1])
-    mine = np.hypot(*(points - np.asarray(one.at)).T) < SAME_POINT_MM
+    mine = np.hypot(*(points - np.asarray(wanted.at)).T) < SAME_POINT_MM
     others = np.min(away[~mine], axis=0) if np.any(~mine) else np.full(len(boxes), np.inf)
     return np.min(away[mine], axis=0), others
 
 
-def _leaders(one: Wanted, boxes: FloatArray, doubtful: NDArray[np.bool_]) -> FloatArray:
+def _leaders(wanted: Wanted, boxes: FloatArray, doubtful: NDArray[np.bool_]) -> FloatArray:
     """The thin line from a point's mark to each box, as segments; nan where none is needed."""
-    at = np.asarray(one.at)
+    at = np.asarray(wanted.at)
     near = np.clip(at, boxes[:, :2], boxes[:, 2:])
     span = near - at
     length = np.hypot(span[:, 0], span[:, 1])
     unit = span / np.maximum(length, SAME_POINT_MM)[:, None]
-    lines = np.hstack([at + unit * one.radius, near - unit * CLEAR_MM, np.zeros((len(boxes), 1))])
+    lines = np.hstack([at + unit * wanted.radius, near - unit * CLEAR_MM, np.zeros((len(boxes), 1))])
     return np.where(doubtful[:, None], lines, np.nan)
 
 

@@ -15,10 +15,22 @@ from reference.authored.assignment import Assignment
 from reference.construction.elements import Along
 from reference.construction.steps import ArcAndLine, Given, Similar, Step, TwoArcs, TwoLines
 from reference.drawing import symbols
-from reference.drawing.canvas import INK, PAPER, Area, Bounds, Curve, Label, Point, Ring, Shape, Stroke, moved
+from reference.drawing.canvas import (
+    INK,
+    PAPER,
+    Area,
+    Bounds,
+    Curve,
+    Label,
+    Point,
+    Ring,
+    Shape,
+    Stroke,
+    shifted,
+)
 from reference.drawing.labels import segments_of
 from reference.drawing.sketch import LETTER_MM, PLATE_FILL, polygon, sketch
-from reference.drawing.subject import PLAN_COLOURS, Figure, Subject, Wording
+from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Subject, Wording
 from reference.drawing.symbols import point, unit
 from reference.drawing.tables import column
 from reference.plan import Plan
@@ -31,7 +43,7 @@ CORNERS = (None, (0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))
 Mask = NDArray[np.bool_]
 
 
-def lay_out(figures: Sequence[Figure], room: Bounds, column: Bounds) -> tuple[list[Point], bool]:
+def lay_out(figures: Sequence[DrawnFigure], room: Bounds, column: Bounds) -> tuple[list[Point], bool]:
     """How far each figure is moved from its own origin, and whether all have their place.
 
     Arguments: `room` is the sheet inside its frame, `column` the part of it that the table takes, at
@@ -42,11 +54,11 @@ def lay_out(figures: Sequence[Figure], room: Bounds, column: Bounds) -> tuple[li
     return (found, True) if found else (_one_on_another(figures, room), False)
 
 
-def _sizes(figures: Sequence[Figure]) -> list[tuple[float, float]]:
+def _sizes(figures: Sequence[DrawnFigure]) -> list[tuple[float, float]]:
     return [(box[2] - box[0], box[3] - box[1]) for box in (figure.bounds for figure in figures)]
 
 
-def _in_rows(figures: Sequence[Figure], room: Bounds) -> list[Point] | None:
+def _in_rows(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point] | None:
     """In rows, the spare room shared out evenly: as many to a row as leaves the widest spaces.
 
     None where every way leaves too little.
@@ -56,7 +68,7 @@ def _in_rows(figures: Sequence[Figure], room: Bounds) -> list[Point] | None:
     return moves if gap >= LEAST_GAP_MM else None
 
 
-def _rows(figures: Sequence[Figure], breaks: Sequence[bool], room: Bounds) -> tuple[float, list[Point]]:
+def _rows(figures: Sequence[DrawnFigure], breaks: Sequence[bool], room: Bounds) -> tuple[float, list[Point]]:
     """The least space and the places where a new row starts after each figure marked so."""
     left, top, right, bottom = room
     sizes, rows = _sizes(figures), [[0]]
@@ -78,7 +90,9 @@ def _rows(figures: Sequence[Figure], breaks: Sequence[bool], room: Bounds) -> tu
     return gap, moves
 
 
-def _where_there_is_room(figures: Sequence[Figure], room: Bounds, kept_free: Bounds) -> list[Point] | None:
+def _where_there_is_room(
+    figures: Sequence[DrawnFigure], room: Bounds, kept_free: Bounds
+) -> list[Point] | None:
     """The largest figure in the middle or in a corner, each other where it keeps farthest from all there.
 
     Of these ways the one whose figures keep farthest apart; None where none has room for all.
@@ -92,7 +106,7 @@ def _where_there_is_room(figures: Sequence[Figure], room: Bounds, kept_free: Bou
 
 
 def _packed(
-    figures: Sequence[Figure], room: Bounds, kept_free: Bounds, corner: tuple[float, float] | None
+    figures: Sequence[DrawnFigure], room: Bounds, kept_free: Bounds, corner: tuple[float, float] | None
 ) -> tuple[float, list[Point]]:
     """How far the figures keep apart, zero where one has no place, and their moves."""
     taken = np.zeros((int((room[3] - room[1]) / CELL_MM), int((room[2] - room[0]) / CELL_MM)), dtype=bool)
@@ -111,7 +125,7 @@ def _packed(
     return float(least), [moves[k] for k in range(len(figures))]
 
 
-def _mask(figure: Figure) -> tuple[Mask, Point]:
+def _mask(figure: DrawnFigure) -> tuple[Mask, Point]:
     """The cells that a figure's ink needs, with the least gap around; the corner of the first cell."""
     x0, y0, x1, y1 = figure.bounds
     corner = (x0 - LEAST_GAP_MM, y0 - LEAST_GAP_MM)
@@ -160,7 +174,7 @@ def _roomiest(taken: Mask, mask: Mask, corner: tuple[float, float] | None) -> tu
     return (int(row), int(column)), float(depth[row, column])
 
 
-def _one_on_another(figures: Sequence[Figure], room: Bounds) -> list[Point]:
+def _one_on_another(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point]:
     """All from the room's top left corner: what does not fit is at least seen."""
     return [(room[0] - box[0], room[1] - box[1]) for box in (figure.bounds for figure in figures)]
 
@@ -172,7 +186,7 @@ ARC_HALF_RAD = 0.22
 MODEL_MM, LARGE_MM = 1.0, 90.0
 
 
-def stage(figure: Figure, earlier: Collection[str], node: str) -> tuple[Shape, ...]:
+def stage(figure: DrawnFigure, earlier: Collection[str], node: str) -> tuple[Shape, ...]:
     """The figure once a node's step is done, after the steps of the earlier nodes."""
     known = {*earlier, node}
     shown = [part for part in figure.parts if part.node in known and part.until not in known]
@@ -182,7 +196,7 @@ def stage(figure: Figure, earlier: Collection[str], node: str) -> tuple[Shape, .
     return (*plates, *(shape for shape in (*before, *now) if not _is_light(shape)))
 
 
-def grey(figure: Figure) -> tuple[Shape, ...]:
+def grey(figure: DrawnFigure) -> tuple[Shape, ...]:
     """The finished figure without its caption, all of it grey."""
     return tuple(inked(part.shape, BEFORE) for part in figure.parts if part.node and not part.until)
 
@@ -266,7 +280,7 @@ ENGLISH = Wording()
 
 
 @dataclass(frozen=True, slots=True)
-class Sheet:
+class DrawnSheet:
     """One A3 sheet of the reference drawing; `fits` is False where a figure is too large for it."""
 
     shapes: tuple[Shape, ...]
@@ -280,7 +294,7 @@ def reference_drawing(
     wording: Wording = ENGLISH,
     *,
     altitude: bool = False,
-) -> list[Sheet]:
+) -> list[DrawnSheet]:
     """The drawing of one variant of a plan on A3, true to scale.
 
     All on one sheet where it fits, else on the sheets that the assignment asks for, else on as many as
@@ -304,9 +318,9 @@ def reference_drawing(
     )
 
 
-def _one_after_another(subject: Subject, figures: Sequence[Figure]) -> list[Sheet]:
+def _one_after_another(subject: Subject, figures: Sequence[DrawnFigure]) -> list[DrawnSheet]:
     """Sheets with as many figures each, in their order, as fit."""
-    sheets: list[tuple[Sheet, list[Figure]]] = []
+    sheets: list[tuple[DrawnSheet, list[DrawnFigure]]] = []
     for figure in figures:
         together = _sheet(subject, [*sheets[-1][1], figure]) if sheets else None
         if together is not None and together.fits:
@@ -316,7 +330,7 @@ def _one_after_another(subject: Subject, figures: Sequence[Figure]) -> list[Shee
     return [sheet for sheet, _ in sheets]
 
 
-def figures_of(subject: Subject) -> dict[str, Figure]:
+def figures_of(subject: Subject) -> dict[str, DrawnFigure]:
     """Each figure of a plan by its name."""
     return {
         name: sketch(subject) if name == "mechanism" else polygon(subject, name)
@@ -324,7 +338,7 @@ def figures_of(subject: Subject) -> dict[str, Figure]:
     }
 
 
-def _sheet(subject: Subject, figures: Sequence[Figure]) -> Sheet:
+def _sheet(subject: Subject, figures: Sequence[DrawnFigure]) -> DrawnSheet:
     left, top, right, bottom = FRAME
     corners = ((left, top), (right, top), (right, bottom), (left, bottom))
     shapes: list[Shape] = [Stroke(corner, corners[(i + 1) % 4], 0.7) for i, corner in enumerate(corners)]
@@ -332,8 +346,8 @@ def _sheet(subject: Subject, figures: Sequence[Figure]) -> Sheet:
     shapes.extend(beside.shapes)
     moves, placed = lay_out(figures, FRAME, beside.box)
     for figure, by in zip(figures, moves, strict=True):
-        shapes.extend(moved(shape, by) for shape in figure.shapes)
+        shapes.extend(shifted(shape, by) for shape in figure.shapes)
     if not (placed and beside.fits):
         at = (left + 5, bottom - 5)
         shapes.append(Label(at, subject.wording.too_large, WARNING_MM, colour=WARNING_COLOUR))
-    return Sheet(tuple(shapes), placed and beside.fits)
+    return DrawnSheet(tuple(shapes), placed and beside.fits)

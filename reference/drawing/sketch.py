@@ -9,7 +9,7 @@ from reference.construction.steps import Step, TwoLines
 from reference.drawing import symbols
 from reference.drawing.canvas import CONSTRUCTION, INK, Area, Curve, Label, Shape, Stroke, pieces_of
 from reference.drawing.labels import Style, Wanted, lengths_inside, letters, segments_of
-from reference.drawing.subject import PLAN_COLOURS, Figure, Part, Subject
+from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Part, Subject
 from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, hinged_on, point, unit
 from reference.drawing.triangles import altitudes
 from reference.geometry import FloatArray
@@ -53,7 +53,7 @@ def drive_letter(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted
 def _rate(subject: Subject) -> float:
     """The crank's angular velocity, or the driven slider's speed."""
     driver = subject.plan.mechanism.driver
-    return subject.one(np.asarray(driver.speed if isinstance(driver, DrivenSlider) else driver.omega))
+    return subject.number(np.asarray(driver.speed if isinstance(driver, DrivenSlider) else driver.omega))
 
 
 def _stands(subject: Subject) -> bool:
@@ -127,7 +127,7 @@ SUPPORT_CLEAR_COSINE = 0.62
 CAPTION_GAP_MM, CAPTION_MM = 6.0, 3.5
 
 
-def sketch(subject: Subject) -> Figure:
+def sketch(subject: Subject) -> DrawnFigure:
     """The mechanism of one variant."""
     nodes = subject.nodes("mechanism")
     thin = altitudes(subject, nodes)
@@ -139,11 +139,11 @@ def sketch(subject: Subject) -> Figure:
     return captioned(subject, "mechanism", (*drawn, *named), INK)
 
 
-def captioned(subject: Subject, name: str, parts: tuple[Part, ...], colour: str) -> Figure:
+def captioned(subject: Subject, name: str, parts: tuple[Part, ...], colour: str) -> DrawnFigure:
     """A figure with its title and scale above it."""
-    left, top, _right, _bottom = Figure(name, parts).bounds
+    left, top, _right, _bottom = DrawnFigure(name, parts).bounds
     caption = Label((left, top - CAPTION_GAP_MM), subject.caption(name), CAPTION_MM, colour=colour)
-    return Figure(name, (*parts, Part("", caption)))
+    return DrawnFigure(name, (*parts, Part("", caption)))
 
 
 def _layers(subject: Subject, nodes: dict[str, complex]) -> Iterator[Iterator[Part]]:
@@ -237,7 +237,7 @@ def _joints(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
     for group in mechanism.groups:
         ratio = group.ratio if isinstance(group, PointOnLine) else getattr(group, "line_ratio", None)
         if isinstance(group, PointOnLine | Plate) and ratio is not None:
-            yield from _welds(group, subject.one(np.asarray(ratio)), subject, nodes)
+            yield from _welds(group, subject.number(np.asarray(ratio)), subject, nodes)
 
 
 def _free_points(mechanism: Mechanism) -> set[str]:
@@ -300,7 +300,7 @@ ABSOLUTE_MM, RELATIVE_MM = 0.5, 0.3
 """Widths of vectors from the pole, and of all others."""
 
 
-def polygon(subject: Subject, figure: str) -> Figure:
+def polygon(subject: Subject, figure: str) -> DrawnFigure:
     """One plan of one variant."""
     colour, nodes = PLAN_COLOURS[figure], subject.nodes(figure)
     drawn = [*_lines(subject, figure, nodes), *_vectors(subject, figure, nodes)]

@@ -48,7 +48,7 @@ class Wording:
         """A number, written with a point, as the language writes it."""
         return text.replace(".", self.decimal_mark).replace("-", "−")
 
-    def told(self, variant: Variant) -> str:
+    def variant_text(self, variant: Variant) -> str:
         """The student's number and position."""
         values = (("n", variant.n), ("position", variant.position))
         return ", ".join(f"{self.variant[name]} = {value}" for name, value in values if value is not None)
@@ -67,7 +67,7 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class DrawnFigure:
     """A figure about its own origin, sheet millimetres, y down."""
 
     name: str
@@ -98,10 +98,10 @@ class Subject:
     def title(self) -> str:
         """The assignment's title and the variant, in the wording's language."""
         title = self.assignment.file.title.in_language(self.wording.lang)
-        told = self.wording.told(self.plan.variants[self.index])
+        told = self.wording.variant_text(self.plan.variants[self.index])
         return f"{title}, {told}" if told else title
 
-    def one(self, values: FloatArray) -> float:
+    def number(self, values: FloatArray) -> float:
         """The variant's number, of an array over variants or of a number common to all."""
         return float(values[self.index] if np.ndim(values) else values)
 
@@ -140,8 +140,8 @@ class Subject:
     def is_zero(self, vector: str) -> bool:
         """Whether a vector is too short, against its plan, to have a direction."""
         figure = self.plan.construction.figure_of(self.plan.construction.vectors[vector].head)
-        size = self.one(self.plan.size_mm(figure))
-        return self.one(np.abs(self.plan.drawn_mm(vector))) <= max(ZERO_SHARE * size, 1e-9)
+        size = self.number(self.plan.size_mm(figure))
+        return self.number(np.abs(self.plan.drawn_mm(vector))) <= max(ZERO_SHARE * size, 1e-9)
 
     def shown(self, name: str) -> str:
         """A name as the assignment's students know it."""
@@ -151,12 +151,12 @@ class Subject:
         """A node's or a vector's name, set."""
         return pieces_of(self.shown(name))
 
-    def scale_told(self, scale: str) -> tuple[Piece, ...]:
+    def scale_with_value(self, scale: str) -> tuple[Piece, ...]:
         """A scale with its value: kL = 0.005 m/mm."""
-        value = self.wording.number(f"{self.one(getattr(self.plan.scales, scale)):.5g}")
+        value = self.wording.number(f"{self.number(getattr(self.plan.scales, scale)):.5g}")
         unit = self.wording.unit(SCALE_UNITS[scale])
         return (*scale_pieces(self.shown(scale)), Piece(f" = {value} {unit}"))
 
     def caption(self, figure: str) -> Text:
         """What stands above a figure."""
-        return (Piece(f"{self.wording.titles[figure]},  "), *self.scale_told(SCALE_OF[figure]))
+        return (Piece(f"{self.wording.titles[figure]},  "), *self.scale_with_value(SCALE_OF[figure]))

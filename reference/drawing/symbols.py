@@ -46,13 +46,20 @@ def point(z: complex) -> Point:
     return (float(z.real), float(-z.imag))
 
 
-def arrow(start: complex, end: complex, width: float, colour: str) -> Iterator[Shape]:
-    """A vector: a line and a filled head, shorter where the vector is short."""
+def arrow(
+    start: complex,
+    end: complex,
+    width: float,
+    colour: str,
+    head_mm: tuple[float, float] = ARROW_MM,
+    dash: tuple[float, ...] = (),
+) -> Iterator[Shape]:
+    """A vector: a line and a filled head (length and half width), shorter where the vector is short."""
     along = (end - start) / abs(end - start)
-    length = min(ARROW_MM[0], ARROW_SHARE * abs(end - start))
-    half = ARROW_MM[1] * length / ARROW_MM[0]
+    length = min(head_mm[0], ARROW_SHARE * abs(end - start))
+    half = head_mm[1] * length / head_mm[0]
     neck = end - along * length
-    yield Stroke(point(start), point(neck), width, colour)
+    yield Stroke(point(start), point(neck), width, colour, dash)
     yield Area((point(end), point(neck + 1j * along * half), point(neck - 1j * along * half)), colour)
 
 
@@ -193,7 +200,7 @@ def _bars_of(subject: Subject, group: Group, nodes: dict[str, complex]) -> Itera
         case Plate(node=node, base=base, link=link):
             yield from (_between(node, link, pin, node, nodes) for pin in base)
         case PointOnLine(node=node, base=(p, q), link=link, ratio=ratio):
-            share = subject.one(np.asarray(ratio))
+            share = subject.number(np.asarray(ratio))
             if not 0.0 <= share <= 1.0:
                 yield _between(node, link, p if share < 0.0 else q, node, nodes)
         case Slider(node=node, pin=pin, link=link):
@@ -236,7 +243,7 @@ def slot_direction(group: SlottedLink, nodes: dict[str, complex]) -> complex:
 
 def slot_of_yoke(subject: Subject, group: Yoke) -> complex:
     """The direction of a yoke's slot."""
-    return complex(np.exp(1j * subject.one(np.asarray(group.slot_rad))))
+    return complex(np.exp(1j * subject.number(np.asarray(group.slot_rad))))
 
 
 def blocks(subject: Subject, nodes: dict[str, complex]) -> Iterator[Block]:
@@ -267,7 +274,7 @@ def _block(subject: Subject, node: str, guide: Guide, nodes: dict[str, complex],
 
 def _along(subject: Subject, guide: Guide, nodes: dict[str, complex]) -> complex:
     if isinstance(guide, FixedGuide):
-        return complex(np.exp(1j * subject.one(np.asarray(guide.angle_rad))))
+        return complex(np.exp(1j * subject.number(np.asarray(guide.angle_rad))))
     return unit(nodes[guide.base[1]] - nodes[guide.base[0]])
 
 

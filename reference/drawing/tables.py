@@ -33,7 +33,7 @@ RULE_COLOUR = "#9aa3ad"
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class TableRow:
     """A row of the table: name, where it stands on paper, drawn length, value, direction or sense."""
 
     name: Text
@@ -46,7 +46,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class TableColumn:
     """What stands beside the figures, how far down it reaches, and whether it has room."""
 
     shapes: tuple[Shape, ...]
@@ -54,7 +54,9 @@ class Column:
     fits: bool
 
 
-def column(subject: Subject, figures: Sequence[str], corner: tuple[float, float], bottom: float) -> Column:
+def column(
+    subject: Subject, figures: Sequence[str], corner: tuple[float, float], bottom: float
+) -> TableColumn:
     """Title, data and table of a sheet's figures, from the column's top right corner down."""
     left, top = corner[0] - COLUMN_MM, corner[1]
     head, y = _heading(subject, (left + EDGE_MM, top + EDGE_MM))
@@ -65,7 +67,7 @@ def column(subject: Subject, figures: Sequence[str], corner: tuple[float, float]
         table = list(_table(rows, (left, y), max(height, LEAST_ROW_MM)))
         y += len(rows) * max(height, LEAST_ROW_MM)
     rules = [Stroke((left, top), (left, y), 0.3), Stroke((left, y), (corner[0], y), 0.3)]
-    return Column((*rules, *head, *table), (left, top, corner[0], y), height >= LEAST_ROW_MM)
+    return TableColumn((*rules, *head, *table), (left, top, corner[0], y), height >= LEAST_ROW_MM)
 
 
 def _heading(subject: Subject, at: tuple[float, float]) -> tuple[list[Shape], float]:
@@ -76,7 +78,7 @@ def _heading(subject: Subject, at: tuple[float, float]) -> tuple[list[Shape], fl
     lang = subject.wording.lang
     title = subject.assignment.file.title.in_language(lang)
     lines += [(line, TITLE_MM) for line in wrapped(title, TITLE_MM, COLUMN_MM - 2 * EDGE_MM)]
-    told = subject.wording.told(subject.plan.variants[subject.index])
+    told = subject.wording.variant_text(subject.plan.variants[subject.index])
     if told:
         lines.append((told, TITLE_MM))
     lines += [(datum, DATA_MM) for datum in _flowed(given_data(subject), COLUMN_MM - 2 * EDGE_MM)]
@@ -108,16 +110,16 @@ def _flowed(data: Iterator[tuple[Piece, ...]], wide: float) -> list[tuple[Piece,
     return lines
 
 
-def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[Row]:
+def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[TableRow]:
     """Headings, the vectors of these figures, the rates that follow from them."""
     wording, plan = subject.wording, subject.plan
-    yield Row(*wording.columns)
+    yield TableRow(*wording.columns)
     shown = [vector for figure in figures for vector in plan.construction.vectors_of(figure)]
     for vector in shown:
-        drawn = subject.one(np.abs(plan.drawn_mm(vector.name)))
-        real = 0.0 if subject.is_zero(vector.name) else subject.one(np.abs(plan.vectors_si[vector.name]))
-        angle = f"{subject.one(plan.direction_deg(vector.name)):.2f}°"
-        yield Row(
+        drawn = subject.number(np.abs(plan.drawn_mm(vector.name)))
+        real = 0.0 if subject.is_zero(vector.name) else subject.number(np.abs(plan.vectors_si[vector.name]))
+        angle = f"{subject.number(plan.direction_deg(vector.name)):.2f}°"
+        yield TableRow(
             subject.letter(vector.name),
             (*subject.letter(vector.tail), Piece(" "), *subject.letter(vector.head)),
             wording.number(f"{drawn:.2f}"),
@@ -128,10 +130,10 @@ def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[Row]:
     for name, values in plan.rates.items():
         rate = plan.construction.rates[name]
         if rate.vector in names:
-            turns = 0.0 if subject.is_zero(rate.vector) else subject.one(values)
+            turns = 0.0 if subject.is_zero(rate.vector) else subject.number(values)
             unit = wording.unit("rad/s" if name.startswith("omega") else "rad/s²")
             value = wording.number(f"{four_digits(abs(turns))}")
-            yield Row(subject.letter(name), "", "", f"{value} {unit}", "" if turns else "–", turns)
+            yield TableRow(subject.letter(name), "", "", f"{value} {unit}", "" if turns else "–", turns)
 
 
 def four_digits(value: float) -> str:
@@ -148,7 +150,7 @@ def _cell(column_at: int, text: Text, at: tuple[float, float], size: float) -> L
     return Label((at[0] + end, at[1]), text, fitting, "end")
 
 
-def _table(rows: Sequence[Row], at: tuple[float, float], height: float) -> Iterator[Shape]:
+def _table(rows: Sequence[TableRow], at: tuple[float, float], height: float) -> Iterator[Shape]:
     left, top = at
     size = LETTER_SHARE * height
     for k, row in enumerate(rows):

@@ -1,14 +1,14 @@
-"""A mechanism followed from one position: how far its driven link goes, and where branches cross.
+"""Continuation of a mechanism from one position: how far its driven link goes, and where branches cross.
 
 Each Assur group closes while its closures, smooth functions of the driven coordinate, are positive.
 Where one changes its sign the driven link is stopped. Where one only touches zero (a parallelogram
 stretched along its ground, a kite folded, an isosceles slider-crank at its guide's end) both branches
-meet, and the motion goes on smoothly on what is from there on the other branch: its side is reversed.
-So sides are found once, from the closures' zeros and minima, not from one sample to the next: no
-step is too coarse, and no near miss of a flat position is taken for a passage.
+meet, and the motion goes on smoothly on the other branch: the group's side is reversed.
+Sides thus follow from the closures' zeros and minima, not from one sample to the next: no step is too
+coarse, and no near miss of a flat position is taken for a passage.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,10 +25,13 @@ SCANNED = 3001
 ROUNDINGS = 32.0 * float(np.finfo(np.float64).eps)
 """A closure this small against the coordinates it comes from is zero."""
 LARGEST_AMPLIFICATION = 1e6
+"""Of rounding errors, as they are counted in a closure's slack at most."""
 NEAR = 1e-4
-"""Flat positions of two groups so near to each other are one: the second is found only roughly."""
+"""Flat positions of two groups so near to each other are one: the second is located only roughly."""
 PARTS = 64
+"""An interval is divided into so many parts at a time: one evaluation on an array each."""
 FINEST = 2.0 * float(np.finfo(np.float64).eps)
+"""Relative width of an interval that is not divided further: neighbouring numbers."""
 TURN = 2.0 * np.pi
 BoolArray = NDArray[np.bool_]
 
@@ -52,7 +55,7 @@ class Closure:
 
 
 @dataclass(frozen=True, slots=True)
-class Following:
+class Continuation:
     """A mechanism of one variant, followed both ways from its own position.
 
     Attributes
@@ -77,15 +80,15 @@ class Following:
     @property
     def events(self) -> tuple[Event, ...]:
         """The flat positions that are passed, in order."""
-        found = [
+        events = [
             Event(at, group.node, _why(group))
             for group in self.mechanism.groups
             for at in self.changes.get(group.node, ())
         ]
-        return tuple(sorted(found, key=lambda event: event.at))
+        return tuple(sorted(events, key=lambda event: event.at))
 
 
-def follow(mechanism: Mechanism, start: float, low: float, high: float) -> Following:
+def follow(mechanism: Mechanism, start: float, low: float, high: float) -> Continuation:
     """Follow a mechanism of one variant from `start`, where it assembles, at most to `low` and `high`."""
     changes: dict[str, tuple[float, ...]] = {}
     ends = [low, high]
@@ -98,16 +101,15 @@ def follow(mechanism: Mechanism, start: float, low: float, high: float) -> Follo
 
         touched: set[float] = set()
         for index in range(len(closures(np.array([start])))):
-            curve = _Curve(closures, index)
             for end in (0, 1):
-                found = _walk(curve, start, ends[end], may_pass=not isinstance(group, CrossSlider))
-                touched.update(_snapped(at, changes) for at in found.touched)
-                if found.stop is not None:
-                    ends[end] = found.stop
-                    stops[end] = Event(found.stop, group.node, _why(group))
+                walk = _walk(closures, index, (start, ends[end]), may_pass=not isinstance(group, CrossSlider))
+                touched.update(_snapped(at, changes) for at in walk.touched)
+                if walk.stop is not None:
+                    ends[end] = walk.stop
+                    stops[end] = Event(walk.stop, group.node, _why(group))
         changes[group.node] = tuple(sorted(touched))
-    inside = {node: tuple(at for at in found if ends[0] < at < ends[1]) for node, found in changes.items()}
-    return Following(mechanism, start, ends[0], ends[1], (stops[0], stops[1]), inside)
+    inside = {node: tuple(at for at in passed if ends[0] < at < ends[1]) for node, passed in changes.items()}
+    return Continuation(mechanism, start, ends[0], ends[1], (stops[0], stops[1]), inside)
 
 
 def _why(group: Group) -> str:
@@ -151,48 +153,35 @@ def _unit_speed(mechanism: Mechanism) -> Solution:
 
 def closures_of(solution: Solution, group: Group) -> list[Closure]:
     """A group's closures, from the joints before it at unit speed of the driven link."""
+    joints = solution.joints
     with np.errstate(all="ignore"):
         match group:
             case Dyad(pins=(p, q), lengths_m=(first, second)):
-                between = _Distance(solution.joints[p], solution.joints[q])
-                return [between.short_of(first + second), between.beyond(np.abs(first - second))]
+                longest, shortest = first + second, np.abs(first - second)
+                return [
+                    _distance(joints[p], joints[q], longest, -1),
+                    _distance(joints[p], joints[q], shortest),
+                ]
             case SlottedLink(pin=pin, pivot=pivot, offset_m=offset):
-                return [_Distance(solution.joints[pivot], solution.joints[pin]).beyond(np.abs(offset))]
-            case Slider():
-                return _closures_of_slider(solution.joints[group.pin], rail_of(solution, group.guide), group)
-            case CrossSlider(guides=(one, other)):
-                return [_crossing(rail_of(solution, one), rail_of(solution, other))]
+                return [_distance(joints[pivot], joints[pin], np.abs(offset))]
+            case Slider(length_m=length):
+                end, rail = joints[group.pin], rail_of(solution, group.guide)
+                height = cross(rail.along, end.position - rail.joint.position)
+                slope = cross(rail.along, end.velocity - rail.velocity(end.position))
+                slack = _rounding(end, rail.joint) + ROUNDINGS * length
+                return [_closure(length - height, -slope, slack), _closure(length + height, slope, slack)]
+            case CrossSlider(guides=(first, second)):
+                return [_crossing(rail_of(solution, first), rail_of(solution, second))]
     return []
 
 
-class _Distance:
-    """Of two joints, and how it changes."""
-
-    def __init__(self, p: Joint, q: Joint) -> None:
-        d, speed = q.position - p.position, q.velocity - p.velocity
-        self.metres = np.abs(d)
-        self.slope = 2.0 * dot(d, speed)
-        self.rounding = _rounding(p, q)
-
-    def short_of(self, limit: FloatArray) -> Closure:
-        total = limit + self.metres
-        return _closure(
-            (limit - self.metres) * total, -self.slope, (self.rounding + ROUNDINGS * limit) * total
-        )
-
-    def beyond(self, limit: FloatArray) -> Closure:
-        total = limit + self.metres
-        return _closure(
-            (self.metres - limit) * total, self.slope, (self.rounding + ROUNDINGS * limit) * total
-        )
-
-
-def _closures_of_slider(pin: Joint, rail: Rail, group: Slider) -> list[Closure]:
-    length = group.length_m
-    height = cross(rail.along, pin.position - rail.joint.position)
-    slope = cross(rail.along, pin.velocity - rail.velocity(pin.position))
-    slack = _rounding(pin, rail.joint) + ROUNDINGS * length
-    return [_closure(length - height, -slope, slack), _closure(length + height, slope, slack)]
+def _distance(p: Joint, q: Joint, limit: FloatArray, sign: int = 1) -> Closure:
+    """Two joints farther apart than a limit (with sign -1: nearer), as a difference of squares."""
+    d, speed = q.position - p.position, q.velocity - p.velocity
+    metres = np.abs(d)
+    total = limit + metres
+    slack = (_rounding(p, q) + ROUNDINGS * limit) * total
+    return _closure(sign * (metres - limit) * total, sign * 2.0 * dot(d, speed), slack)
 
 
 def _crossing(first: Rail, second: Rail) -> Closure:
@@ -214,37 +203,34 @@ def _closure(value: Complex, slope: Number, slack: Number) -> Closure:
 
 # Zeros and minima ---------------------------------------------------------------------------------
 
-
-@dataclass(frozen=True, slots=True)
-class _Curve:
-    """One closure as a function of the driven coordinate."""
-
-    closures: Callable[[FloatArray], list[Closure]]
-    index: int
-
-    def __call__(self, driven: FloatArray) -> Closure:
-        return self.closures(driven)[self.index]
+Closures = Callable[[FloatArray], list[Closure]]
+"""A group's closures as functions of the driven coordinate."""
 
 
 @dataclass(slots=True)
 class _Walk:
-    """What a walk along a closure meets: flat positions that are passed, and the stop."""
+    """Events on the way along a closure: flat positions that are passed, and the stop."""
 
     touched: list[float]
     stop: float | None = None
 
 
-def _walk(curve: _Curve, start: float, limit: float, *, may_pass: bool) -> _Walk:
+def _walk(closures: Closures, index: int, way: tuple[float, float], *, may_pass: bool) -> _Walk:
     """From the start to a limit, or to where the closure ends the motion.
 
     Samples crowd at both ends, as near to a stop all others of the mechanism's motions do.
     """
+
+    def curve(driven: FloatArray) -> Closure:
+        return closures(driven)[index]
+
+    start, limit = way
     steps = start + (limit - start) * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, SCANNED)))
-    found = curve(steps)
-    sign, ahead = np.sign(found.value[0]), np.sign(limit - start)
-    told = np.isfinite(found.value) & np.isfinite(found.slope)
-    steps, value, slack = steps[told], sign * found.value[told], found.slack[told]
-    slope = sign * ahead * found.slope[told]
+    scan = curve(steps)
+    sign, ahead = np.sign(scan.value[0]), np.sign(limit - start)
+    known = np.isfinite(scan.value) & np.isfinite(scan.slope)
+    steps, value, slack = steps[known], sign * scan.value[known], scan.slack[known]
+    slope = sign * ahead * scan.slope[known]
     # Between two samples a closure falls no lower than its slope can take it.
     reached = value[:-1] + 2.0 * slope[:-1] * np.abs(np.diff(steps))
     turns = (slope[:-1] < 0.0) & (slope[1:] >= 0.0) & (reached <= slack[:-1])
@@ -278,7 +264,7 @@ def change(holds: Callable[[FloatArray], BoolArray], inside: float, outside: flo
     return low, high
 
 
-def _is_passed(curve: _Curve, at: float, span: float) -> bool:
+def _is_passed(curve: Callable[[FloatArray], Closure], at: float, span: float) -> bool:
     """Whether branches cross there: the closure leaves zero as a square, not as a fourth power."""
     step = min(1e-3, 1e-4 * span)
     near, far = curve(np.array([at + step, at + 2.0 * step])).value
@@ -287,8 +273,5 @@ def _is_passed(curve: _Curve, at: float, span: float) -> bool:
 
 def _snapped(at: float, changes: Mapping[str, tuple[float, ...]]) -> float:
     """The flat position of an earlier group, where that is so near that both are one."""
-    return next((known for known in _all(changes) if abs(known - at) < NEAR), at)
-
-
-def _all(changes: Mapping[str, tuple[float, ...]]) -> Iterator[float]:
-    return (at for found in changes.values() for at in found)
+    earlier = (known for passed in changes.values() for known in passed)
+    return next((known for known in earlier if abs(known - at) < NEAR), at)

@@ -5,18 +5,18 @@ through flat positions by `reference.kinematics.continuation`.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from reference.errors import CallError
 from reference.geometry import FloatArray
-from reference.kinematics.continuation import TURN, BoolArray, Event, Following, change, follow
+from reference.kinematics.continuation import TURN, BoolArray, Continuation, Event, change, follow
 from reference.kinematics.motion import Motion, move, move_where_possible
 from reference.kinematics.solving import one_variant, solve
 from reference.mechanism import (
     Crank,
-    CrossSlider,
+    DrivenSlider,
     Dyad,
     FixedGuide,
     Group,
@@ -24,15 +24,15 @@ from reference.mechanism import (
     Plate,
     Slider,
     SlottedLink,
-    Yoke,
+    guides_of,
 )
 
 FEWEST, MOST = 3, 100_001
-LOOKED_AT = 1441
-"""Positions of a turn in which other ranges are looked for."""
+"""Samples of a cycle: a start, a middle and an end; more than any table or diagram needs."""
+SEARCHED = 1441
+"""Positions of a turn, a quarter of a degree apart, in which other ranges are looked for."""
 AT_IT = 1e-9
-"""A sample this near to a singular position, against the range, is in it."""
-HALF = 0.5
+"""A sample this near to a singular position, as a share of the range, is singular."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,17 +49,17 @@ class Cycle:
     start : the variant's own driven coordinate
     turns : of the crank until all is as before: 1, seldom 2; 0 where it cannot turn fully
     elsewhere : other ranges in which the mechanism assembles with its authored sides
-    untold : why nothing is told, by the sample
+    undetermined : why a sample has no rates, by its index
     """
 
-    following: Following
+    following: Continuation
     driven: FloatArray
     mechanism: Mechanism
     motion: Motion
     start: float
     turns: int
     elsewhere: tuple[tuple[float, float], ...]
-    untold: dict[int, str]
+    undetermined: dict[int, str]
 
     @property
     def is_turned(self) -> bool:
@@ -80,7 +80,7 @@ def cycle(mechanism: Mechanism, samples: int = 361) -> Cycle:
 
     A crank that returns to another assembly after a turn is followed over two turns; a driven slider
     over the range in which the mechanism assembles. A group stays on its authored side but for flat
-    positions, which are passed smoothly (by velocity). Nothing is told at singular samples.
+    positions, which are passed smoothly (by velocity). Singular samples have no rates.
 
     Raises CallError for too few or too many samples, MechanismError where the variant itself has no
     motion.
@@ -91,14 +91,14 @@ def cycle(mechanism: Mechanism, samples: int = 361) -> Cycle:
     following, turns = _followed(mechanism)
     low, high = (0.0, turns * TURN) if turns else (following.low, following.high)
     driven = np.linspace(low, high, samples)
-    untold = _singular(following, driven)
+    undetermined = _singular(following, driven)
     at_samples = following.at(driven)
-    motion = _motion(following, at_samples, driven, untold)
+    motion = _motion(following, at_samples, driven, undetermined)
     elsewhere = () if turns else _elsewhere(following)
-    return Cycle(following, driven, at_samples, motion, following.start, turns, elsewhere, untold)
+    return Cycle(following, driven, at_samples, motion, following.start, turns, elsewhere, undetermined)
 
 
-def _followed(mechanism: Mechanism) -> tuple[Following, int]:
+def _followed(mechanism: Mechanism) -> tuple[Continuation, int]:
     """The mechanism followed over its whole cycle, and in how many turns that closes."""
     driver = mechanism.driver
     if not isinstance(driver, Crank):
@@ -108,15 +108,16 @@ def _followed(mechanism: Mechanism) -> tuple[Following, int]:
     following = follow(mechanism, start, start - TURN, start + 2.0 * TURN)
     if following.stops == (None, None):
         reversed_once = any(
-            sum(start < at < start + TURN for at in found) % 2 for found in following.changes.values()
+            sum(start < at < start + TURN for at in changes) % 2 for changes in following.changes.values()
         )
         return following, 2 if reversed_once else 1
-    middle = HALF * (following.low + following.high)
-    shift = -TURN * np.floor((middle + HALF * HALF * TURN) / TURN)
+    # The middle of the range comes to lie between -90 and 270 degrees.
+    middle = 0.5 * (following.low + following.high)
+    shift = -TURN * np.floor((middle + 0.25 * TURN) / TURN)
     return _shifted(following, float(shift)), 0
 
 
-def _shifted(following: Following, by: float) -> Following:
+def _shifted(following: Continuation, by: float) -> Continuation:
     """The same in angles that are so many turns further, its range about the first turn."""
     if by == 0.0:
         return following
@@ -127,7 +128,7 @@ def _shifted(following: Following, by: float) -> Following:
         low=following.low + by,
         high=following.high + by,
         stops=(low, high),
-        changes={node: tuple(at + by for at in found) for node, found in following.changes.items()},
+        changes={node: tuple(at + by for at in changes) for node, changes in following.changes.items()},
     )
 
 
@@ -135,26 +136,14 @@ def _reach(mechanism: Mechanism) -> float:
     """How far a driven slider may go at most: all lengths in line, and all distances on the ground."""
     take = one_variant(0)
     places = [complex(take(place)) for place in mechanism.ground_m.values()]
-    places += [complex(take(guide.through_m)) for guide in _fixed_guides(mechanism)]
+    guides = [guide for group in mechanism.groups for guide in guides_of(group)]
+    places += [complex(take(guide.through_m)) for guide in guides if isinstance(guide, FixedGuide)]
     driver = mechanism.driver
     total = 0.0
-    if not isinstance(driver, Crank):
+    if isinstance(driver, DrivenSlider):
         total += abs(float(take(driver.displacement_m)))
         total += sum(abs(place - complex(take(driver.guide_m))) for place in places)
     return 2.0 * (total + sum(_lengths(group) for group in mechanism.groups)) or 1.0
-
-
-def _fixed_guides(mechanism: Mechanism) -> list[FixedGuide]:
-    found = []
-    for group in mechanism.groups:
-        match group:
-            case Slider(guide=guide) | Yoke(guide=guide):
-                found.append(guide)
-            case CrossSlider(guides=guides):
-                found.extend(guides)
-            case _:
-                pass
-    return [guide for guide in found if isinstance(guide, FixedGuide)]
 
 
 def _lengths(group: Group) -> float:
@@ -166,43 +155,38 @@ def _lengths(group: Group) -> float:
     return 0.0
 
 
-def _singular(following: Following, driven: FloatArray) -> dict[int, str]:
-    """Samples in a flat position or at a stop, and why nothing is told there."""
+def _singular(following: Continuation, driven: FloatArray) -> dict[int, str]:
+    """Samples in a flat position or at a stop, by index, and why they have no rates."""
     within = AT_IT * float(driven[-1] - driven[0])
     stops = tuple(stop for stop in following.stops if stop is not None)
-    untold: dict[int, str] = {}
+    undetermined: dict[int, str] = {}
     for event in (*following.events, *stops):
         for index in np.flatnonzero(np.abs(driven - event.at) <= within):
-            untold.setdefault(int(index), f"{event.node}: {event.why}")
-    return untold
+            undetermined.setdefault(int(index), f"{event.node}: {event.why}")
+    return undetermined
 
 
 def _motion(
-    following: Following, at_samples: Mechanism, driven: FloatArray, untold: dict[int, str]
+    following: Continuation, at_samples: Mechanism, driven: FloatArray, undetermined: dict[int, str]
 ) -> Motion:
-    """At all samples; of the singular ones the positions alone."""
+    """At all samples; of the singular ones the positions only."""
     singular = np.zeros(driven.size, dtype=np.bool_)
-    singular[list(untold)] = True
+    singular[list(undetermined)] = True
     motion = move_where_possible(following.at(np.where(singular, following.start, driven)))
     with np.errstate(all="ignore"):
         for name, joint in solve(at_samples, accelerations=False).joints.items():
             place = np.broadcast_to(joint.position, driven.shape)
             motion.position[name][singular] = place[singular]
     for index in np.flatnonzero(~np.isfinite(motion.predicted_error)):
-        untold.setdefault(int(index), "too near to a singular position to be determined")
-    _tell_nothing(motion, singular)
+        undetermined.setdefault(int(index), "too near to a singular position to be determined")
+    motion.predicted_error[singular] = np.inf
+    for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
+        for values in rates.values():
+            values[singular] = np.nan
     return motion
 
 
-def _tell_nothing(motion: Motion, singular: BoolArray) -> None:
-    motion.predicted_error[singular] = np.inf
-    for told in (field.name for field in fields(motion)):
-        if told in {"velocity", "acceleration", "omega", "epsilon"}:
-            for values in getattr(motion, told).values():
-                values[singular] = np.nan
-
-
-def _elsewhere(following: Following) -> tuple[tuple[float, float], ...]:
+def _elsewhere(following: Continuation) -> tuple[tuple[float, float], ...]:
     """Other ranges in which the mechanism assembles as authored, to full accuracy."""
     authored = replace(following, changes={})
     is_crank = isinstance(following.mechanism.driver, Crank)
@@ -221,12 +205,11 @@ def _elsewhere(following: Following) -> tuple[tuple[float, float], ...]:
         closed = [np.broadcast_to(np.isfinite(joint.position), driven.shape) for joint in joints]
         return np.asarray(np.all(closed, axis=0))
 
-    found: list[tuple[float, float]] = []
+    ranges: list[tuple[float, float]] = []
     for low, high in outside:
         if high - low > AT_IT * TURN:
-            grid = np.linspace(low, high, LOOKED_AT)[1:-1]
-            found += _runs(grid, assembles)
-    return tuple(found)
+            ranges += _runs(np.linspace(low, high, SEARCHED)[1:-1], assembles)
+    return tuple(ranges)
 
 
 def _runs(grid: FloatArray, assembles: Callable[[FloatArray], BoolArray]) -> Iterator[tuple[float, float]]:

@@ -11,10 +11,10 @@ one; where that is not enough, in eighty digits one by one. Where a mechanism ha
 error says which group fails to close, by how much, and what to do.
 """
 
-from collections.abc import Callable, Iterable
+import math
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,6 @@ from reference.errors import MechanismError
 from reference.geometry import ComplexArray, FloatArray
 from reference.kinematics.solving import (
     Solution,
-    a_stretch,
     as_it_is,
     each_number_once,
     one_variant,
@@ -55,36 +54,38 @@ can draw. Ordinary mechanisms stay far below, and solving again takes ten times 
 EXTENDED_ENOUGH = LOSSY * EPSILON / EXTENDED
 """A predicted relative error up to which extended floats bring it below `LOSSY`; beyond, eighty digits."""
 LEAST_SINE = 8e-16
-"""Of a transmission angle; below it (as between guides at 0 and 180 degrees) nothing is told: the data's
+"""Of a transmission angle; below it (as between guides at 0 and 180 degrees) there is no solution: the data's
 last digit decides how the mechanism moves."""
 DIGITS = 80
-
-Put = Callable[[Solution, NDArray[np.intp]], None]
-"""Takes a solution of some variants over into the motion."""
+"""Decimal digits of the last resort."""
 
 
-def refine(
-    mechanism: Mechanism, predicted: FloatArray, sine: FloatArray, put: Put, *, accelerations: bool
-) -> NDArray[np.bool_]:
-    """Solve again what has lost digits, and say which variants those were.
+def refined(
+    mechanism: Mechanism, predicted: FloatArray, sine: FloatArray, *, accelerations: bool
+) -> tuple[NDArray[np.bool_], list[tuple[Solution, NDArray[np.intp]]]]:
+    """Which variants have lost digits, and their new solutions, each with the rows that it is of.
 
-    `predicted` (N,) is brought up to date in place: infinite where there is no solution. `sine` (N,) is
-    the least of each variant's transmission angles.
+    Arguments
+    ---------
+    predicted : (N,) relative errors; brought up to date in place, infinite where there is no solution
+    sine : (N,) the least of each variant's transmission angles
     """
     predicted[~(sine >= LEAST_SINE)] = np.inf
     again = (predicted > LOSSY) & np.isfinite(predicted)
     wide = again & (predicted <= EXTENDED_ENOUGH)
+    solutions = []
     rows = np.flatnonzero(wide)
     if rows.size:
-        put(solve(mechanism, some_variants(rows), accelerations=accelerations, anew=True), rows)
+        solutions.append(
+            (solve(mechanism, some_variants(rows), accelerations=accelerations, anew=True), rows)
+        )
         predicted[rows] = np.maximum(predicted[rows] * (EXTENDED / EPSILON), EPSILON)
     for index in np.flatnonzero(again & ~wide):
-        row = np.array([index])
         solution = _in_digits(mechanism, int(index), accelerations)
         predicted[index] = EPSILON if solution is not None else np.inf
         if solution is not None:
-            put(solution, row)
-    return again
+            solutions.append((solution, np.array([index])))
+    return again, solutions
 
 
 def _in_digits(mechanism: Mechanism, index: int, accelerations: bool) -> Solution | None:
@@ -193,12 +194,8 @@ SAFETY = 32.0
 """Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""
 FEW = 3
 """So many variants are faster one by one, on Python's numbers."""
-
 CLASSES = 200
 """From so many variants on it pays to calculate once what they share."""
-MANY, STRETCH = 100_000, 8192
-"""From so many variants on, arrays are taken so long at a time: what is between stays near the processor."""
-
 BoolArray = NDArray[np.bool_]
 
 
@@ -261,35 +258,28 @@ def _origin(mechanism: Mechanism) -> ComplexArray:
 
 
 def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
-    """More digits for what has lost some; nothing is told of a variant without a motion."""
-
-    def put(solution: Solution, rows: NDArray[np.intp]) -> None:
-        _put(motion, solution, rows)
-
+    """Solve again what has lost digits; nan where a variant has no motion."""
     predicted = motion.predicted_error
     sine = reduce(np.minimum, motion.transmission.values(), np.ones(predicted.shape))
-    motion.recomputed[:] = refine(mechanism, predicted, sine, put, accelerations=accelerations)
+    motion.recomputed[:], solutions = refined(mechanism, predicted, sine, accelerations=accelerations)
+    for solution, rows in solutions:
+        _put(motion, solution, rows)
     broken = np.isinf(predicted)
-    if broken.any():
-        for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
-            for values in rates.values():
-                values[broken] = np.nan
+    for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
+        for values in rates.values():
+            values[broken] = np.nan
 
 
-def _put(motion: Motion, solution: Solution, rows: NDArray[np.intp] | slice) -> None:
+def _put(motion: Motion, solution: Solution, rows: NDArray[np.intp]) -> None:
     """Take the solution of some variants over into the motion."""
     for name, joint in solution.joints.items():
         motion.position[name][rows] = _rounded(joint.position)
         motion.velocity[name][rows] = _rounded(joint.velocity)
         if motion.acceleration:
             motion.acceleration[name][rows] = _rounded(joint.acceleration)
-    for given, found in (
-        (motion.omega, solution.omega),
-        (motion.epsilon, solution.epsilon),
-        (motion.transmission, solution.transmission),
-    ):
-        for name in given:
-            given[name][rows] = np.real(_rounded(found[name]))
+    for quantity in ("omega", "epsilon", "transmission"):
+        for name, values in getattr(motion, quantity).items():
+            values[rows] = np.real(_rounded(getattr(solution, quantity)[name]))
 
 
 def _rounded(number: Any) -> Any:  # noqa: ANN401 - of extended floats or of many digits
@@ -307,39 +297,7 @@ def _in_doubles(mechanism: Mechanism, count: int, accelerations: bool) -> Motion
     if count <= FEW:
         return _one_by_one(mechanism, count, accelerations)
     with np.errstate(all="ignore"):
-        if count < MANY:
-            return _on_arrays(mechanism, count, accelerations)
-        return _in_stretches(mechanism, count, accelerations)
-
-
-def _in_stretches(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
-    """As `_on_arrays`, on a part of the variants after another: intermediate results stay near."""
-    motion: Motion | None = None
-    for start in range(0, count, STRETCH):
-        rows = slice(start, start + STRETCH)
-        solution = solve(mechanism, a_stretch(rows), accelerations=accelerations)
-        motion = motion or _room_for(solution, count, accelerations)
-        _put(motion, solution, rows)
-        motion.predicted_error[rows] = _predicted_error(_amplification(solution))
-    return cast("Motion", motion)
-
-
-def _room_for(solution: Solution, count: int, accelerations: bool) -> Motion:
-    """A motion not yet filled in, with the names of a solution."""
-
-    def rows(names: Iterable[str], kind: type) -> Any:  # noqa: ANN401 - real or complex
-        return {name: np.empty(count, dtype=kind) for name in names}
-
-    return Motion(
-        rows(solution.joints, complex),
-        rows(solution.joints, complex),
-        rows(solution.joints, complex) if accelerations else {},
-        rows(solution.omega, float),
-        rows(solution.epsilon, float) if accelerations else {},
-        rows(solution.transmission, float),
-        np.empty(count),
-        np.zeros(count, dtype=np.bool_),
-    )
+        return _on_arrays(mechanism, count, accelerations)
 
 
 def _amplification(solution: Solution) -> Any:  # noqa: ANN401 - an array, or one number
@@ -347,11 +305,10 @@ def _amplification(solution: Solution) -> Any:  # noqa: ANN401 - an array, or on
     return reduce(larger, [joint.amplification for joint in solution.joints.values()])
 
 
-def _predicted_error(amplification: Any) -> FloatArray:  # noqa: ANN401 - an array, or one number
-    """What the growth of rounding errors up to a result says of it; infinite where it is nan."""
-    predicted = np.atleast_1d(SAFETY * EPSILON * amplification)
-    predicted[np.isnan(predicted)] = np.inf
-    return predicted
+def _predicted_error(amplification: FloatArray) -> FloatArray:
+    """(N,) what the growth of rounding errors says of the results' error; infinite where it is nan."""
+    predicted = SAFETY * EPSILON * amplification
+    return np.where(np.isnan(predicted), np.inf, predicted)
 
 
 def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
@@ -388,10 +345,11 @@ def _one_by_one(mechanism: Mechanism, count: int, accelerations: bool) -> Motion
         with np.errstate(all="ignore"):
             return _on_arrays(mechanism, count, accelerations)
     first = solutions[0]
-    grown = [_amplification(one) for one in solutions]
-    predicted = [SAFETY * EPSILON * one if one == one else np.inf for one in grown]  # noqa: PLR0124 - nan
-    states = iter(np.array([_states(one) for one in solutions]).T)
-    rates = iter(np.array([_rates(one, accelerations) for one in solutions]).T)
+    grown = [_amplification(solution) for solution in solutions]
+    predicted = [np.inf if math.isnan(times) else SAFETY * EPSILON * times for times in grown]
+    # One array for all that is complex and one for all that is real: faster than one for each joint.
+    states = iter(np.array([_states(solution) for solution in solutions]).T)
+    rates = iter(np.array([_rates(solution, accelerations) for solution in solutions]).T)
     return Motion(
         dict(zip(first.joints, states, strict=False)),
         dict(zip(first.joints, states, strict=False)),
@@ -404,12 +362,12 @@ def _one_by_one(mechanism: Mechanism, count: int, accelerations: bool) -> Motion
     )
 
 
-def _states(one: Solution) -> list[complex]:
-    joints = one.joints.values()
+def _states(solution: Solution) -> list[complex]:
+    joints = solution.joints.values()
     positions, velocities = [joint.position for joint in joints], [joint.velocity for joint in joints]
     return positions + velocities + [joint.acceleration for joint in joints]
 
 
-def _rates(one: Solution, accelerations: bool) -> list[float]:
-    epsilon = one.epsilon.values() if accelerations else ()
-    return [*one.omega.values(), *epsilon, *one.transmission.values()]
+def _rates(solution: Solution, accelerations: bool) -> list[float]:
+    epsilon = solution.epsilon.values() if accelerations else ()
+    return [*solution.omega.values(), *epsilon, *solution.transmission.values()]

@@ -1,7 +1,7 @@
 """A mechanism solved group by group, on numbers of any kind (`reference.numbers`).
 
-The closed forms are those of `reference.kinematics.assur`; here they meet the mechanism's joints and links.
-Nothing is checked here: what does not assemble is nan, `reference.kinematics.motion` says so in words.
+The closed forms of `reference.kinematics.assur` are applied to the mechanism's joints and links. Nothing is
+checked here: what does not assemble is nan, and `reference.kinematics.motion` says why.
 """
 
 from collections.abc import Callable
@@ -64,8 +64,14 @@ class Solution:
     slots: dict[str, tuple[str, Complex]] = field(default_factory=dict)
     """By a slotted link's node: its pivot, and the direction of its guide."""
     take: Take = as_it_is
+    accelerations: bool = True
     anew: bool = False
     """Whether shapes of links are calculated from their data, not taken as they were rounded."""
+
+    def add(self, name: str, node: Joint, sine: Number, amplification: Number) -> None:
+        """A group's node; rounding errors of what it hangs on grow by 1 / sine^2 and by `amplification`."""
+        node.amplification = amplification / (sine * sine)
+        self.joints[name], self.transmission[name] = node, abs(sine)
 
 
 @dataclass(slots=True)
@@ -104,16 +110,16 @@ def solve(
     `anew` calculates the shapes of links in those numbers, from their lengths or coordinates: the
     mechanism holds them rounded to doubles.
     """
-    solution = Solution(take=take, anew=anew)
+    solution = Solution(take=take, accelerations=accelerations, anew=anew)
     for name, place in mechanism.ground_m.items():
         solution.joints[name] = Joint(take(place))
-    _drive(solution, mechanism.driver, accelerations)
+    _drive(solution, mechanism.driver)
     for group in mechanism.groups:
-        _add(solution, group, accelerations)
+        _add(solution, group)
     return solution
 
 
-def _drive(solution: Solution, driver: Driver, accelerations: bool) -> None:
+def _drive(solution: Solution, driver: Driver) -> None:
     take = solution.take
     match driver:
         case Crank():
@@ -123,7 +129,7 @@ def _drive(solution: Solution, driver: Driver, accelerations: bool) -> None:
             foot, lost = assur.exact_sum(solution.joints[driver.pivot].position, axis)
             place, lost_too = assur.exact_sum(foot, rest)
             pin = Joint(place, 1j * omega * arm, rest=lost + lost_too)
-            if accelerations:
+            if solution.accelerations:
                 pin.acceleration = assur.turned(arm, omega, epsilon)
                 solution.epsilon[driver.link] = epsilon
             solution.omega[driver.link] = omega
@@ -131,28 +137,28 @@ def _drive(solution: Solution, driver: Driver, accelerations: bool) -> None:
             along = assur.heading(take(driver.guide_rad))
             place = take(driver.guide_m) + along * take(driver.displacement_m)
             pin = Joint(place, along * take(driver.speed))
-            if accelerations:
+            if solution.accelerations:
                 pin.acceleration = along * take(driver.acceleration)
     solution.joints[driver.pin] = pin
 
 
-def _add(solution: Solution, group: Group, accelerations: bool) -> None:
+def _add(solution: Solution, group: Group) -> None:
     match group:
         case Dyad():
-            _add_dyad(solution, group, accelerations)
+            _add_dyad(solution, group)
         case Slider():
-            _add_slider(solution, group, accelerations)
+            _add_slider(solution, group)
         case SlottedLink():
-            _add_slotted(solution, group, accelerations)
+            _add_slotted(solution, group)
         case CrossSlider(node=node, guides=(first, second)):
             rails = (rail_of(solution, first), rail_of(solution, second))
-            _add_crossing(solution, node, rails, accelerations)
+            _add_crossing(solution, node, rails)
             for guide, rail in zip(group.guides, rails, strict=True):
                 _add_coincident(solution, guide, rail, node)
         case Yoke(node=node):
             pin = solution.joints[group.pin]
             slot = Rail(pin, assur.heading(solution.take(group.slot_rad)), pin.amplification)
-            _add_crossing(solution, node, (rail_of(solution, group.guide), slot), accelerations)
+            _add_crossing(solution, node, (rail_of(solution, group.guide), slot))
         case SlotPoint():
             _add_slot_point(solution, group, solution.take(group.local_m))
         case Plate() | PointOnLine():
@@ -172,7 +178,12 @@ def _nearness(size2: Number, p: Joint, q: Joint) -> Number:
     return root(size2 / (size2 + dot(p.position, p.position) + dot(q.position, q.position)))
 
 
-def _add_dyad(solution: Solution, group: Dyad, accelerations: bool) -> None:
+def _amplification(size2: Number, p: Joint, q: Joint) -> Number:
+    """By how much rounding errors have grown in the vector between two joints, of a length (its square)."""
+    return larger(p.amplification, q.amplification) / _nearness(size2, p, q)
+
+
+def _add_dyad(solution: Solution, group: Dyad) -> None:
     p, q = (solution.joints[pin] for pin in group.pins)
     link_p, link_q = group.links
     take, d = solution.take, _between(p, q)
@@ -185,18 +196,15 @@ def _add_dyad(solution: Solution, group: Dyad, accelerations: bool) -> None:
     omega = assur.rrr_turns(along, across, stretch)
     solution.omega[link_p], solution.omega[link_q] = omega
     node = Joint(p.position + arm, p.velocity + 1j * omega[0] * arm)
-    if accelerations:
+    if solution.accelerations:
         growth = (q.acceleration - p.acceleration) * inverse
         epsilon = assur.rrr_accelerations(along, across, stretch, growth, omega)
         solution.epsilon[link_p], solution.epsilon[link_q] = epsilon
         node.acceleration = p.acceleration + assur.turned(arm, omega[0], epsilon[0])
-    share = sine * sine * _nearness(square, p, q)
-    node.amplification = larger(p.amplification, q.amplification) / share
-    solution.joints[group.node] = node
-    solution.transmission[group.node] = sine
+    solution.add(group.node, node, sine, _amplification(square, p, q))
 
 
-def _add_slider(solution: Solution, group: Slider, accelerations: bool) -> None:
+def _add_slider(solution: Solution, group: Slider) -> None:
     pin, rail = solution.joints[group.pin], rail_of(solution, group.guide)
     take, along, foot = solution.take, rail.along, rail.joint.position
     height = cross(along, pin.position - foot)
@@ -208,7 +216,7 @@ def _add_slider(solution: Solution, group: Slider, accelerations: bool) -> None:
     omega, speed = assur.rrp_velocity(reach, height, along, pin.velocity - under)
     solution.omega[group.link] = omega
     node = Joint(place, under + along * speed)
-    if accelerations:
+    if solution.accelerations:
         under = rail.acceleration(place)
         coriolis = 2.0 * rail.omega * speed if rail.turns else 0.0
         epsilon, slide = assur.rrp_acceleration(
@@ -216,14 +224,12 @@ def _add_slider(solution: Solution, group: Slider, accelerations: bool) -> None:
         )
         solution.epsilon[group.link] = epsilon
         node.acceleration = under + along * (slide + 1j * coriolis)
-    share = sine * sine * _nearness(length * length, pin, rail.joint)
-    node.amplification = larger(pin.amplification, rail.amplification) / share
-    solution.joints[group.node] = node
-    solution.transmission[group.node] = sine
+    grown = larger(pin.amplification, rail.amplification) / _nearness(length * length, pin, rail.joint)
+    solution.add(group.node, node, sine, grown)
     _add_coincident(solution, group.guide, rail, group.node)
 
 
-def _add_slotted(solution: Solution, group: SlottedLink, accelerations: bool) -> None:
+def _add_slotted(solution: Solution, group: SlottedLink) -> None:
     pin, pivot = solution.joints[group.pin], solution.joints[group.pivot]
     d, offset = _between(pivot, pin), solution.take(group.offset_m)
     reach, along, sine = assur.rpr_place(d, offset, solution.take(group.side))
@@ -231,15 +237,12 @@ def _add_slotted(solution: Solution, group: SlottedLink, accelerations: bool) ->
     omega, speed = assur.rpr_velocity(reach, offset, along, relative)
     solution.omega[group.link] = omega
     node = Joint(pin.position, pivot.velocity + 1j * omega * d, rest=pin.rest)
-    if accelerations:
+    if solution.accelerations:
         relative = pin.acceleration - pivot.acceleration
         epsilon = assur.rpr_acceleration(reach, offset, along, relative, (omega, speed))
         solution.epsilon[group.link] = epsilon
         node.acceleration = pivot.acceleration + assur.turned(d, omega, epsilon)
-    share = sine * sine * _nearness(dot(d, d), pin, pivot)
-    node.amplification = larger(pin.amplification, pivot.amplification) / share
-    solution.joints[group.node] = node
-    solution.transmission[group.node] = sine
+    solution.add(group.node, node, sine, _amplification(dot(d, d), pin, pivot))
     solution.slots[group.node] = (group.pivot, along)
     if group.foot is not None:
         foot = SlotPoint(group.foot, group.node, group.link, np.asarray(0j))
@@ -292,7 +295,7 @@ def rail_of(solution: Solution, guide: Guide) -> Rail:
         return Rail(Joint(through), assur.heading(angle))
     g, h = (solution.joints[joint] for joint in guide.base)
     d = _between(g, h)
-    amplification = larger(g.amplification, h.amplification) / _nearness(dot(d, d), g, h)
+    amplification = _amplification(dot(d, d), g, h)
     epsilon = solution.epsilon.get(guide.link, 0.0)
     return Rail(g, d / abs(d), amplification, solution.omega[guide.link], epsilon, turns=True)
 
@@ -310,7 +313,7 @@ def _add_coincident(solution: Solution, guide: Guide, rail: Rail, node: str) -> 
     )
 
 
-def _add_crossing(solution: Solution, node: str, rails: tuple[Rail, Rail], accelerations: bool) -> None:
+def _add_crossing(solution: Solution, node: str, rails: tuple[Rail, Rail]) -> None:
     first, second = rails
     across = second.joint.position - first.joint.position
     reach, sine = assur.cross_place(across, first.along, second.along)
@@ -318,16 +321,14 @@ def _add_crossing(solution: Solution, node: str, rails: tuple[Rail, Rail], accel
     under = (first.velocity(place), second.velocity(place))
     slides = assur.cross_slides(under[1] - under[0], first.along, second.along, sine)
     joint = Joint(place, under[0] + first.along * slides[0])
-    if accelerations:
+    if solution.accelerations:
         carried = tuple(
             rail.acceleration(place) + 2j * rail.omega * slide * rail.along
             for rail, slide in zip(rails, slides, strict=True)
         )
         slide, _ = assur.cross_slides(carried[1] - carried[0], first.along, second.along, sine)
         joint.acceleration = carried[0] + first.along * slide
-    joint.amplification = larger(first.amplification, second.amplification) / (sine * sine)
-    solution.joints[node] = joint
-    solution.transmission[node] = abs(sine)
+    solution.add(node, joint, sine, larger(first.amplification, second.amplification))
 
 
 # Some variants of a mechanism, in other kinds of numbers -------------------------------------------
@@ -336,16 +337,6 @@ def _add_crossing(solution: Solution, node: str, rails: tuple[Rail, Rail], accel
 def each_number_once(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
     """Takes all variants at once; what they share and an array only repeats, one time."""
     return values[:1] if type(values) is not int and values.strides == (0,) else values
-
-
-def a_stretch(rows: slice) -> Take:
-    """Takes neighbouring variants; what all variants share, one time."""
-
-    def take(values: Any) -> Any:  # noqa: ANN401 - as above
-        once = each_number_once(values)
-        return once if type(once) is int or once.size == 1 else once[rows]
-
-    return take
 
 
 def one_variant(index: int, number: Callable[[Any], Any] | None = None, *, among: int | None = None) -> Take:

@@ -5,6 +5,7 @@ drawn node, with its covariance, and for each mistake how rare it is.
 """
 
 import math
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -56,12 +57,12 @@ TINY = 1e-6
 SETTLING = 2
 """Steps in which a node is moved to the lengths seen of it."""
 
-Spread = tuple[float, float, float]
+Covariance = tuple[float, float, float]
 """mm^2: variance along x, covariance, variance along y."""
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class Observation:
     """A node, or a vector that ends in it, as drawn.
 
     Attributes
@@ -76,12 +77,12 @@ class Seen:
     node: str
     tail: str | None
     value: complex
-    spread: Spread
+    spread: Covariance
     has_direction: bool = True
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
+class Observations:
     """What somebody drew.
 
     Attributes
@@ -90,14 +91,14 @@ class Work:
     sketches : by plan, the mechanism's joints as drawn beside it, where that is a sketch of its own
     """
 
-    seen: tuple[Seen, ...]
+    seen: tuple[Observation, ...]
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
 
 
-def by_node(construction: Construction, seen: Iterable[Seen]) -> dict[str, tuple[Seen, ...]]:
+def by_node(construction: Construction, seen: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
     """What was seen, by the end that is made later; vectors seen the other way round are turned."""
     order = {step.node: index for index, step in enumerate(construction.steps)}
-    found: dict[str, tuple[Seen, ...]] = {}
+    found: dict[str, tuple[Observation, ...]] = {}
     for one in seen:
         if one.tail is not None and order[one.tail] > order[one.node]:
             value = -one.value if one.has_direction else one.value
@@ -106,7 +107,7 @@ def by_node(construction: Construction, seen: Iterable[Seen]) -> dict[str, tuple
     return found
 
 
-def seen_later(construction: Construction, seen: Mapping[str, tuple[Seen, ...]]) -> frozenset[str]:
+def seen_later(construction: Construction, seen: Mapping[str, tuple[Observation, ...]]) -> frozenset[str]:
     """The nodes that were seen, or that something seen is made from or reckoned from, rightly or wrongly."""
     wanted = set(seen) | {one.tail for ones in seen.values() for one in ones if one.tail is not None}
     # A wrong line may be taken by any link, and through a pole.
@@ -119,7 +120,7 @@ def seen_later(construction: Construction, seen: Mapping[str, tuple[Seen, ...]])
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
+class NodeObservations:
     """What was seen of one node. Arrays of places end in the branches' axis.
 
     Attributes
@@ -128,14 +129,14 @@ class Sight:
     care : (branches,) how many times a usual hand's standard deviations
     """
 
-    seen: tuple[Seen, ...]
+    seen: tuple[Observation, ...]
     turned: ComplexArray | None
     care: FloatArray
 
     def __bool__(self) -> bool:
         return bool(self.seen)
 
-    def value(self, one: Seen) -> ComplexArray | complex:
+    def value(self, one: Observation) -> ComplexArray | complex:
         """As it would stand in a plan that is not turned."""
         if self.turned is None or not one.has_direction:
             return one.value
@@ -206,7 +207,7 @@ class Sight:
         return np.asarray(((yy * x - xy * y) + 1j * (xx * y - xy * x)) / (xx * yy - xy**2))
 
 
-def _off(off: ComplexArray, spread: Spread, moved: ComplexArray | None) -> tuple[FloatArray, FloatArray]:
+def _off(off: ComplexArray, spread: Covariance, moved: ComplexArray | None) -> tuple[FloatArray, FloatArray]:
     """Deviations squared, in standard deviations, and the determinants of their covariances."""
     x, y = off.real, off.imag
     xx, xy, yy = (np.asarray(one) for one in spread)
@@ -219,7 +220,7 @@ def _off(off: ComplexArray, spread: Spread, moved: ComplexArray | None) -> tuple
     return np.asarray((yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant), np.asarray(determinant)
 
 
-def _off_length(seen_mm: float, vector: ComplexArray, spread: Spread) -> tuple[FloatArray, FloatArray]:
+def _off_length(seen_mm: float, vector: ComplexArray, spread: Covariance) -> tuple[FloatArray, FloatArray]:
     """Deviations of lengths squared, in standard deviations, and their variances."""
     length, x, y = np.abs(vector), vector.real, vector.imag
     xx, xy, yy = spread
@@ -259,21 +260,22 @@ class Repertoire:
 
 
 KEPT = 32
-_kept: dict[tuple[int, Skill], Repertoire] = {}
+"""So many constructions' repertoires are kept: a class draws one, or one for each position."""
+_kept: deque[Repertoire] = deque(maxlen=KEPT)
 
 
 def repertoire_of(construction: Construction, skill: Skill) -> Repertoire:
     """The repertoire of a construction, kept: a class draws one and the same."""
-    key = (id(construction), skill)
-    if key not in _kept or _kept[key].construction is not construction:
-        if len(_kept) >= KEPT:
-            _kept.clear()
-        _kept[key] = Repertoire(construction, skill)
-    return _kept[key]
+    for repertoire in _kept:
+        if repertoire.construction is construction and repertoire.skill == skill:
+            return repertoire
+    repertoire = Repertoire(construction, skill)
+    _kept.append(repertoire)
+    return repertoire
 
 
 @dataclass(frozen=True, slots=True)
-class Ways:
+class StepAlternatives:
     """Ways to make a step in each branch, the right one first; arrays (ways, branches).
 
     Attributes
@@ -305,8 +307,8 @@ class Ways:
         """Whether nobody knows what was done."""
         return way >= len(self.mistakes) - self.others
 
-    def __add__(self, more: "Ways") -> "Ways":
-        return Ways(
+    def __add__(self, more: "StepAlternatives") -> "StepAlternatives":
+        return StepAlternatives(
             np.concatenate((self.place, more.place)),
             np.concatenate((self.cost, more.cost)),
             np.concatenate((self.misfit, more.misfit)),
@@ -317,12 +319,12 @@ class Ways:
 
 
 @dataclass(frozen=True, slots=True)
-class Bench:
+class StepContext:
     """Where a step is made: the nodes so far in each branch, and what was seen of the new one."""
 
     nodes: Mapping[str, ComplexArray]
     known: Mapping[str, FloatArray]
-    sight: Sight
+    sight: NodeObservations
     repertoire: Repertoire
 
     @property
@@ -330,15 +332,15 @@ class Bench:
         """How many branches there are."""
         return len(self.sight.care)
 
-    def right(self, step: Step) -> Ways:
+    def right(self, step: Step) -> StepAlternatives:
         """The step as it should be made."""
         return self._ways(step, [(None, step)])
 
-    def wrong(self, step: Step) -> Ways:
+    def wrong(self, step: Step) -> StepAlternatives:
         """The step with each mistake in it."""
         return self._ways(step, self.repertoire.wrong(step))
 
-    def slips(self, step: Given) -> Ways | None:
+    def slips(self, step: Given) -> StepAlternatives | None:
         """The right direction with a length that was computed wrongly, as long as it was drawn."""
         seen, view = self.sight.seen, View(self.nodes, self.known)
         one = next((one for one in seen if one.tail == step.start or one.has_direction), None)
@@ -356,7 +358,7 @@ class Bench:
         changed = replace(step, factor=step.factor * factors)  # type: ignore[arg-type]
         return replace(self._ways(step, [(Mistake(SLIP, step.node), changed)]), factors=factors)
 
-    def something_else(self, right: Ways) -> Ways:
+    def something_else(self, right: StepAlternatives) -> StepAlternatives:
         """The node where it was drawn, whatever made it; from lengths alone on either side."""
         sight, nodes = self.sight, self.nodes
         start = np.where(np.isfinite(right.place[0]), right.place[0], 0.0)
@@ -368,17 +370,17 @@ class Bench:
             starts.append(np.asarray(tails[0] + along**2 * np.conj(start - tails[0])))
         place = np.array([sight.settled(one, nodes) for one in starts])
         zero = np.zeros(place.shape)
-        return Ways(place, zero + sight.anywhere, zero, (None,) * len(starts), others=len(starts))
+        return StepAlternatives(place, zero + sight.anywhere, zero, (None,) * len(starts), others=len(starts))
 
-    def _ways(self, step: Step, steps: Sequence[tuple[Mistake | None, Step]]) -> Ways:
+    def _ways(self, step: Step, steps: Sequence[tuple[Mistake | None, Step]]) -> StepAlternatives:
         mistakes = tuple(mistake for mistake, _ in steps)
         if not steps:
             empty = np.zeros((0, self.count))
-            return Ways(empty.astype(np.complex128), empty, empty, ())
+            return StepAlternatives(empty.astype(np.complex128), empty, empty, ())
         place, moved = self._placed(step, [changed for _, changed in steps])
         misfit, cost = self.sight.held_against(place, moved, self.nodes)
         rarity = np.array([0.0 if one is None else RARITY[one.code] for one in mistakes])
-        return Ways(place, cost + rarity[:, None], misfit, mistakes)
+        return StepAlternatives(place, cost + rarity[:, None], misfit, mistakes)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:
         """Where each puts the node, and how far each act of a usual hand moves it (ways, acts, branches)."""

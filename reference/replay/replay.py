@@ -24,11 +24,11 @@ from reference.replay.explanations import (
     AT_MOST,
     SUSPECT,
     WITHIN,
-    Bench,
-    Seen,
-    Sight,
-    Ways,
-    Work,
+    NodeObservations,
+    Observation,
+    Observations,
+    StepAlternatives,
+    StepContext,
     by_node,
     repertoire_of,
     seen_later,
@@ -56,7 +56,7 @@ class Root:
 
 
 @dataclass(frozen=True, slots=True)
-class Account:
+class Replay:
     """One way in which the drawing may have been made.
 
     Attributes
@@ -64,30 +64,36 @@ class Account:
     care : how many times a usual hand's standard deviations
     made : the mistakes, in the order of construction
     unexplained : nodes whose steps went wrong in no known way
-    right : by node seen, root mean square misfit in standard deviations if its step were made rightly
+    branches, index : the replay that it comes from, and which of its branches it is
     """
 
     cost: float
     care: float
     made: tuple[Mistake, ...]
     unexplained: tuple[str, ...]
-    right: Mapping[str, float]
+    branches: "_Branches" = field(repr=False)
+    index: int
 
     @property
     def is_innocent(self) -> bool:
         """Whether everything was made rightly."""
         return not self.made and not self.unexplained
 
+    @property
+    def right(self) -> Mapping[str, float]:
+        """By node seen, root mean square misfit in standard deviations if its step were made rightly."""
+        return {node: float(misfit[self.index]) for node, misfit in self.branches.right.items()}
+
 
 def replay(
     drawing: Drawing,
-    work: Work,
+    work: Observations,
     roots: Sequence[Root],
     skill: Skill,
     *,
     cares: Sequence[float] = (1.0,),
     blind: bool = False,
-) -> list[Account]:
+) -> list[Replay]:
     """The accounts of a drawing, the likeliest first.
 
     Arguments
@@ -107,12 +113,12 @@ def replay(
             for step in steps:
                 if step.node in needed:
                     here, nodes = told.get(step.node, ()), ChainMap(sketch, branches.nodes)
-                    bench = Bench(nodes, branches.known, branches.sight(here, figure), repertoire)
+                    bench = StepContext(nodes, branches.known, branches.sight(here, figure), repertoire)
                     branches.go_on(step, figure, here, _ways(step, bench, branches.is_blind, blind=blind))
     return branches.accounts()
 
 
-def _ways(step: Step, bench: Bench, has_guessed: BoolArray, *, blind: bool) -> Ways:
+def _ways(step: Step, bench: StepContext, has_guessed: BoolArray, *, blind: bool) -> StepAlternatives:
     """The right way to make a step, and the wrong ones where that does not explain what was seen.
 
     Arguments: `has_guessed` tells the branches that suppose a mistake that nothing told of.
@@ -151,11 +157,11 @@ class _Branches:
     unexplained: list[tuple[str, ...]]
     right: dict[str, FloatArray]
 
-    def sight(self, seen: tuple[Seen, ...], figure: str) -> Sight:
+    def sight(self, seen: tuple[Observation, ...], figure: str) -> NodeObservations:
         """What was seen of a node of a figure."""
-        return Sight(seen, self.turned.get(figure), self.care)
+        return NodeObservations(seen, self.turned.get(figure), self.care)
 
-    def go_on(self, step: Step, figure: str, seen: tuple[Seen, ...], ways: Ways) -> None:
+    def go_on(self, step: Step, figure: str, seen: tuple[Observation, ...], ways: StepAlternatives) -> None:
         """Each way in each branch: the likeliest of them."""
         costs, place, right = self.cost + ways.cost, ways.place[0], ways.misfit[0]
         if len(ways.mistakes) == 1:
@@ -200,16 +206,10 @@ class _Branches:
         self.made = [self.made[i] for i in index]
         self.unexplained = [self.unexplained[i] for i in index]
 
-    def accounts(self) -> list[Account]:
+    def accounts(self) -> list[Replay]:
         """What the branches have come to, the likeliest first."""
         return [
-            Account(
-                float(self.cost[i]),
-                float(self.care[i]),
-                self.made[i],
-                self.unexplained[i],
-                {node: float(misfit[i]) for node, misfit in self.right.items()},
-            )
+            Replay(float(self.cost[i]), float(self.care[i]), self.made[i], self.unexplained[i], self, i)
             for i in np.argsort(self.cost, kind="stable").tolist()
             if np.isfinite(self.cost[i])
         ]

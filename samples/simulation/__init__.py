@@ -13,15 +13,22 @@ from samples.simulation.settings import (
     PERFECT,
     SLOPPY,
     TYPICAL,
-    Hand,
+    HandStyle,
     PageStyle,
     PenStyle,
     Scan,
     Settings,
     Student,
 )
-from samples.simulation.storing import blank_back, encoded, write_pdf, write_truth
-from samples.simulation.student import SimulatedSheet, measured_by, simulate
+from samples.simulation.student import (
+    SimulatedSheet,
+    blank_back,
+    encoded,
+    measured_by,
+    simulate,
+    write_pdf,
+    write_truth,
+)
 
 __all__ = [
     "CAREFUL",
@@ -31,7 +38,7 @@ __all__ = [
     "PERFECT",
     "SLOPPY",
     "TYPICAL",
-    "Hand",
+    "HandStyle",
     "PageStyle",
     "PenStyle",
     "PrintedSheet",

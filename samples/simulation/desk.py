@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from grader.records import Box
 from samples.simulation import figures, page, symbols, truth, wording
-from samples.simulation.hand import MECHANISM, VELOCITY, DrawnFigure, DrawnSheet, Task
+from samples.simulation.hand import DrawingTask, DrawnFigure, DrawnSheet
 from samples.simulation.lettering import any_handwriting
 from samples.simulation.scanner import Background
-from samples.simulation.settings import PageStyle, Settings
-from samples.simulation.sketch import Sketch
+from samples.simulation.settings import MECHANISM, VELOCITY, Box, PageStyle, Settings
+from samples.simulation.sketch import SheetSketch
 from samples.simulation.strokes import Rng
 
 _FRAME_GAP_MM = 4.0
@@ -45,7 +44,7 @@ Printed = Mapping[str, PrintedSheet]
 class Desk:
     """Who draws what on which paper."""
 
-    task: Task
+    task: DrawingTask
     settings: Settings
     printed: Printed | None
     student_id: str
@@ -65,20 +64,20 @@ class Desk:
 
     def draw_out(
         self, sheet: DrawnSheet, number: tuple[int, int]
-    ) -> tuple[Sketch, dict[str, Any], page.Frame | None]:
+    ) -> tuple[SheetSketch, dict[str, Any], page.Frame | None]:
         """Pen on paper: the sketch, the truth about it, the frame of a plain sheet.
 
         Arguments: `number` is the sheet's and how many there are.
         """
         rng = np.random.default_rng([self.seed, 2, number[0] - 1])
         writing = any_handwriting(np.random.default_rng([self.seed, 5]))
-        sketch = Sketch(rng, self.settings.hand, self.settings.pen, self.settings.page, writing)
+        sketch = SheetSketch(rng, self.settings.hand, self.settings.pen, self.settings.page, writing)
         told = self._plain(sketch, sheet, number) if self.printed is None else self._on_print(sketch, sheet)
         return sketch, told, told.pop("frame", None)
 
     # Plain paper ------------------------------------------------------------------------------
 
-    def _plain(self, sketch: Sketch, sheet: DrawnSheet, number: tuple[int, int]) -> dict[str, Any]:
+    def _plain(self, sketch: SheetSketch, sheet: DrawnSheet, number: tuple[int, int]) -> dict[str, Any]:
         written: dict[str, str] = {}
         page.print_squares(sketch)
         frame = page.draw_frame(sketch)
@@ -121,7 +120,7 @@ class Desk:
         return (x + gap, y + gap, w - 2 * gap, h - 2 * gap), taken
 
     def _abandoned(
-        self, sketch: Sketch, sheet: DrawnSheet, room: Box, taken: list[Box]
+        self, sketch: SheetSketch, sheet: DrawnSheet, room: Box, taken: list[Box]
     ) -> list[float] | None:
         """A plan begun at a wrong place and crossed out; its box where there was room for it."""
         plan = next((figure for figure in sheet.figures if figure.name != MECHANISM), None)
@@ -146,7 +145,7 @@ class Desk:
 
     # Printed paper ----------------------------------------------------------------------------
 
-    def _on_print(self, sketch: Sketch, sheet: DrawnSheet) -> dict[str, Any]:
+    def _on_print(self, sketch: SheetSketch, sheet: DrawnSheet) -> dict[str, Any]:
         paper = (self.printed or {})[sheet.kind]
         origins = page.place_in_zones(sheet.figures, paper.zones, sketch.rng)
         missing = self._figures(sketch, sheet, origins)
@@ -156,7 +155,7 @@ class Desk:
         return {**told, "fields": filled}
 
     def _figures(
-        self, sketch: Sketch, sheet: DrawnSheet, origins: Mapping[str, complex]
+        self, sketch: SheetSketch, sheet: DrawnSheet, origins: Mapping[str, complex]
     ) -> dict[str, dict[str, str]]:
         """Draw the figures; the vectors that are not drawn, with the reason, by plan."""
         missing = {}
@@ -172,7 +171,7 @@ class Desk:
                     figures.draw_helpers(sketch, self.task, joints, nodes, student.helpers)
         return missing
 
-    def _fill_fields(self, sketch: Sketch, sheet: DrawnSheet, paper: PrintedSheet) -> dict[str, str]:
+    def _fill_fields(self, sketch: SheetSketch, sheet: DrawnSheet, paper: PrintedSheet) -> dict[str, str]:
         """The scales and the measured lengths written into the printed boxes; what was written, by box."""
         task, style = self.task, sketch.page
         texts = {}
@@ -204,7 +203,7 @@ def ruler_text(length_mm: float, style: PageStyle, rng: Rng, *, in_cells: bool =
     return wording.number(read, style)
 
 
-def _write_digits(sketch: Sketch, text: str, cells: Sequence[Box], name: str) -> None:
+def _write_digits(sketch: SheetSketch, text: str, cells: Sequence[Box], name: str) -> None:
     """A digit in each cell, the last in the last one, each somewhat off its cell's middle."""
     digits = [letter for letter in text if letter.isdigit()][-len(cells) :]
     for digit, (x, y, w, h) in zip(digits, cells[-len(digits) :], strict=True):

@@ -1,19 +1,102 @@
 """The mechanism's sketch and the two plans as a student draws them."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from reference.construction.elements import FixedLine, Line
 from reference.construction.graph import Vector, evaluate
-from reference.construction.steps import Divide, Given, Similar, TwoArcs, TwoLines
-from reference.mechanism import Crank, Dyad, Plate
+from reference.construction.steps import ArcAndLine, Divide, Given, OnGuide, Similar, Step, TwoArcs, TwoLines
+from reference.mechanism import (
+    Crank,
+    Dyad,
+    Group,
+    Plate,
+    PointOnLine,
+    Slider,
+    SlotPoint,
+    SlottedLink,
+    Yoke,
+    moving_guides,
+)
 from samples.simulation import symbols
-from samples.simulation.hand import MECHANISM, DrawnFigure, Nodes, Task
-from samples.simulation.links import blocks_of, coincident, fixed_guides, lines_of, links_of
-from samples.simulation.settings import Student
-from samples.simulation.sketch import CHAIN, DASHES, Sketch
+from samples.simulation.hand import DrawingTask, DrawnFigure, Nodes
+from samples.simulation.settings import MECHANISM, Student
+from samples.simulation.sketch import CHAIN, DASHES, SheetSketch
 from samples.simulation.strokes import Dash, arc
+
+
+def links_of(task: DrawingTask) -> Iterator[tuple[str, str, str]]:
+    """Strokes of the sketch: name, tail and head joint."""
+    driver = task.mechanism.driver
+    if isinstance(driver, Crank):
+        yield f"{driver.pivot}{driver.pin}", driver.pivot, driver.pin
+    for group in task.mechanism.groups:
+        for tail, head in _bars(task, group):
+            yield f"{tail}{head}", tail, head
+
+
+def _bars(task: DrawingTask, group: Group) -> Iterator[tuple[str, str]]:
+    match group:
+        case SlottedLink(pivot=pivot, foot=foot):
+            yield foot or pivot, _end_of_slot(task, group)
+            if foot is not None:
+                yield pivot, foot
+        case SlotPoint(node=node, slotted=slotted):
+            link = _slotted_link(task, slotted)
+            if node != _end_of_slot(task, link):
+                yield link.pivot, node
+        case PointOnLine(node=node, base=(p, q), ratio=ratio):
+            if not 0.0 < float(np.mean(ratio)) < 1.0:
+                yield (q if float(np.mean(ratio)) > 1.0 else p), node
+        case Dyad(node=node, pins=pins) | Plate(node=node, base=pins):
+            yield from ((pin, node) for pin in pins)
+        case Slider(node=node, pin=pin) | Yoke(node=node, pin=pin):
+            yield pin, node
+
+
+def _slotted_link(task: DrawingTask, node: str) -> SlottedLink:
+    return next(g for g in task.mechanism.groups if isinstance(g, SlottedLink) and g.node == node)
+
+
+def _end_of_slot(task: DrawingTask, link: SlottedLink) -> str:
+    """The point in which a slotted link's bar ends: beyond the block where the link goes on in line."""
+    points = (g for g in task.mechanism.groups if isinstance(g, SlotPoint) and g.slotted == link.node)
+    in_line = [one for one in points if np.all(one.local_m.imag == np.mean(link.offset_m))]
+    ahead = [one for one in in_line if float(np.mean(one.local_m.real)) * float(np.mean(link.side)) > 0.0]
+    return max(ahead, key=lambda one: float(np.mean(abs(one.local_m))), default=link).node
+
+
+def coincident(task: DrawingTask) -> set[str]:
+    """Joints that lie where another does and have no sign or letter of their own."""
+    slotted = {g.node for g in task.mechanism.groups if isinstance(g, SlottedLink)}
+    return slotted | {guide.coincident for g in task.mechanism.groups for guide in moving_guides(g)}
+
+
+def blocks_of(task: DrawingTask, group: Group) -> Iterator[tuple[str, str, str]]:
+    """Where a block sits on a moving guide, and two joints of that guide."""
+    if isinstance(group, SlottedLink):
+        yield group.pin, group.foot or group.pivot, _end_of_slot(task, group)
+    yield from ((group.node, *guide.base) for guide in moving_guides(group))
+
+
+def fixed_guides(step: Step) -> list[FixedLine]:
+    """The guides on the ground along which a step's node slides."""
+    match step:
+        case ArcAndLine(guide=guide) | OnGuide(guide=guide):
+            found = [guide]
+        case TwoLines(first=first, second=second):
+            found = [first, second]
+        case _:
+            found = []
+    return [guide for guide in found if isinstance(guide, FixedLine)]
+
+
+def lines_of(step: TwoLines) -> list[Line]:
+    """The lines of a step that are drawn from a node."""
+    return [line for line in (step.first, step.second) if isinstance(line, Line)]
+
 
 TOO_SHORT_MM = 0.8
 
@@ -26,7 +109,7 @@ def at_origin(figure: DrawnFigure, origin: complex) -> dict[str, complex]:
 # Mechanism ----------------------------------------------------------------------------------------
 
 
-def draw_mechanism(sketch: Sketch, task: Task, nodes: Nodes, student: Student) -> None:
+def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student: Student) -> None:
     """Links, joints, supports, sliders, letters, and what some people add."""
     turn = complex(np.exp(1j * np.radians(student.turn_deg)))
     _compass_arcs(sketch, task, nodes)
@@ -54,7 +137,7 @@ def draw_mechanism(sketch: Sketch, task: Task, nodes: Nodes, student: Student) -
         sketch.letter(nodes[joint], text, sketch.page.letter_mm, names=joint, distance_mm=2.0)
 
 
-def _sliders(sketch: Sketch, task: Task, nodes: Nodes, turn: complex) -> None:
+def _sliders(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, turn: complex) -> None:
     """Blocks: on guides on the ground with their guides, on moving links without."""
     for node, step in ((step.node, step) for step in task.wrong.construction.figures[MECHANISM]):
         for guide in fixed_guides(step):
@@ -69,7 +152,7 @@ def _sliders(sketch: Sketch, task: Task, nodes: Nodes, turn: complex) -> None:
             symbols.block(sketch, nodes[at], along / abs(along))
 
 
-def _link(sketch: Sketch, name: str, tail: complex, head: complex) -> None:
+def _link(sketch: SheetSketch, name: str, tail: complex, head: complex) -> None:
     p, q = sketch.redrawn(tail, head)
     along = (q - p) / max(abs(q - p), 1e-9)
     if sketch.style.links_stop_short and abs(q - p) > 5 * symbols.JOINT_RADIUS_MM:
@@ -82,7 +165,7 @@ def _link(sketch: Sketch, name: str, tail: complex, head: complex) -> None:
         sketch.line(sketch.pen("ghost"), p + 0.2 * miss, q + miss)
 
 
-def _compass_arcs(sketch: Sketch, task: Task, nodes: Nodes) -> None:
+def _compass_arcs(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:
     """The traces of the compass where two arcs met."""
     for step in task.wrong.construction.figures[MECHANISM]:
         if isinstance(step, TwoArcs) and sketch.chance(sketch.style.arcs):
@@ -93,7 +176,7 @@ def _compass_arcs(sketch: Sketch, task: Task, nodes: Nodes) -> None:
                 sketch.curve(sketch.pen("thin"), points)
 
 
-def _crank_extras(sketch: Sketch, task: Task, nodes: Nodes) -> None:
+def _crank_extras(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:
     crank = task.mechanism.driver
     if not isinstance(crank, Crank):
         return
@@ -107,7 +190,7 @@ def _crank_extras(sketch: Sketch, task: Task, nodes: Nodes) -> None:
     symbols.turning_arrow(sketch, pivot, start, min(radius * 0.5, sketch.rng.uniform(7, 12)), sense)
 
 
-def _vectors_at_pin(sketch: Sketch, task: Task, nodes: Nodes) -> None:
+def _vectors_at_pin(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:
     """v_A and a_A drawn at the crank's pin as well."""
     known, crank = task.wrong.parameters, task.mechanism.driver
     if not isinstance(crank, Crank):
@@ -126,7 +209,7 @@ def _vectors_at_pin(sketch: Sketch, task: Task, nodes: Nodes) -> None:
             sketch.letter(q, _vector_text(sketch, name), height, names=name, distance_mm=1.5)
 
 
-def _altitude(sketch: Sketch, task: Task, nodes: Nodes) -> None:
+def _altitude(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:
     """The right triangle whose altitude gives a normal component, at the first moving link's end."""
     fixed = task.mechanism.is_ground
     dyads = (g for g in task.mechanism.groups if isinstance(g, Dyad) and not fixed(g.pins[0]))
@@ -148,7 +231,7 @@ def _altitude(sketch: Sketch, task: Task, nodes: Nodes) -> None:
         sketch.line(pen, *sketch.redrawn(p, q))
 
 
-def _velocity_ends(task: Task, dyad: Dyad) -> tuple[str, str]:
+def _velocity_ends(task: DrawingTask, dyad: Dyad) -> tuple[str, str]:
     vector = task.right.construction.vectors[f"v_{dyad.node}{dyad.pins[0]}"]
     return vector.tail, vector.head
 
@@ -156,7 +239,9 @@ def _velocity_ends(task: Task, dyad: Dyad) -> tuple[str, str]:
 # Plans --------------------------------------------------------------------------------------------
 
 
-def draw_plan(sketch: Sketch, task: Task, figure: str, nodes: Nodes, student: Student) -> dict[str, str]:
+def draw_plan(
+    sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes, student: Student
+) -> dict[str, str]:
     """A plan: construction lines, vectors, letters. Returns the vectors not drawn, each with the reason."""
     missing = {name: "mistake" for name in task.missing if name in _names(task, figure)}
     _construction_lines(sketch, task, figure, nodes)
@@ -171,11 +256,13 @@ def draw_plan(sketch: Sketch, task: Task, figure: str, nodes: Nodes, student: St
     return missing
 
 
-def _names(task: Task, figure: str) -> set[str]:
+def _names(task: DrawingTask, figure: str) -> set[str]:
     return {vector.name for vector in task.right.construction.vectors_of(figure)}
 
 
-def _left_out(sketch: Sketch, task: Task, vector: Vector, nodes: Nodes, student: Student) -> str | None:
+def _left_out(
+    sketch: SheetSketch, task: DrawingTask, vector: Vector, nodes: Nodes, student: Student
+) -> str | None:
     if abs(nodes[vector.head] - nodes[vector.tail]) < TOO_SHORT_MM:
         return "too short to draw"
     if _is_result(task, vector) and sketch.chance(student.omitted):
@@ -183,7 +270,7 @@ def _left_out(sketch: Sketch, task: Task, vector: Vector, nodes: Nodes, student:
     return None
 
 
-def _is_result(task: Task, vector: Vector) -> bool:
+def _is_result(task: DrawingTask, vector: Vector) -> bool:
     """Whether a vector only joins two nodes that are there without it (pole and c, pole and b')."""
     step = task.wrong.construction.step(vector.head)
     if isinstance(step, TwoLines):
@@ -191,7 +278,7 @@ def _is_result(task: Task, vector: Vector) -> bool:
     return vector.link is None and not isinstance(step, Given)
 
 
-def _vector(sketch: Sketch, task: Task, figure: str, vector: Vector, nodes: Nodes) -> None:
+def _vector(sketch: SheetSketch, task: DrawingTask, figure: str, vector: Vector, nodes: Nodes) -> None:
     p, q = sketch.redrawn(nodes[vector.tail], nodes[vector.head])
     pen = sketch.pen("line", plan=True)
     dash = None
@@ -211,7 +298,7 @@ def _vector(sketch: Sketch, task: Task, figure: str, vector: Vector, nodes: Node
         sketch.letter(middle, text, 0.75 * sketch.page.letter_mm, names=vector.name, distance_mm=0.9)
 
 
-def _construction_lines(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
+def _construction_lines(sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes) -> None:
     """Thin lines that run past the points they gave."""
     for step in task.wrong.construction.figures[figure]:
         if not isinstance(step, TwoLines):
@@ -228,7 +315,7 @@ def _construction_lines(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -
             sketch.construction.setdefault(figure, []).append(ends)
 
 
-def _construction_dash(sketch: Sketch) -> Dash | None:
+def _construction_dash(sketch: SheetSketch) -> Dash | None:
     """None for a line drawn through."""
     share = sketch.style.construction_dashed
     if not share or not sketch.chance(share):
@@ -236,7 +323,7 @@ def _construction_dash(sketch: Sketch) -> Dash | None:
     return DASHES if sketch.chance(0.6) else CHAIN
 
 
-def draw_helpers(sketch: Sketch, task: Task, mechanism: Nodes, plan: Nodes, count: int) -> None:
+def draw_helpers(sketch: SheetSketch, task: DrawingTask, mechanism: Nodes, plan: Nodes, count: int) -> None:
     """Thin lines of no meaning: a link's direction carried over to the plan, a ruler set wrongly."""
     links = list(links_of(task))
     points = list(plan.values())
@@ -255,7 +342,7 @@ def draw_helpers(sketch: Sketch, task: Task, mechanism: Nodes, plan: Nodes, coun
         sketch.line(sketch.pen("thin", plan=True), foot - before * along, foot + past * along)
 
 
-def _unnamed_sides(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
+def _unnamed_sides(sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes) -> None:
     """Sides of a similar triangle that no named vector draws."""
     drawn = {frozenset((v.tail, v.head)) for v in task.wrong.construction.vectors_of(figure)}
     for step in task.wrong.construction.figures[figure]:
@@ -268,7 +355,7 @@ def _unnamed_sides(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> Non
                     sketch.lines[figure, f"side {end} {step.node}"] = (p, q)
 
 
-def _letters(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
+def _letters(sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes) -> None:
     circles = sketch.chance(sketch.style.node_circles)
     dots = not circles and sketch.chance(sketch.style.node_dots)
     for node, at in nodes.items():
@@ -287,13 +374,13 @@ def _letters(sketch: Sketch, task: Task, figure: str, nodes: Nodes) -> None:
         sketch.letter(at, text, sketch.page.letter_mm, names=node, distance_mm=1.2)
 
 
-def pole_text(task: Task, figure: str) -> str:
+def pole_text(task: DrawingTask, figure: str) -> str:
     """The letter of a plan's pole as the assignment has it."""
     pole = task.wrong.construction.poles[figure]
     return task.assignment.file.names.get(pole, pole)
 
 
-def _vector_text(sketch: Sketch, name: str) -> str:
+def _vector_text(sketch: SheetSketch, name: str) -> str:
     kind, about, *part = name.split("_")
     bar = "\u0304" if sketch.page.bar_over_vectors else ""
     return f"{kind}{bar}_{{{about}}}" + (f"^{part[0]}" if part else "")

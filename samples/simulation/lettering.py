@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from samples.simulation.glyphs import GLYPHS, TWINS
-from samples.simulation.strokes import ComplexArray, Pen, Rng, Stroke, inked, smooth
+from samples.simulation.strokes import ComplexArray, InkStroke, PenWidth, Rng, inked, smooth
 
 BAR = "\u0304"
 """A bar over the letter before it, as over a vector's name."""
@@ -55,17 +55,17 @@ def any_handwriting(rng: Rng) -> Handwriting:
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WrittenText:
     """Strokes of a text and its box: (left, bottom), (right, top), complex sheet millimetres."""
 
-    strokes: tuple[Stroke, ...]
+    strokes: tuple[InkStroke, ...]
     low: complex
     high: complex
 
-    def moved(self, by: complex) -> "Written":
+    def moved(self, by: complex) -> "WrittenText":
         """The same text elsewhere."""
-        strokes = tuple(Stroke(s.points + by, s.width, s.dark, s.layer) for s in self.strokes)
-        return Written(strokes, self.low + by, self.high + by)
+        strokes = tuple(InkStroke(s.points + by, s.width, s.dark, s.layer) for s in self.strokes)
+        return WrittenText(strokes, self.low + by, self.high + by)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ def _strokes_of(sign: str, forms: dict[str, int]) -> list[tuple[bool, ComplexArr
     return strokes
 
 
-def write(rng: Rng, pen: Pen, text: str, height_mm: float, style: Handwriting) -> Written:
+def write(rng: Rng, pen: PenWidth, text: str, height_mm: float, style: Handwriting) -> WrittenText:
     """A text whose base line starts at 0."""
     forms = dict(style.forms)
     at, strokes = 0.0, []
@@ -129,9 +129,9 @@ def write(rng: Rng, pen: Pen, text: str, height_mm: float, style: Handwriting) -
     return _boxed(strokes)
 
 
-def _boxed(strokes: list[Stroke]) -> Written:
+def _boxed(strokes: list[InkStroke]) -> WrittenText:
     if not strokes:
-        return Written((), 0j, 0j)
+        return WrittenText((), 0j, 0j)
     points = np.concatenate([stroke.points for stroke in strokes])
     low = complex(points.real.min(), points.imag.min())
-    return Written(tuple(strokes), low, complex(points.real.max(), points.imag.max()))
+    return WrittenText(tuple(strokes), low, complex(points.real.max(), points.imag.max()))

@@ -7,14 +7,14 @@ from typing import Literal
 import numpy as np
 
 from reference.authored.assignment import Assignment, Variant
-from reference.construction.mistakes import CODES
 from samples.simulation.hand import possible_mistakes
+from samples.simulation.mistakes import CODES
 from samples.simulation.settings import (
     CAREFUL,
     SLOPPY,
     TYPICAL,
     Colour,
-    Hand,
+    HandStyle,
     PageStyle,
     PenStyle,
     Scan,
@@ -155,7 +155,7 @@ PENS: dict[str, PenStyle] = {
 }
 
 
-def any_pen(rng: Rng, hand: Hand) -> PenStyle:
+def any_pen(rng: Rng, hand: HandStyle) -> PenStyle:
     """Somebody's pens and way of finishing a drawing."""
     kind = rng.choice(list(PENS), p=[0.24, 0.2, 0.22, 0.1, 0.1, 0.09, 0.05])
     style = PENS[str(kind)]

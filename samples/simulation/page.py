@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grader.records import Box
 from samples.simulation import wording
 from samples.simulation.figures import extent
-from samples.simulation.hand import DrawnFigure, Task
-from samples.simulation.sketch import SQUARES_LAYER, Sketch
-from samples.simulation.strokes import Pen, Rng, straight
+from samples.simulation.hand import DrawingTask, DrawnFigure
+from samples.simulation.settings import Box
+from samples.simulation.sketch import SQUARES_LAYER, SheetSketch
+from samples.simulation.strokes import PenWidth, Rng, straight
 
 PAPER_MM = (420.0, 297.0)
 FRAMES_MM: Mapping[str, Box] = {
@@ -32,12 +32,12 @@ class Frame:
     corners: tuple[complex, ...] | None
 
 
-def print_squares(sketch: Sketch) -> None:
+def print_squares(sketch: SheetSketch) -> None:
     """The fine lines of squared paper, printed a little askew to its edges."""
     pitch = sketch.page.squared_mm
     if pitch <= 0.0:
         return
-    pen = Pen(SQUARES_LAYER, 0.12, 0.6, 0.0, 0.0)
+    pen = PenWidth(SQUARES_LAYER, 0.12, 0.6, 0.0, 0.0)
     turn = complex(np.exp(1j * sketch.rng.normal(0.0, 0.003)))
     start = sketch.rng.uniform(0.0, pitch, 2)
     w, h = PAPER_MM
@@ -47,7 +47,7 @@ def print_squares(sketch: Sketch) -> None:
         sketch.strokes.append(straight(sketch.rng, pen, p * turn, q * turn))
 
 
-def draw_frame(sketch: Sketch) -> Frame:
+def draw_frame(sketch: SheetSketch) -> Frame:
     """The frame, ruled by hand with small errors, or printed exactly."""
     style = sketch.page
     if style.frame == "none":
@@ -56,7 +56,7 @@ def draw_frame(sketch: Sketch) -> Frame:
     corners = [complex(x, -y), complex(x + w, -y), complex(x + w, -y - h), complex(x, -y - h)]
     printed = style.frame_by == "print"
     if not printed:
-        miss = max(0.12, 0.7 * sketch.hand.place_mm)
+        miss = max(0.12, 1.4 * sketch.hand.reading_mm)
         corners = [c + complex(*sketch.rng.normal(0.0, miss, 2)) for c in corners]
     pen = sketch.pen("print" if printed else "line")
     for p, q in zip(corners, corners[1:] + corners[:1], strict=True):
@@ -65,7 +65,7 @@ def draw_frame(sketch: Sketch) -> Frame:
     return Frame(style.frame, style.frame_by, tuple(corners))
 
 
-def title_block(sketch: Sketch, rows: list[list[str]], corner: complex) -> Box | None:
+def title_block(sketch: SheetSketch, rows: list[list[str]], corner: complex) -> Box | None:
     """A title block whose lower right corner is the frame's; its box in sheet millimetres, y down."""
     kind = sketch.page.title_block
     if kind == "none":
@@ -92,7 +92,7 @@ def title_block(sketch: Sketch, rows: list[list[str]], corner: complex) -> Box |
     return (low.real, -top.imag, wide, high)
 
 
-def _form_columns(sketch: Sketch, low: complex, high: float, x1: float) -> None:
+def _form_columns(sketch: SheetSketch, low: complex, high: float, x1: float) -> None:
     """The narrow columns of signatures at the left of a form."""
     thin = sketch.pen("print" if sketch.page.frame_by == "print" else "thin")
     thick = sketch.pen("print" if sketch.page.frame_by == "print" else "line")
@@ -103,7 +103,7 @@ def _form_columns(sketch: Sketch, low: complex, high: float, x1: float) -> None:
         sketch.line(thin, complex(low.real, y), complex(x1, y))
 
 
-def _cells(sketch: Sketch, cells: list[str], box: Box) -> None:
+def _cells(sketch: SheetSketch, cells: list[str], box: Box) -> None:
     x, y, w, h = box
     shares = np.cumsum([0.0, *(len(cell) + 6.0 for cell in cells)])
     shares /= shares[-1]
@@ -190,7 +190,7 @@ def place_in_zones(
 
 
 def write_caption(
-    sketch: Sketch, task: Task, figure: str, nodes: Mapping[str, complex], written: dict[str, str]
+    sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Mapping[str, complex], written: dict[str, str]
 ) -> None:
     """The figure's caption above it (or below), with its scale where the student writes it there."""
     low, high = extent(nodes)
@@ -203,7 +203,7 @@ def write_caption(
         sketch.text(complex(max(low.real, 26.0), top - 1.6 * height * index), text, height)
 
 
-def write_block(sketch: Sketch, lines: list[str], room: Box, taken: list[Box]) -> None:
+def write_block(sketch: SheetSketch, lines: list[str], room: Box, taken: list[Box]) -> None:
     """Working written where there is room for it, or not at all."""
     if not lines:
         return

@@ -10,8 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.records import FloatArray, GreyImage
-from samples.simulation.strokes import ComplexArray, Stroke
+from samples.simulation.strokes import ComplexArray, FloatArray, GreyImage, InkStroke
 
 Mapping = Callable[[FloatArray], FloatArray]
 """Sheet millimetres (n, 2), y down, to pixels (n, 2)."""
@@ -21,7 +20,7 @@ _BATCH = 4_000_000
 """Pixels looked at in one go: bounds the memory."""
 
 
-def render(strokes: Sequence[Stroke], mapping: Mapping, shape: tuple[int, int]) -> GreyImage:
+def render(strokes: Sequence[InkStroke], mapping: Mapping, shape: tuple[int, int]) -> GreyImage:
     """Coverage times darkness, 0 .. 255, where strokes overlap the stronger one.
 
     Arguments: `mapping` takes sheet millimetres to pixels, `shape` is (height, width).
@@ -48,7 +47,7 @@ def _touches(p: FloatArray, q: FloatArray, reach: FloatArray, shape: tuple[int, 
     return np.asarray(inside.all(axis=1))
 
 
-def _pieces(strokes: Sequence[Stroke], mapping: Mapping) -> FloatArray:
+def _pieces(strokes: Sequence[InkStroke], mapping: Mapping) -> FloatArray:
     """Capsules (x0, y0, x1, y1, radius0, radius1, dark0, dark1) in pixels, each a few pixels long."""
     points = np.concatenate([stroke.points for stroke in strokes])
     widths = np.concatenate([stroke.width for stroke in strokes])

@@ -12,15 +12,44 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.records import FloatArray, GreyImage
-from samples.simulation.paper import hand_shadow, smudge, stain
 from samples.simulation.raster import render
 from samples.simulation.settings import Colour, PenStyle, Scan
 from samples.simulation.sketch import MAIN_LAYER, PLAN_LAYER, PRINT_LAYER, SQUARES_LAYER
-from samples.simulation.strokes import Rng, Stroke
-from samples.simulation.view import View
+from samples.simulation.strokes import FloatArray, GreyImage, InkStroke, Rng
+from samples.simulation.view import PaperView
 
 Float32Array = NDArray[np.float32]
+
+
+def hand_shadow(u: Float32Array, v: Float32Array, depth: float, rng: Rng) -> Float32Array:
+    """The soft-edged shadow of a phone and an arm over part of the sheet."""
+    angle, at = rng.uniform(0, 2 * np.pi), rng.uniform(-0.15, 0.35)
+    distance = u * np.cos(angle) + v * np.sin(angle) - at + 0.08 * np.sin(5 * (u - v) + rng.uniform(0, 6))
+    return np.asarray(1.0 - depth / (1.0 + np.exp(-distance / rng.uniform(0.01, 0.06))), dtype=np.float32)
+
+
+def stain(mx: Float32Array, my: Float32Array, rng: Rng) -> Float32Array:
+    """A ring where a cup stood, or a drop: brown with a darker rim."""
+    x, y = rng.uniform(30, 390), rng.uniform(20, 277)
+    ring = rng.random() < 0.5
+    radius = rng.uniform(32.0, 42.0) if ring else rng.uniform(3.0, 12.0)
+    uneven = 1.0 + 0.03 * np.sin(3 * np.arctan2(my - y, mx - x) + rng.uniform(0, 6))
+    distance = np.hypot(mx - x, my - y) * uneven
+    rim = np.exp(-0.5 * ((distance - radius) / rng.uniform(0.6, 1.5)) ** 2)
+    inside = 0.0 if ring else 1.0 / (1.0 + np.exp(np.clip((distance - radius) / 0.4, -30.0, 30.0)))
+    depth = rng.uniform(0.05, 0.16)
+    return np.asarray(1.0 - depth * np.maximum(rim, 0.6 * inside), dtype=np.float32)
+
+
+def smudge(mx: Float32Array, my: Float32Array, rng: Rng) -> Float32Array:
+    """A long soft spot where a hand rubbed."""
+    x, y, angle = rng.uniform(40, 380), rng.uniform(30, 260), rng.uniform(0, np.pi)
+    along = (mx - x) * np.cos(angle) + (my - y) * np.sin(angle)
+    across = -(mx - x) * np.sin(angle) + (my - y) * np.cos(angle)
+    blob = np.exp(-0.5 * ((along / rng.uniform(6, 25)) ** 2 + (across / rng.uniform(2, 7)) ** 2))
+    return np.asarray(1.0 - rng.uniform(0.01, 0.06) * blob, dtype=np.float32)
+
+
 _TONER: Colour = (22, 22, 24)
 _SQUARES: Colour = (150, 190, 225)
 _COARSE = 8
@@ -39,12 +68,12 @@ class Background:
 class DrawnPaper:
     """What lies on the glass: strokes, the pens that made them, and what was printed before."""
 
-    strokes: Sequence[Stroke]
+    strokes: Sequence[InkStroke]
     pens: PenStyle
     background: Background | None = None
 
 
-def digitise(paper: DrawnPaper, scan: Scan, view: View, rng: Rng) -> NDArray[np.uint8]:
+def digitise(paper: DrawnPaper, scan: Scan, view: PaperView, rng: Rng) -> NDArray[np.uint8]:
     """The stored image: (h, w) grey, (h, w, 3) RGB, or for one bit (h, w) of 0 and 255."""
     light = _light(scan, view, rng, paper.pens.smudges)
     mask = _paper_mask(view, scan)
@@ -81,7 +110,7 @@ def _of(colour: Colour, channel: int | None) -> float:
 
 
 def _inks(
-    strokes: Sequence[Stroke], pens: PenStyle, view: View, rng: Rng
+    strokes: Sequence[InkStroke], pens: PenStyle, view: PaperView, rng: Rng
 ) -> list[tuple[Float32Array, Colour]]:
     """Coverage 0..1 and colour of each layer that is on the sheet."""
     colours: Mapping[str, Colour] = {
@@ -132,7 +161,7 @@ def _smear(cover: Float32Array, amount: float, px_per_mm: float, rng: Rng) -> No
     np.maximum(cover, np.clip(full, 0.0, 1.0) * np.float32(amount), out=cover)
 
 
-def _printed(background: Background, view: View) -> Float32Array:
+def _printed(background: Background, view: PaperView) -> Float32Array:
     """The printed sheet's brightness 0..1 on the view's grid."""
     scale = min(1.0, view.px_per_mm / background.px_per_mm)
     page = background.grey
@@ -149,7 +178,7 @@ def _printed(background: Background, view: View) -> Float32Array:
     return _through_lens(page, pitch, view)
 
 
-def _through_lens(page: GreyImage, pitch: FloatArray, view: View) -> Float32Array:
+def _through_lens(page: GreyImage, pitch: FloatArray, view: PaperView) -> Float32Array:
     """The page's brightness looked up for every pixel, some rows at a time."""
     height, width = view.size
     result = np.empty(view.size, np.float32)
@@ -162,12 +191,12 @@ def _through_lens(page: GreyImage, pitch: FloatArray, view: View) -> Float32Arra
     return np.asarray(result / np.float32(255.0))
 
 
-def _show_through(strokes: Sequence[Stroke], view: View, scan: Scan) -> Float32Array | None:
+def _show_through(strokes: Sequence[InkStroke], view: PaperView, scan: Scan) -> Float32Array | None:
     """Another drawing on the back, faint, mirrored and blurred."""
     if scan.show_through <= 0.0:
         return None
     back = [
-        Stroke(np.asarray(414.0 - np.conj(s.points), dtype=np.complex128), s.width, s.dark, s.layer)
+        InkStroke(np.asarray(414.0 - np.conj(s.points), dtype=np.complex128), s.width, s.dark, s.layer)
         for s in strokes[::2]
     ]
     small = (view.size[0] // 3, view.size[1] // 3)
@@ -180,7 +209,7 @@ def _show_through(strokes: Sequence[Stroke], view: View, scan: Scan) -> Float32A
 # Paper and light ----------------------------------------------------------------------------------
 
 
-def _outline(view: View) -> FloatArray:
+def _outline(view: PaperView) -> FloatArray:
     """The paper's outline in pixels, fine enough for a bent edge."""
     x0, y0, x1, y1 = view.paper_mm
     corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
@@ -189,7 +218,7 @@ def _outline(view: View) -> FloatArray:
     return view.to_px(np.concatenate(edges))
 
 
-def _paper_mask(view: View, scan: Scan) -> Float32Array | None:
+def _paper_mask(view: PaperView, scan: Scan) -> Float32Array | None:
     """1 on the paper, 0 on the bed (and through punched holes); None where the paper fills the image."""
     height, width = view.size
     polygon = np.round(_outline(view) * 16).astype(np.int32)
@@ -206,7 +235,7 @@ def _paper_mask(view: View, scan: Scan) -> Float32Array | None:
     return np.asarray(mask.astype(np.float32) / np.float32(255.0))
 
 
-def _light(scan: Scan, view: View, rng: Rng, smudges: int) -> Float32Array:
+def _light(scan: Scan, view: PaperView, rng: Rng, smudges: int) -> Float32Array:
     """Illumination with folds, smudges, shadows and the paper's edge, about 1."""
     height, width = (max(2, side // _COARSE) for side in view.size)
     y, x = np.mgrid[0:height, 0:width].astype(np.float32)

@@ -4,30 +4,40 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Colour = tuple[int, int, int]
+Box = tuple[float, float, float, float]
+"""Left, top, width and height, sheet millimetres, y down."""
+MECHANISM, VELOCITY, ACCELERATION = "mechanism", "velocity_plan", "acceleration_plan"
+PLANS = (VELOCITY, ACCELERATION)
+"""The figures of a drawing, by the names of the published formats."""
 
 
 @dataclass(frozen=True, slots=True)
-class Hand:
-    """Standard deviations of one act of drawing; they propagate through the construction.
+class HandStyle:
+    """How large one person's slips are (`samples.simulation.instruments`); they propagate.
 
     Attributes
     ----------
-    angle_deg : of a line set parallel or perpendicular to another
-    place_mm : of a length transferred, an arc opened, the foot of a line
-    mark_mm : of a point's mark
+    edge_mm : of a ruler's edge beside each point that it should pass through
+    square_deg : of a set square for every 100 mm that a direction is carried, and of a protractor
+    reading_mm : of a length set on or read off a scale
+    graduation_mm : to which lengths are read, 0 for exactly
+    mark_mm : of a pencil's dot or a needle's prick, along x and along y
     redraw_mm : of a stroke's end about the node that it joins
     """
 
-    angle_deg: float = 0.3
-    place_mm: float = 0.3
+    edge_mm: float = 0.15
+    square_deg: float = 0.15
+    reading_mm: float = 0.15
+    graduation_mm: float = 0.5
     mark_mm: float = 0.1
     redraw_mm: float = 0.15
 
 
-PERFECT = Hand(0.0, 0.0, 0.0, 0.0)
-CAREFUL = Hand(0.15, 0.15, 0.05, 0.08)
-TYPICAL = Hand()
-SLOPPY = Hand(0.8, 0.7, 0.2, 0.35)
+PERFECT = HandStyle(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+CAREFUL = HandStyle(0.08, 0.06, 0.08, 0.5, 0.05, 0.08)
+TYPICAL = HandStyle()
+SLOPPY = HandStyle(0.4, 0.45, 0.4, 1.0, 0.2, 0.35)
+"""Plotting on paper is good to 0.1 to 0.4 mm, usually to 0.25: between a careful and a typical hand's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +203,7 @@ class Scan:
 class Settings:
     """Everything about one student's work, save what is left to the seed."""
 
-    hand: Hand = TYPICAL
+    hand: HandStyle = TYPICAL
     student: Student = field(default_factory=Student)
     pen: PenStyle = field(default_factory=PenStyle)
     page: PageStyle = field(default_factory=PageStyle)

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from samples.simulation.lettering import Handwriting, Written, write
-from samples.simulation.settings import Hand, PageStyle, PenStyle
-from samples.simulation.strokes import ComplexArray, Dash, Pen, Rng, Stroke, dashed, inked, straight
+from samples.simulation.lettering import Handwriting, WrittenText, write
+from samples.simulation.settings import HandStyle, PageStyle, PenStyle
+from samples.simulation.strokes import ComplexArray, Dash, InkStroke, PenWidth, Rng, dashed, inked, straight
 
 Segment = tuple[complex, complex]
 PRINT_LAYER, MAIN_LAYER, PLAN_LAYER, SQUARES_LAYER = "print", "main", "plan", "squares"
@@ -16,7 +16,7 @@ DASHES = Dash(4.0, 1.8)
 
 
 @dataclass(frozen=True, slots=True)
-class Label:
+class WrittenLabel:
     """A text on the sheet: what it names, and its box (low, high corners)."""
 
     text: str
@@ -26,7 +26,7 @@ class Label:
 
 
 @dataclass(slots=True)
-class Sketch:
+class SheetSketch:
     """Everything drawn on one side of one sheet so far.
 
     Attributes
@@ -38,39 +38,39 @@ class Sketch:
     """
 
     rng: Rng
-    hand: Hand
+    hand: HandStyle
     style: PenStyle
     page: PageStyle
     writing: Handwriting
-    strokes: list[Stroke] = field(default_factory=list)
-    labels: list[Label] = field(default_factory=list)
+    strokes: list[InkStroke] = field(default_factory=list)
+    labels: list[WrittenLabel] = field(default_factory=list)
     lines: dict[tuple[str, str], Segment] = field(default_factory=dict)
     construction: dict[str, list[Segment]] = field(default_factory=dict)
 
-    def pen(self, kind: str, *, plan: bool = False) -> Pen:
+    def pen(self, kind: str, *, plan: bool = False) -> PenWidth:
         """The student's pen for a kind of line: line, thin, text or print."""
         style = self.style
         layer = PLAN_LAYER if plan and style.plan_colour is not None else MAIN_LAYER
         match kind:
             case "line":
-                return Pen(layer, style.line_mm, style.dark, style.pressure, style.wobble_mm)
+                return PenWidth(layer, style.line_mm, style.dark, style.pressure, style.wobble_mm)
             case "thin":
-                return Pen(layer, style.thin_mm, style.thin_dark, style.pressure, style.wobble_mm)
+                return PenWidth(layer, style.thin_mm, style.thin_dark, style.pressure, style.wobble_mm)
             case "ghost":
-                return Pen(layer, style.line_mm * 1.2, style.ghost_dark, 0.4, 0.08)
+                return PenWidth(layer, style.line_mm * 1.2, style.ghost_dark, 0.4, 0.08)
             case "print":
-                return Pen(PRINT_LAYER, 0.35, 0.95, 0.0, 0.0)
+                return PenWidth(PRINT_LAYER, 0.35, 0.95, 0.0, 0.0)
             case _:
-                return Pen(MAIN_LAYER, 0.8 * style.line_mm, 0.92 * style.dark, style.pressure, 0.0)
+                return PenWidth(MAIN_LAYER, 0.8 * style.line_mm, 0.92 * style.dark, style.pressure, 0.0)
 
-    def line(self, pen: Pen, p: complex, q: complex, dash: Dash | None = None) -> None:
+    def line(self, pen: PenWidth, p: complex, q: complex, dash: Dash | None = None) -> None:
         """A straight stroke exactly from p to q (its wobble apart)."""
         if abs(q - p) < 0.05:
             return
         stroke = straight(self.rng, pen, p, q)
         self.strokes.extend([stroke] if dash is None else dashed(self.rng, stroke, dash))
 
-    def curve(self, pen: Pen, points: ComplexArray, dash: Dash | None = None) -> None:
+    def curve(self, pen: PenWidth, points: ComplexArray, dash: Dash | None = None) -> None:
         """A stroke through points."""
         stroke = inked(self.rng, pen, points)
         self.strokes.extend([stroke] if dash is None else dashed(self.rng, stroke, dash))
@@ -88,11 +88,11 @@ class Sketch:
 
     # Writing ----------------------------------------------------------------------------------
 
-    def text(self, at: complex, text: str, height_mm: float, *, names: str = "") -> Written:
+    def text(self, at: complex, text: str, height_mm: float, *, names: str = "") -> WrittenText:
         """Write a text with its base line's start at a point."""
         written = write(self.rng, self.pen("text"), text, height_mm, self.writing).moved(at)
         self.strokes.extend(written.strokes)
-        self.labels.append(Label(text, names, written.low, written.high))
+        self.labels.append(WrittenLabel(text, names, written.low, written.high))
         return written
 
     def letter(self, near: complex, text: str, height_mm: float, *, names: str, distance_mm: float) -> None:
@@ -107,7 +107,7 @@ class Sketch:
         centre = max(tried, key=self._room())
         placed = written.moved(centre - middle)
         self.strokes.extend(placed.strokes)
-        self.labels.append(Label(text, names, placed.low, placed.high))
+        self.labels.append(WrittenLabel(text, names, placed.low, placed.high))
 
     def _room(self) -> Callable[[complex], float]:
         """How far the nearest ink is, with a person's carelessness; a letter's width is enough."""

@@ -1,6 +1,6 @@
 """A pen's stroke, and how a hand wavers along it.
 
-Positions are complex sheet millimetres, x - i y (y up), as in `grader.records`.
+Positions are complex sheet millimetres, x - i y (y up).
 """
 
 from collections.abc import Iterator
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.records import FloatArray
-
 ComplexArray = NDArray[np.complex128]
+FloatArray = NDArray[np.float64]
+GreyImage = NDArray[np.uint8]
 Rng = np.random.Generator
 
 _STEP_MM = 1.5
@@ -20,7 +20,7 @@ _WAVE_MM = (18.0, 90.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Pen:
+class PenWidth:
     """What the student holds.
 
     Attributes
@@ -39,7 +39,7 @@ class Pen:
 
 
 @dataclass(frozen=True, slots=True)
-class Stroke:
+class InkStroke:
     """A drawn polyline: points (n,), width (n,) mm and darkness (n,) 0..1, in a layer of ink."""
 
     points: ComplexArray
@@ -65,7 +65,7 @@ def wave(rng: Rng, along_mm: FloatArray, wavelengths_mm: tuple[float, float] = _
     return np.asarray(waves.sum(axis=1) / np.sqrt(2.0))
 
 
-def straight(rng: Rng, pen: Pen, p: complex, q: complex) -> Stroke:
+def straight(rng: Rng, pen: PenWidth, p: complex, q: complex) -> InkStroke:
     """A line from p to q; its wobble has no share of offset or direction (least squares)."""
     length = abs(q - p)
     count = max(2, int(np.ceil(length / _STEP_MM)) + 1)
@@ -78,15 +78,15 @@ def straight(rng: Rng, pen: Pen, p: complex, q: complex) -> Stroke:
     return inked(rng, pen, points)
 
 
-def inked(rng: Rng, pen: Pen, points: ComplexArray) -> Stroke:
+def inked(rng: Rng, pen: PenWidth, points: ComplexArray) -> InkStroke:
     """A stroke through given points, with the pressure of the hand."""
     along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(points)))])
     press = 1.0 + pen.pressure * np.clip(wave(rng, along), -2.0, 2.0)
     width = np.maximum(pen.width_mm * (1.0 + 0.6 * (press - 1.0)), 0.08)
-    return Stroke(points, width, np.clip(pen.dark * press, 0.02, 1.0), pen.layer)
+    return InkStroke(points, width, np.clip(pen.dark * press, 0.02, 1.0), pen.layer)
 
 
-def dashed(rng: Rng, stroke: Stroke, dash: Dash) -> list[Stroke]:
+def dashed(rng: Rng, stroke: InkStroke, dash: Dash) -> list[InkStroke]:
     """The stroke cut into dashes (and dots) of unequal length."""
     along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(stroke.points)))])
     return [_cut(stroke, along, low, high) for low, high in _spans(rng, float(along[-1]), dash)]
@@ -101,12 +101,12 @@ def _spans(rng: Rng, length: float, dash: Dash) -> Iterator[tuple[float, float]]
         dot = not dot and dash.dot_mm > 0
 
 
-def _cut(stroke: Stroke, along: FloatArray, low: float, high: float) -> Stroke:
+def _cut(stroke: InkStroke, along: FloatArray, low: float, high: float) -> InkStroke:
     inner = (along > low) & (along < high)
     at = np.concatenate([[low], along[inner], [high]])
     points = np.interp(at, along, stroke.points.real) + 1j * np.interp(at, along, stroke.points.imag)
     width, dark = np.interp(at, along, stroke.width), np.interp(at, along, stroke.dark)
-    return Stroke(points, width, dark, stroke.layer)
+    return InkStroke(points, width, dark, stroke.layer)
 
 
 def arc(centre: complex, radius: float, start_rad: float, sweep_rad: float) -> ComplexArray:

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from samples.simulation.sketch import CHAIN, Sketch
-from samples.simulation.strokes import Pen, arc
+from samples.simulation.sketch import CHAIN, SheetSketch
+from samples.simulation.strokes import PenWidth, arc
 
 JOINT_RADIUS_MM = 1.3
 
 
-def arrowhead(sketch: Sketch, pen: Pen, tail: complex, tip: complex, size_mm: float) -> None:
+def arrowhead(sketch: SheetSketch, pen: PenWidth, tail: complex, tip: complex, size_mm: float) -> None:
     """An arrowhead at `tip`, as this person makes them; shrunk on short vectors, none on tiny ones."""
     length = abs(tip - tail)
     kind = sketch.style.arrow
@@ -19,7 +19,7 @@ def arrowhead(sketch: Sketch, pen: Pen, tail: complex, tip: complex, size_mm: fl
     back = -(tip - tail) / length
     spread = np.radians(sketch.style.arrow_half_deg * rng.uniform(0.8, 1.2))
     left, right = (tip + size * back * np.exp(1j * s * spread * rng.uniform(0.8, 1.2)) for s in (1, -1))
-    fine = Pen(pen.layer, 0.75 * pen.width_mm, pen.dark, pen.pressure, 0.0)
+    fine = PenWidth(pen.layer, 0.75 * pen.width_mm, pen.dark, pen.pressure, 0.0)
     if kind == "filled":
         for share in np.linspace(0.0, 1.0, max(3, int(size / 0.5))):
             sketch.line(fine, tip, left + (right - left) * share)
@@ -34,7 +34,7 @@ def arrowhead(sketch: Sketch, pen: Pen, tail: complex, tip: complex, size_mm: fl
         sketch.line(fine, tip, right)
 
 
-def circle(sketch: Sketch, centre: complex, radius_mm: float, pen: Pen) -> None:
+def circle(sketch: SheetSketch, centre: complex, radius_mm: float, pen: PenWidth) -> None:
     """A circle, by compass or by hand: nearly closed."""
     rng = sketch.rng
     sweep = 2 * np.pi + rng.normal(0.0, 0.15)
@@ -43,14 +43,14 @@ def circle(sketch: Sketch, centre: complex, radius_mm: float, pen: Pen) -> None:
     sketch.curve(pen, centre + (points - centre) * wobble)
 
 
-def dot(sketch: Sketch, centre: complex, radius_mm: float) -> None:
+def dot(sketch: SheetSketch, centre: complex, radius_mm: float) -> None:
     """A point pressed or turned into the paper."""
     pen = sketch.pen("line", plan=True)
-    fine = Pen(pen.layer, 0.7 * radius_mm, pen.dark, pen.pressure, 0.0)
+    fine = PenWidth(pen.layer, 0.7 * radius_mm, pen.dark, pen.pressure, 0.0)
     sketch.curve(fine, arc(centre, 0.55 * radius_mm, sketch.rng.uniform(0, 2 * np.pi), 4 * np.pi))
 
 
-def hatching(sketch: Sketch, p: complex, q: complex, depth_mm: float, gap_mm: float = 1.6) -> None:
+def hatching(sketch: SheetSketch, p: complex, q: complex, depth_mm: float, gap_mm: float = 1.6) -> None:
     """Short slanted strokes to the right of the line from p to q (below, when it runs to the right)."""
     length = abs(q - p)
     along = (q - p) / max(length, 1e-9)
@@ -63,7 +63,7 @@ def hatching(sketch: Sketch, p: complex, q: complex, depth_mm: float, gap_mm: fl
         at += gap_mm * sketch.rng.uniform(0.75, 1.3)
 
 
-def support(sketch: Sketch, at: complex, turn: complex) -> None:
+def support(sketch: SheetSketch, at: complex, turn: complex) -> None:
     """A fixed pivot, standing the way that `turn` (a unit vector along the ground) says."""
     pen = sketch.pen("line")
     wide, high = sketch.rng.uniform(3.2, 4.6), sketch.rng.uniform(4.5, 6.5)
@@ -85,7 +85,7 @@ def support(sketch: Sketch, at: complex, turn: complex) -> None:
     hatching(sketch, *ends, depth_mm=2.4)
 
 
-def slider(sketch: Sketch, at: complex, along: complex) -> None:
+def slider(sketch: SheetSketch, at: complex, along: complex) -> None:
     """A sliding block on a guide: a rectangle, the guide's centre line, ground below or on both sides."""
     pen, thin = sketch.pen("line"), sketch.pen("thin")
     high = block(sketch, at, along)
@@ -99,7 +99,7 @@ def slider(sketch: Sketch, at: complex, along: complex) -> None:
         sketch.line(thin, at - along * reach * 1.2, at + along * reach * 1.3, CHAIN)
 
 
-def block(sketch: Sketch, at: complex, along: complex) -> float:
+def block(sketch: SheetSketch, at: complex, along: complex) -> float:
     """A sliding block; half its height."""
     pen = sketch.pen("line")
     wide, high = sketch.rng.uniform(4.5, 7.5), sketch.rng.uniform(2.4, 3.8)
@@ -109,7 +109,9 @@ def block(sketch: Sketch, at: complex, along: complex) -> float:
     return float(high)
 
 
-def turning_arrow(sketch: Sketch, centre: complex, start_rad: float, radius_mm: float, sense: float) -> None:
+def turning_arrow(
+    sketch: SheetSketch, centre: complex, start_rad: float, radius_mm: float, sense: float
+) -> None:
     """A curved arrow about a pivot, with the letter omega."""
     pen = sketch.pen("text")
     points = arc(centre, radius_mm, start_rad, np.sign(sense) * sketch.rng.uniform(0.9, 1.5))
@@ -120,7 +122,7 @@ def turning_arrow(sketch: Sketch, centre: complex, start_rad: float, radius_mm: 
     sketch.letter(middle, "ω_1", 0.8 * sketch.page.letter_mm, names="", distance_mm=1.0)
 
 
-def cross_out(sketch: Sketch, low: complex, high: complex) -> None:
+def cross_out(sketch: SheetSketch, low: complex, high: complex) -> None:
     """Two or three long strokes through something that does not count."""
     pen = sketch.pen("line")
     rng = sketch.rng
@@ -129,7 +131,7 @@ def cross_out(sketch: Sketch, low: complex, high: complex) -> None:
         sketch.curve(pen, np.array([p, bend, q]))
 
 
-def inside_hatching(sketch: Sketch, corners: tuple[complex, complex, complex], gap_mm: float) -> None:
+def inside_hatching(sketch: SheetSketch, corners: tuple[complex, complex, complex], gap_mm: float) -> None:
     """Parallel thin lines across a triangular plate."""
     points = np.array(corners)
     lean = complex(np.exp(1j * sketch.rng.uniform(0.5, 1.2)))

@@ -7,17 +7,18 @@ have drawn with the same mistakes: what follow-through should expect.
 """
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from reference.construction.mistakes import Mistake
 from samples.simulation.figures import at_origin, pole_text
-from samples.simulation.hand import MECHANISM, DrawnFigure, DrawnSheet, Task
+from samples.simulation.hand import DrawingTask, DrawnFigure, DrawnSheet
+from samples.simulation.mistakes import StudentMistake
 from samples.simulation.page import Frame
-from samples.simulation.settings import Settings
-from samples.simulation.sketch import Label, Sketch
-from samples.simulation.view import View
+from samples.simulation.settings import MECHANISM, Settings
+from samples.simulation.sketch import SheetSketch, WrittenLabel
+from samples.simulation.view import PaperView
 
 SCHEMA_VERSION = 1
 
@@ -35,9 +36,9 @@ def direction(vector: complex) -> float | None:
 
 
 def drawing_truth(
-    task: Task,
+    task: DrawingTask,
     sheet: DrawnSheet,
-    sketch: Sketch,
+    sketch: SheetSketch,
     origins: Mapping[str, complex],
     missing: Mapping[str, Mapping[str, str]],
 ) -> dict[str, Any]:
@@ -60,7 +61,7 @@ def drawing_truth(
     }
 
 
-def _label(label: Label) -> dict[str, Any]:
+def _label(label: WrittenLabel) -> dict[str, Any]:
     top_left, low_right = complex(label.low.real, label.high.imag), complex(label.high.real, label.low.imag)
     return {"text": label.text, "names": label.names, "box_mm": [*xy(top_left), *xy(low_right)]}
 
@@ -69,8 +70,8 @@ def _rounded(scales: Mapping[str, float]) -> dict[str, float]:
     return {name: float(f"{value:.9g}") for name, value in scales.items()}
 
 
-def _mistake(mistake: Mistake) -> dict[str, Any]:
-    usual = Mistake(mistake.code, mistake.at)
+def _mistake(mistake: StudentMistake) -> dict[str, Any]:
+    usual = StudentMistake(mistake.code, mistake.at)
     details = ("slot", "other", "factor", "quarters", "n", "position")
     told = {name: getattr(mistake, name) for name in details}
     unusual = {name: value for name, value in told.items() if value != getattr(usual, name)}
@@ -78,7 +79,7 @@ def _mistake(mistake: Mistake) -> dict[str, Any]:
 
 
 def _figure(
-    task: Task, figure: DrawnFigure, sketch: Sketch, origin: complex, missing: Mapping[str, str]
+    task: DrawingTask, figure: DrawnFigure, sketch: SheetSketch, origin: complex, missing: Mapping[str, str]
 ) -> dict[str, Any]:
     nodes = at_origin(figure, origin)
     lines = {name: [xy(p), xy(q)] for (owner, name), (p, q) in sketch.lines.items() if owner == figure.name}
@@ -108,7 +109,7 @@ def _figure(
     return {**truth, "vectors": vectors, "missing": dict(missing), "sides": sides, "construction": thin}
 
 
-def scan_truth(view: View, frame: Frame | None, settings: Settings) -> dict[str, Any]:
+def scan_truth(view: PaperView, frame: Frame | None, settings: Settings) -> dict[str, Any]:
     """Where the paper lies among the pixels."""
     grid = np.array([[x, y] for y in (10.0, 102.0, 194.0, 286.0) for x in np.linspace(10.0, 410.0, 6)])
     pixels = view.to_px(grid)
@@ -137,9 +138,5 @@ def scan_truth(view: View, frame: Frame | None, settings: Settings) -> dict[str,
             "copy_scale": scan.copy_scale,
             "quarter_turns": scan.quarter_turns,
         },
-        "hand": {
-            "angle_deg": settings.hand.angle_deg,
-            "place_mm": settings.hand.place_mm,
-            "redraw_mm": settings.hand.redraw_mm,
-        },
+        "hand": asdict(settings.hand),
     }

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grader.records import FloatArray
 from samples.simulation.page import PAPER_MM
 from samples.simulation.settings import Scan
-from samples.simulation.strokes import Rng
+from samples.simulation.strokes import FloatArray, Rng
 
 _PHONE_PX = (4000, 3000)
 _PHONE_DPI = 220.0
@@ -21,7 +20,7 @@ _FOCAL = 1.05
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class PaperView:
     """A mapping from sheet to stored pixels.
 
     Attributes
@@ -92,7 +91,7 @@ def projected(homography: FloatArray, xy: FloatArray) -> FloatArray:
     return np.asarray(lifted[:, :2] / lifted[:, 2:])
 
 
-def view_of(scan: Scan, rng: Rng) -> View:
+def view_of(scan: Scan, rng: Rng) -> PaperView:
     """How this scanner or phone sees the sheet."""
     upright, size = _phone(scan, rng) if scan.device == "phone" else _glass(scan, rng)
     homography = upright
@@ -104,7 +103,7 @@ def view_of(scan: Scan, rng: Rng) -> View:
     paper = (-grow * w, -grow * h, (1 + grow) * w, (1 + grow) * h)
     phone = scan.device == "phone"
     k1, curl = (scan.lens_k1, scan.curl_mm) if phone else (0.0, 0.0)
-    return View(homography, size, k1, scan.quarter_turns % 4, paper, curl)
+    return PaperView(homography, size, k1, scan.quarter_turns % 4, paper, curl)
 
 
 def _glass(scan: Scan, rng: Rng) -> tuple[FloatArray, tuple[int, int]]:

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from reference.mechanism import Crank
-from samples.simulation.hand import ACCELERATION, MECHANISM, VELOCITY, Task
-from samples.simulation.settings import PageStyle
+from samples.simulation.hand import DrawingTask
+from samples.simulation.settings import ACCELERATION, MECHANISM, VELOCITY, PageStyle
 from samples.simulation.strokes import Rng
 
 CAPTIONS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
@@ -36,6 +36,8 @@ UNITS: Mapping[str, tuple[str, str, str]] = {
     "ru": ("м/мм", "(м/с)/мм", "(м/с^2)/мм"),
     "en": ("m/mm", "(m/s)/mm", "(m/s^2)/mm"),
 }
+SCALE_UNITS: Mapping[str, str] = dict(zip(("kL", "kv", "ka"), UNITS["en"], strict=True))
+"""As they are entered in rosters and tables of measurements."""
 _SCALE_OF = {MECHANISM: "kL", VELOCITY: "kv", ACCELERATION: "ka"}
 
 
@@ -45,7 +47,12 @@ def number(value: float, page: PageStyle, digits: int = 4) -> str:
     return text.replace(".", ",") if page.decimal_comma else text
 
 
-def scale_text(name: str, value: float, task: Task, page: PageStyle, rng: Rng) -> str:
+def declared_texts(scales: Mapping[str, float]) -> dict[str, str]:
+    """Scales as they are entered, to the last digit."""
+    return {name: f"{value!r} {SCALE_UNITS[name]}" for name, value in scales.items()}
+
+
+def scale_text(name: str, value: float, task: DrawingTask, page: PageStyle, rng: Rng) -> str:
     """A declared scale as it is written on the sheet."""
     known = task.assignment.file.names.get(name, name)
     symbol = f"{known[0]}_{known[1:]}"
@@ -58,7 +65,7 @@ def scale_text(name: str, value: float, task: Task, page: PageStyle, rng: Rng) -
     return f"{symbol} = {number(value, page)} {unit}"
 
 
-def caption(figure: str, task: Task, page: PageStyle, rng: Rng, written: dict[str, str]) -> list[str]:
+def caption(figure: str, task: DrawingTask, page: PageStyle, rng: Rng, written: dict[str, str]) -> list[str]:
     """The lines written above a figure; scales written go into `written`."""
     choices = CAPTIONS[page.language][figure]
     lines = [choices[rng.integers(len(choices))]] if page.captions else []
@@ -70,7 +77,7 @@ def caption(figure: str, task: Task, page: PageStyle, rng: Rng, written: dict[st
     return lines
 
 
-def title_rows(task: Task, page: PageStyle, rng: Rng, written: dict[str, str]) -> list[list[str]]:
+def title_rows(task: DrawingTask, page: PageStyle, rng: Rng, written: dict[str, str]) -> list[list[str]]:
     """The cells of the title block, row by row; scales written go into `written`."""
     words = WORDS[page.language]
     who = task.variant.n if task.variant.n is not None else task.variant.position
@@ -94,7 +101,7 @@ def plain(text: str) -> str:
     return text.replace("_", "").replace("^2", "²").replace("^", "")
 
 
-def calculations(task: Task, page: PageStyle, nodes: Mapping[str, complex]) -> list[str]:
+def calculations(task: DrawingTask, page: PageStyle, nodes: Mapping[str, complex]) -> list[str]:
     """A few lines of working, with this student's own numbers."""
     known, crank = task.wrong.parameters, task.mechanism.driver
     lines = []

@@ -2,19 +2,61 @@
 
 import argparse
 import json
+import platform
 import sys
+from dataclasses import asdict, dataclass
+from itertools import chain
+from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
 from tests.bench.judging import JudgingBench
-from tests.bench.judging_class import measure_class
-from tests.bench.judging_scans import judged_scan
+from tests.bench.judging_tally import JudgingFigures, judging_tables
+from tests.bench.lines import LinesFigures, lines_tables
+from tests.bench.plain_text import as_text
 from tests.bench.reading import ReadingBench
-from tests.bench.report import Report
-from tests.bench.solver import SolverBench
+from tests.bench.reading_scenes import ForeignRow, foreign_tables
+from tests.bench.reading_tally import SceneRow, reading_tables
+from tests.bench.solver import SolverBench, SolverFigures, solver_tables
 
 PARTS = ("solver", "reading", "judging")
+SCHEMA_VERSION = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """All that was measured, and where; None or nothing for what was not asked for."""
+
+    solver: SolverFigures | None = None
+    reading: tuple[SceneRow, ...] = ()
+    foreign: tuple[ForeignRow, ...] = ()
+    lines: LinesFigures | None = None
+    judging: JudgingFigures | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """One JSON object."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "machine": {
+                "processor": platform.processor() or platform.machine(),
+                "python": platform.python_version(),
+                "numpy": np.__version__,
+            },
+            "solver": None if self.solver is None else self.solver.as_json(),
+            "reading": [asdict(row) for row in self.reading],
+            "foreign": [asdict(row) for row in self.foreign],
+            "lines": None if self.lines is None else asdict(self.lines),
+            "judging": None if self.judging is None else self.judging.as_json(),
+        }
+
+    def as_text(self) -> str:
+        """Tables that read well in a terminal and in Markdown."""
+        solver = [] if self.solver is None else solver_tables(self.solver)
+        judging = [] if self.judging is None else judging_tables(self.judging)
+        reading = (reading_tables(self.reading), foreign_tables(self.foreign), lines_tables(self.lines))
+        return as_text(chain(solver, *reading, judging))
 
 
 def main(arguments: list[str]) -> None:
@@ -26,7 +68,7 @@ def main(arguments: list[str]) -> None:
     reading = ReadingBench(quick=quick, students=students) if "reading" in parts else None
     judging = None
     if "judging" in parts:
-        judging = JudgingBench(quick=quick, students=students, whole_class=measure_class, scan=judged_scan)
+        judging = JudgingBench(quick=quick, students=students, whole=True)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         benches: list[SolverBench | ReadingBench | JudgingBench | None] = [solver, reading, judging]
         for bench in benches:

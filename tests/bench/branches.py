@@ -16,8 +16,7 @@ import numpy as np
 from reference.geometry import ComplexArray, FloatArray, cross, direction, dot
 from reference.kinematics.motion import move_where_possible
 from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, Slider, SlotPoint, SlottedLink
-from tests.bench.arrays import one_of
-from tests.bench.peers import FSOLVE, Fsolve, NoAnswerError, Places, sketch
+from tests.bench.peers import FSOLVE, Fsolve, NoAnswerError, Places, one_of, sketch
 
 CASES, CASES_QUICK = 100_000, 2_000
 PEER_CASES, PEER_CASES_QUICK = 2_000, 100

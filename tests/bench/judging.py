@@ -6,21 +6,162 @@ Who draws what stands in `judging_students`, what is due in `judging_truth`. One
 """
 
 import argparse
+import csv
 import math
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 
+import cv2
+import numpy as np
+
+from grader.comparison.evidence import Submission
 from grader.comparison.task import Task, task_of
+from grader.folder.batch import Batch, grade
+from grader.inputs.measurements import names_of, read_measurements
 from grader.marking.mark import judge
 from grader.outcomes import Quantity
-from tests.bench.judging_assignments import ASSIGNMENTS
-from tests.bench.judging_handed_in import submission
-from tests.bench.judging_students import HANDS, KINDS, SOURCES, Key, Kind, Source, Work, student
-from tests.bench.judging_tables import judging_tables
-from tests.bench.judging_tally import ClassTime, JudgingFigures, Result, Times, result_of
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef, Reading
+from grader.rubric import RubricFile
+from reference.authored.assignment import Assignment
+from samples.simulation import Settings, SimulatedSheet, any_settings, simulate
+from samples.simulation.student import drawn_by
+from samples.simulation.wording import declared_texts
+from tests.bench.judging_handed_in import measured_line, submission
+from tests.bench.judging_students import (
+    ASSIGNMENTS,
+    HANDS,
+    KINDS,
+    SOURCES,
+    Kind,
+    Source,
+    StudentKey,
+    StudentWork,
+    assignment_named,
+    codes_of,
+    is_hidden,
+    student,
+)
+from tests.bench.judging_tally import ClassTime, JudgingFigures, Result, Times, judging_tables, result_of
 from tests.bench.plain_text import as_text
 
-__all__ = ["ASSIGNMENTS", "JudgingBench", "Key", "judged"]
+MANY = 40
+"""So many different students; the class repeats them under other names."""
+
+
+def measure_class(rows: int, assignment: str = "pump") -> ClassTime:
+    """Half of the class draw rightly, half with a mistake; measured with ruler and protractor."""
+    task, rubric = assignment_named(assignment)
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        (place / "handed-in").mkdir()
+        _write(place / "handed-in" / "class.csv", assignment, rows)
+        start = time.process_time()
+        _judge_all(place / "handed-in" / "class.csv", task, rubric)
+        judging = time.process_time() - start
+        batch = Batch(task, rubric, place / "handed-in", place / "out", jobs=1)
+        start, clock = time.process_time(), time.perf_counter()
+        results = grade(batch, _silent)
+        spent, passed = time.process_time() - start, time.perf_counter() - clock
+    return ClassTime(assignment, rows, len(results.reports), judging, spent, passed)
+
+
+def _judge_all(path: Path, assignment: Assignment, rubric: RubricFile) -> None:
+    """The file read and every line of it judged, nothing written."""
+    for line in read_measurements(path, names_of(assignment)):
+        variant = assignment.variant(line.n, line.position)
+        handed_in = Submission(measured=line.reading, values=line.values, declared=line.scales)
+        judge(task_of(assignment, rubric, variant), handed_in)
+
+
+def _silent(what: str, done: int, of: int) -> None:
+    del what, done, of
+
+
+def _write(path: Path, assignment: str, rows: int) -> None:
+    keys = [
+        StudentKey(assignment, "typical", "right" if seed % 2 else "single", seed) for seed in range(MANY)
+    ]
+    lines = [measured_line(key, with_directions=True) for key in keys]
+    heads = list(dict.fromkeys(name for line in lines for name in line))
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, ["student_id", *heads], restval="")
+        writer.writeheader()
+        writer.writerows({"student_id": f"s{row:04d}", **lines[row % len(lines)]} for row in range(rows))
+
+
+_TRIES = 40
+
+
+def judged_scan(key: StudentKey, times: Times) -> list[Result]:
+    """One student's scans (flatbed, 300 dpi), read and judged, against what was due.
+
+    Raises ValueError where no drawing of this kind comes about.
+    """
+    work, pages = _drawn(key)
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        readings = _read(work, pages)
+    finally:
+        cv2.setNumThreads(threads)
+    handed_in = Submission(
+        readings=tuple(one for one in readings if one.figures), declared=declared_texts(work.task.declared)
+    )
+    task = task_of(work.assignment, work.rubric, work.variant)
+    start = time.process_time()
+    judgement = judge(task, handed_in)
+    times.scans.append(1000.0 * (time.process_time() - start))
+    return [result_of(work, "scans", handed_in, judgement)]
+
+
+def _drawn(key: StudentKey) -> tuple[StudentWork, list[SimulatedSheet]]:
+    assignment, rubric = assignment_named(key.assignment)
+    variants = assignment.variants()
+    lot = key.lot("scan")
+    variant = variants[int(lot.integers(len(variants)))]
+    for _ in range(_TRIES):
+        seed = int(lot.integers(1_000_000))
+        settings = _settings(key, seed, lot)
+        try:
+            desk, drawn = drawn_by(assignment, variant, seed, settings)
+        except ValueError:  # a mistake that cannot be made here
+            continue
+        if is_hidden(desk.task):
+            continue
+        pages = simulate(assignment, variant, seed, settings)
+        left_out = {
+            name
+            for page in pages
+            for figure in page.truth["figures"].values()
+            for name in figure.get("missing", {})
+        }
+        left = frozenset(left_out) | desk.task.missing
+        work = StudentWork(
+            key, assignment, rubric, desk.task, drawn, declares=True, letters=True, left_out=left
+        )
+        return work, pages
+    raise ValueError(f"{key}: no such drawing in {_TRIES} tries")
+
+
+def _settings(key: StudentKey, seed: int, lot: np.random.Generator) -> Settings:
+    """Habits, pen, page and scan by lot; the hand and the mistakes by the key."""
+    settings = any_settings(seed, device="flatbed", dpi=300.0, mistakes=0.0)
+    habits = replace(settings.student, mistakes=codes_of(key, lot))
+    return replace(settings, hand=HANDS[key.hand], student=habits)
+
+
+def _read(work: StudentWork, pages: Sequence[SimulatedSheet]) -> list[Reading]:
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [page.save(Path(folder) / str(number)) for number, page in enumerate(pages)]
+        scanned = [open_page(PageRef(path.name, path=path)) for path in paths]
+        declared = declared_texts(work.task.declared)
+        pages_read = read_pages(scanned, work.assignment, work.variant, declared, work.rubric.vectors)
+        return [page.reading for page in pages_read]
+
 
 STUDENTS: Mapping[Kind, int] = {"right": 96, "single": 48, "pair": 48, "slip": 12}
 """Of each kind for an assignment and a hand: 2,016 right drawings in all."""
@@ -33,7 +174,7 @@ SCANS: Mapping[Kind, int] = {"right": 1, "single": 4}
 """Students of each kind, for a mechanism of these and a hand, whose scans are read."""
 
 
-def judged(key: Key, times: Times | None = None, sources: Sequence[Source] = SOURCES) -> list[Result]:
+def judged(key: StudentKey, times: Times | None = None, sources: Sequence[Source] = SOURCES) -> list[Result]:
     """One student's work judged from each source, against what was due. Raises ValueError for no such one."""
     work = student(key)
     noted = times if times is not None else Times()
@@ -43,7 +184,7 @@ def judged(key: Key, times: Times | None = None, sources: Sequence[Source] = SOU
     return [_judged_from(work, task, source, noted) for source in sources]
 
 
-def _judged_from(work: Work, task: Task, source: Source, noted: Times) -> Result:
+def _judged_from(work: StudentWork, task: Task, source: Source, noted: Times) -> Result:
     handed_in = submission(work, source)
     start = time.process_time()
     judgement = judge(task, handed_in)
@@ -55,9 +196,8 @@ def _judged_from(work: Work, task: Task, source: Source, noted: Times) -> Result
 class JudgingBench:
     """The whole benchmark of judging; `run` tells what was measured, step by step.
 
-    Arguments: `students` of each kind for an assignment and a hand. Where wanted, `whole_class` measures a
-    class of so many rows through the whole program (`tests.bench.judging_class`), and `scan` a student's
-    simulated scans (`tests.bench.judging_scans`): careful and typical hands, fewer of each kind.
+    Arguments: `students` of each kind for an assignment and a hand; `whole` for simulated scans (careful and
+    typical hands, fewer of each kind) and a class's file of measurements through the whole program as well.
     """
 
     def __init__(
@@ -66,39 +206,34 @@ class JudgingBench:
         quick: bool = False,
         students: int | None = None,
         assignments: Sequence[str] = ASSIGNMENTS,
-        whole_class: Callable[[int], ClassTime] | None = None,
-        scan: Callable[[Key, Times], list[Result]] | None = None,
+        whole: bool = False,
     ) -> None:
         few = students or (QUICK if quick else None)
         self._counts = dict.fromkeys(KINDS, few) if few else STUDENTS
         self._classes = [(name, hand) for name in assignments for hand in HANDS]
-        self._whole_class = whole_class
-        self._rows = ROWS_QUICK if quick else ROWS
-        self._scan = None if quick else scan
-        self._scanned = [one for one in self._classes if one[0] in SCANNED and one[1] != "sloppy"]
+        scanned = [one for one in self._classes if one[0] in SCANNED and one[1] != "sloppy"]
+        self._scanned = scanned if whole and not quick else []
+        self._rows = (ROWS_QUICK if quick else ROWS) if whole else 0
         self.figures = JudgingFigures()
-        self.steps = (
-            len(self._classes) + (whole_class is not None) + (self._scan is not None) * len(self._scanned)
-        )
+        self.steps = len(self._classes) + len(self._scanned) + (self._rows > 0)
 
     def run(self) -> Iterator[str]:
         """Measure, naming what was measured."""
         for name, hand in self._classes:
             for kind, count in self._counts.items():
                 for seed in range(1, count + 1):
-                    self._measure(Key(name, hand, kind, seed), judged)
+                    self._measure(StudentKey(name, hand, kind, seed), judged)
             yield f"judging: {name}, {hand} hands"
-        if self._scan is not None:
-            for name, hand in self._scanned:
-                for kind, count in SCANS.items():
-                    for seed in range(1, count + 1):
-                        self._measure(Key(name, hand, kind, seed), self._scan)
-                yield f"judging: {name}, {hand} hands, scans"
-        if self._whole_class is not None:
-            self.figures.classes.append(self._whole_class(self._rows))
+        for name, hand in self._scanned:
+            for kind, count in SCANS.items():
+                for seed in range(1, count + 1):
+                    self._measure(StudentKey(name, hand, kind, seed), judged_scan)
+            yield f"judging: {name}, {hand} hands, scans"
+        if self._rows:
+            self.figures.classes.append(measure_class(self._rows))
             yield "judging: a class's measurements"
 
-    def _measure(self, key: Key, how: Callable[[Key, Times], list[Result]]) -> None:
+    def _measure(self, key: StudentKey, how: Callable[[StudentKey, Times], list[Result]]) -> None:
         try:
             results = how(key, self.figures.times)
         except ValueError as error:
@@ -118,7 +253,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen = parser.parse_args(arguments)
     if chosen.case:
         name, hand, kind, seed = chosen.case
-        print(*_in_full(Key(name, hand, kind, int(seed))), sep="\n")
+        print(*_in_full(StudentKey(name, hand, kind, int(seed))), sep="\n")
         return
     bench = JudgingBench(quick=chosen.quick, students=chosen.students, assignments=chosen.assignments)
     for _ in bench.run():
@@ -127,7 +262,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(*bench.figures.failures[: chosen.failures], sep="\n")
 
 
-def _in_full(key: Key) -> Iterator[str]:
+def _in_full(key: StudentKey) -> Iterator[str]:
     work = student(key)
     yield f"{key}: {work.variant}, {'scales declared' if work.declares else 'nothing declared'}"
     turn = math.degrees(float(work.task.right.parameters["turn"]))

@@ -1,12 +1,17 @@
-"""How a simulated student's drawing reaches the judge, without pictures.
+"""How a simulated student's drawing reaches the judge without pictures, and what can be seen of it.
 
 The same drawing is handed in three ways: as a perfect reader would read it (`nodes`), as its owner would
-measure it with ruler and protractor (`directions`), and with the ruler alone (`lengths`).
+measure it with ruler and protractor (`directions`), and with the ruler alone (`lengths`). Some hand in values
+computed from it: each follows from the own drawn length, at the scale declared and the real length of the
+link, its sense from the own drawing, rounded to three digits. So it is due its marks whatever was drawn
+before, but for a slip: a right drawing's one value off by a factor.
 """
 
 import cmath
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -22,11 +27,219 @@ from grader.records import (
     Swapped,
     Unread,
 )
-from tests.bench.judging_redrawn import vectors_of
-from tests.bench.judging_students import Source, Work
-from tests.bench.judging_values import computed
+from grader.rubric import CriterionTable, ToleranceTable
+from reference.construction.graph import AngularRate, evaluate
+from reference.geometry import cross
+from samples.simulation.mistakes import Intent
+from samples.simulation.wording import declared_texts
+from tests.bench.judging_students import (
+    ON_SHEETS,
+    SOURCES,
+    Source,
+    StudentKey,
+    StudentWork,
+    student,
+    vectors_of,
+)
 
-UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
+Due = Literal["right", "follows", "wrong", "either", "missed", "absent"]
+CLEAR, PLAIN = 2.5, 1.0
+"""Multiples of the rubric's tolerance beyond which it is clearly wrong, and up to which it is right."""
+SHORT = 1.5
+"""A value from a vector shorter than so many times the least to be judged may be taken for trivial."""
+
+
+@dataclass(frozen=True, slots=True)
+class Visible:
+    """What the judge can see: the vectors and links, and whether their directions are known."""
+
+    directed: Mapping[str, bool]
+
+    @classmethod
+    def of(cls, handed_in: Submission, links: Mapping[str, tuple[str, str]]) -> "Visible":
+        """From what was handed in; a link is seen where both of its joints are."""
+        readings = [*handed_in.readings, *([handed_in.measured] if handed_in.measured else [])]
+        joints = {
+            joint for one in readings if MECHANISM in one.figures for joint in one.figures[MECHANISM].nodes
+        }
+        vectors = {
+            name: vector.direction_deg is not None
+            for reading in readings
+            for figure in reading.figures.values()
+            for name, vector in figure.vectors.items()
+        }
+        return cls({**vectors, **{name: True for name, ends in links.items() if joints.issuperset(ends)}})
+
+
+def off(drawn: complex, due: complex, tolerance: ToleranceTable, *, directed: bool) -> float:
+    """How far a vector is from another, in the rubric's plain tolerances; infinite where there is none."""
+    if not cmath.isfinite(due) or not cmath.isfinite(drawn):
+        return math.inf
+    allowed = max(tolerance.length_mm, tolerance.length_relative * abs(due))
+    far = abs(abs(drawn) - abs(due)) / allowed
+    if directed and min(abs(drawn), abs(due)) >= max(tolerance.least_mm, 1e-9):
+        across = math.degrees(math.atan(tolerance.across_mm / abs(due)))
+        turned = abs(math.degrees(math.remainder(cmath.phase(drawn) - cmath.phase(due), math.tau)))
+        far = max(far, turned / max(tolerance.direction_deg, across))
+    return far
+
+
+SHARE = 0.4
+"""Of students hand in angular quantities."""
+RULER_MM = 0.2
+DIGITS = 3
+FACTORS = (0.1, 10.0, 0.5, 2.0, -1.0)
+LEAST_SLIPPED_MM = 10.0
+"""Slips are made in what is long enough to show them."""
+LEAST_SINE = 0.5
+"""A vector nearer to its link's own direction does not tell in which sense it turns it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Computed:
+    """What one student computed.
+
+    Attributes
+    ----------
+    values : as handed in, SI, by vector or angular quantity
+    right : as they follow from the own drawing
+    slip : the one computed wrongly, None without one
+    """
+
+    values: Mapping[str, float] = field(default_factory=dict)
+    right: Mapping[str, float] = field(default_factory=dict)
+    slip: str | None = None
+    factor: float = 1.0
+
+
+def computed(work: StudentWork) -> Computed:
+    """The values of one student; most have none."""
+    lot = work.key.lot("values")
+    has_slip = work.key.kind == "slip"
+    if (lot.random() >= SHARE and not has_slip) or any(work.swaps()):
+        return Computed()
+    right = {name: _rounded(value) for name, value in _rates(work, lot).items()}
+    if not has_slip:
+        return Computed(right, right)
+    right |= {name: _rounded(value) for name, value in _of_vectors(work, lot).items()}
+    able = [name for name in right if abs(_drawn(work, _vector(work, name))) > LEAST_SLIPPED_MM]
+    if not able:
+        return Computed(right, right)
+    slip = able[int(lot.integers(len(able)))]
+    factors = [one for one in FACTORS if one > 0.0 or slip in work.construction.rates]
+    factor = float(lot.choice(factors))
+    return Computed({**right, slip: right[slip] * factor}, right, slip, factor)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _vector(work: StudentWork, name: str) -> str:
+    """The vector that a value comes from."""
+    rates = work.construction.rates
+    return rates[name].vector if name in rates else name
+
+
+def _rates(work: StudentWork, lot: np.random.Generator) -> dict[str, float]:
+    asked = {one.angular for one in work.rubric.criterion if one.angular}
+    return {
+        name: _rate(work, rate, _drawn(work, rate.vector), lot.normal(0.0, RULER_MM))
+        for name, rate in work.construction.rates.items()
+        if name in asked and rate.vector not in work.left_out
+    }
+
+
+def _rate(work: StudentWork, rate: AngularRate, drawn: complex, slip_mm: float) -> float:
+    link = _link(work, rate)
+    length_m = length_of(work.task.wrong, rate, abs(link) * work.task.declared["kL"])
+    scale = work.task.declared[work.construction.vectors[rate.vector].scale]
+    return math.copysign(1.0, across(work, rate)) * max(abs(drawn) + slip_mm, 0.0) * scale / length_m
+
+
+def _link(work: StudentWork, rate: AngularRate) -> complex:
+    own = work.own(work.construction.figure_of(work.construction.vectors[rate.vector].head))
+    return own[rate.link[1]] - own[rate.link[0]]
+
+
+def across(work: StudentWork, rate: AngularRate) -> float:
+    """The sine from a rate's link, as sketched, to its vector, as drawn: its sign is the sense."""
+    link, drawn = _link(work, rate), _drawn(work, rate.vector)
+    size = abs(link) * abs(drawn)
+    return (link.conjugate() * drawn).imag / size if size else 0.0
+
+
+def length_of(drawing: Intent, rate: AngularRate, sketched_m: float) -> float:
+    """The real length of a rate's link: given, or as on the sketch to the point of a slotted link."""
+    given = drawing.parameters.get(rate.length)
+    return sketched_m if given is None else float(given)
+
+
+def _of_vectors(work: StudentWork, lot: np.random.Generator) -> dict[str, float]:
+    poles = set(work.construction.poles.values())
+    return {
+        name: max(abs(_drawn(work, name)) + lot.normal(0.0, RULER_MM), 0.0) * work.task.declared[vector.scale]
+        for name, vector in work.construction.vectors.items()
+        if vector.tail in poles and name in work.rubric.vectors and name not in work.left_out
+    }
+
+
+def _drawn(work: StudentWork, name: str) -> complex:
+    vector = work.construction.vectors[name]
+    own = work.own(work.construction.figure_of(vector.head))
+    return own[vector.head] - own[vector.tail]
+
+
+def exact_rates(work: StudentWork) -> dict[str, tuple[float, float]]:
+    """Of each angular quantity its exact value, and what a millimetre of its vector is worth."""
+    drawing = work.task.right
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    found = {}
+    for name, rate in drawing.construction.rates.items():
+        vector = drawing.construction.vectors[rate.vector]
+        link = nodes[rate.link[1]] - nodes[rate.link[0]]
+        drawn = nodes[vector.head] - nodes[vector.tail]
+        length_m = length_of(drawing, rate, abs(complex(link)) * float(drawing.parameters["kL"]))
+        per_mm = float(drawing.parameters[vector.scale]) / length_m
+        sense = math.copysign(1.0, float(cross(np.asarray(link), np.asarray(drawn))))
+        found[name] = sense * abs(complex(drawn)) * per_mm, per_mm
+    return found
+
+
+def rate_due(
+    work: StudentWork, source: Source, criterion: CriterionTable, handed_in: Computed, visible: Visible
+) -> Due:
+    """Of a value rightly computed from the own drawing."""
+    name = criterion.name
+    if source not in SOURCES or name not in handed_in.values:
+        return "absent"
+    exact, per_mm = exact_rates(work)[name]
+    tolerance, value = work.rubric.tolerance_of(criterion), handed_in.values[name]
+    allowed = max(tolerance.length_mm, tolerance.length_relative * abs(exact) / per_mm) * per_mm
+    apart = abs(value - exact) / allowed
+    if apart <= PLAIN:
+        return "right"
+    rate = work.construction.rates[name]
+    # A sense that came out the other way cannot be told from lengths, nor without the own sketch; nothing
+    # can of a vector that was not seen, or of one that runs along the link instead of across.
+    codes = {one.code for one in work.task.mistakes}
+    sketch_seen = source in ON_SHEETS or not codes & {"other_assembly", "other_variant"}
+    knows_sense = visible.directed.get(rate.vector, False) and sketch_seen
+    is_told = rate.vector in visible.directed and (knows_sense or value * exact > 0.0)
+    is_told &= abs(across(work, rate)) > LEAST_SINE and (rate.length in _lengths(work) or sketch_seen)
+    # Speeds taken for rev/min are in these values though the drawing does not show them.
+    is_told &= work.declares or "rpm_not_converted" not in codes
+    if not is_told or abs(value) / per_mm < SHORT * tolerance.least_mm:
+        return "either"
+    return "follows" if apart > CLEAR else "right"
+
+
+def _lengths(work: StudentWork) -> set[str]:
+    """Lengths that are given, and the same in the data that the student took."""
+    right, taken = (one.parameters for one in (work.task.right, work.task.wrong))
+    return {name for name, value in right.items() if name in taken and float(value) == float(taken[name])}
+
+
 SE_MM = (0.05, 0.1)
 """A perfect reader's standard errors of a node lie between these."""
 SURE = (0.95, 0.99)
@@ -38,9 +251,9 @@ PAPER = {MECHANISM: 100 - 90j, VELOCITY_PLAN: 300 - 90j, ACCELERATION_PLAN: 200 
 # As a perfect reader reads it -----------------------------------------------------------------------
 
 
-def submission(work: Work, source: Source) -> Submission:
+def submission(work: StudentWork, source: Source) -> Submission:
     """The student's work as it is handed in, without pictures."""
-    declared = texts(work.task.declared) if work.declares else {}
+    declared = declared_texts(work.task.declared) if work.declares else {}
     values, lot = computed(work).values, work.key.lot(source)
     if source == "nodes":
         return Submission(readings=_readings(work, lot), values=values, declared=declared)
@@ -48,12 +261,7 @@ def submission(work: Work, source: Source) -> Submission:
     return Submission(measured=measured, values=values, declared=declared)
 
 
-def texts(scales: Mapping[str, float]) -> dict[str, str]:
-    """Scales as they are declared."""
-    return {name: f"{value!r} {UNITS[name]}" for name, value in scales.items()}
-
-
-def _readings(work: Work, lot: np.random.Generator) -> tuple[Reading, ...]:
+def _readings(work: StudentWork, lot: np.random.Generator) -> tuple[Reading, ...]:
     se = float(lot.uniform(*SE_MM))
     readings = []
     for sheet in work.sheets:
@@ -83,7 +291,9 @@ def _readings(work: Work, lot: np.random.Generator) -> tuple[Reading, ...]:
     return tuple(readings)
 
 
-def _vectors(work: Work, figure: str, nodes: Mapping[str, ReadNode], se: float) -> dict[str, ReadVector]:
+def _vectors(
+    work: StudentWork, figure: str, nodes: Mapping[str, ReadNode], se: float
+) -> dict[str, ReadVector]:
     vectors = {}
     for vector in work.construction.vectors_of(figure):
         if vector.name in work.left_out:
@@ -101,7 +311,7 @@ def _vectors(work: Work, figure: str, nodes: Mapping[str, ReadNode], se: float) 
 # As its owner measures it ---------------------------------------------------------------------------
 
 
-def _measured(work: Work, lot: np.random.Generator, *, with_turn: bool) -> Reading:
+def _measured(work: StudentWork, lot: np.random.Generator, *, with_turn: bool) -> Reading:
     figures = {}
     right = vectors_of(work.task.right, ())
     for figure in work.construction.poles:
@@ -122,3 +332,17 @@ def _measured(work: Work, lot: np.random.Generator, *, with_turn: bool) -> Readi
             vectors[vector.name] = ReadVector(length, 0.0, turn, None if turn is None else 0.0, 1.0)
         figures[figure] = Figure({}, vectors)
     return Reading(figures)
+
+
+def measured_line(key: StudentKey, *, with_directions: bool) -> dict[str, object]:
+    """What one student enters into a table of measurements. Raises ValueError where there is no such one."""
+    work = student(key)
+    handed_in = submission(work, "directions" if with_directions else "lengths")
+    line: dict[str, object] = {"n": work.variant.n, "position": work.variant.position, **handed_in.declared}
+    for figure in (handed_in.measured or Reading({})).figures.values():
+        for name, vector in figure.vectors.items():
+            line[name] = vector.length_mm
+            if vector.direction_deg is not None:
+                line[f"{name}_deg"] = vector.direction_deg
+    line.update({f"{name}_value": value for name, value in handed_in.values.items()})
+    return {name: value for name, value in line.items() if value is not None}

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from grader.outcomes import NamedMistake as Named
 from reference.construction.graph import Construction
 from reference.construction.mistakes import Mistake
-from tests.bench.judging_redrawn import Asked, is_same, meant, vectors_of
-from tests.bench.judging_rules import CLEAR, Seen, off
-from tests.bench.judging_students import ON_SHEETS, Source, Work
+from samples.simulation.mistakes import StudentMistake
+from tests.bench.judging_handed_in import CLEAR, Visible, off
+from tests.bench.judging_students import ON_SHEETS, Asked, Source, StudentWork, is_same, meant, vectors_of
 
 ALIKE_MM = 0.3
 """Two mistakes whose drawings differ by less in every observed vector count as each other."""
@@ -28,7 +28,7 @@ class Made:
     otherwise (a declared scale, a vector that is not there).
     """
 
-    mistake: Mistake
+    mistake: StudentMistake
     shows: float
 
     @property
@@ -37,13 +37,13 @@ class Made:
         return self.shows > CLEAR
 
 
-def mistakes_due(work: Work, source: Source, seen: Seen) -> list[Made]:
+def mistakes_due(work: StudentWork, source: Source, visible: Visible) -> list[Made]:
     """The mistakes made, the first in order of construction first."""
     order = sorted(work.task.mistakes, key=lambda one: _place(work.construction, one))
-    return [Made(one, _shows(work, source, seen, one)) for one in order]
+    return [Made(one, _shows(work, source, visible, one)) for one in order]
 
 
-def _place(construction: Construction, mistake: Mistake) -> int:
+def _place(construction: Construction, mistake: StudentMistake) -> int:
     """Where in the construction a mistake is made, as a number that grows along it."""
     nodes = [step.node for step in construction.steps]
     match mistake.code, mistake.at:
@@ -62,7 +62,7 @@ def _place(construction: Construction, mistake: Mistake) -> int:
     return nodes.index(mistake.at)
 
 
-def _shows(work: Work, source: Source, seen: Seen, mistake: Mistake) -> float:
+def _shows(work: StudentWork, source: Source, visible: Visible, mistake: StudentMistake) -> float:
     if mistake.code == "vector_missing":
         needed = {one.name for one in work.rubric.criterion if not one.optional}
         return math.inf if source in ON_SHEETS and mistake.at in needed else 0.0
@@ -73,17 +73,23 @@ def _shows(work: Work, source: Source, seen: Seen, mistake: Mistake) -> float:
     if mistake.code == "labels_swapped" and work.by_letters(source):
         return math.inf
     rest = [one for one in work.task.mistakes if one is not mistake]
-    return _most_apart(work, seen, as_handed_in(work, source, work.task.mistakes), _try(work, source, rest))
+    return _most_apart(
+        work, visible, as_handed_in(work, source, work.task.mistakes), _try(work, source, rest)
+    )
 
 
-def as_handed_in(work: Work, source: Source, mistakes: Sequence[Mistake]) -> dict[str, complex]:
+def as_handed_in(
+    work: StudentWork, source: Source, mistakes: Sequence[Mistake | StudentMistake]
+) -> dict[str, complex]:
     """Vectors by a perfect hand with these mistakes in them, as this source tells them."""
     if work.by_letters(source):
         mistakes = [one for one in mistakes if one.code != "labels_swapped"]
     return vectors_of(work.task.right, mistakes)
 
 
-def _try(work: Work, source: Source, mistakes: Sequence[Mistake]) -> dict[str, complex]:
+def _try(
+    work: StudentWork, source: Source, mistakes: Sequence[Mistake | StudentMistake]
+) -> dict[str, complex]:
     """The same; nothing where they cannot all be made."""
     try:
         return as_handed_in(work, source, mistakes)
@@ -91,19 +97,21 @@ def _try(work: Work, source: Source, mistakes: Sequence[Mistake]) -> dict[str, c
         return {}
 
 
-def _most_apart(work: Work, seen: Seen, one: Mapping[str, complex], other: Mapping[str, complex]) -> float:
+def _most_apart(
+    work: StudentWork, visible: Visible, one: Mapping[str, complex], other: Mapping[str, complex]
+) -> float:
     """How far two drawings are apart in what is seen, in tolerances."""
     return max(
         (
             off(one[name], other[name], work.rubric.tolerance, directed=directed)
-            for name, directed in seen.directed.items()
+            for name, directed in visible.directed.items()
             if name in other
         ),
         default=0.0,
     )
 
 
-def is_named(work: Work, source: Source, seen: Seen, made: Mistake, named: Named) -> bool:
+def is_named(work: StudentWork, source: Source, visible: Visible, made: StudentMistake, named: Named) -> bool:
     """Whether a report names this mistake, or one that gives the same drawing as seen."""
     if is_same(made, named):
         return True
@@ -113,20 +121,20 @@ def is_named(work: Work, source: Source, seen: Seen, made: Mistake, named: Named
     really = as_handed_in(work, source, work.task.mistakes)
     for other in meant(asked, named):
         instead = [other if one is made else one for one in work.task.mistakes]
-        if _is_alike(seen, really, _try(work, source, instead)):
+        if _is_alike(visible, really, _try(work, source, instead)):
             return True
     return False
 
 
-def _is_alike(seen: Seen, one: Mapping[str, complex], other: Mapping[str, complex]) -> bool:
+def _is_alike(visible: Visible, one: Mapping[str, complex], other: Mapping[str, complex]) -> bool:
     apart = (
         abs(one[name] - other[name]) if directed else abs(abs(one[name]) - abs(other[name]))
-        for name, directed in seen.directed.items()
+        for name, directed in visible.directed.items()
         if name in other
     )
     return bool(other) and all(gap <= ALIKE_MM for gap in apart)
 
 
-def first_of(made: Iterable[Made]) -> Mistake | None:
+def first_of(made: Iterable[Made]) -> StudentMistake | None:
     """The first mistake that is to be named."""
     return next((one.mistake for one in made if one.visible), None)

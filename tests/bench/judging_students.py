@@ -1,26 +1,231 @@
-"""Simulated students without pictures: what they drew.
+"""Simulated students without pictures: the mechanisms, who drew what, and the same drawn by a perfect hand.
 
-A student is told by a `Key` and is the same in every run: the variant, the scales, a turned sketch,
-vectors not drawn out, the mistakes and the hand's errors all follow from it.
+A student follows from a `StudentKey` and is the same in every run: the variant, the scales, a turned sketch,
+vectors not drawn out, the mistakes and the hand's errors. Two mechanisms have what the built-in assignments
+do not: a plate inside a six-bar of two dyads, a slider on a guide beside the crank's pivot with a dyad hung
+on its rod. Their rubrics are those that `planmark new` would write.
 """
 
+import tomllib
 import zlib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
 
+from grader.outcomes import NamedMistake as Named
 from grader.records import ACCELERATION_PLAN
-from grader.rubric import RubricFile
-from reference.authored.assignment import Assignment, Variant
-from reference.construction.graph import Construction
-from reference.construction.mistakes import CODES
-from samples.simulation import CAREFUL, SLOPPY, TYPICAL, Hand
-from samples.simulation.hand import DrawnSheet, Task, draw, task_of
+from grader.rubric import RubricFile, rubric_of
+from reference.authored.assignment import Assignment, AssignmentFile, Variant, load_assignment
+from reference.authored.mechanism import check_mechanism
+from reference.authored.toml_file import validate
+from reference.construction.graph import Construction, evaluate, parameters_of
+from reference.construction.mistakes import Drawing, Mistake, commit, single_mistakes
+from reference.errors import AuthoredFileError
+from samples.simulation import CAREFUL, SLOPPY, TYPICAL, HandStyle
+from samples.simulation.hand import DrawingTask, DrawnSheet, draw, task_of
+from samples.simulation.mistakes import CODES, Intent, StudentMistake, scalars, with_mistake
 from samples.simulation.settings import Student
-from tests.bench.judging_assignments import assignment_named
-from tests.bench.judging_redrawn import relabelled
+from tests.whole_rubric import rubric_for
+
+_SCALES = 'scales = { crank_mm = 50, kL = "crank_m / crank_mm", kv = "omega * kL", ka = "kv**2 / kL" }'
+_PAGES = """
+[[page]]
+kind = "velocity"
+figures = ["mechanism", "velocity_plan"]
+
+[[page]]
+kind = "acceleration"
+figures = ["mechanism", "acceleration_plan"]
+"""
+
+STEPHENSON = f"""
+schema_version = 1
+id = "stephenson"
+title = {{ en = "Six-bar of Stephenson's third kind" }}
+task = {{ en = "Draw the plans." }}
+rubric = "stephenson"
+variant = {{ n = {{ from = 1, to = 14 }}, values = {{ phi_deg = "334 + 2*n", n1_rpm = "90 + 5*n" }} }}
+{_SCALES}
+{_PAGES}
+[mechanism]
+schema_version = 1
+id = "stephenson"
+title = {{ en = "Six-bar of Stephenson's third kind" }}
+length_unit = "mm"
+ground = {{ O1 = [0, 0], O2 = [260, -40], O3 = [330, 240] }}
+crank = {{ pivot = "O1", pin = "A", length = 90, angle_deg = "phi_deg", rpm = "n1_rpm" }}
+group = [
+  {{ type = "RRR", node = "B", pins = ["A", "O2"], links = ["2", "3"], lengths = [240, 180], side = "left" }},
+  {{ type = "plate", node = "C", base = ["A", "B"], link = "2", lengths = [170, 150], side = "left" }},
+  {{ type = "RRR", node = "D", pins = ["C", "O3"], links = ["4", "5"], lengths = [160, 150], side = "left" }},
+]
+"""
+
+OFFSET = f"""
+schema_version = 1
+id = "offset"
+title = {{ en = "Offset slider-crank with a dyad on its rod" }}
+task = {{ en = "Draw the plans." }}
+rubric = "offset"
+variant = {{ n = {{ from = 1, to = 12 }}, values = {{ phi_deg = "36 + 2*n", n1_rpm = "150 + 10*n" }} }}
+{_SCALES}
+{_PAGES}
+[mechanism]
+schema_version = 1
+id = "offset"
+title = {{ en = "Offset slider-crank with a dyad on its rod" }}
+length_unit = "mm"
+ground = {{ O1 = [0, 0], O3 = [220, 260] }}
+crank = {{ pivot = "O1", pin = "A", length = 80, angle_deg = "phi_deg", rpm = "n1_rpm" }}
+
+[[mechanism.group]]
+type = "RRP"
+node = "B"
+pin = "A"
+link = "2"
+length = 260
+guide = {{ through = [0, -50], angle_deg = 0 }}
+side = "ahead"
+
+[[mechanism.group]]
+type = "point_on_line"
+node = "C"
+base = ["A", "B"]
+link = "2"
+ratio = 0.6
+
+[[mechanism.group]]
+type = "RRR"
+node = "D"
+pins = ["C", "O3"]
+links = ["4", "5"]
+lengths = [200, 140]
+side = "left"
+"""
+
+_OWN = {"stephenson": STEPHENSON, "offset": OFFSET}
+ASSIGNMENTS = ("pump", "press", "engine", "shaper", "piston", *_OWN)
+
+
+@cache
+def assignment_named(name: str) -> tuple[Assignment, RubricFile]:
+    """An assignment and its rubric by name. Raises CallError for an unknown one."""
+    if name not in _OWN:
+        assignment = load_assignment(name)
+        return assignment, rubric_of(assignment)
+    file = validate(AssignmentFile, tomllib.loads(_OWN[name]), name)
+    if isinstance(file.mechanism, str):  # pragma: no cover - the tables above hold theirs
+        raise TypeError(file.mechanism)
+    faults = tuple(check_mechanism(file.mechanism))
+    if faults:
+        raise AuthoredFileError(name, faults)
+    assignment = Assignment(file, file.mechanism, Path(f"{name}.assignment.toml"))
+    mechanism = assignment.mechanism(assignment.variants()[:1])
+    return assignment, rubric_for(name, file.title, mechanism)
+
+
+SCALES = ("kL", "kv", "ka")
+
+
+def with_mistakes(right: Intent, mistakes: Sequence[Mistake | StudentMistake]) -> Intent:
+    """The drawing as somebody intends it who makes these mistakes; letters swapped are only written so.
+
+    A student's mistakes are made as the simulation makes them, one that a report names as the program does.
+    Raises ValueError where a mistake cannot be made.
+    """
+    drawing = right
+    for mistake in mistakes:
+        if isinstance(mistake, StudentMistake):
+            named_only = mistake.code == "vector_missing"
+            drawing = drawing if named_only else with_mistake(drawing, mistake)
+        elif mistake.code not in {"labels_swapped", "vector_missing", "rpm_not_converted"}:
+            redrawn = commit(mistake, Drawing(drawing.construction, drawing.parameters))
+            drawing = Intent(redrawn.construction, redrawn.parameters)
+    return drawing
+
+
+def vectors_of(right: Intent, mistakes: Sequence[Mistake | StudentMistake]) -> dict[str, complex]:
+    """Every vector and link, mm, under the names written beside them. Raises ValueError as above."""
+    drawing = with_mistakes(right, mistakes)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    swaps = [(one.other[0], one.other[1]) for one in mistakes if one.code == "labels_swapped"]
+    named = relabelled({name: complex(place) for name, place in nodes.items()}, swaps)
+    vectors = {name: (one.tail, one.head) for name, one in right.construction.vectors.items()}
+    ends = {**vectors, **right.construction.links}
+    return {name: named[head] - named[tail] for name, (tail, head) in ends.items()}
+
+
+def relabelled(nodes: Mapping[str, complex], swaps: Sequence[tuple[str, str]]) -> dict[str, complex]:
+    """Nodes under the names that stand beside them."""
+    named = dict(nodes)
+    for first, second in swaps:
+        if first in named and second in named:
+            named[first], named[second] = named[second], named[first]
+    return named
+
+
+# What a report names ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Whose drawing it is."""
+
+    assignment: Assignment
+    variant: Variant
+    right: Intent
+
+
+def meant(asked: Asked, named: Named) -> Iterator[Mistake]:
+    """What a mistake named in a report may mean: itself, in whichever line of its step it was made.
+
+    A factor may be given from either side.
+    """
+    mistake, construction = named.mistake, asked.right.construction
+    right = Drawing(construction, asked.right.parameters)
+    match mistake.code:
+        case "vector_missing" | "labels_swapped" | "figure_rotated":
+            yield mistake
+        case "other_variant":
+            yield from _other_variant(asked, mistake)
+        case "scale_wrong" | "rpm_not_converted" | "arithmetic":
+            factors = (mistake.factor, 1.0 / mistake.factor if mistake.factor else 0.0)
+            yield from (replace(mistake, factor=factor) for factor in factors)
+        case _:
+            for figure in construction.figures:
+                for single in single_mistakes(right, figure):
+                    if (single.code, single.at, single.other) == (mistake.code, mistake.at, mistake.other):
+                        yield single
+
+
+def _other_variant(asked: Asked, named: Mistake) -> Iterator[Mistake]:
+    other = Variant(named.n, named.position)
+    if other == asked.variant or other not in asked.assignment.variants():
+        return
+    scales = asked.assignment.scales([other])
+    parameters = parameters_of(asked.assignment.mechanism([other]), scales.kL, scales.kv, scales.ka)
+    yield replace(named, parameters=scalars(parameters))
+
+
+def is_same(made: StudentMistake, named: Named) -> bool:
+    """Whether a report names this mistake: its code and its place."""
+    if made.code != named.code:
+        return False
+    match made.code:
+        case "labels_swapped":
+            return set(made.other) == set(named.mistake.other)
+        case "other_variant":
+            return (named.mistake.n, named.mistake.position) == (made.n, made.position)
+        case "rpm_not_converted":
+            return True
+        case "figure_rotated":
+            return made.at == named.at and named.mistake.quarters % 4 == made.quarters % 4
+    return made.at == named.at
+
 
 Kind = Literal["right", "single", "pair", "slip"]
 """Slip: rightly drawn, one value wrongly computed from it."""
@@ -29,12 +234,12 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 SOURCES: tuple[Source, ...] = ("nodes", "directions", "lengths")
 """Without pictures."""
 ON_SHEETS = frozenset({"scans", "nodes"})
-HANDS: Mapping[str, Hand] = {"careful": CAREFUL, "typical": TYPICAL, "sloppy": SLOPPY}
+HANDS: Mapping[str, HandStyle] = {"careful": CAREFUL, "typical": TYPICAL, "sloppy": SLOPPY}
 _TRIES = 60
 
 
 @dataclass(frozen=True, slots=True)
-class Key:
+class StudentKey:
     """Which student: the same key gives the same drawing."""
 
     assignment: str
@@ -52,7 +257,7 @@ class Key:
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
+class StudentWork:
     """What one student drew.
 
     Attributes
@@ -64,10 +269,10 @@ class Work:
     left_out : vectors that are not drawn, by mistake or as they need not be
     """
 
-    key: Key
+    key: StudentKey
     assignment: Assignment
     rubric: RubricFile
-    task: Task
+    task: DrawingTask
     sheets: tuple[DrawnSheet, ...]
     declares: bool
     letters: bool
@@ -105,7 +310,7 @@ class Work:
         return source in ON_SHEETS and self.letters
 
 
-def student(key: Key) -> Work:
+def student(key: StudentKey) -> StudentWork:
     """The student of a key.
 
     Raises ValueError where no drawing of this kind comes about in many tries.
@@ -129,11 +334,11 @@ def student(key: Key) -> Work:
         declares = bool(lot.random() < 0.7) or own_scales
         letters = bool(lot.random() < 0.5)
         left_out = frozenset(skipped) | task.missing
-        return Work(key, assignment, rubric, task, sheets, declares, letters, left_out)
+        return StudentWork(key, assignment, rubric, task, sheets, declares, letters, left_out)
     raise ValueError(f"{key}: no such drawing in {_TRIES} tries")
 
 
-def _habits(key: Key, assignment: Assignment, lot: np.random.Generator) -> Student:
+def _habits(key: StudentKey, assignment: Assignment, lot: np.random.Generator) -> Student:
     """Scales, turn, sheets and mistakes."""
     own = lot.random() < 0.3
     crank = float(lot.choice([30.0, 40.0, 50.0, 60.0])) if own and lot.random() < 0.5 else None
@@ -151,7 +356,7 @@ def _habits(key: Key, assignment: Assignment, lot: np.random.Generator) -> Stude
     )  # fmt: skip
 
 
-def codes_of(key: Key, lot: np.random.Generator) -> tuple[str, ...]:
+def codes_of(key: StudentKey, lot: np.random.Generator) -> tuple[str, ...]:
     """Codes of the mistakes to make; another student's data come before what is done with them."""
     if key.kind in {"right", "slip"}:
         return ()
@@ -163,7 +368,7 @@ def codes_of(key: Key, lot: np.random.Generator) -> tuple[str, ...]:
     return tuple(sorted((first, second), key=lambda code: code != "other_variant"))
 
 
-def is_hidden(task: Task) -> bool:
+def is_hidden(task: DrawingTask) -> bool:
     """Whether one of two mistakes hides the other: at one line of one step, or both in a scale."""
     places = [(one.at, one.slot) for one in task.mistakes]
     in_scales = {"scale_wrong", "rpm_not_converted"} <= {one.code for one in task.mistakes}

@@ -1,8 +1,8 @@
-"""What judging came to, student by student and summed up."""
+"""What judging came to, student by student, summed up, and as tables."""
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -10,18 +10,18 @@ import numpy as np
 
 from grader.comparison.evidence import Submission
 from grader.outcomes import Judgement, NamedMistake
-from reference.construction import mistakes as operators
+from samples.simulation.mistakes import StudentMistake
+from tests.bench.judging_handed_in import Due, Visible, computed
 from tests.bench.judging_naming import Made, first_of, is_named, mistakes_due
-from tests.bench.judging_rules import Due, Seen
-from tests.bench.judging_students import SOURCES, Key, Source, Work
+from tests.bench.judging_students import SOURCES, Source, StudentKey, StudentWork
 from tests.bench.judging_truth import charged_once, verdicts_due
-from tests.bench.judging_values import computed
+from tests.bench.plain_text import NOTHING, Table
 
 CHARGED, CREDITED = frozenset({"none", "partial"}), frozenset({"full", "follow_through"})
 
 
 @dataclass(frozen=True, slots=True)
-class Marked:
+class MarkedCriterion:
     """One criterion: what was due, what the judge said."""
 
     criterion: str
@@ -56,12 +56,12 @@ class Result:
     unpunished : something visible was done wrongly, cost nothing and goes to nobody
     """
 
-    key: Key
+    key: StudentKey
     source: Source
-    criteria: tuple[Marked, ...]
-    made: tuple[operators.Mistake, ...]
+    criteria: tuple[MarkedCriterion, ...]
+    made: tuple[StudentMistake, ...]
     mistakes: tuple[NamedMistake, ...]
-    first: operators.Mistake | None
+    first: StudentMistake | None
     named: bool
     surest: bool
     among_rivals: bool
@@ -90,9 +90,9 @@ class Result:
         return " | ".join(parts)
 
 
-def told(mistake: operators.Mistake) -> str:
+def told(mistake: StudentMistake) -> str:
     """A mistake made, in one line."""
-    usual = operators.Mistake(mistake.code, mistake.at)
+    usual = StudentMistake(mistake.code, mistake.at)
     details = ("slot", "other", "factor", "quarters", "n", "position")
     differ = [
         (name, getattr(mistake, name)) for name in details if getattr(mistake, name) != getattr(usual, name)
@@ -106,23 +106,23 @@ def _named(mistake: NamedMistake) -> str:
     return f"{mistake.code} {mistake.at} {detail} {mistake.confidence:.2f}{rivals}"
 
 
-def result_of(work: Work, source: Source, handed_in: Submission, judgement: Judgement) -> Result:
+def result_of(work: StudentWork, source: Source, handed_in: Submission, judgement: Judgement) -> Result:
     """A judgement held against the truth."""
-    seen = Seen.of(handed_in, work.construction.links)
-    due = verdicts_due(work, source, seen)
+    visible = Visible.of(handed_in, work.construction.links)
+    due = verdicts_due(work, source, visible)
     said = {one.criterion: one.verdict for one in judgement.outcomes}
     due = charged_once(work, due, said)
-    marked = tuple(Marked(name, due[name], verdict) for name, verdict in said.items())
-    made = mistakes_due(work, source, seen)
+    marked = tuple(MarkedCriterion(name, due[name], verdict) for name, verdict in said.items())
+    made = mistakes_due(work, source, visible)
     told = computed(work)
     if told.slip is not None and source in SOURCES:
-        made.append(Made(operators.Mistake("arithmetic", told.slip, factor=told.factor), math.inf))
+        made.append(Made(StudentMistake("arithmetic", told.slip, factor=told.factor), math.inf))
     first = first_of(made)
 
-    def names(mistake: NamedMistake, one: operators.Mistake) -> bool:
+    def names(mistake: NamedMistake, one: StudentMistake) -> bool:
         if told.slip is not None:
             return mistake.code == one.code and one.at in {mistake.at, *mistake.explains}
-        return is_named(work, source, seen, one, mistake)
+        return is_named(work, source, visible, one, mistake)
 
     told_first = [first is not None and names(mistake, first) for mistake in judgement.mistakes]
     if any(one.name == told.slip and one.mistake == "arithmetic" for one in judgement.outcomes):
@@ -192,7 +192,7 @@ class Count:
 
 
 @dataclass(slots=True)
-class Tally:
+class JudgingTally:
     """All results of one kind of student and source.
 
     Attributes
@@ -240,7 +240,7 @@ class Tally:
         made = "+".join(sorted(one.code for one in result.made)) or "nothing"
         self.instead.update((made, named.code) for named in result.not_made)
 
-    def _add_criterion(self, one: Marked) -> None:
+    def _add_criterion(self, one: MarkedCriterion) -> None:
         if one.due == "absent":
             self.blank.add(one.verdict == "review")
         if not one.counts:
@@ -261,11 +261,11 @@ class Tally:
         return {**asdict(self), "instead": [[*key, count] for key, count in self.instead.most_common()]}
 
 
-def summed(results: Iterable[Result], by: Sequence[str]) -> dict[tuple[str, ...], Tally]:
+def summed(results: Iterable[Result], by: Sequence[str]) -> dict[tuple[str, ...], JudgingTally]:
     """Tallies by assignment, hand, kind or source."""
-    tallies: dict[tuple[str, ...], Tally] = {}
+    tallies: dict[tuple[str, ...], JudgingTally] = {}
     for result in results:
-        tallies.setdefault(where(result, by), Tally()).add(result)
+        tallies.setdefault(where(result, by), JudgingTally()).add(result)
     return tallies
 
 
@@ -312,3 +312,127 @@ def _spread(spent: Sequence[float]) -> dict[str, float] | None:
         return None
     middle, most = np.percentile(spent, (50.0, 95.0))
     return {"median": float(middle), "p95": float(most), "count": len(spent)}
+
+
+def judging_tables(figures: JudgingFigures) -> Iterator[Table]:
+    """Verdicts, mistakes named, codes, times."""
+    results = figures.results
+    yield _verdicts(results, ("source", "hand"), "Judging: verdicts")
+    yield _verdicts(results, ("source", "assignment"), "Judging: verdicts by mechanism")
+    yield _names(results, ("source", "hand"), "Judging: the first mistake named")
+    yield _names(results, ("source", "assignment"), "Judging: the first mistake named, by mechanism")
+    yield _codes(results)
+    yield _instead(results)
+    yield _times(figures.times)
+    if figures.classes:
+        yield _classes(figures.classes)
+
+
+def _of(count: Count) -> str:
+    return f"{count.hits} of {count.of}"
+
+
+def _percent(count: Count) -> str:
+    return NOTHING if count.share is None else f"{100.0 * count.share:.1f} %"
+
+
+def _verdicts(results: Sequence[Result], by: Sequence[str], title: str) -> Table:
+    heads = [
+        *by, "students", "charged wrongly", "credited wrongly", "review", "follow-through credited",
+        "hand's own miss charged", "unpunished", "nothing to judge by: review",
+    ]  # fmt: skip
+    rows = [
+        [
+            *place, str(one.students), _of(one.false_charges), _of(one.false_credits), _percent(one.reviews),
+            f"{_percent(one.followed)} of {one.followed.of}", _of(one.missed), _of(one.unpunished),
+            _of(one.blank),
+        ]
+        for place, one in summed(results, by).items()
+    ]  # fmt: skip
+    return title, heads, rows
+
+
+def _names(results: Sequence[Result], by: Sequence[str], title: str) -> Table:
+    """Singles, pairs and slips beside each other; in brackets what is named only as a rival of another."""
+    heads = [
+        *by, "one mistake", "the first of two", "as the surest of two", "a slip in computing",
+        "wrong names: one mistake", "two", "right drawings accused",
+    ]  # fmt: skip
+    rows = []
+    for place in dict.fromkeys(where(one, by) for one in results):
+        here = [one for one in results if where(one, by) == place]
+        kinds = {kind: tally for (kind,), tally in summed(here, ("kind",)).items()}
+        right, single, pair, slip = (
+            kinds.get(kind, JudgingTally()) for kind in ("right", "single", "pair", "slip")
+        )
+        rows.append(
+            [
+                *place, _named_share(single), _named_share(pair), _percent(pair.surest), _named_share(slip),
+                _of(single.misnamed), _of(pair.misnamed), _of(right.accused),
+            ]
+        )  # fmt: skip
+    return title, heads, rows
+
+
+def _named_share(tally: JudgingTally) -> str:
+    if not tally.named.of:
+        return NOTHING
+    return f"{_percent(tally.named)} (+ {_percent(tally.rivals)}) of {tally.named.of}"
+
+
+def _codes(results: Sequence[Result]) -> Table:
+    """Single mistakes of careful and typical hands, by code."""
+    singles = [one for one in results if one.key.kind == "single" and one.key.hand != "sloppy"]
+    tallies = summed(singles, ("source",))
+    codes = sorted({code for tally in tallies.values() for code in tally.codes})
+    heads = ["code", *(source for (source,) in tallies)]
+    rows = [[code, *(_code(tally, code) for tally in tallies.values())] for code in codes]
+    return "Judging: single mistakes of careful and typical hands named, by code", heads, rows
+
+
+def _code(tally: JudgingTally, code: str) -> str:
+    return _of(tally.codes[code]) if code in tally.codes else NOTHING
+
+
+def _instead(results: Sequence[Result]) -> Table:
+    """What was named and not made, of single mistakes and right drawings."""
+    rows = [
+        [source, made, named, str(count)]
+        for (source, kind), tally in summed(results, ("source", "kind")).items()
+        if kind != "pair"
+        for (made, named), count in tally.instead.most_common(6)
+    ]
+    return "Judging: named and not made", ["source", "made", "named", "times"], rows
+
+
+def _times(times: Times) -> Table:
+    rows = [
+        [name, f"{np.median(spent):.1f}", f"{np.percentile(spent, 95):.1f}", str(len(spent))]
+        for name, spent in (
+            ("right drawings", times.right),
+            ("wrong drawings", times.wrong),
+            ("read from scans", times.scans),
+            ("making the task", times.task),
+        )
+        if spent
+    ]
+    return "Judging: processor time, ms", ["what", "median", "95 % within", "of"], rows
+
+
+def _classes(classes: Sequence[ClassTime]) -> Table:
+    heads = [
+        "assignment",
+        "rows",
+        "graded",
+        "read and judged, s",
+        "with pages and results written, s",
+        "wall, s",
+    ]
+    rows = [
+        [
+            one.assignment, str(one.rows), str(one.graded), f"{one.judging_s:.1f}", f"{one.processor_s:.1f}",
+            f"{one.wall_s:.1f}",
+        ]
+        for one in classes
+    ]  # fmt: skip
+    return "Judging: a class's measurements through the whole program, one process", heads, rows

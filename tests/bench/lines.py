@@ -7,7 +7,7 @@ the picture already in memory and its millimetres known.
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,10 +19,9 @@ from samples.simulation.raster import render
 from samples.simulation.scanner import DrawnPaper, digitise
 from samples.simulation.settings import PenStyle, Scan
 from samples.simulation.sketch import DASHES, MAIN_LAYER
-from samples.simulation.strokes import Pen, Rng, Stroke, dashed, straight
-from samples.simulation.view import View, view_of
-from tests.bench.plain_text import Table
-from tests.bench.tables import NOTHING
+from samples.simulation.strokes import InkStroke, PenWidth, Rng, dashed, straight
+from samples.simulation.view import PaperView, view_of
+from tests.bench.plain_text import NOTHING, Table
 
 RESOLUTIONS_DPI = (100.0, 150.0, 200.0, 300.0, 400.0, 600.0)
 RESOLUTIONS_QUICK_DPI = (150.0,)
@@ -53,7 +52,7 @@ class LineSheet:
     """
 
     grey: GreyImage
-    view: View
+    view: PaperView
     true: Sequence[Segment]
     solid: int
 
@@ -111,10 +110,6 @@ class LinesFigures:
 
     rows: Sequence[LinesRow]
     noiseless: Noiseless
-
-    def as_json(self) -> dict[str, Any]:
-        """For the report's JSON."""
-        return asdict(self)
 
 
 def measure_lines(*, quick: bool = False) -> LinesFigures:
@@ -217,10 +212,10 @@ def pencil_sheet(dpi: float, seed: int = 1) -> LineSheet:
     """Random pencil strokes, solid and dashed, scanned askew with noise: the same at each resolution."""
     rng = np.random.default_rng([seed, 1])
     true = _scattered(rng, SOLID + DASHED)
-    strokes: list[Stroke] = []
+    strokes: list[InkStroke] = []
     for number, (p, q) in enumerate(true):
         dark = rng.uniform(0.45, 0.8)
-        stroke = straight(rng, Pen(MAIN_LAYER, rng.uniform(*_WIDTHS_MM), dark, 0.12, 0.0), p, q)
+        stroke = straight(rng, PenWidth(MAIN_LAYER, rng.uniform(*_WIDTHS_MM), dark, 0.12, 0.0), p, q)
         strokes.extend([stroke] if number < SOLID else dashed(rng, stroke, DASHES))
     scan = Scan(dpi=dpi, skew_deg=0.6, stretch=0.0)
     scanner = np.random.default_rng([seed, 2])
@@ -268,7 +263,7 @@ def noiseless_sheet(seed: int = 1) -> tuple[LineSheet, list[list[int]]]:
         true += [(complex(p), complex(q)) for p, q in zip(corners, np.roll(corners, -1), strict=True)]
         joints += [[first + (k - 1) % count, first + k] for k in range(count)]
     strokes = [
-        straight(rng, Pen(MAIN_LAYER, rng.uniform(*_WIDTHS_MM), _INK, 0.0, 0.0), p, q) for p, q in true
+        straight(rng, PenWidth(MAIN_LAYER, rng.uniform(*_WIDTHS_MM), _INK, 0.0, 0.0), p, q) for p, q in true
     ]
     scan = Scan(dpi=_RENDER_DPI, skew_deg=0.0, shift_mm=0.0, stretch=0.0)
     view = view_of(scan, rng)

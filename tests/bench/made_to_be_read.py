@@ -37,18 +37,18 @@ from samples.simulation import any_settings, simulate
 from samples.simulation.desk import Desk
 from samples.simulation.lettering import write
 from samples.simulation.printing import printed_sheets
-from samples.simulation.sketch import Label, Sketch
+from samples.simulation.sketch import SheetSketch, WrittenLabel
+from samples.simulation.wording import SCALE_UNITS, declared_texts
 
 RIGHT_MM, RIGHT_DEG, WRONG_MM, SURE, ZERO_MM = 0.3, 0.3, 1.0, 0.9, 0.4
 SHORT_MM = 8.0
 CLEAR_MM, REACH_MM = 3.0, 14.0
-UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
 
 
 @contextlib.contextmanager
 def letters_clear() -> Iterator[None]:
     """Students who write their letters last, where there is room for them."""
-    usual_letter, usual_figures = Sketch.letter, Desk._figures
+    usual_letter, usual_figures = SheetSketch.letter, Desk._figures
     waiting = []
 
     def later(_sketch, near, text, height_mm, *, names, distance_mm):
@@ -61,14 +61,16 @@ def letters_clear() -> Iterator[None]:
         waiting.clear()
         return missing
 
-    Sketch.letter, Desk._figures = later, figures
+    SheetSketch.letter, Desk._figures = later, figures
     try:
         yield
     finally:
-        Sketch.letter, Desk._figures = usual_letter, usual_figures
+        SheetSketch.letter, Desk._figures = usual_letter, usual_figures
 
 
-def write_clear(sketch: Sketch, near: complex, text: str, height_mm: float, names: str, distance_mm: float):
+def write_clear(
+    sketch: SheetSketch, near: complex, text: str, height_mm: float, names: str, distance_mm: float
+):
     """A letter at the nearest place with 3 mm of paper around it; where there is none, the emptiest."""
     written = write(sketch.rng, sketch.pen("text"), text, height_mm, sketch.writing)
     middle, half = (written.low + written.high) / 2.0, (written.high - written.low) / 2.0
@@ -89,7 +91,7 @@ def write_clear(sketch: Sketch, near: complex, text: str, height_mm: float, name
             break
     placed = written.moved(best - middle)
     sketch.strokes.extend(placed.strokes)
-    sketch.labels.append(Label(text, names, placed.low, placed.high))
+    sketch.labels.append(WrittenLabel(text, names, placed.low, placed.high))
 
 
 def at_own_scales(assignment: Assignment, variant: Variant) -> Assignment:
@@ -98,7 +100,7 @@ def at_own_scales(assignment: Assignment, variant: Variant) -> Assignment:
     assert found.plan is not None
     (proposal,) = [one for one in found.scales if one.name == "round_each"]
     index = found.plan.variants.index(variant)
-    values = {name: parse(repr(float(getattr(proposal.scales, name)[index]))) for name in UNITS}
+    values = {name: parse(repr(float(getattr(proposal.scales, name)[index]))) for name in SCALE_UNITS}
     scales = assignment.file.scales.model_copy(update=values)
     return replace(assignment, file=assignment.file.model_copy(update={"scales": scales}))
 
@@ -126,7 +128,7 @@ def count(
         sheets = simulate(assignment, variant, seed, settings, printed=paper)
     rubric = load_rubric(assignment.file.rubric, beside=assignment.path)
     told = sheets[0].truth["scales"]["declared"]
-    declared = {name: f"{value!r} {UNITS[name]}" for name, value in told.items()}
+    declared = declared_texts(told)
     with tempfile.TemporaryDirectory() as folder:
         paths = [sheet.save(Path(folder) / f"s{index}") for index, sheet in enumerate(sheets)]
         seen = [open_page(PageRef(path.name, path=path)) for path in paths]

@@ -29,7 +29,7 @@ from reference.mechanism import (
     Yoke,
     moving_guides,
 )
-from tests.bench.arrays import one_of
+from tests.bench.peers import one_of
 
 DIGITS = 60
 """50 digits of the results, and some for what near-singular positions cost."""

@@ -4,6 +4,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
 """Title, heads, rows."""
+NOTHING = "-"
+"""Stands where there is no figure."""
 
 
 def as_text(tables: Iterable[Table]) -> str:

@@ -15,13 +15,20 @@ from grader.pipeline import open_page, read_pages
 from grader.records import PageRef, ScannedPage
 from reference.construction.derive import construction_of
 from tests.bench.lines import LinesFigures, measure_lines
-from tests.bench.reading_foreign import BREAKDOWNS, ForeignRow, measure_foreign
 from tests.bench.reading_memory import peak_mb
-from tests.bench.reading_scenes import SCENES, Scene, Work, works
-from tests.bench.reading_tally import STAGES, ReadingRow, Tally, row_of
+from tests.bench.reading_scenes import (
+    BREAKDOWNS,
+    SCENES,
+    ForeignRow,
+    ReadingScene,
+    SceneWork,
+    measure_foreign,
+    works,
+)
+from tests.bench.reading_tally import STAGES, ReadingTally, SceneRow, row_of
 from tests.bench.reading_truth import figures_of
 
-__all__ = ["SCENES", "STAGES", "STUDENTS", "ReadingBench", "ReadingRow", "measure_reading"]
+__all__ = ["SCENES", "STAGES", "STUDENTS", "ReadingBench", "SceneRow", "measure_reading"]
 
 STUDENTS, STUDENTS_QUICK = 6, 1
 SCENES_QUICK = ("plain", "printed")
@@ -37,7 +44,7 @@ class ReadingBench:
         self.quick = quick
         self.students = students or (STUDENTS_QUICK if quick else STUDENTS)
         self.scenes = tuple(scene for scene in SCENES if not quick or scene.name in SCENES_QUICK)
-        self.rows: list[ReadingRow] = []
+        self.rows: list[SceneRow] = []
         self.foreign: list[ForeignRow] = []
         self.lines: LinesFigures | None = None
         self.steps = len(self.scenes) + 2
@@ -60,16 +67,18 @@ class ReadingBench:
 
 
 def measure_reading(
-    *, students: int = STUDENTS, first_seed: int = 1, scenes: Sequence[Scene] = SCENES
-) -> Iterator[ReadingRow]:
+    *, students: int = STUDENTS, first_seed: int = 1, scenes: Sequence[ReadingScene] = SCENES
+) -> Iterator[SceneRow]:
     """A row per scene; the same students in each run."""
     for scene in scenes:
         yield measure_scene(scene, students, first_seed)
 
 
-def measure_scene(scene: Scene, students: int, first_seed: int = 1, *, memory: bool = True) -> ReadingRow:
+def measure_scene(
+    scene: ReadingScene, students: int, first_seed: int = 1, *, memory: bool = True
+) -> SceneRow:
     """Every student of a scene simulated, read and held against the truth; peak memory of the first."""
-    tally, peak = Tally(), None
+    tally, peak = ReadingTally(), None
     with tempfile.TemporaryDirectory() as folder:
         for work in works(scene, students, first_seed):
             paths = [sheet.save(Path(folder) / f"{number}") for number, sheet in enumerate(work.sheets)]
@@ -79,7 +88,7 @@ def measure_scene(scene: Scene, students: int, first_seed: int = 1, *, memory: b
     return row_of(scene.name, scene.title, tally, peak)
 
 
-def _read_one(tally: Tally, work: Work, paths: Sequence[Path]) -> None:
+def _read_one(tally: ReadingTally, work: SceneWork, paths: Sequence[Path]) -> None:
     start, clock = time.process_time(), time.perf_counter()
     scans = [open_page(PageRef(path.name, path=path)) for path in paths]
     pages, failed = read_all(scans, work)
@@ -93,7 +102,7 @@ def _read_one(tally: Tally, work: Work, paths: Sequence[Path]) -> None:
         tally.add_sheet(sheet.truth, figures, work.rubric.vectors, page, page.reading)
 
 
-def read_all(pages: Sequence[ScannedPage], work: Work) -> tuple[list[ScannedPage], bool]:
+def read_all(pages: Sequence[ScannedPage], work: SceneWork) -> tuple[list[ScannedPage], bool]:
     """A student's pages with what is read on them; nothing, and True, where the reader breaks down."""
     try:
         wanted = work.rubric.vectors

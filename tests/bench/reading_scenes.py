@@ -1,35 +1,50 @@
-"""Scenes in which reading is measured: who drew what on which paper, and how it became a file."""
+"""Scenes in which reading is measured: who drew what on which paper, and how it became a file.
 
-from collections.abc import Iterator, Mapping, Sequence
+And pages on which the drawing asked for is not: nothing is to be read into them.
+"""
+
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 from grader.inputs.roster import RosterRow
+from grader.pipeline import open_page, read_pages
 from grader.printed.answer_sheet import make_sheets
+from grader.records import PageRef, ScannedPage
 from grader.rubric import RubricFile, load_rubric
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from samples.simulation import (
     CAREFUL,
     SLOPPY,
     TYPICAL,
-    Hand,
+    HandStyle,
     PrintedSheet,
+    Scan,
     Settings,
     SimulatedSheet,
     any_settings,
     simulate,
 )
+from samples.simulation.lettering import any_handwriting
 from samples.simulation.mixture import Device
+from samples.simulation.page import FRAMES_MM, draw_frame, print_squares
 from samples.simulation.printing import printed_sheets
+from samples.simulation.scanner import Background, DrawnPaper, digitise
+from samples.simulation.sketch import SheetSketch
+from samples.simulation.view import view_of
+from samples.simulation.wording import CAPTIONS, WORDS, declared_texts
+from tests.bench.plain_text import Table
+from tests.bench.reading_truth import SURE
 
-_UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
 _TRIES = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class ReadingScene:
     """A kind of sheet.
 
     Attributes
@@ -44,7 +59,7 @@ class Scene:
     name: str
     title: str
     assignment: str = "pump"
-    hands: tuple[Hand, ...] = (CAREFUL, TYPICAL)
+    hands: tuple[HandStyle, ...] = (CAREFUL, TYPICAL)
     mistakes: float = 0.0
     wrong: bool = False
     device: Device = "flatbed"
@@ -55,26 +70,26 @@ class Scene:
 
 ALL_HANDS = (CAREFUL, TYPICAL, SLOPPY)
 SCENES = (
-    Scene("plain", "flatbed 300 dpi, plain sheet"),
-    Scene("printed", "flatbed 300 dpi, answer sheet", printed=True),
-    Scene("sloppy", "sloppy hands", hands=(SLOPPY,)),
-    Scene("wrong", "wrong drawings", mistakes=1.0, wrong=True),
-    Scene("hard", "hard sheets", hardship=4.0),
-    Scene("150", "flatbed 150 dpi", dpi=150.0),
-    Scene("copies", "1-bit copies", device="copier"),
-    Scene("phone", "phone photos, answer sheet", device="phone", dpi=None, printed=True),
-    Scene("press", "press", assignment="press", hands=ALL_HANDS, mistakes=0.3),
-    Scene("engine", "engine", assignment="engine", hands=ALL_HANDS, mistakes=0.3),
-    Scene("shaper", "shaper", assignment="shaper", hands=ALL_HANDS, mistakes=0.3),
-    Scene("piston", "piston", assignment="piston", hands=ALL_HANDS, mistakes=0.3),
+    ReadingScene("plain", "flatbed 300 dpi, plain sheet"),
+    ReadingScene("printed", "flatbed 300 dpi, answer sheet", printed=True),
+    ReadingScene("sloppy", "sloppy hands", hands=(SLOPPY,)),
+    ReadingScene("wrong", "wrong drawings", mistakes=1.0, wrong=True),
+    ReadingScene("hard", "hard sheets", hardship=4.0),
+    ReadingScene("150", "flatbed 150 dpi", dpi=150.0),
+    ReadingScene("copies", "1-bit copies", device="copier"),
+    ReadingScene("phone", "phone photos, answer sheet", device="phone", dpi=None, printed=True),
+    ReadingScene("press", "press", assignment="press", hands=ALL_HANDS, mistakes=0.3),
+    ReadingScene("engine", "engine", assignment="engine", hands=ALL_HANDS, mistakes=0.3),
+    ReadingScene("shaper", "shaper", assignment="shaper", hands=ALL_HANDS, mistakes=0.3),
+    ReadingScene("piston", "piston", assignment="piston", hands=ALL_HANDS, mistakes=0.3),
 )
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
+class SceneWork:
     """One student's sheets and what is known about them without looking."""
 
-    scene: Scene
+    scene: ReadingScene
     seed: int
     assignment: Assignment
     variant: Variant
@@ -84,22 +99,21 @@ class Work:
     @property
     def declared(self) -> dict[str, str]:
         """The scales as the student declares them."""
-        scales: Mapping[str, float] = self.sheets[0].truth["scales"]["declared"]
-        return {name: f"{value!r} {_UNITS[name]}" for name, value in scales.items()}
+        return declared_texts(self.sheets[0].truth["scales"]["declared"])
 
 
-def scene_named(name: str) -> Scene:
+def scene_named(name: str) -> ReadingScene:
     """One of the scenes. Raises KeyError."""
     return {scene.name: scene for scene in SCENES}[name]
 
 
-def works(scene: Scene, students: int, first_seed: int = 1) -> Iterator[Work]:
+def works(scene: ReadingScene, students: int, first_seed: int = 1) -> Iterator[SceneWork]:
     """So many students of a scene; the same seeds give the same sheets."""
     for seed in range(first_seed, first_seed + students):
         yield work(scene, seed)
 
 
-def work(scene: Scene, seed: int) -> Work:
+def work(scene: ReadingScene, seed: int) -> SceneWork:
     """One student of a scene."""
     assignment, rubric = task_named(scene.assignment)
     variants = assignment.variants()
@@ -107,7 +121,7 @@ def work(scene: Scene, seed: int) -> Work:
     settings = _settings(scene, assignment, variant, seed)
     printed = answer_sheets(assignment, variant) if scene.printed else None
     sheets = simulate(assignment, variant, seed, settings, printed=printed)
-    return Work(scene, seed, assignment, variant, rubric, sheets)
+    return SceneWork(scene, seed, assignment, variant, rubric, sheets)
 
 
 @cache
@@ -117,7 +131,7 @@ def task_named(name: str) -> tuple[Assignment, RubricFile]:
     return assignment, load_rubric(assignment.file.rubric, beside=assignment.path)
 
 
-def _settings(scene: Scene, assignment: Assignment, variant: Variant, seed: int) -> Settings:
+def _settings(scene: ReadingScene, assignment: Assignment, variant: Variant, seed: int) -> Settings:
     """Somebody of the scene, drawn by lot; for wrong drawings somebody who makes a mistake."""
     lot = np.random.default_rng([seed, 9])
     hand = scene.hands[int(lot.integers(len(scene.hands)))]
@@ -136,3 +150,189 @@ def answer_sheets(assignment: Assignment, variant: Variant) -> Mapping[str, Prin
     row = RosterRow("s01", "", n=variant.n, position=variant.position)
     sheets = make_sheets(assignment, [row])
     return printed_sheets(sheets.pdf, sheets.layout)
+
+
+PAGES, PAGES_QUICK = 2, 1
+READ_AS = ("pump", "press")
+OTHERS = ("press", "engine", "shaper", "piston")
+BREAKDOWNS = (ArithmeticError, LookupError, ValueError)
+"""What the reader must never raise; where it does, the page counts as one on which it broke down."""
+_FIRST_SEED = 700
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignRow:
+    """A kind of foreign page: how many, and what was read into them.
+
+    Attributes
+    ----------
+    readings : each page is read as several assignments
+    vectors, confident : reported, and reported with confidence
+    failed : readings in which the reader broke down
+    """
+
+    kind: str
+    readings: int
+    vectors: int
+    confident: int
+    failed: int = 0
+
+
+def measure_foreign(*, quick: bool = False) -> Iterator[ForeignRow]:
+    """Every kind of foreign page; a quick run reads one of each as one assignment, and few kinds."""
+    pages, names = (PAGES_QUICK, READ_AS[:1]) if quick else (PAGES, READ_AS)
+    seeds = range(_FIRST_SEED, _FIRST_SEED + pages)
+    for kind, draw in _WRITTEN.items():
+        yield _row(kind, [(_page(draw, seed), names) for seed in seeds])
+    if not quick:
+        yield _row("answer sheet left empty", [(_empty_form(_FIRST_SEED), READ_AS[:1])])
+    for other in OTHERS[: 1 if quick else None]:
+        foreign = [name for name in names if name != other]
+        drawn = [(sheet, foreign) for seed in seeds for sheet in _drawing(other, seed)]
+        yield _row(f"a drawing for {other}", drawn)
+
+
+def foreign_tables(rows: Sequence[ForeignRow]) -> Iterator[Table]:
+    """The rows as a table, where there are any."""
+    if rows:
+        heads = ["page", "readings", "vectors reported", "with confidence", "broken down"]
+        cells = [
+            [row.kind, *map(str, (row.readings, row.vectors, row.confident, row.failed))] for row in rows
+        ]
+        yield "Reading: pages without the drawing asked for", heads, cells
+
+
+def _row(kind: str, pages: Sequence[tuple[SimulatedSheet, Sequence[str]]]) -> ForeignRow:
+    """Each page read as each of the assignments named."""
+    row = ForeignRow(kind, 0, 0, 0)
+    with tempfile.TemporaryDirectory() as folder:
+        for number, (sheet, names) in enumerate(pages):
+            path = sheet.save(Path(folder) / f"{number}")
+            page = open_page(PageRef(path.name, path=path))
+            for name in names:
+                row = _counted(row, _confidences(page, name, number))
+    return row
+
+
+def _counted(row: ForeignRow, found: Sequence[float] | None) -> ForeignRow:
+    """One reading more, by the confidences of what was reported; None where the reader broke down."""
+    sure = sum(confidence >= SURE for confidence in found or ())
+    return ForeignRow(
+        row.kind, row.readings + 1, row.vectors + len(found or ()), row.confident + sure,
+        row.failed + (found is None),
+    )  # fmt: skip
+
+
+def _confidences(page: ScannedPage, name: str, number: int) -> list[float] | None:
+    """Of everything that is reported of a page when it is read as some student's of an assignment."""
+    assignment, rubric = task_named(name)
+    variants = assignment.variants()
+    try:
+        variant = variants[number % len(variants)]
+        reading = read_pages([page], assignment, variant, {}, rubric.vectors)[0].reading
+    except BREAKDOWNS:
+        return None
+    return [one.confidence for figure in reading.figures.values() for one in figure.vectors.values()]
+
+
+def _drawing(name: str, seed: int) -> list[SimulatedSheet]:
+    """Somebody's work for another assignment."""
+    assignment, _ = task_named(name)
+    variants = assignment.variants()
+    variant = variants[seed % len(variants)]
+    settings = any_settings(seed, device="flatbed", dpi=300.0, mistakes=0.0)
+    return simulate(assignment, variant, seed, settings)
+
+
+def _empty_form(seed: int) -> SimulatedSheet:
+    """A printed answer sheet as it was handed out."""
+    assignment, _ = task_named(READ_AS[0])
+    printed = answer_sheets(assignment, assignment.variants()[0])
+    return _page(lambda _: None, seed, next(iter(printed.values())).background)
+
+
+def _page(
+    draw: Callable[[SheetSketch], None], seed: int, background: Background | None = None
+) -> SimulatedSheet:
+    """A page written on and scanned."""
+    rng = np.random.default_rng([seed, 11])
+    settings = any_settings(seed, device="flatbed", dpi=300.0, mistakes=0.0)
+    settings = replace(settings, scan=replace(settings.scan, dpi_tag=300.0))
+    sketch = SheetSketch(rng, settings.hand, settings.pen, settings.page, any_handwriting(rng))
+    draw(sketch)
+    return _scanned(sketch, settings, background)
+
+
+def _scanned(sketch: SheetSketch, settings: Settings, background: Background | None) -> SimulatedSheet:
+    scan: Scan = settings.scan
+    view = view_of(scan, sketch.rng)
+    image = digitise(DrawnPaper(sketch.strokes, settings.pen, background), scan, view, sketch.rng)
+    return SimulatedSheet(image, {}, settings)
+
+
+# What stands on them ---------------------------------------------------------------------------------
+
+
+def _text(sketch: SheetSketch) -> None:
+    """A page of notes inside a frame."""
+    draw_frame(sketch)
+    words = [word for texts in CAPTIONS.values() for kinds in texts.values() for word in kinds]
+    words += [word for told in WORDS.values() for word in told.values()]
+    x, y, w, h = FRAMES_MM["iso"]
+    height = 4.5
+    for row in range(round((h - 20.0) / (2.2 * height))):
+        at = x + 8.0
+        while at < x + w - 70.0:
+            word = str(sketch.rng.choice(words))
+            place = complex(at, -(y + 12.0 + 2.2 * height * row) - height)
+            at = sketch.text(place, word, height).high.real + 4.0
+
+
+def _table(sketch: SheetSketch) -> None:
+    """A ruled table with numbers in its cells."""
+    draw_frame(sketch)
+    x, y, w, h = FRAMES_MM["iso"]
+    columns = np.linspace(x + 15.0, x + w - 15.0, int(sketch.rng.integers(6, 12)))
+    rows = np.linspace(y + 15.0, y + h - 30.0, int(sketch.rng.integers(10, 20)))
+    pen = sketch.pen("line")
+    for at in columns:
+        sketch.line(pen, complex(at, -rows[0]), complex(at, -rows[-1]))
+    for at in rows:
+        sketch.line(pen, complex(columns[0], -at), complex(columns[-1], -at))
+    for left in columns[:-1]:
+        for top in rows[1:]:
+            sketch.text(complex(left + 3.0, -top + 3.0), f"{sketch.rng.uniform(0, 99):.2f}", 3.5)
+
+
+def _squares(sketch: SheetSketch) -> None:
+    """Squared paper with nothing on it."""
+    sketch.page = replace(sketch.page, squared_mm=5.0)
+    print_squares(sketch)
+
+
+def _curves(sketch: SheetSketch) -> None:
+    """Diagrams of curves over time, with axes: another part of the same course."""
+    draw_frame(sketch)
+    pen = sketch.pen("line")
+    for left in (40.0, 235.0):
+        for top in (25.0, 115.0, 205.0):
+            corner = complex(left, -top - 60.0)
+            sketch.line(pen, corner, corner + 65j)
+            sketch.line(pen, corner, corner + 165.0)
+            share = np.linspace(0.0, 1.0, 60)
+            wave = sum(
+                sketch.rng.normal(0.0, 12.0 / k) * np.sin(2 * np.pi * k * share + sketch.rng.uniform(0, 6))
+                for k in (1, 2, 3)
+            )
+            points = corner + 160.0 * share + 1j * (30.0 + np.clip(wave, -28.0, 28.0))
+            sketch.curve(pen, np.asarray(points, dtype=np.complex128))
+            sketch.text(corner + 68j, str(sketch.rng.choice(["s(t)", "v(t)", "a(t)"])), 4.5)
+
+
+_WRITTEN: Mapping[str, Callable[[SheetSketch], None]] = {
+    "blank paper": lambda _: None,
+    "text": _text,
+    "a table": _table,
+    "squared paper": _squares,
+    "curves with axes": _curves,
+}

@@ -1,16 +1,87 @@
-"""What reading came to on the sheets of one scene, counted sheet by sheet."""
+"""What reading came to on the sheets of one scene, counted sheet by sheet, and as tables.
+
+A standard error is right where |error| / se is below 1 in 68.3 % and below 1.96 in 95 % of cases; the robust
+root mean square (1.4826 times the median of |error| / se) is then 1. A confidence is right where of all that
+is reported at it the same share is right.
+"""
 
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from grader.records import Figure, Reading, ScannedPage
-from tests.bench.honesty import Honesty, Spread, calibration, whitened
-from tests.bench.reading_places import OnPaper
-from tests.bench.reading_truth import SURE, Judged, TrueFigure, each_vector
+from grader.records import Figure, FloatArray, Reading, ScannedPage
+from tests.bench.plain_text import NOTHING, Table
+from tests.bench.reading_truth import NEAR_MM, SURE, Judged, OnPaper, TrueFigure, each_vector
+
+BINS = ((0.0, 0.5), (0.5, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 0.99), (0.99, 1.0 + 1e-9))
+NORMAL_SHARES = (0.683, 0.95)
+_TO_SPREAD = 1.4826
+"""The median of |x| to the standard deviation of a Gaussian."""
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorSpread:
+    """Errors in units of their standard error: how many, shares below 1 and 1.96, robust rms."""
+
+    count: int
+    under_1: float | None
+    under_196: float | None
+    rms: float | None
+
+    @classmethod
+    def of(cls, ratios: Sequence[float]) -> "ErrorSpread":
+        """From errors over standard errors, of either sign."""
+        if not ratios:
+            return cls(0, None, None, None)
+        size = np.abs(np.array(ratios))
+        return cls(
+            len(size), float((size < 1.0).mean()), float((size < 1.96).mean()),
+            float(_TO_SPREAD * np.median(size)),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Bin:
+    """What was reported at a confidence from `low` to below `high`, and the share within 0.5 mm."""
+
+    low: float
+    high: float
+    count: int
+    mean: float | None
+    right: float | None
+
+
+def calibration(reported: Sequence[tuple[float, float]]) -> list[Bin]:
+    """Of (confidence, error in mm): how often each confidence was right."""
+    values = np.array(reported, dtype=float).reshape(-1, 2)
+    found = []
+    for low, high in BINS:
+        inside = values[(values[:, 0] >= low) & (values[:, 0] < high)]
+        mean = float(inside[:, 0].mean()) if len(inside) else None
+        right = float((inside[:, 1] <= NEAR_MM).mean()) if len(inside) else None
+        found.append(Bin(low, min(high, 1.0), len(inside), mean, right))
+    return found
+
+
+def whitened(error: complex, cov: FloatArray) -> list[float]:
+    """A place's error along the two principal axes of its covariance, in standard errors."""
+    variances, axes = np.linalg.eigh(cov)
+    along = np.array([error.real, error.imag]) @ axes
+    return [float(x) for x in along / np.sqrt(np.maximum(variances, 1e-12))]
+
+
+@dataclass(frozen=True, slots=True)
+class Honesty:
+    """Spreads of confidently read lengths (to nodes, to the nearer of nodes and stroke) and of nodes."""
+
+    length_to_nodes: ErrorSpread
+    length_to_nearer: ErrorSpread
+    nodes: ErrorSpread
+    confidence: Sequence[Bin]
+
 
 STAGES = ("decode", "sheet", "ink", "reading")
 UPRIGHT_DEG = 45.0
@@ -18,7 +89,7 @@ SCALE_SHARE = 0.01
 
 
 @dataclass(slots=True)
-class Tally:
+class ReadingTally:
     """What was seen so far.
 
     Attributes
@@ -97,7 +168,7 @@ def _stroke_ends(figure: TrueFigure, node: str) -> Iterable[complex]:
 
 
 @dataclass(frozen=True, slots=True)
-class ReadingRow:
+class SceneRow:
     """One scene's figures. Shares are of 1; None where there was nothing to count.
 
     Attributes
@@ -109,7 +180,7 @@ class ReadingRow:
     right_and_confident : what needs no person and is right
     short, short_right : the shorter ones
     misreads, confidently : silent misreads, out of how many reported with confidence
-    node_mm, near_mm, joint_mm : median and p95 of confidently read nodes, see `Tally`
+    node_mm, near_mm, joint_mm : median and p95 of confidently read nodes, see `ReadingTally`
     times_ms, processor_ms : medians per page of processor time, by stage and in all
     peak_mb : of a process of its own that reads one student's sheets
     """
@@ -141,18 +212,14 @@ class ReadingRow:
     processor_ms: float
     peak_mb: float | None
 
-    def as_json(self) -> dict[str, Any]:
-        """For the report's JSON."""
-        return asdict(self)
 
-
-def row_of(scene: str, title: str, tally: Tally, peak_mb: float | None) -> ReadingRow:
+def row_of(scene: str, title: str, tally: ReadingTally, peak_mb: float | None) -> SceneRow:
     """A scene's figures from what was counted."""
     everything = [one for sheet in tally.judged for one in sheet]
     drawn = [one for one in everything if not one.true.missing]
     long, short = ([one for one in drawn if one.short is is_short] for is_short in (False, True))
     counting = [one for one in everything if one.counts and one.sure]
-    return ReadingRow(
+    return SceneRow(
         scene=scene,
         title=title,
         students=tally.students,
@@ -182,14 +249,14 @@ def row_of(scene: str, title: str, tally: Tally, peak_mb: float | None) -> Readi
     )
 
 
-def honesty_of(tally: Tally) -> Honesty:
+def honesty_of(tally: ReadingTally) -> Honesty:
     """Spreads of what was read with confidence, and how often each confidence was right."""
     everything = [one for sheet in tally.judged for one in sheet if one.reported and one.counts]
     sure = [one for one in everything if one.sure and not one.true.missing and one.se_mm > 0.0]
     return Honesty(
-        Spread.of([one.node_error_mm / one.se_mm for one in sure if one.node_error_mm is not None]),
-        Spread.of([one.near_error_mm / one.se_mm for one in sure if one.near_error_mm is not None]),
-        Spread.of(tally.node_ratios),
+        ErrorSpread.of([one.node_error_mm / one.se_mm for one in sure if one.node_error_mm is not None]),
+        ErrorSpread.of([one.near_error_mm / one.se_mm for one in sure if one.near_error_mm is not None]),
+        ErrorSpread.of(tally.node_ratios),
         calibration([(one.confidence, one.error_mm) for one in everything]),
     )
 
@@ -212,3 +279,92 @@ def _quantiles(errors: Sequence[float]) -> tuple[float | None, float | None]:
     if not errors:
         return None, None
     return float(np.quantile(errors, 0.5)), float(np.quantile(errors, 0.95))
+
+
+Column = tuple[str, Callable[[SceneRow], str]]
+
+
+def reading_tables(reading: Sequence[SceneRow]) -> Iterator[Table]:
+    """All tables of the scenes, where any was measured."""
+    if reading:
+        yield _table("Reading: sheets and vectors", reading, _VECTORS)
+        yield _table("Reading: error of confidently read nodes, mm (median / p95)", reading, _NODES)
+        shares = " and ".join(f"{100 * share:.1f} %" for share in NORMAL_SHARES)
+        title = "Reading: errors over their standard errors: shares below 1 and 1.96, robust rms"
+        yield _table(f"{title} (honest: {shares}, 1)", reading, _SPREADS)
+        yield _confidence(reading)
+        yield _table("Reading: processor milliseconds per page, and peak memory", reading, _TIMES)
+
+
+def _table(title: str, rows: Sequence[SceneRow], columns: Sequence[Column]) -> Table:
+    return title, [head for head, _ in columns], [[cell(row) for _, cell in columns] for row in rows]
+
+
+def _percent(share: float | None) -> str:
+    return NOTHING if share is None else f"{100 * share:.0f} %"
+
+
+def _pair(pair: tuple[float | None, float | None]) -> str:
+    return NOTHING if pair[0] is None else f"{pair[0]:.3f} / {pair[1]:.3f}"
+
+
+def _spread(spread: ErrorSpread) -> str:
+    if spread.rms is None:
+        return NOTHING
+    return f"{_percent(spread.under_1)}, {_percent(spread.under_196)}, {spread.rms:.2f}"
+
+
+_SCENE: Column = ("scene", lambda row: row.title)
+_VECTORS: Sequence[Column] = (
+    _SCENE,
+    ("sheets", lambda row: str(row.sheets)),
+    ("entirely right", lambda row: _percent(row.sheets_right)),
+    ("vectors", lambda row: str(row.vectors)),
+    ("right", lambda row: _percent(row.right)),
+    ("confident", lambda row: _percent(row.confident)),
+    ("doubtful", lambda row: _percent(row.doubtful)),
+    ("unread", lambda row: _percent(row.unread)),
+    ("under 5 mm: right", lambda row: f"{_percent(row.short_right)} of {row.short}"),
+    ("silent misreads", lambda row: f"{row.misreads} of {row.confidently}"),
+)
+_NODES: Sequence[Column] = (
+    _SCENE,
+    ("from the node", lambda row: _pair(row.node_mm)),
+    ("from the node or its strokes' ends", lambda row: _pair(row.near_mm)),
+    ("joints of the sketch", lambda row: _pair(row.joint_mm)),
+)
+_SPREADS: Sequence[Column] = (
+    _SCENE,
+    ("lengths, node to node", lambda row: _spread(row.honesty.length_to_nodes)),
+    ("lengths, nearer of nodes and stroke", lambda row: _spread(row.honesty.length_to_nearer)),
+    ("nodes", lambda row: _spread(row.honesty.nodes)),
+    ("lengths, nodes counted", lambda row: f"{row.honesty.length_to_nodes.count}, {row.honesty.nodes.count}"),
+)
+
+
+def _stage(name: str) -> Column:
+    return name, lambda row: f"{row.times_ms[name]:.0f}"
+
+
+_TIMES: Sequence[Column] = (
+    _SCENE,
+    *(_stage(name) for name in STAGES),
+    ("in all", lambda row: f"{row.processor_ms:.0f}"),
+    ("peak MB", lambda row: NOTHING if row.peak_mb is None else f"{row.peak_mb:.0f}"),
+    ("refused, broken down", lambda row: f"{row.refused}, {row.failed}"),
+    ("turned wrongly", lambda row: str(row.turned)),
+    ("scale off by > 1 %", lambda row: str(row.off_scale)),
+)
+
+
+def _confidence(reading: Sequence[SceneRow]) -> Table:
+    """All scenes together: a bin of one scene is too small."""
+    lines = []
+    for bins in zip(*(row.honesty.confidence for row in reading), strict=True):
+        count = sum(one.count for one in bins)
+        mean = sum((one.mean or 0.0) * one.count for one in bins)
+        right = sum((one.right or 0.0) * one.count for one in bins)
+        told = [f"{mean / count:.3f}", f"{100 * right / count:.1f} %"] if count else [NOTHING, NOTHING]
+        lines.append([f"{bins[0].low:g} to {bins[0].high:g}", str(count), *told])
+    heads = ["confidence", "vectors reported", "mean confidence", "within 0.5 mm"]
+    return "Reading: confidence against what came true (all scenes)", heads, lines

@@ -19,11 +19,12 @@ import numpy as np
 from grader.folder import batch
 from grader.folder.batch import Batch, grade
 from grader.inputs.roster import RosterRow
-from grader.printed.answer_sheet import Asked, make_sheets
-from grader.rubric import load_rubric
+from grader.printed.answer_sheet import make_sheets
+from grader.rubric import Asked, load_rubric
 from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 from samples.simulation.printing import printed_sheets
+from tests.inline import Inline
 
 PUMP = load_assignment("pump")
 HEAD = "student_id,name,n,kL,kv,ka"
@@ -48,7 +49,7 @@ def timed(folder: Path, out: Path, rubric, lines) -> tuple[list, float]:
     """The reports, without what the clock says, and the processor's seconds."""
     (folder / "roster.csv").write_text("\n".join([HEAD, *lines]) + "\n")
     start = time.process_time()
-    results = grade(Batch(PUMP, rubric, folder, out), lambda *_: None)
+    results = grade(Batch(PUMP, rubric, folder, out), lambda *_: None, Inline())
     return [_verdicts(report) for report in results.reports], time.process_time() - start
 
 

@@ -18,9 +18,8 @@ import numpy as np
 from reference.errors import MechanismError
 from reference.kinematics.motion import Motion, move, move_where_possible
 from reference.mechanism import Dyad, Group, Mechanism, Slider, SlottedLink
-from tests.bench.arrays import stacked
 from tests.bench.oracle import ExactMotion
-from tests.bench.peers import FSOLVE, Answer, Fsolve, NoAnswerError, answer_of, error_of, sketch
+from tests.bench.peers import FSOLVE, Answer, Fsolve, NoAnswerError, answer_of, error_of, sketch, stacked
 from tests.bench.singular import KINDS, Case, Kind
 
 EPSILON = float(np.finfo(np.float64).eps)

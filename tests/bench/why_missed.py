@@ -34,11 +34,11 @@ from grader.records import Figure, PageRef, Reading, ScannedPage
 from grader.rubric import load_rubric
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.construction.derive import construction_of
-from tests.bench.reading_places import OnPaper
 from tests.bench.reading_scenes import SCENES, scene_named, works
 from tests.bench.reading_truth import (
     RIGHT_MM,
     Judged,
+    OnPaper,
     Segment,
     TrueFigure,
     figures_of,
@@ -54,7 +54,7 @@ END_MM, END_PX_PER_MM = 4.0, 60.0
 
 
 @dataclass
-class Student:
+class StudentPages:
     """One student's pages, whatever made them."""
 
     name: str
@@ -66,17 +66,17 @@ class Student:
     places: list[PageRef]
 
 
-def simulated(scene: str, students: int, first: int, folder: Path) -> Iterator[Student]:
+def simulated(scene: str, students: int, first: int, folder: Path) -> Iterator[StudentPages]:
     for work in works(scene_named(scene), students, first):
         name = f"{scene}-{work.seed}"
         paths = [sheet.save(folder / f"{name}_{number}") for number, sheet in enumerate(work.sheets, 1)]
-        yield Student(
+        yield StudentPages(
             name, work.assignment, work.variant, work.declared, work.rubric.vectors,
             [sheet.truth for sheet in work.sheets], [PageRef(path.name, path=path) for path in paths],
         )  # fmt: skip
 
 
-def from_folder(folder: Path, students: int | None) -> Iterator[Student]:
+def from_folder(folder: Path, students: int | None) -> Iterator[StudentPages]:
     truths = defaultdict(list)
     for line in (folder / "truth.jsonl").read_text(encoding="utf-8").splitlines():
         truth = json.loads(line)
@@ -88,7 +88,9 @@ def from_folder(folder: Path, students: int | None) -> Iterator[Student]:
         wanted = load_rubric(assignment.file.rubric, beside=assignment.path).vectors
         places = [PageRef(t["class_file"], t["page"], path=folder / t["class_file"]) for t in own]
         variant = assignment.variant(row.n, row.position)
-        yield Student(f"{folder.name}-{student}", assignment, variant, dict(row.scales), wanted, own, places)
+        yield StudentPages(
+            f"{folder.name}-{student}", assignment, variant, dict(row.scales), wanted, own, places
+        )
 
 
 def found_along(true: Segment, strokes: np.ndarray) -> float:
@@ -176,7 +178,7 @@ def sheet_fault(seen: ScannedPage, on_paper: OnPaper | None) -> str:
 
 
 def misses_of(
-    student: Student, seen: ScannedPage, reading: Reading, truth: dict[str, Any]
+    student: StudentPages, seen: ScannedPage, reading: Reading, truth: dict[str, Any]
 ) -> Iterator[tuple]:
     """Every asked vector of a page: how it fared, and the miss, if it is one."""
     construction = construction_of(student.assignment.mechanism([student.variant]))
@@ -256,7 +258,7 @@ def panel(
 # Counting -----------------------------------------------------------------------------------------------
 
 
-def look_at(title: str, students: Iterator[Student], pictures: Path | None, *, tell: bool) -> None:
+def look_at(title: str, students: Iterator[StudentPages], pictures: Path | None, *, tell: bool) -> None:
     counts: dict[str, Counter[str]] = {"long": Counter(), "short": Counter()}
     sheets = Counter()
     for student in students:

@@ -9,7 +9,7 @@ import typer
 from pydantic import BaseModel
 
 from grader.cli.app import app
-from grader.cli.checking import schema_names
+from grader.cli.exporting import schema_names
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference.authored import assignment, mechanism
 from reference.construction.mistakes import CODES

@@ -7,7 +7,7 @@ import jsonschema
 import pypdfium2
 import pytest
 
-from grader.cli.checking import schema
+from grader.cli.exporting import schema
 from reference.authored.assignment import library
 
 

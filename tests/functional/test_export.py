@@ -12,7 +12,7 @@ import typer.main
 from typer.testing import CliRunner
 
 from grader.cli import app
-from grader.cli.checking import schema
+from grader.cli.exporting import schema
 
 ROOT = Path(__file__).parents[2]
 RESULTS = Path(__file__).parent / "results.json"

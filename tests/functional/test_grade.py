@@ -11,7 +11,7 @@ import numpy as np
 import pikepdf
 import pytest
 
-from grader.cli.checking import schema
+from grader.cli.exporting import schema
 from reference.authored.assignment import built_in, load_assignment
 from reference.construction.mistakes import Mistake
 from reference.plan import exact_plan

@@ -9,7 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 from grader.cli.app import app
-from grader.cli.checking import schema, schema_names
+from grader.cli.exporting import schema, schema_names
 from reference.authored.assignment import library
 
 

@@ -15,6 +15,11 @@ HEAVY = frozenset(
 )
 SCANS = frozenset("scipy cv2 PIL pikepdf pypdfium2 tifffile imagecodecs simplejpeg zxingcpp".split())
 PAGES = frozenset({"jinja2", "reportlab"})
+JUDGING = """
+cli comparison diagnosis documents feedback i18n judging measurements outcomes quantities records roster
+rubric scoring selfcheck witness
+"""
+"""The rooms of the program that entered measurements pass through."""
 
 PROGRAM = """
 import atexit, sys
@@ -30,7 +35,7 @@ main()
 
 
 def imported(folder, *arguments):
-    """The heavy modules that a command has imported when it ends."""
+    """The modules that a command has imported when it ends."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "COLUMNS": "120"}
     run = subprocess.run(  # noqa: S603 - our own program
         [sys.executable, "-c", PROGRAM, *arguments], cwd=folder, env=environment, capture_output=True,
@@ -39,7 +44,7 @@ def imported(folder, *arguments):
     assert run.returncode in {0, 1}, run.stderr
     modules = (folder / "imported.txt").read_text().split("\n")
     assert "grader.cli.commands" in modules
-    return HEAVY & set(modules)
+    return set(modules)
 
 
 @pytest.fixture
@@ -71,15 +76,26 @@ def folder(tmp_path):
     ],
 )
 def test_a_command_imports_no_heavy_library_that_it_does_not_use(folder, command, allowed):
-    assert imported(folder, *command.split()) <= allowed
+    assert HEAVY & imported(folder, *command.split()) <= allowed
+
+
+@pytest.mark.parametrize(
+    ("command", "needed"),
+    [
+        ("--help", "cli"),
+        ("plan pump --n 7 --json", "cli documents files i18n plan_document"),
+        ("check pump --measured measured.json", JUDGING),
+    ],
+)
+def test_a_command_imports_no_room_of_the_program_that_it_does_not_use(folder, command, needed):
+    modules = (module.split(".") for module in imported(folder, *command.split()))
+    assert {names[1] for names in modules if names[0] == "grader" and len(names) > 1} <= set(needed.split())
 
 
 def test_grading_imports_no_heavy_library_beyond_those_of_scans_pages_and_processes(folder):
     allowed = {*SCANS, *PAGES, "rich", "pebble", "psutil"}
-    assert (
-        imported(
-            folder, "grade", "class", "--assignment", "pump", "--roster", "class/roster.csv", "--out", "out",
-            "--jobs", "1",
-        )
-        <= allowed
+    modules = imported(
+        folder, "grade", "class", "--assignment", "pump", "--roster", "class/roster.csv", "--out", "out",
+        "--jobs", "1",
     )  # fmt: skip
+    assert HEAVY & modules <= allowed

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.cli.checking import schema
+from grader.cli.exporting import schema
 from grader.comparison.evidence import Submission
 from grader.marking.mark import judge
 from grader.marking.report import report_of

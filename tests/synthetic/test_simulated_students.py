@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from reference.authored.assignment import load_assignment
-from reference.construction.mistakes import CODES
 from reference.plan import exact_plan
 from samples.simulation import (
     CLEAN_SCAN,
@@ -21,6 +20,7 @@ from samples.simulation import (
     simulate,
 )
 from samples.simulation.hand import draw, task_of
+from samples.simulation.mistakes import CODES
 
 ROUNDING_MM = 2e-4
 TINY = replace(CLEAN_SCAN, dpi=12.0)

@@ -6,8 +6,8 @@ import pytest
 from reference.authored.assignment import load_assignment
 from samples.simulation import CAREFUL, CLEAN_SCAN, PERFECT, PenStyle, Scan, Settings, simulate
 from samples.simulation.raster import render
-from samples.simulation.strokes import Pen, straight
-from samples.simulation.view import View
+from samples.simulation.strokes import PenWidth, straight
+from samples.simulation.view import PaperView
 
 RENDER_ERROR_MM = 0.01  # what sampling by whole pixels leaves of a centre of mass at 150 dpi
 SCAN_ERROR_MM = 0.02
@@ -35,7 +35,7 @@ def test_a_ruled_stroke_lies_on_its_line(dpi, angle_deg):
     q = p + 17.0 * np.exp(1j * np.radians(-angle_deg))
     if q.real < 2:
         q, p = q + 20, p + 20
-    stroke = straight(np.random.default_rng(1), Pen("main", 0.43, 0.8, 0.0, 0.0), p, q)
+    stroke = straight(np.random.default_rng(1), PenWidth("main", 0.43, 0.8, 0.0, 0.0), p, q)
     image = render([stroke], lambda xy: xy * pitch - 0.5, (int(45 * pitch), int(45 * pitch)))
     ends = [np.array([z.real, -z.imag]) * pitch - 0.5 for z in (p, q)]
     assert centre_line_error_mm(image, *ends, pitch) < RENDER_ERROR_MM
@@ -71,7 +71,7 @@ def test_a_scanned_vector_lies_where_truth_says(scan):
 def view_told_by(truth):
     width, height = truth["image_size"]
     k1 = truth["lens"]["k1"] if truth["lens"] else 0.0
-    return View(np.array(truth["homography"]), (height, width), k1, 0, (0.0, 0.0, 420.0, 297.0))
+    return PaperView(np.array(truth["homography"]), (height, width), k1, 0, (0.0, 0.0, 420.0, 297.0))
 
 
 def narrow_error_mm(image, p_px, q_px, px_per_mm):

@@ -6,7 +6,7 @@ import jsonschema
 import pytest
 from pydantic import ValidationError
 
-from grader.cli.checking import schema, schema_names
+from grader.cli.exporting import schema, schema_names
 from grader.comparison.evidence import Submission
 from grader.documents import (
     SCHEMA_VERSION,

@@ -39,9 +39,9 @@ _SPELT: Mapping[str, tuple[str, ...]] = {
 }
 """Signs that a letter of the text may look like: a Cyrillic m is a small M, a Cyrillic s a c."""
 _MOST_DIGITS = 7
-"""No scale is written with more."""
+"""Of a number, its decimals included; more are not followed."""
 _BEAM = 60
-"""Texts followed at a time; more of them change no reading."""
+"""The likeliest texts up to a piece of ink, which are followed further."""
 _SKIPPED = -2.0
 """A piece of ink taken for no sign: beside its own probability of being none."""
 _MISPLACED = -4.0
@@ -109,16 +109,16 @@ class State:
 @cache
 def units(name: str) -> tuple[str, ...]:
     """The units of a scale as people write them, and none."""
-    found = [""]
+    spellings = [""]
     for real, paper in product(_LENGTHS, _LENGTHS):
         if name == "kL":
-            found.append(f"{real}/{paper}")
+            spellings.append(f"{real}/{paper}")
             continue
         for second in ("s",) if name == "kv" else ("s2", "s^2"):
-            found += [f"({real}/{second})/{paper}", f"{real}/{second}/{paper}"]
-            found += [f"{real}/({second}{point}{paper})" for point in _POINTS]
-            found += [f"{real}/{second}{point}{paper}" for point in _POINTS]
-    return tuple(found)
+            spellings += [f"({real}/{second})/{paper}", f"{real}/{second}/{paper}"]
+            spellings += [f"{real}/({second}{point}{paper})" for point in _POINTS]
+            spellings += [f"{real}/{second}{point}{paper}" for point in _POINTS]
+    return tuple(spellings)
 
 
 @cache
@@ -127,11 +127,11 @@ def rules(name: str) -> tuple[str, ...]:
     if name == "kL":
         return ()
     speeds = ("ω",) if name == "kv" else ("ω2", "ω^2")
-    found = [f"{speed}{point}kL" for speed in speeds for point in ("", *_POINTS)]
+    spellings = [f"{speed}{point}kL" for speed in speeds for point in ("", *_POINTS)]
     if name == "ka":
-        found += [f"ω{point}kv" for point in ("", *_POINTS)]
-        found += ["kv2/kL", "kv^2/kL"]
-    return tuple(found)
+        spellings += [f"ω{point}kv" for point in ("", *_POINTS)]
+        spellings += ["kv2/kL", "kv^2/kL"]
+    return tuple(spellings)
 
 
 def start(name: str) -> State:
@@ -286,7 +286,7 @@ _FOREIGN = 0.25
 _LARGE, _HARDLY = 1000.0, -4.0
 """From here on, a number lost its decimal point more likely than that anybody chose the scale."""
 _MOST_TEXTS = 200
-"""Less likely texts add nothing to the sum of those that mean the same."""
+"""The likeliest, among which those that mean the same are put together."""
 _SCALE_OF: Mapping[str, str] = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
 _DIGITS = "0123456789"
 _LEAST_PEAK = 40

@@ -104,7 +104,7 @@ class _Piece:
 def _pieces(mask: GreyImage, unit: float, least_mm: float) -> list[_Piece]:
     """The pieces of a mask that are neither too small nor too large for a sign."""
     contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-    found: list[_Piece] = []
+    pieces: list[_Piece] = []
     for index, contour in enumerate(contours):
         if hierarchy[0, index, 3] >= 0:
             continue
@@ -113,8 +113,8 @@ def _pieces(mask: GreyImage, unit: float, least_mm: float) -> list[_Piece]:
             continue
         own = np.zeros((h, w), dtype=np.uint8)
         cv2.drawContours(own, [contour], 0, 1, cv2.FILLED, offset=(-x, -y))
-        found.append(_Piece((x, y, w, h), own & mask[y : y + h, x : x + w]))
-    return found if len(found) <= _MOST else []
+        pieces.append(_Piece((x, y, w, h), own & mask[y : y + h, x : x + w]))
+    return pieces if len(pieces) <= _MOST else []
 
 
 def _but_words(pieces: list[_Piece]) -> list[_Piece]:

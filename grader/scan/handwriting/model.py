@@ -303,16 +303,16 @@ def _pieces(grey: GreyImage, unit: float) -> list[_Piece]:
         return []
     mask = (soft > _INK * peak).astype(np.uint8)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    kept = [row for row in range(1, len(stats)) if stats[row, 2:4].max() > _DUST_MM * unit]
-    if not kept or len(kept) > _MOST_PIECES:
+    rows = [row for row in range(1, len(stats)) if stats[row, 2:4].max() > _DUST_MM * unit]
+    if not rows or len(rows) > _MOST_PIECES:
         return []
-    line = float(np.quantile(stats[kept, 3], 0.8))
-    found: list[_Piece] = []
-    for row in kept:
+    line = float(np.quantile(stats[rows, 3], 0.8))
+    pieces: list[_Piece] = []
+    for row in rows:
         x, y, w, h = (int(side) for side in stats[row, :4])
         own = (labels[y : y + h, x : x + w] == row).astype(np.uint8)
-        found.extend(_parted(_Piece((x, y, w, h), own), line))
-    return sorted(found, key=lambda piece: piece.middle)
+        pieces.extend(_parted(_Piece((x, y, w, h), own), line))
+    return sorted(pieces, key=lambda piece: piece.middle)
 
 
 def _parted(piece: _Piece, line: float) -> list[_Piece]:
@@ -327,15 +327,15 @@ def _parted(piece: _Piece, line: float) -> list[_Piece]:
         low, high = round((number - 0.35) * w / parts), round((number + 0.35) * w / parts)
         cuts.append(low + int(ink[low : high + 1].argmin()))
     edges = [*cuts, w]
-    found = []
+    pieces = []
     for left, right in pairwise(edges):
         own = piece.own[:, left:right]
         rows = np.flatnonzero(own.any(axis=1))
         if right - left < 2 or len(rows) == 0:
             continue
         top, bottom = int(rows[0]), int(rows[-1]) + 1
-        found.append(_Piece((x + left, y + top, right - left, bottom - top), own[top:bottom]))
-    return found
+        pieces.append(_Piece((x + left, y + top, right - left, bottom - top), own[top:bottom]))
+    return pieces
 
 
 def _around(pieces: list[_Piece]) -> _Box:

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from scipy.optimize import approx_fprime, least_squares
+from scipy.optimize import least_squares
 
 from grader.printed.layout import PAGE_MM
 from grader.records import FloatArray
@@ -16,6 +17,7 @@ _POINTS = 5
 """Places along a side at which it is compared with the map: enough to notice a bent one."""
 _FIRST, _LAST = 0.05, 0.95
 """Share of a side's length at the first and the last of them; ends are often hidden or rounded."""
+_PLACES = np.linspace(_FIRST, _LAST, _POINTS)[:, None]
 _CENTRE_MM = np.array(PAGE_MM) / 2.0
 _SIZE_MM = 100.0
 """About which, and in units of which, a map is given by numbers: they are then of a usual size each."""
@@ -33,7 +35,7 @@ _FREEDOMS = (4, 6, 8)
 """Parameters of a similarity, of an affine map and of a perspective."""
 _LEAST_POINTS = 4
 """One whole marker."""
-_TOLERANCE = 1e-15
+_TOLERANCE = 1e-12
 """Relative change at which a fit is finished: what follows must not depend on where it stopped."""
 
 
@@ -58,15 +60,17 @@ def solve(residuals: Callable[[FloatArray], FloatArray], start: FloatArray) -> S
     if len(first) < len(start) or not np.all(np.isfinite(first)):
         raise np.linalg.LinAlgError("too few residuals, or some that are not finite")
     tolerances = dict.fromkeys(("ftol", "xtol", "gtol"), _TOLERANCE)
-    fit = least_squares(residuals, start, method="lm", x_scale="jac", **tolerances)
+    slope = partial(_derivative, residuals)
+    fit = least_squares(residuals, start, slope, method="lm", x_scale="jac", **tolerances)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac)
     return Solution(np.asarray(fit.x), np.asarray(covariance), 2.0 * float(fit.cost))
 
 
 def _derivative(function: Callable[[FloatArray], FloatArray], params: FloatArray) -> FloatArray:
-    """(values, p) how a smooth function changes with its parameters."""
-    jacobian = approx_fprime(params, function, 1e-7 * np.maximum(np.abs(params), 1.0))
-    return np.asarray(jacobian, dtype=np.float64).reshape(-1, len(params))
+    """(values, p) how a smooth function changes with its parameters, by central differences."""
+    steps = np.diag(1e-6 * np.maximum(np.abs(params), 1.0))
+    columns = [(function(params + step) - function(params - step)) / (2.0 * step.max()) for step in steps]
+    return np.stack(columns, axis=-1).reshape(-1, len(params))
 
 
 def scale_error(to_matrix: Callable[[FloatArray], FloatArray], solution: Solution) -> float:
@@ -103,11 +107,16 @@ def homography_of(
     params: FloatArray, centre_mm: FloatArray = _CENTRE_MM, size_mm: float = _SIZE_MM
 ) -> FloatArray:
     """Map by 4, 6 or 8 numbers: similarity, unequal axes and shear, perspective, about a middle."""
-    a, b, x, y, e, f, g, h = np.append(params, np.zeros(8 - len(params)))
-    linear = np.array([[a, -b], [b, a]]) @ np.array([[1.0 + e, f], [f, 1.0 - e]])
-    about = np.array([[linear[0, 0], linear[0, 1], x], [linear[1, 0], linear[1, 1], y], [g, h, 1.0]])
-    to_unit = np.array([[1.0, 0.0, -centre_mm[0]], [0.0, 1.0, -centre_mm[1]], [0.0, 0.0, size_mm]])
-    return np.asarray(about @ to_unit / size_mm)
+    a, b, x, y, e, f, g, h = np.append(params, np.zeros(8 - len(params))).tolist()
+    # The similarity's turn and scale, times unequal axes and shear.
+    upper, lower = (
+        (a * (1.0 + e) - b * f, a * f - b * (1.0 - e)),
+        (b * (1.0 + e) + a * f, b * f + a * (1.0 - e)),
+    )
+    matrix = np.array([[*upper, x], [*lower, y], [g, h, 1.0]])
+    matrix[:, :2] /= size_mm
+    matrix[:, 2] -= matrix[:, :2] @ centre_mm
+    return matrix
 
 
 def homography_params(homography: FloatArray) -> FloatArray:
@@ -174,41 +183,48 @@ def fit_sides(
     guess = homography_params(start) if perspective else affine_params(start)
     stated = None if dpi is None or perspective else np.log(np.array(dpi) / MM_PER_INCH)
 
+    se_mm = np.array([[side.model.side_se_mm] for side in sides]).reshape(-1, 1) * np.sqrt(_POINTS / 2.0)
+
     def residuals(params: FloatArray) -> FloatArray:
-        inverse = inverted(to_matrix(params))
-        parts = [_off(inverse, side) / (side.model.side_se_mm * np.sqrt(_POINTS / 2.0)) for side in sides]
+        parts = [(_off_mm(inverted(to_matrix(params)), sides) / se_mm).ravel()]
         if stated is not None:
             parts.append((params[:2] - stated) / DPI_SE)
         if not perspective:
             parts.append((params - guess) / (_LOOSE * np.array([1.0, 1.0, 1.0, *np.exp(guess[:2])])))
-        return np.concatenate([np.zeros(0), *parts])
+        return np.concatenate(parts)
 
     solution = solve(residuals, guess)
     matrix = to_matrix(solution.params)
     freedom = 2 * len(sides) + (2 if stated is not None else 0) - len(guess)
     inflate = max(1.0, solution.chi2 / max(freedom, 1))
     scale_se = scale_error(to_matrix, solution) * float(np.sqrt(inflate))
-    inverse = inverted(matrix)
-    off = np.array([_off(inverse, side) for side in sides]).reshape(-1, _POINTS)
+    off = _off_mm(inverted(matrix), sides)
     rms = float(np.sqrt(np.mean(off**2))) if len(sides) else 0.0
     return Fit(matrix / matrix[2, 2], solution.chi2, freedom, rms, scale_se, off.mean(axis=1))
 
 
-def _off(inverse: FloatArray, side: Side) -> FloatArray:
-    """(points,) mm by which a side's points miss it."""
-    share = np.linspace(_FIRST, _LAST, _POINTS)[:, None]
-    ends = side.line.ends
-    mm = mapped(inverse, ends[0] + share * (ends[1] - ends[0]))
-    return np.asarray(mm[:, side.axis] - side.value + _shadow_mm(side, mm))
+def _off_mm(inverse: FloatArray, sides: list[Side]) -> FloatArray:
+    """(sides, points) mm by which places along the sides miss them.
+
+    A paper edge seen as a dark line is its shadow: the sheet ends at the shadow's inner border.
+    """
+    if not sides:
+        return np.zeros((0, _POINTS))
+    ends = np.array([side.line.ends for side in sides])
+    mm = mapped(inverse, ends[:, :1] + _PLACES * (ends[:, 1:] - ends[:, :1]))
+    mm_per_px = (
+        np.hypot(*(mm[:, -1] - mm[:, 0]).T) / np.hypot(*(ends[:, 1] - ends[:, 0]).T) / (_LAST - _FIRST)
+    )
+    inward = [_shadow_px(side) for side in sides]
+    axis, value = [side.axis for side in sides], np.array([[side.value] for side in sides])
+    return np.asarray(mm[np.arange(len(sides)), :, axis] - value + (inward * mm_per_px)[:, None])
 
 
-def _shadow_mm(side: Side, mm: FloatArray) -> float:
-    """A paper edge seen as a dark line is its shadow: the sheet ends at the shadow's inner border."""
+def _shadow_px(side: Side) -> float:
+    """From the middle of a paper edge's shadow to its inner border, towards larger coordinates; else 0."""
     if side.model is not PAPER or side.line.kind != RIDGE:
         return 0.0
-    px_per_mm = side.line.length * (_LAST - _FIRST) / float(np.hypot(*(mm[-1] - mm[0])))
-    inward = 1.0 if side.value < 1.0 else -1.0
-    return inward * 0.5 * side.line.width / px_per_mm
+    return (0.5 if side.value < 1.0 else -0.5) * side.line.width
 
 
 # Through the corners of printed markers -----------------------------------------------------------
@@ -283,18 +299,23 @@ def fit_projection(marked: Marked) -> Projection:
     if len(marked) < _LEAST_POINTS:
         raise ValueError(f"at least {_LEAST_POINTS} points are expected, not {len(marked)}")
     centre, size = marked.mm.mean(axis=0), float(np.ptp(marked.mm, axis=0).max()) / 2.0
-    similarity = _similarity((marked.mm - centre) / size, marked.px)
-    se_px = _POINT_SE_MM * float(np.hypot(*similarity[:2])) / size
 
     def off_px(params: FloatArray) -> FloatArray:
         at = mapped(homography_of(params[1:], centre, size), marked.mm + params[0] * marked.outward)
         return np.asarray(at - marked.px)
 
-    def residuals(params: FloatArray) -> FloatArray:
+    def fitted(start: FloatArray) -> Solution:
+        se_px = _POINT_SE_MM * float(np.hypot(*start[1:3])) / size
         # What is known of the gain beforehand is one more datum.
-        return np.append(off_px(params).ravel() / se_px, params[0] / _GAIN_SE_MM)
+        return solve(lambda p: np.append(off_px(p).ravel() / se_px, p[0] / _GAIN_SE_MM), start)
 
-    best = _plainest(residuals, similarity, len(marked))
+    best = last = fitted(np.array([0.0, *_similarity((marked.mm - centre) / size, marked.px)]))
+    for freedom in _FREEDOMS[1:]:
+        last = fitted(np.array([*last.params, 0.0, 0.0]))
+        # The misfit that is left says how good the corners are where they are worse than usual.
+        noise = max(1.0, last.chi2 / max(2 * len(marked) - freedom, 1))
+        if best.chi2 - last.chi2 > 2 * _WORTH * noise:
+            best = last
     matrix = homography_of(best.params[1:], centre, size)
     misfit = np.hypot(*off_px(best.params).T) / _px_per_mm(matrix)
     rms = float(np.sqrt(np.mean(misfit**2)))
@@ -302,18 +323,6 @@ def fit_projection(marked: Marked) -> Projection:
     covariance = best.covariance[1:, 1:] * max(1.0, (rms / (_POINT_SE_MM * np.sqrt(2.0))) ** 2)
     gain, params = float(best.params[0]), best.params[1:]
     return Projection(matrix / matrix[2, 2], rms, misfit, gain, params, covariance, centre, size)
-
-
-def _plainest(residuals: Callable[[FloatArray], FloatArray], similarity: FloatArray, points: int) -> Solution:
-    """Gain and the map's numbers, by the fewest of them that a freer map does not beat by far."""
-    best = last = solve(residuals, np.array([0.0, *similarity]))
-    for freedom in _FREEDOMS[1:]:
-        last = solve(residuals, np.array([*last.params, 0.0, 0.0]))
-        # The misfit that is left says how good the corners are where they are worse than usual.
-        noise = max(1.0, last.chi2 / max(2 * points - freedom, 1))
-        if best.chi2 - last.chi2 > 2 * _WORTH * noise:
-            best = last
-    return best
 
 
 def _similarity(mm: FloatArray, px: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from grader.scan.register.homography import FRAMES, PAPER, Model, drawn_ends, ti
 from grader.scan.register.lines import RIDGE, STEP, LongLine
 
 _LINES_EACH_WAY = 12
-"""Of the longest lines in each direction: a title block adds a few to the eight of paper and frame."""
+"""Of the longest lines in each direction: a title block adds a few to the four of paper and frame."""
 _APART = 0.4
 """Of the image's width or height: opposite sides of a sheet are farther apart than this."""
 _LEAST_LENGTH = 0.4
@@ -71,15 +71,15 @@ def hypotheses(
 
     Half turns differ by the title block and, where the paper's edges are seen too, by the margins.
     """
-    found: list[Hypothesis] = []
+    readings: list[Hypothesis] = []
     for quad in _quadrilaterals(lines, shape):
         corners = _corners(quad)
         for model in (PAPER, *FRAMES):
             trust = _kind_trust(model, quad)
             if trust > 0.0:
-                found += _in_each_turn(corners, model, trust, shape, resolution)
+                readings += _in_each_turn(corners, model, trust, shape, resolution)
     drawn = drawn_ends(lines)
-    best = sorted(found, key=lambda hypothesis: -hypothesis.score)[:_LOOKED_AT]
+    best = sorted(readings, key=lambda hypothesis: -hypothesis.score)[:_LOOKED_AT]
     return sorted((_agreed(one, lines, drawn) for one in best), key=lambda hypothesis: -hypothesis.score)
 
 
@@ -129,7 +129,7 @@ def _in_each_turn(
     resolution: Resolution | None,
 ) -> list[Hypothesis]:
     """Readings of four corners (left top, clockwise) as those of a model; half turns look alike."""
-    found = []
+    readings = []
     for turns in (0, 1):
         map_px = _quad_map(model, np.roll(corners, turns, axis=0))
         params = None if map_px is None else affine_params(map_px)
@@ -140,9 +140,9 @@ def _in_each_turn(
         penalty = _camera_misfit(map_px, shape) if perspective else _scan_misfit(params, resolution)
         if penalty < _HOPELESS:
             turned = _quad_map(model, np.roll(corners, turns + 2, axis=0))
-            found.append(Hypothesis(map_px, perspective, trust - penalty))
-            found += [] if turned is None else [Hypothesis(turned, perspective, trust - penalty)]
-    return found
+            readings.append(Hypothesis(map_px, perspective, trust - penalty))
+            readings += [] if turned is None else [Hypothesis(turned, perspective, trust - penalty)]
+    return readings
 
 
 def _quad_map(model: Model, corners: FloatArray) -> FloatArray | None:
@@ -224,7 +224,7 @@ def on_sides(
     brighter = _brighter_mm(inverse, lines, px)
     drawn = np.array([line.kind == RIDGE for line in lines])
     x0, y0, x1, y1 = model.box
-    found: list[Side] = []
+    sides: list[Side] = []
     for axis, value, outer in ((0, x0, -1), (1, y0, -1), (0, x1, 1), (1, y1, 1)):
         length = (y1 - y0) if axis == 0 else (x1 - x0)
         along = np.abs(mm[:, 1, 1 - axis] - mm[:, 0, 1 - axis])
@@ -234,8 +234,8 @@ def on_sides(
         fits &= drawn if model is not PAPER else drawn | (brighter[:, axis] * outer < 0)
         if fits.any():
             best = int(np.where(fits, off, np.inf).argmin())
-            found.append(Side(lines[best], model, axis, value))
-    return found
+            sides.append(Side(lines[best], model, axis, value))
+    return sides
 
 
 def _brighter_mm(inverse: FloatArray, lines: list[LongLine], px: FloatArray) -> FloatArray:

@@ -46,7 +46,7 @@ _GAP_PX = 80.0
 _SEED_PX = 40.0
 """Of a chain's longest piece: dashes and letters in a row are no side of a sheet."""
 _ROUNDS = 4
-"""A chain grows as its line becomes better known; more rounds change nothing."""
+"""A chain grows as its line becomes better known."""
 _LEAST_SHARE = 0.12
 """Of the image's width or height; the title block's lines are kept too."""
 _STROKE_PX = (0.3, 6.5)

@@ -42,7 +42,7 @@ from grader.scan.register.homography import rotation_deg
 _LONG_SIDES_PX = (1700, 3400)
 """At about 4 px/mm a module has 3 pixels; a phone's photo may need a closer look."""
 _CLOSE_UP_PX_PER_MM = 10.0
-"""A module has 7 to 10 pixels."""
+"""A module of the code has about 8 pixels."""
 _MARGIN_MM = 3.0
 """Around the code's place: how far a map by two markers may be off, and more of the quiet zone."""
 _BLUR_PX, _SHARPER = 6.0, 1.5
@@ -224,12 +224,12 @@ def _markers(grey: GreyImage, quads: dict[int, FloatArray]) -> _Markers | None:
     if template is None or count < _LEAST_MARKERS:
         return None
     ours = [number for number in sorted(quads) if number in template.marker_ids]
-    px, seen = _refined(grey, np.stack([quads[number] for number in ours]))
+    px, whole = _refined(grey, np.stack([quads[number] for number in ours]))
     places = np.array(ours) - template.marker_ids.start
     mm = MARKER_CORNERS[places]
     outward = (mm - mm.mean(axis=1, keepdims=True)) / (MARKER_MM / 2.0)
-    owner = np.broadcast_to(places[:, None], seen.shape)
-    return _Markers(template, Marked(mm[seen], px[seen], outward[seen]), owner[seen])
+    owner = np.broadcast_to(places[:, None], whole.shape)
+    return _Markers(template, Marked(mm[whole], px[whole], outward[whole]), owner[whole])
 
 
 def _detector() -> cv2.aruco.ArucoDetector:

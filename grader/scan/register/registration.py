@@ -4,7 +4,7 @@ Evidence that disagrees or is missing becomes a problem of the sheet. The most l
 sheet's size and pose is taken; where none is sure enough, the page is refused.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -100,8 +100,8 @@ def register_plain(page: Page) -> Sheet | Unread:
 
 def _as_told(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
     """The best reading; of the half turns that the drawing does not tell apart, the one the file asks for."""
-    alike = [one for one in ranked if one.score > ranked[0].score - _SAME]
-    return min(alike, key=lambda one: off_turn_deg(one.mm_to_px, turn_deg))
+    best = [reading for reading in ranked if reading.score > ranked[0].score - _SAME]
+    return min(best, key=lambda reading: off_turn_deg(reading.mm_to_px, turn_deg))
 
 
 def _rival_scale(ranked: list[Hypothesis]) -> float | None:
@@ -162,11 +162,11 @@ def _from_lines(
 ) -> Sheet | Unread:
     copied = _is_copy(page)
     try:
-        fit, frame = _settled(_of_the_drawing(best) if copied else best, dpi, copied=copied), best.frame
+        fit, frame = _settled(best, dpi, copied=copied), best.frame
     except np.linalg.LinAlgError:
         return Unread("sheet", "the long lines found do not make one sheet")
     block_mm = title_block_mm(fit.mm_to_px, drawn_ends(lines))
-    doubt = _doubt(best, fit, block_mm, _Stated(dpi is not None, bool(problems)))
+    doubt = _doubt(best, fit, block_mm, stated_a3=dpi is not None, stated_other=bool(problems))
     if doubt is not None:
         return Unread("sheet", doubt)
     if block_mm == 0.0:
@@ -190,22 +190,11 @@ def _is_copy(page: Page) -> bool:
     return bool(np.all((sample == 0) | (sample == _WHITE)))
 
 
-def _of_the_drawing(best: Hypothesis) -> Hypothesis:
-    """Without the paper's sides, where the frame has all of its own: a copy's paper is not its drawing's."""
-    drawn = tuple(side for side in best.sides if side.model is not PAPER)
-    return replace(best, sides=drawn) if len(drawn) == _ALL_SIDES else best
+def _doubt(best: Hypothesis, fit: Fit, block_mm: float, *, stated_a3: bool, stated_other: bool) -> str | None:
+    """Why the lines found are not enough to know the sheet, or None.
 
-
-@dataclass(frozen=True, slots=True)
-class _Stated:
-    """What the file says of its resolution: that the page is A3, or that it is something else."""
-
-    a3: bool
-    other: bool
-
-
-def _doubt(best: Hypothesis, fit: Fit, block_mm: float, stated: _Stated) -> str | None:
-    """Why the lines found are not enough to know the sheet, or None."""
+    Arguments: whether by its stated resolution the page is A3, or something else.
+    """
     of_frame = sum(side.model is not PAPER for side in best.sides)
     of_paper = len(best.sides) - of_frame
     both = of_frame >= _MOST_SIDES and of_paper >= _SOME_SIDES
@@ -213,9 +202,9 @@ def _doubt(best: Hypothesis, fit: Fit, block_mm: float, stated: _Stated) -> str 
         return "the long lines found do not settle the scale"
     if fit.freedom > 0 and fit.rms_mm > _NO_FIT_MM:
         return f"what could be frame and paper's edges disagree by {fit.rms_mm:.1f} mm: not an A3 drawing"
-    if block_mm == 0.0 and not stated.a3 and not both:
+    if block_mm == 0.0 and not stated_a3 and not both:
         return "neither a title block nor frame and paper together show that this is an A3 drawing"
-    if stated.other and not (of_frame >= _MOST_SIDES and block_mm > 0.0):
+    if stated_other and not (of_frame >= _MOST_SIDES and block_mm > 0.0):
         return "by its resolution the page is not A3, and no frame with a title block says otherwise"
     return None
 
@@ -235,19 +224,21 @@ def _with_lens(flat: Flat, sheet: Sheet, best: Hypothesis) -> Sheet:
     return replace(sheet, lens=replace(lens, scale_se=scale_se))
 
 
-def _settled(best: Hypothesis, dpi: tuple[float, float] | None, *, copied: bool = False) -> Fit:
+def _settled(best: Hypothesis, dpi: tuple[float, float] | None, *, copied: bool) -> Fit:
     """Refit with the sides that agree; a side far off after the fit is dropped, once.
 
-    The scale of a copy is not the scanner's: where its frame has all four sides, they alone tell it.
+    Neither the paper nor the resolution of a copy is its drawing's: where the frame has all four sides,
+    they alone are fitted.
     """
     sides = list(best.sides)
-    if copied and len(sides) == _ALL_SIDES and all(side.model is not PAPER for side in sides):
-        dpi = None
+    drawn = [side for side in sides if side.model is not PAPER]
+    if copied and len(drawn) == _ALL_SIDES:
+        sides, dpi = drawn, None
     fit = fit_sides(best.mm_to_px, sides, dpi, perspective=best.perspective)
-    keep = [side for side, off in zip(sides, fit.side_mm, strict=True) if abs(off) < _FAR_OFF_MM]
-    return (
-        fit if len(keep) == len(sides) else fit_sides(fit.mm_to_px, keep, dpi, perspective=best.perspective)
-    )
+    near = [side for side, off in zip(sides, fit.side_mm, strict=True) if abs(off) < _FAR_OFF_MM]
+    if len(near) == len(sides):
+        return fit
+    return fit_sides(fit.mm_to_px, near, dpi, perspective=best.perspective)
 
 
 def _from_resolution(

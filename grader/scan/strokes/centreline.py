@@ -48,7 +48,7 @@ _TAKEN_PAST_MM, _PAST_MM = 0.3, 0.2
 _ASIDE_MM = 0.3
 """Beyond their widths, how near strokes come that hide each other's borders."""
 _MOST_NEIGHBOURS = 6
-"""At one place of a plan hardly more than three strokes run side by side."""
+"""Those longest beside a stroke; others hide less of it."""
 _LONG_MM = 20.0
 """Neighbours of a longer stroke need not be as long as itself."""
 _HIDDEN = 0.5
@@ -179,7 +179,7 @@ def refined(flat: Flat, fitted: Fitted, pen: Pen) -> Fitted:
 def rejoined(fitted: Fitted, px_per_mm: float) -> tuple[FloatArray, BoolArray]:
     """((k, 2, 2) ends, (k,) which stay) where strokes that overlap on one line are made one.
 
-    A band told only its one border at first; refined, its two ends turn out to be of one stroke. What
+    A band showed only its one border at first; refined, its two ends turn out to be of one stroke. What
     only abuts stays apart: a dark vector and its faint construction line.
     """
     ends, stay = fitted.ends.copy(), np.ones(len(fitted), dtype=bool)
@@ -241,13 +241,13 @@ def _fit(flat: Flat, strokes: Fitted, count: int, unit: float, middles: Callable
     """The strokes moved onto lines through the middles of `count` cuts each; `unit` is in px/mm."""
     reach = _REACH_MM * unit + float(strokes.width.max())
     cuts = cut_across(flat, strokes.ends, count, reach, 0.5 * strokes.width + _CAPTURE_MM * unit)
-    seen = middles(cuts)
-    lines = robust_lines(cuts.along, seen.offset, seen.weight, _NOISE_MM * unit)
-    known = seen.weight > 0
-    agrees = known & (lines.weight > _USED * seen.weight)
-    support = agrees.mean(axis=1) + _HIDDEN * seen.hidden.mean(axis=1)
+    middle = middles(cuts)
+    lines = robust_lines(cuts.along, middle.offset, middle.weight, _NOISE_MM * unit)
+    known = middle.weight > 0
+    agrees = known & (lines.weight > _USED * middle.weight)
+    support = agrees.mean(axis=1) + _HIDDEN * middle.hidden.mean(axis=1)
     across, turn = _standard_errors(cuts.along, lines, unit)
-    width = np.where(seen.lone.sum(axis=1) >= _LEAST_LONE, _mean_of(cuts.width, seen.lone), strokes.width)
+    width = np.where(middle.lone.sum(axis=1) >= _LEAST_LONE, _mean_of(cuts.width, middle.lone), strokes.width)
     return Fitted(
         lines.shifted(strokes.ends),
         width,
@@ -356,10 +356,10 @@ def _beside_neighbours(
     width = strokes.width[rows]
     clear = _OUTER_MM * unit - width[:, None] / 2.0
     every = np.ones(cuts.along.shape, dtype=bool)
-    found = _middles(cuts, width, (lowest > clear, highest < -clear), (every, every), unit)
-    weight = np.where(np.abs(found.offset) < _OFF_MM * unit, found.weight, 0.0)
+    middle = _middles(cuts, width, (lowest > clear, highest < -clear), (every, every), unit)
+    weight = np.where(np.abs(middle.offset) < _OFF_MM * unit, middle.weight, 0.0)
     hidden = np.isfinite(cuts.left) & reaches.any(axis=1) & (weight == 0.0)
-    return replace(found, weight=weight, hidden=hidden)
+    return replace(middle, weight=weight, hidden=hidden)
 
 
 def crossings(

@@ -8,7 +8,16 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from grader.records import Box, FloatArray, GreyImage, Ink, InkMap, Page, Sheet, Strokes, Unread
-from grader.scan.pixels import BoolArray, Flat, at_full_size, cut_out, flatten, lengths_and_directions, parts
+from grader.scan.pixels import (
+    BoolArray,
+    Flat,
+    at_full_size,
+    cut_out,
+    flatten,
+    lengths_and_directions,
+    parts,
+    reduction,
+)
 from grader.scan.strokes.centreline import Fitted, Pen, fit_centre, refined, rejoined
 from grader.scan.strokes.ends import coverage, find_ends, find_tips, split_by_darkness, through_bands
 from grader.scan.strokes.regions import (
@@ -298,7 +307,7 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
 
 def _ink_map(contrast: GreyImage, scale: float, sheet: Sheet) -> InkMap:
     """Contrast of the whole sheet, upright, from the page reduced by `scale`."""
-    reduced = np.array([[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5], [0.0, 0.0, 1.0]])
+    to_px = reduction(scale) @ sheet.mm_to_px
     # The centre of the map's pixel q is at q / 6 mm.
     box = (-0.5 / _MAP_PX_PER_MM, -0.5 / _MAP_PX_PER_MM, *sheet.page_mm)
-    return InkMap(cut_out(contrast, reduced @ sheet.mm_to_px, box, _MAP_PX_PER_MM, outside=0), _MAP_PX_PER_MM)
+    return InkMap(cut_out(contrast, to_px, box, _MAP_PX_PER_MM, outside=0), _MAP_PX_PER_MM)

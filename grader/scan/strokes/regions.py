@@ -24,7 +24,7 @@ from grader.scan.strokes.seeds import PX_PER_MM, Seeds
 _TURN = 0.16
 """Pieces that differ by more than 9 degrees are never joined."""
 _ROUNDS = 6
-"""A line grows as it becomes better known; more rounds change nothing."""
+"""A line grows as it becomes better known."""
 _MOST_OFF = 1.7
 """Of the distance allowed beside a line: so far off are pieces that lie far beyond its ends."""
 PROBES = 13

@@ -10,7 +10,7 @@ import pytest
 
 from grader.authoring.findings import named
 from grader.authoring.lint import lint, lint_document
-from grader.cli.checking import schema
+from grader.cli.exporting import schema
 from grader.rubric import load_rubric
 from reference.authored.assignment import Variant, built_in, library, load_assignment
 from reference.plan import exact_plan

@@ -5,11 +5,10 @@ import json
 import pytest
 
 from tests.bench import solver
-from tests.bench.__main__ import main
+from tests.bench.__main__ import Report, main
 from tests.bench.branches import BranchRow
 from tests.bench.judging_tally import JudgingFigures
-from tests.bench.reading_tally import Tally, row_of
-from tests.bench.report import Report
+from tests.bench.reading_tally import ReadingTally, row_of
 from tests.bench.singular import KINDS
 from tests.bench.solver import SolverBench, measure_errors
 from tests.bench.speed import SpeedRow, measure_speed, speed_rows
@@ -18,7 +17,7 @@ from tests.bench.stability import DISTANCES_QUICK, measure_stability
 SHARE_OF_PLAN = 1e-12
 """Error allowed, relative to the plan's size."""
 
-READING = row_of("plain", "a plain sheet", Tally(refused=7), 123.0)
+READING = row_of("plain", "a plain sheet", ReadingTally(refused=7), 123.0)
 
 
 def test_every_built_in_assignment_is_held_against_fifty_digits():
@@ -84,10 +83,10 @@ def test_the_command_prints_the_figures_of_the_parts_asked_for(asked, monkeypatc
         figures = solver.SolverFigures(branches=(branch,))
         rows, foreign, lines = (READING,), (), None
 
-        def __init__(self, quick, students=None, whole_class=None, scan=None):
+        def __init__(self, quick, students=None, whole=False):
             assert quick
             assert students is None
-            if whole_class is not None and scan is not None:
+            if whole:
                 self.figures = JudgingFigures()
 
         def run(self):

@@ -11,26 +11,39 @@ from grader.comparison.task import task_of
 from grader.marking.mark import judge
 from grader.outcomes import NamedMistake as Named
 from grader.records import Reading
-from reference.construction.mistakes import Mistake, commit
+from reference.construction.mistakes import Mistake as Operator
 from samples.simulation.hand import draw
 from samples.simulation.hand import task_of as drawing_task
+from samples.simulation.mistakes import Occasion, possible, with_mistake
+from samples.simulation.mistakes import StudentMistake as Mistake
 from samples.simulation.settings import PERFECT, Student
-from tests.bench import judging, judging_scans
-from tests.bench.judging import JudgingBench, judged, main
-from tests.bench.judging_assignments import ASSIGNMENTS, assignment_named
-from tests.bench.judging_class import measure_class
-from tests.bench.judging_handed_in import submission
+from tests.bench import judging
+from tests.bench.judging import JudgingBench, judged, main, measure_class
+from tests.bench.judging_handed_in import Visible, computed, exact_rates, off, submission
 from tests.bench.judging_naming import is_named, mistakes_due
-from tests.bench.judging_redrawn import Asked, meant, vectors_of
-from tests.bench.judging_rules import Seen, off
-from tests.bench.judging_students import SOURCES, Key, Work, student
-from tests.bench.judging_tables import judging_tables
-from tests.bench.judging_tally import ClassTime, JudgingFigures, Marked, Tally, Times, result_of, summed
+from tests.bench.judging_students import (
+    ASSIGNMENTS,
+    SOURCES,
+    StudentKey,
+    StudentWork,
+    assignment_named,
+    student,
+    vectors_of,
+)
+from tests.bench.judging_tally import (
+    ClassTime,
+    JudgingFigures,
+    JudgingTally,
+    MarkedCriterion,
+    Times,
+    judging_tables,
+    result_of,
+    summed,
+)
 from tests.bench.judging_truth import verdicts_due
-from tests.bench.judging_values import computed, exact_rates
 from tests.bench.plain_text import as_text
 
-STEEP = Key("pump", "careful", "single", 1)
+STEEP = StudentKey("pump", "careful", "single", 1)
 ROUNDING_MM = 1e-9
 
 
@@ -42,16 +55,16 @@ def drawn(name, *mistakes, n=None, position=None, declares=True, letters=False, 
     task = drawing_task(assignment, variant, habits, np.random.default_rng(1))
     wrong = task.right
     for mistake in mistakes:
-        wrong = wrong if mistake.code == "labels_swapped" else commit(mistake, wrong)
+        wrong = with_mistake(wrong, mistake)
     task = replace(task, wrong=wrong, mistakes=mistakes)
     sheets = draw(task, PERFECT, habits, np.random.default_rng(2))
     skipped = frozenset(left_out) | task.missing
-    return Work(STEEP, assignment, rubric, task, sheets, declares, letters, skipped)
+    return StudentWork(STEEP, assignment, rubric, task, sheets, declares, letters, skipped)
 
 
 def due(work, source="nodes"):
     """What is due to each criterion, and the mistakes."""
-    seen = Seen.of(submission(work, source), work.construction.links)
+    seen = Visible.of(submission(work, source), work.construction.links)
     return verdicts_due(work, source, seen), mistakes_due(work, source, seen), seen
 
 
@@ -70,14 +83,14 @@ def test_every_mechanism_of_the_benchmark_can_be_drawn_in_all_its_variants(name)
 
 
 def test_a_key_gives_the_same_student_in_every_run_and_another_key_another():
-    one, again, other = (student(Key("press", "typical", "single", seed)) for seed in (3, 3, 4))
+    one, again, other = (student(StudentKey("press", "typical", "single", seed)) for seed in (3, 3, 4))
     assert one.sheets == again.sheets
     assert one.sheets != other.sheets
     assert submission(one, "directions") == submission(again, "directions")
 
 
 def test_the_same_drawing_is_handed_in_from_its_nodes_with_directions_and_by_its_lengths_alone():
-    work = student(Key("engine", "careful", "right", 5))
+    work = student(StudentKey("engine", "careful", "right", 5))
     read, turned, ruled = (submission(work, source) for source in SOURCES)
     assert read.readings
     assert read.measured is None
@@ -156,7 +169,7 @@ def test_a_wrong_scale_may_be_charged_at_the_vector_from_which_its_plan_follows_
 
 
 def test_a_plates_image_by_similarity_has_fewer_vectors_than_the_rubric_asks_for():
-    keys = (Key("pump", "careful", "single", seed) for seed in range(200))
+    keys = (StudentKey("pump", "careful", "single", seed) for seed in range(200))
     works = (student(key) for key in keys)
     work = next(
         one for one in works if "a_CA_n" not in one.construction.vectors
@@ -179,8 +192,9 @@ def test_a_wrong_assembly_is_charged_on_the_sketch_or_else_where_the_plan_first_
 
 
 def test_of_another_students_data_the_crank_is_charged_or_else_the_first_vector_and_the_rest_follows():
-    named = Named(Mistake("other_variant", "mechanism", position=3), (), 1.0)
-    work = drawn("press", next(meant_of("press", named, position=1)), position=1)
+    right = drawn("press", position=1)
+    choices = possible("other_variant", Occasion(right.assignment, right.variant, right.task.right))
+    work = drawn("press", next(one for one in choices if one.position == 3), position=1)
     found, made, _ = due(work)
     assert group(found, "wrong") == {"O1A"}
     assert found["v_A"] == found["v_B"] == found["v_D"] == "follows"
@@ -233,30 +247,26 @@ def test_vectors_are_compared_by_the_rubrics_plain_tolerance():
 # What a report names --------------------------------------------------------------------------------
 
 
-def meant_of(name, named, n=None, position=None):
-    work = drawn(name, n=n, position=position)
-    return meant(Asked(work.assignment, work.variant, work.task.right), named)
-
-
 def test_two_mistakes_that_draw_the_same_count_as_each_other():
     turned = Mistake("figure_rotated", "velocity_plan", quarters=2)
     work = drawn("press", turned, position=1)
-    seen = Seen.of(submission(work, "nodes"), work.construction.links)
+    seen = Visible.of(submission(work, "nodes"), work.construction.links)
     right = work.task.right
     both = [vectors_of(right, [one]) for one in (turned, Mistake("sense_reversed", "a"))]
     assert all(abs(both[0][name] - both[1][name]) < ROUNDING_MM for name in both[0])
-    assert is_named(work, "nodes", seen, turned, Named(Mistake("sense_reversed", "a"), (), 0.9))
-    assert not is_named(work, "nodes", seen, turned, Named(Mistake("sense_reversed", "a'"), (), 0.9))
-    assert is_named(work, "nodes", seen, turned, Named(turned, (), 0.9))
+    assert is_named(work, "nodes", seen, turned, Named(Operator("sense_reversed", "a"), (), 0.9))
+    assert not is_named(work, "nodes", seen, turned, Named(Operator("sense_reversed", "a'"), (), 0.9))
+    itself = Named(Operator("figure_rotated", "velocity_plan", quarters=2), (), 0.9)
+    assert is_named(work, "nodes", seen, turned, itself)
 
 
 def test_a_mistake_that_differs_only_in_direction_is_as_good_in_lengths_alone():
     made = Mistake("image_mirrored", "c")
     work = drawn("engine", Mistake("sense_reversed", "a"), n=3)
-    seen = Seen.of(submission(work, "lengths"), {})
-    named = Named(Mistake("figure_rotated", "velocity_plan", quarters=1), (), 0.9)
+    seen = Visible.of(submission(work, "lengths"), {})
+    named = Named(Operator("figure_rotated", "velocity_plan", quarters=1), (), 0.9)
     assert is_named(work, "lengths", seen, work.task.mistakes[0], named)
-    assert not is_named(work, "lengths", seen, made, Named(Mistake("sense_reversed", "b"), (), 0.9))
+    assert not is_named(work, "lengths", seen, made, Named(Operator("sense_reversed", "b"), (), 0.9))
 
 
 # How it is counted ----------------------------------------------------------------------------------
@@ -276,7 +286,7 @@ def result(made=(), **verdicts):
 def test_false_charges_and_false_credits_are_counted_apart():
     right = result(v_B="none", v_C="review")
     wrong = result([Mistake("parallel_for_perpendicular", "b", 0)], v_B="full", v_BA="none")
-    tally = Tally()
+    tally = JudgingTally()
     tally.add(right)
     assert tally.false_charges.hits == 1
     assert tally.reviews.hits == 1
@@ -290,19 +300,18 @@ def test_false_charges_and_false_credits_are_counted_apart():
 
 
 def test_credit_given_for_what_follows_is_counted_of_all_that_follows():
-    tally = Tally()
+    tally = JudgingTally()
     for verdict in ("follow_through", "full", "none", "review", "not_judged"):
-        tally._add_criterion(Marked("v_C", "follows", verdict))
+        tally._add_criterion(MarkedCriterion("v_C", "follows", verdict))
     assert (tally.followed.hits, tally.followed.of) == (2, 4)
     assert (tally.false_charges.hits, tally.false_charges.of) == (1, 4)
 
 
 def test_the_benchmark_measures_as_many_steps_as_it_says_and_tells_all_of_it(monkeypatch):
     monkeypatch.setattr(judging, "HANDS", ("careful",))
-    timed = ClassTime("pump", 50, 50, 0.5, 1.0, 1.1)
-    bench = JudgingBench(
-        students=1, assignments=("engine",), whole_class=lambda rows: replace(timed, rows=rows)
-    )
+    monkeypatch.setattr(judging, "SCANNED", ())
+    monkeypatch.setattr(judging, "measure_class", lambda rows: ClassTime("pump", rows, 50, 0.5, 1.0, 1.1))
+    bench = JudgingBench(students=1, assignments=("engine",), whole=True)
     told = list(bench.run())
     assert len(told) == bench.steps
     figures = bench.figures
@@ -320,14 +329,14 @@ def test_one_case_is_told_in_full(capsys):
     told = capsys.readouterr().out
     assert "engine careful single 4" in told
     assert "due" in told
-    assert judged(Key("engine", "careful", "single", 4))
+    assert judged(StudentKey("engine", "careful", "single", 4))
 
 
 # Values computed, scans, whole classes --------------------------------------------------------------
 
 
 def test_a_slip_in_one_value_is_wrong_there_and_nowhere_else():
-    work = student(Key("shaper", "careful", "slip", 1))
+    work = student(StudentKey("shaper", "careful", "slip", 1))
     told = computed(work)
     assert told.values[told.slip] == pytest.approx(told.right[told.slip] * told.factor)
     assert {name for name in told.values if told.values[name] != told.right[name]} == {told.slip}
@@ -342,7 +351,7 @@ def test_a_slip_in_one_value_is_wrong_there_and_nowhere_else():
 
 
 def test_values_computed_from_a_right_drawing_are_the_exact_ones_to_a_hands_errors():
-    work = replace(drawn("shaper", n=4), key=Key("shaper", "careful", "slip", 2))
+    work = replace(drawn("shaper", n=4), key=StudentKey("shaper", "careful", "slip", 2))
     exact = exact_rates(work)
     told = computed(work)
     assert set(exact) <= set(told.right)
@@ -352,8 +361,8 @@ def test_values_computed_from_a_right_drawing_are_the_exact_ones_to_a_hands_erro
 
 def test_the_sense_of_a_value_is_due_only_where_it_can_be_told():
     mistake = Mistake("sense_reversed", "a")
-    work = replace(drawn("press", mistake, position=1), key=Key("press", "careful", "single", 0))
-    seeds = (Key("press", "careful", "single", seed) for seed in range(20))
+    work = replace(drawn("press", mistake, position=1), key=StudentKey("press", "careful", "single", 0))
+    seeds = (StudentKey("press", "careful", "single", seed) for seed in range(20))
     with_values = next(one for key in seeds if computed(one := replace(work, key=key)).values)
     found, _, _ = due(with_values, "directions")
     by_length, _, _ = due(with_values, "lengths")
@@ -364,12 +373,10 @@ def test_the_sense_of_a_value_is_due_only_where_it_can_be_told():
 def test_scans_are_judged_as_read_against_what_was_drawn(monkeypatch):
     """With a perfect reader in place of pictures: what is due does not hang on the reader."""
     page = SimpleNamespace(truth={"figures": {"velocity_plan": {"missing": {"v_D": "not drawn out"}}}})
-    monkeypatch.setattr(judging_scans, "simulate", lambda *_: [page])
-    monkeypatch.setattr(
-        judging_scans, "_read", lambda work, _: [*submission(work, "nodes").readings, Reading({})]
-    )
+    monkeypatch.setattr(judging, "simulate", lambda *_: [page])
+    monkeypatch.setattr(judging, "_read", lambda work, _: [*submission(work, "nodes").readings, Reading({})])
     times = Times()
-    (one,) = judging_scans.judged_scan(Key("engine", "careful", "single", 5), times)
+    (one,) = judging.judged_scan(StudentKey("engine", "careful", "single", 5), times)
     assert one.source == "scans"
     assert len(one.made) == len(times.scans) == 1
     by_name = {marked.criterion: marked for marked in one.criteria}

@@ -8,7 +8,6 @@ from reference.authored.assignment import load_assignment
 from reference.construction.derive import construction_of
 from samples.simulation import Scan, simulate
 from samples.simulation.settings import PERFECT, Settings
-from tests.bench.honesty import NORMAL_SHARES, Spread, calibration, whitened
 from tests.bench.lines import (
     LinesFigures,
     Noiseless,
@@ -16,9 +15,16 @@ from tests.bench.lines import (
     measure_noiseless,
     measure_resolution,
 )
-from tests.bench.reading_places import OnPaper
-from tests.bench.reading_tally import Tally, row_of
-from tests.bench.reading_truth import LEAST_MM, MISREAD_MM, TrueVector, each_vector, figures_of, judged
+from tests.bench.reading_tally import NORMAL_SHARES, ErrorSpread, ReadingTally, calibration, row_of, whitened
+from tests.bench.reading_truth import (
+    LEAST_MM,
+    MISREAD_MM,
+    OnPaper,
+    TrueVector,
+    each_vector,
+    figures_of,
+    judged,
+)
 
 SURE, UNSURE = 0.95, 0.5
 ENDS, STROKE = (10 - 100j, 10 - 50j), (10 - 100j, 10 - 52j)
@@ -114,7 +120,7 @@ def test_a_sheet_is_right_only_where_all_long_vectors_are_and_nothing_is_misread
     good = judged(DRAWN, found())
     short = judged(TrueVector("v_C", VELOCITY_PLAN, (0j, 0.9 * LEAST_MM + 0j), None), None)
     invented = judged(TrueVector("v_D", VELOCITY_PLAN, None, None, "mistake"), found(20.0))
-    row = row_of("", "", Tally(judged=[[good, short], [good, invented], [judged(DRAWN, None)]]), None)
+    row = row_of("", "", ReadingTally(judged=[[good, short], [good, invented], [judged(DRAWN, None)]]), None)
     assert row.sheets_right == pytest.approx(1 / 3)
     assert (row.vectors, row.short, row.misreads, row.confidently) == (3, 1, 1, 3)
     assert row.unread == pytest.approx(1 / 3)
@@ -122,11 +128,11 @@ def test_a_sheet_is_right_only_where_all_long_vectors_are_and_nothing_is_misread
 
 def test_gaussian_errors_have_the_spread_that_they_should():
     rng = np.random.default_rng(4)
-    spread = Spread.of(list(rng.standard_normal(20_000)))
+    spread = ErrorSpread.of(list(rng.standard_normal(20_000)))
     assert spread.under_1 == pytest.approx(NORMAL_SHARES[0], abs=0.01)
     assert spread.under_196 == pytest.approx(NORMAL_SHARES[1], abs=0.01)
     assert spread.rms == pytest.approx(1.0, abs=0.02)
-    assert Spread.of([]).rms is None
+    assert ErrorSpread.of([]).rms is None
 
 
 def test_a_place_is_judged_along_the_axes_of_its_covariance():

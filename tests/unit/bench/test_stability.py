@@ -9,8 +9,7 @@ import pytest
 from reference.authored.assignment import load_assignment
 from reference.kinematics.motion import move
 from tests.bench import branches
-from tests.bench.arrays import one_of, stacked
-from tests.bench.peers import Answer, Fsolve, NoAnswerError, error_of, plain_of, sketch
+from tests.bench.peers import Answer, Fsolve, NoAnswerError, error_of, one_of, plain_of, sketch, stacked
 from tests.bench.singular import KINDS
 from tests.bench.speed import spread
 from tests.bench.stability import EPSILON, _count, _Outcomes, measure_stability, truth_of

@@ -9,6 +9,8 @@ import pytest
 
 from grader.comparison.criteria import compare
 from grader.comparison.evidence import Submission
+from grader.comparison.follow_through import ReplayResult
+from grader.comparison.own import PlanBasis
 from grader.comparison.task import task_of
 from grader.records import Figure, Reading, ReadNode, ReadVector, Unread
 from grader.rubric import Band, CriterionTable, ToleranceTable, load_rubric
@@ -611,6 +613,40 @@ def test_scan_and_measurement_of_different_verdicts_go_to_a_person():
     assert outcome.verdict == "review"
     assert outcome.possible == ("none", "full")
     assert codes(outcome)[0] == "readings_disagree"
+
+
+# The search for what was done ---------------------------------------------------------------------
+
+
+def searches(task, reading):
+    """How often a comparison asks for a search."""
+    asked = []
+
+    def explain(*case):
+        asked.append(case)
+        return ReplayResult()
+
+    compare(task, Submission(measured=reading), explain)
+    return len(asked)
+
+
+def test_a_right_drawing_needs_no_search_for_what_was_done():
+    assert searches(PUMP, measured(PUMP)) == 0
+    assert searches(PUMP, measured(PUMP, directions=False)) == 0
+
+
+def test_a_wrong_drawing_is_searched_once():
+    two = (Mistake("sense_reversed", "a"), Mistake("normal_missing", "n_BA"))
+    assert searches(PUMP, measured(PUMP, mistakes=two)) == 1
+
+
+def test_what_follows_from_a_mechanism_that_the_search_is_sure_of_is_credited():
+    wrong = {**PUMP.parameters, "AB": PUMP.parameters["AB"] * 0.85}
+    drawn = Submission(measured=measured(replace(PUMP, parameters=wrong), directions=False))
+    basis = PlanBasis("instead", PUMP.construction, wrong)
+    unknown, known = compare(PUMP, drawn), compare(PUMP, drawn, lambda *_case: ReplayResult(basis=basis))
+    credited = [list(verdicts(one).values()).count("follow_through") for one in (unknown, known)]
+    assert credited[1] > credited[0] + 3
 
 
 # Rubrics ------------------------------------------------------------------------------------------

@@ -2,13 +2,13 @@ import pytest
 
 from grader.comparison.criteria import held_against_written
 from grader.comparison.evidence import DrawnVector
-from grader.comparison.verdicts import Mark
+from grader.comparison.verdicts import MarkRange
 from grader.feedback.sentences import FULL, HINTS
 from grader.rubric import ToleranceTable
 
 TOLERANCE = ToleranceTable(length_mm=1.0, length_relative=0.02)
 SURE, LEAST = 0.99, 0.9
-RIGHT = Mark(1.0, 1.0, 1.0, ())
+RIGHT = MarkRange(1.0, 1.0, 1.0, ())
 RULER_MM = 0.5
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from grader.cycle.diagram import REASONS, STYLE, Setting, cycle_figure, marks_of, mathtext
-from grader.cycle.quantities import Subject, extremes, strokes_of
+from grader.cycle.quantities import CycleSubject, extremes, strokes_of
 from grader.language import tongue
 from reference.authored.assignment import load_assignment
 from reference.kinematics.cycle import cycle
@@ -22,7 +22,7 @@ ROUNDING = 1e-12
 
 def subject_of(name, n=None, position=None, samples=361):
     assignment = load_assignment(name)
-    return Subject(cycle(assignment.mechanism([assignment.variant(n, position)]), samples))
+    return CycleSubject(cycle(assignment.mechanism([assignment.variant(n, position)]), samples))
 
 
 def figure_of(name, n, position, of, lang, speed=None):
@@ -33,7 +33,7 @@ def figure_of(name, n, position, of, lang, speed=None):
     if speed is not None:
         factor = speed / (0.15 * mechanism.crank.omega[0])
         mechanism = replace(mechanism, driver=replace(mechanism.driver, omega=factor * mechanism.crank.omega))
-    subject = Subject(cycle(mechanism))
+    subject = CycleSubject(cycle(mechanism))
     with rc_context(STYLE):
         setting = Setting(assignment, variant, tongue(lang))
         return cycle_figure(subject, subject.select(of.split(",") if of else []), setting), subject
@@ -89,7 +89,7 @@ def test_an_engine_off_its_guide_returns_quicker():
     (slider, point) = mechanism.groups
     offset = 0.2
     lifted = replace(slider, guide=replace(slider.guide, through_m=np.array([1j * offset])))
-    subject = Subject(cycle(replace(mechanism, groups=(lifted, point))))
+    subject = CycleSubject(cycle(replace(mechanism, groups=(lifted, point))))
     (stroke,) = (one for one in strokes_of(subject) if not one.is_angle)
     inner, outer = (np.arcsin(offset / (0.6 + sign * 0.15)) for sign in (-1, 1))
     back = np.pi + inner - outer
@@ -103,7 +103,7 @@ def test_a_scotch_yoke_goes_and_returns_alike():
     engine = load_assignment("engine").mechanism([load_assignment("engine").variant(1)])
     upright = FixedGuide(np.zeros(1, complex), np.array([np.pi / 2]))
     yoke = Yoke("B", "A", np.zeros(1), upright)
-    subject = Subject(cycle(replace(engine, groups=(yoke,))))
+    subject = CycleSubject(cycle(replace(engine, groups=(yoke,))))
     (stroke,) = strokes_of(subject)
     assert (stroke.name, stroke.is_angle) == ("B", False)
     assert stroke.dead_points == pytest.approx((np.pi / 2, 3 * np.pi / 2), abs=1e-9)

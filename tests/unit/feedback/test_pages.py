@@ -164,3 +164,12 @@ def test_instructors_are_told_how_a_sheet_was_placed_and_students_are_not():
     told = report(reading=ReadSheets(sheets=[read]))
     assert "placed by its markers, ±0.03\u00a0mm" in feedback_page(told, [picture()], "en")
     assert "placed by" not in feedback_page(told, [picture()], "en", "hint")
+
+
+@pytest.mark.parametrize("text", everything())
+def test_a_printed_page_is_a4_on_white_and_cuts_no_row_and_no_picture(text):
+    printed = text.split("@media print {", 1)[1].split("</style>")[0]
+    assert "@page { size: A4" in printed
+    assert "body { background: #fff;" in printed
+    kept_whole = re.search(r"([^{}]*)\{ break-inside: avoid; \}", printed)[1]
+    assert {"tr", ".criteria tbody", "figure"} <= {name.strip() for name in kept_whole.split(",")}

@@ -16,19 +16,22 @@ from grader.folder import batch as jobs_module
 from grader.folder import cache as kept_module
 from grader.folder.batch import Batch, InterruptedRunError, grade
 from grader.folder.cache import (
+    CELL_STAGE,
+    CELLS_OF,
     MARK_STAGE,
     READ_STAGE,
     SCAN_STAGE,
     PageCache,
+    cached_maps,
+    cached_reading,
     digest_of,
     dumped,
-    keep_reading,
-    kept_maps,
-    kept_reading,
     loaded,
     stage_digest,
+    store_reading,
 )
-from grader.folder.changes import told_standing
+from grader.folder.changes import standing_text
+from grader.folder.inventory import identify_page, survey_folder
 from grader.overlay.picture import backdrop
 from grader.records import (
     Figure,
@@ -140,8 +143,8 @@ def test_what_moved_is_told_with_the_standing_before_and_after(class_folder, tmp
     assert run(class_folder, out).moved == []
     again = run(class_folder, out, wider(RUBRIC))
     assert {one.student_id for one in again.moved} == {"s1", "s2"}
-    assert {told_standing(one.before) for one in again.moved} == {"16.25..20 needs review"}
-    assert {told_standing(one.after) for one in again.moved} == {"20"}
+    assert {standing_text(one.before) for one in again.moved} == {"16.25..20 needs review"}
+    assert {standing_text(one.after) for one in again.moved} == {"20"}
     assert json.loads((out / "results.json").read_text())["moved"][0]["after"]["status"] == "graded"
     assert run(class_folder, out, wider(RUBRIC)).moved == []
     scan(class_folder / "s3.png", 130)
@@ -151,7 +154,7 @@ def test_what_moved_is_told_with_the_standing_before_and_after(class_folder, tmp
     assert changed.keys() == {"s2", "s3"}
     assert changed["s2"].after is None
     assert changed["s3"].before is None
-    assert told_standing(None) == "-"
+    assert standing_text(None) == "-"
 
 
 def test_a_changed_line_of_the_roster_reads_only_that_students_scan_again(class_folder, tmp_path, reader):
@@ -197,6 +200,27 @@ def test_each_page_is_decoded_registered_and_tested_for_blankness_once(class_fol
     run(class_folder, tmp_path / "out", wider(RUBRIC))
     assert calls == ["decode", "is_blank", "register"]
     assert len(list((tmp_path / "out" / ".planmark" / "pages").glob("*.page"))) == 2
+
+
+class SlowStrokes(Inline):
+    """Workers in which looking for strokes takes too long."""
+
+    def run(self, function, calls, sheets=()):
+        if function is identify_page:
+            yield from enumerate([Problem("too_slow", "took more than 60 s")] * len(calls))
+        else:
+            yield from super().run(function, calls, sheets)
+
+
+def test_a_page_whose_strokes_take_too_long_still_has_the_owner_that_its_code_says(tmp_path):
+    path = samples_folder() / "pump" / "s06_1.jpg"
+    contents = survey_folder(
+        [path], path.parent, None, SlowStrokes(), lambda *_: None, PageCache(tmp_path / "pages")
+    )
+    (page,) = contents[0].pages
+    assert page.problem == Problem("too_slow", "took more than 60 s", "s06_1.jpg")
+    assert page.identity is not None
+    assert page.identity.student_id == "s06"
 
 
 @pytest.mark.usefixtures("reader")
@@ -263,26 +287,26 @@ def test_cells_that_moved_are_read_again_on_printed_sheets_alone(tmp_path):
     printed = replace(plain, sheet=replace(sheet, zones={"mechanism": (0.0, 0.0, 1.0, 1.0)}))
     before, after = PageCache(tmp_path, printed_key="before"), PageCache(tmp_path, printed_key="after")
     for page in (plain, printed):
-        keep_reading(
+        store_reading(
             tmp_path, "s1", "key", [replace(page, ref=PageRef("s1", problem=Problem("a", "b")))], before
         )
-        assert (kept_reading(tmp_path, "s1", "key", after) is None) == (page is printed)
+        assert (cached_reading(tmp_path, "s1", "key", after) is None) == (page is printed)
 
 
 def test_a_reading_is_not_found_under_another_key_nor_half_written(tmp_path, monkeypatch):
     pages = [ScannedPage(PageRef("s1.png", problem=Problem("told", "something")), reading=drawn_exactly(4))]
     cache = PageCache(tmp_path)
-    keep_reading(tmp_path, "s1", "one", pages, cache)
-    assert kept_reading(tmp_path, "s1", "one", cache) is not None
-    assert kept_reading(tmp_path, "s1", "two", cache) is None
+    store_reading(tmp_path, "s1", "one", pages, cache)
+    assert cached_reading(tmp_path, "s1", "one", cache) is not None
+    assert cached_reading(tmp_path, "s1", "two", cache) is None
 
     def full_disk(*_):
         raise OSError("no room")
 
     monkeypatch.setattr(kept_module, "write_whole", full_disk)
     with pytest.raises(OSError, match="no room"):
-        keep_reading(tmp_path, "s1", "two", pages, cache)
-    assert kept_reading(tmp_path, "s1", "two", cache) is None
+        store_reading(tmp_path, "s1", "two", pages, cache)
+    assert cached_reading(tmp_path, "s1", "two", cache) is None
 
 
 # What a stage depends on --------------------------------------------------------------------------
@@ -308,12 +332,13 @@ def sources(tmp_path_factory):
         ("grader/scan/strokes/tips.onnx", {"scan", "mark"}),
         ("grader/scan/handwriting/letters.npz", {"scan", "mark"}),
         ("grader/scan/decode/pictures.py", {"scan", "mark"}),
-        ("grader/records.py", {"scan", "read", "mark"}),
+        ("grader/records.py", {"scan", "cells", "read", "mark"}),
         ("grader/pipeline.py", {"scan", "read", "mark"}),
         ("grader/reading/plans.py", {"read", "mark"}),
         ("grader/marking/mark.py", {"mark"}),
         ("grader/feedback/templates/feedback.html", {"mark"}),
         ("grader/locale/ro/LC_MESSAGES/planmark.mo", {"mark"}),
+        ("grader/printed/answer_sheet.py", {"cells", "mark"}),
         ("grader/cli/grading.py", set()),
         ("tests/bench.py", set()),
     ],
@@ -321,14 +346,15 @@ def sources(tmp_path_factory):
 def test_what_a_change_makes_stale(sources, file, stale):
     def digests():
         stage_digest.cache_clear()
-        return {stage: stage_digest(modules, sources) for stage, modules in STAGES.items()}
+        digests = {stage: stage_digest(modules, top=sources) for stage, modules in STAGES.items()}
+        return digests | {"cells": stage_digest(CELL_STAGE, CELLS_OF, sources)}
 
     before, path = digests(), sources / file
     content = path.read_bytes()
     path.write_bytes(content + b"\n# changed\n")
     after = digests()
     path.write_bytes(content)
-    assert {stage for stage in STAGES if after[stage] != before[stage]} == stale
+    assert {stage for stage in before if after[stage] != before[stage]} == stale
     assert digests() == before
 
 
@@ -478,14 +504,14 @@ def test_swapped_letters_are_kept_with_a_reading():
 def test_ink_maps_come_back_and_damaged_ones_are_none(tmp_path):
     page = Page("s1.png", 1, np.full((600, 800), 120, np.uint8))
     behind = replace(backdrop(page, None), registered=True, page_mm=(420.0, 297.0))
-    keep_reading(
+    store_reading(
         tmp_path, "s1", "key", [ScannedPage(PageRef("s1.png"), backdrop=behind)], PageCache(tmp_path)
     )
-    (found,) = kept_maps(tmp_path, "s1")
+    (found,) = cached_maps(tmp_path, "s1")
     assert found.shape == CELLS
     (tmp_path / "s1.ink").write_bytes(b"no map")
-    assert kept_maps(tmp_path, "s1") == []
-    assert kept_maps(tmp_path, "nobody") == []
+    assert cached_maps(tmp_path, "s1") == []
+    assert cached_maps(tmp_path, "nobody") == []
 
 
 def test_the_order_of_a_set_which_differs_between_processes_is_no_change():

@@ -194,13 +194,13 @@ def test_the_contact_sheet_shows_every_page_with_its_reason_and_nothing_from_out
     assert "http" not in html
 
 
-def test_a_thumbnail_is_turned_upright():
-    grey = np.full((100, 200), 255, np.uint8)
-    grey[:, :50] = 0
-    turned = decoded(thumbnail(grey, quarter_turns=1).jpeg)
-    assert turned.shape == (200, 100)
-    assert turned[-20:].mean() < 30
-    assert turned[:20].mean() > 220
+def test_a_thumbnail_is_a_small_picture_of_the_whole_page():
+    grey = np.full((1500, 2000), 255, np.uint8)
+    grey[:, :500] = 0
+    small = decoded(thumbnail(grey))
+    assert small.shape == (480, 640)
+    assert small[:, :150].mean() < 30
+    assert small[:, 170:].mean() > 220
 
 
 def decoded(jpeg):

@@ -5,7 +5,7 @@ import json
 import jsonschema
 import pytest
 
-from grader.cli.checking import schema
+from grader.cli.exporting import schema
 from grader.lms.export import export
 from grader.lms.grades import Options, Person
 from reference.errors import CallError, InputFileError

@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 from pydantic import ValidationError
 
-from grader.cli.checking import schema
+from grader.cli.exporting import schema
 from grader.lms.export import export
 from grader.lms.grades import Options, Person
 from grader.lms.marks import json_document

@@ -4,7 +4,7 @@ import pytest
 
 from grader.comparison.evidence import Submission
 from grader.marking.mark import judge
-from grader.marking.self_check import Checked, is_all_right, self_check, told
+from grader.marking.self_check import Checked, checked_values, is_all_right, self_check
 from tests.hands import changed, measured, sheet, task_for, without
 
 PUMP = task_for("pump", 7)
@@ -67,4 +67,4 @@ def test_an_unverifiable_scale_is_open():
 
 def test_what_follows_from_an_own_mistake_is_right():
     judgement = judge(PUMP, Submission(readings=(sheet(PUMP, moved={"b": 0j}),)))
-    assert is_all_right(told(judgement, "hint"))
+    assert is_all_right(checked_values(judgement, "hint"))

@@ -7,7 +7,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from grader.cli.checking import schema
+from grader.cli.exporting import schema
 from grader.documents import ReportDocument, ResultsDocument
 from grader.folder.batch import Batch, grade
 from grader.lms.export import export, read_results

@@ -7,22 +7,24 @@ import numpy as np
 import pytest
 
 from grader.reading import nodes
-from grader.reading.expected import Edge, Expected, Hand, Slack, expect, links_of, vectors_of
+from grader.reading.expected import DraftingErrors, Edge, Expected, Pose, Slack, expect, links_of, vectors_of
 from grader.reading.lines import Lines, lines_of
-from grader.reading.matching import Beliefs, Ends, Explanation, Settled, Taken, explain, explain_each, updated
-from grader.reading.nodes import Signs, fit_nodes, sureness
+from grader.reading.matching import Beliefs, Constraint, EndPrior, StrokeAssignment, assign_strokes, updated
+from grader.reading.nodes import fit_nodes
+from grader.reading.read import Signs, within
 from grader.records import VELOCITY_PLAN
 from tests.unit.reading.drawn import ink_of, task
 
 PLACE_MM = 0.15
+AT_MM = EndPrior().at_mm
 
 
-def explanation(at: list[complex], edges: tuple[Edge, ...], rows: list[int]) -> Explanation:
+def explanation(at: list[complex], edges: tuple[Edge, ...], rows: list[int]) -> StrokeAssignment:
     """Nodes about where they are, each edge with its stroke."""
     count = len(at)
     names = tuple("oabcde"[:count])
     expected = Expected(names, np.array(at), np.eye(2 * count), edges)
-    return Explanation(expected, np.array(rows), np.zeros(len(edges), dtype=bool), 0.0)
+    return StrokeAssignment(expected, np.array(rows), np.zeros(len(edges), dtype=bool), 0.0)
 
 
 def fan(*overruns: float) -> tuple[Lines, list[complex]]:
@@ -89,11 +91,11 @@ def test_a_stroke_moves_what_is_believed_of_other_nodes():
     cov = np.eye(4) + np.kron(np.ones((2, 2)), 9.0 * np.eye(2))
     belief = Beliefs(np.array([[0j, 50 + 0j]]), cov[None])
     lines = lines_of(ink_of([(3j, 50 + 3j)]))
-    unended = Taken(lines, np.zeros(1, dtype=bool), np.zeros((1, 2), dtype=bool))
-    seen = updated(belief, (0, 1), unended, Ends())
-    assert seen.at[0].imag == pytest.approx([3.0, 3.0], abs=0.2)
-    assert np.linalg.eigvalsh(seen.cov[0]).min() > 0.0
-    assert np.trace(seen.cov[0]) < np.trace(cov)
+    not_shared, not_ended = np.zeros(1, dtype=bool), np.zeros((1, 2), dtype=bool)
+    after = updated(belief, (0, 1), lines, not_shared, not_ended, AT_MM)
+    assert after.at[0].imag == pytest.approx([3.0, 3.0], abs=0.2)
+    assert np.linalg.eigvalsh(after.cov[0]).min() > 0.0
+    assert np.trace(after.cov[0]) < np.trace(cov)
 
 
 def test_beliefs_side_by_side_are_corrected_as_each_alone():
@@ -102,11 +104,10 @@ def test_beliefs_side_by_side_are_corrected_as_each_alone():
     many = Beliefs(rng.normal(0.0, 20.0, (3, 3)) + 1j * rng.normal(size=(3, 3)), root @ root.mT + np.eye(6))
     lines = lines_of(ink_of([(2j * row, 50 + 3j * row) for row in range(3)]))
     shared, ended = np.array([False, True, False]), rng.random((3, 2)) > 0.5
-    together = updated(many, (0, 2), Taken(lines, shared, ended), Ends())
+    together = updated(many, (0, 2), lines, shared, ended, AT_MM)
     for row in range(3):
         one = np.array([row])
-        taken = Taken(lines.take(one), shared[one], ended[one])
-        alone = updated(many.take(one), (0, 2), taken, Ends())
+        alone = updated(many.take(one), (0, 2), lines.take(one), shared[one], ended[one], AT_MM)
         assert alone.at[0] == pytest.approx(together.at[row])
         assert alone.cov[0] == pytest.approx(together.cov[row])
 
@@ -114,12 +115,12 @@ def test_beliefs_side_by_side_are_corrected_as_each_alone():
 def test_strokes_are_told_apart_by_where_they_should_lie():
     _, _, drawing = task()
     edges = vectors_of(drawing.construction, VELOCITY_PLAN)
-    expected = expect(drawing, VELOCITY_PLAN, {}, Hand(), edges)
+    expected = expect(drawing, VELOCITY_PLAN, {}, DraftingErrors(), edges)
     at = dict(zip(expected.names, expected.at, strict=True))
     names = [expected.names[edge.tail] + expected.names[edge.head] for edge in edges]
     order = np.random.default_rng(0).permutation(len(edges))
     strokes = [(complex(at[names[k][0]]), complex(at[names[k][1]])) for k in order]
-    found = explain(expected, lines_of(ink_of(strokes)), Ends())[0]
+    found = assign_strokes([expected], lines_of(ink_of(strokes)), EndPrior())[0][0]
     assert [int(order[row]) for row in found.stroke] == list(range(len(edges)))
 
 
@@ -127,15 +128,15 @@ def velocity_plan_drawn():
     """What is expected of a velocity plan, and lines where that lies."""
     _, _, drawing = task()
     edges = vectors_of(drawing.construction, VELOCITY_PLAN)
-    expected = expect(drawing, VELOCITY_PLAN, {}, Hand(), edges)
+    expected = expect(drawing, VELOCITY_PLAN, {}, DraftingErrors(), edges)
     return expected, lines_of(ink_of([(expected.at[edge.tail], expected.at[edge.head]) for edge in edges]))
 
 
 def test_figures_explained_side_by_side_are_explained_as_each_alone():
     expected, lines = velocity_plan_drawn()
-    off = [expected.placed(at, 1.0, 0.0, Slack()) for at in (0.5 + 0.3j, -1.0 + 0.4j, 200 + 0j)]
-    for together, figure in zip(explain_each(off, lines, Ends()), off, strict=True):
-        alone = explain(figure, lines, Ends())
+    off = [expected.placed(Pose(at, 1.0, 0.0, 1.0), Slack()) for at in (0.5 + 0.3j, -1.0 + 0.4j, 200 + 0j)]
+    for together, figure in zip(assign_strokes(off, lines, EndPrior()), off, strict=True):
+        alone = assign_strokes([figure], lines, EndPrior())[0]
         assert [one.stroke.tolist() for one in together] == [one.stroke.tolist() for one in alone]
         assert [one.score for one in together] == pytest.approx([one.score for one in alone])
         assert together[0].expected.at == pytest.approx(alone[0].expected.at)
@@ -143,9 +144,11 @@ def test_figures_explained_side_by_side_are_explained_as_each_alone():
 
 def test_what_is_settled_is_not_asked_again():
     expected, lines = velocity_plan_drawn()
-    free = explain(expected, lines, Ends())[0].stroke
-    without = Settled({0: -1, 1: int(free[1])}, barred=(2, int(free[2])))
-    (found,) = (each[0].stroke for each in explain_each([expected], lines, Ends(), settled=[without]))
+    free = assign_strokes([expected], lines, EndPrior())[0][0].stroke
+    without = Constraint({0: -1, 1: int(free[1])}, barred=(2, int(free[2])))
+    (found,) = (
+        each[0].stroke for each in assign_strokes([expected], lines, EndPrior(), constraints=[without])
+    )
     assert found[0] == -1
     assert found[1] == free[1]
     assert found[2] != free[2]
@@ -154,16 +157,18 @@ def test_what_is_settled_is_not_asked_again():
 def test_an_edge_without_a_stroke_is_left_without():
     _, _, drawing = task()
     edges = vectors_of(drawing.construction, VELOCITY_PLAN)
-    expected = expect(drawing, VELOCITY_PLAN, {}, Hand(), edges)
+    expected = expect(drawing, VELOCITY_PLAN, {}, DraftingErrors(), edges)
     ends = [(complex(expected.at[edge.tail]), complex(expected.at[edge.head])) for edge in edges]
-    found = explain(expected, lines_of(ink_of(ends[:-1])), Ends())[0]
+    found = assign_strokes([expected], lines_of(ink_of(ends[:-1])), EndPrior())[0][0]
     assert found.stroke[-1] == -1 or found.shared[-1]
 
 
 def test_expectations_propagate_the_hands_errors():
     _, _, drawing = task()
-    careless = expect(drawing, VELOCITY_PLAN, {}, Hand(angle_rad=0.02), ())
-    careful = expect(drawing, VELOCITY_PLAN, {}, Hand(angle_rad=0.001, length_mm=0.1, shift_mm=0.05), ())
+    careless = expect(drawing, VELOCITY_PLAN, {}, DraftingErrors(angle_rad=0.02), ())
+    careful = expect(
+        drawing, VELOCITY_PLAN, {}, DraftingErrors(angle_rad=0.001, length_mm=0.1, shift_mm=0.05), ()
+    )
     d = 2 * careful.names.index("d")
     assert careless.cov[d, d] > careful.cov[d, d] > 0.0
     assert careless.at == pytest.approx(careful.at)
@@ -175,7 +180,7 @@ def test_links_of_a_press_are_its_bars():
 
 
 def test_probability_within_half_a_millimetre_falls_with_the_error():
-    shares = [nodes.within(np.diag([s**2, s**2])) for s in (0.05, 0.2, 0.5, 2.0)]
+    shares = [within(np.diag([s**2, s**2])) for s in (0.05, 0.2, 0.5, 2.0)]
     assert shares == sorted(shares, reverse=True)
     assert shares[0] > 0.999
     assert shares[-1] < 0.1
@@ -188,7 +193,7 @@ def test_probability_within_half_a_millimetre_falls_with_the_error():
 )
 def test_every_bad_sign_lowers_the_confidence(worse):
     good = Signs(placed=0.98, named=0.99)
-    assert sureness(replace(good, **worse)) < sureness(good)
+    assert replace(good, **worse).confidence() < good.confidence()
 
 
 def test_ends_that_reach_a_node_side_by_side_count_as_one():
@@ -198,5 +203,5 @@ def test_ends_that_reach_a_node_side_by_side_count_as_one():
         return row
 
     rows = np.array([outward(0, 10), outward(0, 14), outward(0, 18), outward(0, 100), outward(1, 10)])
-    ends = nodes._Ends(rows, np.zeros(5), np.zeros(5), np.zeros((5, 0)), np.zeros((5, 0)))
+    ends = nodes._EndRows(rows, np.zeros(5), np.zeros(5), np.zeros((5, 0)), np.zeros((5, 0)))
     assert nodes._repeated(ends) == pytest.approx([2 / 3, 2 / 3, 2 / 3, 0.0, 0.0])

@@ -65,7 +65,7 @@ def whitworth(first, ground, angle_deg=40.0, offset=0.0):
 
 def told(found: Cycle):
     """The samples at which something is told."""
-    return np.array([index not in found.untold for index in range(found.driven.size)])
+    return np.array([index not in found.undetermined for index in range(found.driven.size)])
 
 
 def moving_with_their_links(found: Cycle):
@@ -103,8 +103,8 @@ def test_the_coupler_of_a_parallelogram_never_turns(angle_deg):
     found = cycle(four_bar(3.0, (1.0, 3.0, 1.0), angle_deg, side))
     here = told(found)
     assert found.turns == 1
-    assert list(found.untold) == [0, 180, 360]
-    assert "in line" in found.untold[180]
+    assert list(found.undetermined) == [0, 180, 360]
+    assert "in line" in found.undetermined[180]
     assert np.max(np.abs(found.motion.omega["2"][here])) < NEAR_FLAT
     assert np.max(np.abs(found.motion.omega["3"][here] - 1.0)) < NEAR_FLAT
     coupler = (found.motion.position["B"] - found.motion.position["A"])[here]
@@ -130,7 +130,7 @@ def test_a_kite_turns_its_rocker_once_in_two_turns():
     phi = found.driven
     assert found.turns == 2
     assert phi[-1] == pytest.approx(4 * np.pi)
-    assert list(found.untold) == [0, 360, 720]
+    assert list(found.undetermined) == [0, 360, 720]
     # B is on the axis, from O1 at distance cos(phi/2) + sqrt(4 - sin^2(phi/2)), or minus the root.
     axis = direction(phi / 2)
     roots = np.sqrt(4.0 - np.sin(phi / 2) ** 2)
@@ -143,7 +143,7 @@ def test_a_kite_turns_its_rocker_once_in_two_turns():
 def test_an_isosceles_slider_crank_passes_its_middle():
     found = cycle(slider_crank(1.0, 1.0, 20.0, side=1))
     here = told(found)
-    assert list(found.untold) == [90, 270]
+    assert list(found.undetermined) == [90, 270]
     assert np.max(np.abs(found.motion.position["B"] - 2.0 * np.cos(found.driven))[here]) < NEAR_FLAT
     assert np.max(np.abs(found.motion.velocity["B"] + 2.0 * np.sin(found.driven))[here]) < NEAR_FLAT
     assert found.turns == 1
@@ -166,7 +166,7 @@ def test_two_parallelograms_one_after_another_both_pass():
     chain = Mechanism({**first.ground_m, "O3": one(6.0 + 0j)}, first.driver, (*first.groups, second))
     found = cycle(chain)
     here = told(found)
-    assert list(found.untold) == [0, 180, 360]
+    assert list(found.undetermined) == [0, 180, 360]
     for link, rate in (("2", 0.0), ("3", 1.0), ("4", 0.0), ("5", 1.0)):
         assert np.max(np.abs(found.motion.omega[link][here] - rate)) < 1e-6
 
@@ -295,7 +295,7 @@ def test_samples_very_near_a_flat_position_are_right_or_untold():
     here = told(found)
     for link in ("3", "5"):
         assert np.max(np.abs(found.motion.omega[link][here] - 1.0)) < 1e-4
-    assert all("determined" in reason or "in line" in reason for reason in found.untold.values())
+    assert all("determined" in reason or "in line" in reason for reason in found.undetermined.values())
 
 
 def test_guides_that_become_parallel_end_the_range():
@@ -337,7 +337,7 @@ def test_a_yoke_moves_harmonically():
     yoke = Yoke("B", "A", one(np.pi / 2), FixedGuide(one(0j), one(0.0)))
     found = cycle(Mechanism({"O1": one(0j)}, crank(0.3, 10.0, 2.0), (yoke,)))
     assert found.motion.velocity["B"].real == pytest.approx(-0.6 * np.sin(found.driven), abs=1e-12)
-    assert not found.untold
+    assert not found.undetermined
 
 
 def test_a_link_on_a_moving_guide_passes_as_on_a_fixed_one():
@@ -359,7 +359,7 @@ def test_the_built_in_mechanisms_turn_fully_and_without_jumps(name):
     assignment = load_assignment(name)
     found = cycle(assignment.mechanism(assignment.variants()[:1]))
     assert found.turns == 1
-    assert not found.untold
+    assert not found.undetermined
     assert not found.following.events
     assert_no_jump(found)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference.construction.graph import evaluate
-from reference.construction.uncertainty import SMALL, Own, Skill, acts, hand_errors, spread, trace
+from reference.construction.uncertainty import SMALL, OwnNode, Skill, acts, hand_errors, spread, trace
 from tests.hands import task_for
 
 SKILL = Skill(angle_deg=0.3, place_mm=0.25, mark_mm=0.1)
@@ -54,7 +54,7 @@ def test_without_own_nodes_a_drawing_is_the_exact_one_and_every_act_moves_someth
 def test_own_nodes_are_taken_as_drawn_and_only_what_comes_after_may_be_missed():
     task = task_for("pump", 7)
     exact = evaluate(task.construction, task.parameters)
-    own = {node: Own(complex(np.ravel(place)[0])) for node, place in exact.items()}
+    own = {node: OwnNode(complex(np.ravel(place)[0])) for node, place in exact.items()}
     by_figure = {
         figure: {step.node: own[step.node] for step in steps if step.node != "d"}
         for figure, steps in task.construction.figures.items()
@@ -71,7 +71,7 @@ def test_what_measuring_leaves_open_is_told_after_the_hands_errors():
     task = task_for("pump", 7)
     places = evaluate(task.construction, task.parameters)
     at = complex(np.ravel(places["c"])[0])
-    found = traced(task, {"velocity_plan": {"c": Own(at, np.array([0.2, 0.2j]))}})
+    found = traced(task, {"velocity_plan": {"c": OwnNode(at, np.array([0.2, 0.2j]))}})
     assert found.hand == len(acts(task.construction))
     moved = found.made["d"].moved
     assert len(moved) == found.hand + 2

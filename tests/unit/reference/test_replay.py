@@ -8,7 +8,7 @@ from reference.construction.graph import evaluate
 from reference.construction.mistakes import Drawing, Mistake, commit
 from reference.construction.uncertainty import Skill, acts
 from reference.plan import exact_plan
-from reference.replay.explanations import Seen, Work
+from reference.replay.explanations import Observation, Observations
 from reference.replay.replay import Root, replay
 
 USUAL = Skill(angle_deg=0.3, place_mm=0.25, mark_mm=0.1)
@@ -38,16 +38,20 @@ def drawn(drawing: Drawing, *mistakes: Mistake, care: float = 0.0, seed: int = 1
     return {name: complex(place) for name, place in nodes.items()}
 
 
-def nodes_of(drawing: Drawing, places: dict[str, complex]) -> Work:
+def nodes_of(drawing: Drawing, places: dict[str, complex]) -> Observations:
     given = {*drawing.construction.poles.values(), "O1", "O2"}
-    return Work(tuple(Seen(name, None, at, READ_MM2) for name, at in places.items() if name not in given))
+    return Observations(
+        tuple(Observation(name, None, at, READ_MM2) for name, at in places.items() if name not in given)
+    )
 
 
-def lengths_of(drawing: Drawing, places: dict[str, complex], spread_mm2: float = 0.15) -> Work:
+def lengths_of(drawing: Drawing, places: dict[str, complex], spread_mm2: float = 0.15) -> Observations:
     spread = (spread_mm2, 0.0, spread_mm2)
-    return Work(
+    return Observations(
         tuple(
-            Seen(one.head, one.tail, abs(places[one.head] - places[one.tail]), spread, has_direction=False)
+            Observation(
+                one.head, one.tail, abs(places[one.head] - places[one.tail]), spread, has_direction=False
+            )
             for one in drawing.construction.vectors.values()
         )
     )
@@ -148,7 +152,7 @@ def test_a_second_sketch_is_what_its_plan_is_drawn_from():
     accelerations = [one.node for one in right.construction.figures["acceleration_plan"]]
     places = {**first, **{name: complex(again[name]) for name in accelerations}}
     seen = nodes_of(right, places).seen
-    beside = replay(right, Work(seen, {"acceleration_plan": second}), [Root()], USUAL)[0]
-    without = replay(right, Work(seen), [Root()], USUAL)[0]
+    beside = replay(right, Observations(seen, {"acceleration_plan": second}), [Root()], USUAL)[0]
+    without = replay(right, Observations(seen), [Root()], USUAL)[0]
     assert beside.is_innocent
     assert beside.cost < without.cost - SURE_COST

@@ -9,7 +9,7 @@ import pytest
 
 from reference.authored.assignment import load_assignment
 from reference.drawing import symbols
-from reference.drawing.canvas import Area, Curve, Label, Stroke, as_pieces, moved
+from reference.drawing.canvas import Area, Curve, Label, Stroke, as_pieces, shifted
 from reference.drawing.labels import Wanted, place_labels, segments_of
 from reference.drawing.sheets import CELL_MM, FRAME, LEAST_GAP_MM, figures_of, lay_out, reference_drawing
 from reference.drawing.sketch import support_direction
@@ -58,7 +58,7 @@ def test_figures_on_one_sheet_keep_apart(position):
         assert position in {0, 2}, "the acceleration plan is 270 mm wide beside a mechanism of 230 mm"
         return
     clouds = [
-        points_of([moved(shape, by) for shape in figure.shapes])
+        points_of([shifted(shape, by) for shape in figure.shapes])
         for figure, by in zip(figures, moves, strict=True)
     ]
     left, top, right, bottom = FRAME

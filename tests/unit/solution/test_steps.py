@@ -168,7 +168,7 @@ def test_each_picture_shows_the_new_step_and_greys_the_earlier_ones(case, folder
         for step in chapter.steps:
             now = [shape for shape in step.picture.shapes if getattr(shape, "colour", "") == NOW]
             named = {"".join(piece.text for piece in as_pieces(s.text)) for s in now if isinstance(s, Label)}
-            letter = letters(subject, step.told.step.node)
+            letter = letters(subject, step.explanation.step.node)
             assert any(letter in label.split(", ") for label in named)
             before = {
                 part
@@ -185,7 +185,7 @@ def test_what_a_direction_is_taken_from_is_shown_on_the_mechanism(folder):
     subject = subject_of("pump 7", "en", folder)
     for chapter in chapters(subject, tongue("en"))[1:3]:
         for step in chapter.steps:
-            assert (step.model is None) == isinstance(step.told.step, Pole)
+            assert (step.model is None) == isinstance(step.explanation.step, Pole)
 
 
 def test_the_page_is_whole_by_itself_and_its_pictures_are_well_formed(folder):
@@ -230,10 +230,10 @@ def test_centres_are_told_and_shown_where_they_are(case, folder):
     chapter = chapters(subject, tongue("en"))[3]
     assert chapter.steps
     for step in chapter.steps:
-        centre = subject.centres[step.told.step.node]
-        told = [float(value) for value in re.findall(r"= ([\d.]+)\smm", plain(step.told.sentence))]
+        centre = subject.centres[step.explanation.step.node]
+        told = [float(value) for value in re.findall(r"= ([\d.]+)\smm", plain(step.explanation.sentence))]
         assert told == pytest.approx(
-            [abs(centre - nodes[joint]) for joint in step.told.step.base], abs=ROUNDED
+            [abs(centre - nodes[joint]) for joint in step.explanation.step.base], abs=ROUNDED
         )
         if step.picture is not None:
             dots = [s for s in step.picture.shapes if isinstance(s, Ring) and s.colour == NOW]
