@@ -38,7 +38,8 @@ class DraftingErrors:
     def of(self, step: Step, kind: str, size_mm: float) -> float:
         """The standard error of one act of a step, mm or rad.
 
-        Arguments: `kind` as in `reference.construction.elements.Errors`; `size_mm` is the length that the step lays off.
+        Arguments: `kind` as in `reference.construction.elements.Errors`; `size_mm` is the length that the
+        step lays off.
         """
         match kind:
             case "angle":
