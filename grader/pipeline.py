@@ -83,9 +83,9 @@ def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
         if isinstance(sheet, Sheet) and not image.damage:
             image, sheet = straighten(image, sheet)
     if image.damage:
-        told = f"{image.damage} are damaged in the file, so that lengths read there would be wrong"
-        advice = "scan the sheet again, or grade it by hand"
-        return _refused(page, "image_damaged_rows", f"{ref.file}: page {ref.page}: {told}: {advice}")
+        damage = f"{image.damage} are damaged in the file, so that lengths read there would be wrong"
+        why = f"{ref.file}: page {ref.page}: {damage}: scan the sheet again, or grade it by hand"
+        return _refused(page, "image_damaged_rows", why)
     if not isinstance(sheet, Sheet):
         return _refused(page, "sheet_refused", f"{ref.file}: page {ref.page}: {sheet.reason}")
     problems = tuple(replace(problem, file=ref.file) for problem in sheet.problems)
@@ -117,9 +117,8 @@ def read_submission(
     drawn = {figure for page in read for figure in page.reading.figures}
     if any(page.narrowed for page in pages) and not asked.figures <= drawn:
         # A figure is not in its zone: people draw where they like.
-        whole = [
-            scan(page.ref, replace(asked, figures=frozenset())) if page.narrowed else page for page in pages
-        ]
+        all_of_it = replace(asked, figures=frozenset())
+        whole = [scan(page.ref, all_of_it) if page.narrowed else page for page in pages]
         read = read_pages(whole, assignment, submission.variant, submission.declared, asked.vectors)
     return read
 
