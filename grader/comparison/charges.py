@@ -20,18 +20,18 @@ class Against(Protocol):
     """Marks a criterion against one expectation."""
 
     def __call__(
-        self, expected: complex, reach: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
+        self, expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
     ) -> MarkRange:
-        """The mark; `reach` is how far a careful hand may miss it, `se` its standard errors."""
+        """The mark; `uncertainty` is how far a careful hand may miss it, `se` its standard errors."""
 
 
 @dataclass(frozen=True, slots=True)
-class Marked:
+class ComparedMark:
     """A mark with what it was held against."""
 
     mark: MarkRange
     expected: complex
-    reach: EndSpread = NO_SPREAD
+    uncertainty: EndSpread = NO_SPREAD
     is_followed: bool = False
 
 
@@ -69,18 +69,18 @@ class Charges:
     doubtful: set[str] = field(default_factory=set)
     shown: set[str] = field(default_factory=set)
     """What the criterion being marked is the first to show: it is charged there, and followed after it."""
-    known_off: dict[str, bool] = field(default_factory=dict)
+    known_wrong: dict[str, bool] = field(default_factory=dict)
     factors: dict[str, float | None] = field(default_factory=dict)
     """By scale, the factor by which all values are off, where that was looked for."""
 
-    def best(self, segment: TaskSegment, against: Against, *, follows_through: bool) -> Marked:
+    def best(self, segment: TaskSegment, against: Against, *, follows_through: bool) -> ComparedMark:
         """The mark on the original data, or a better one on what follows from own earlier values."""
         self.charge_shown()
         exact = segment.drawn(self.used)
-        marked = Marked(against(exact), exact)
+        marked = ComparedMark(against(exact), exact)
         if not marked.mark.is_full:
-            reach = self.following.whole_reach(segment, exact)
-            marked = Marked(against(exact, reach), exact, reach)
+            uncertainty = self.following.uncertainty_of(segment, exact)
+            marked = ComparedMark(against(exact, uncertainty), exact, uncertainty)
         if not marked.mark.is_full and follows_through:
             marked = self.followed_through(segment, against, marked)
         self.charge_shown()
@@ -96,7 +96,9 @@ class Charges:
         self.charged.update(self.shown)
         self.shown.clear()
 
-    def followed_through(self, segment: TaskSegment, against: Against, original: Marked) -> Marked:
+    def followed_through(
+        self, segment: TaskSegment, against: Against, original: ComparedMark
+    ) -> ComparedMark:
         """The best of what follows: from the scale drawn at, from own nodes, from anything else."""
         marked, following = original, self.following
         at_scale = following.at_followed_scale(segment)
@@ -111,8 +113,8 @@ class Charges:
         return marked
 
     def from_own_nodes(
-        self, segment: TaskSegment, against: Against, marked: Marked, original: Marked
-    ) -> Marked:
+        self, segment: TaskSegment, against: Against, marked: ComparedMark, original: ComparedMark
+    ) -> ComparedMark:
         """The mark by the nodes that this step started from, where they are known."""
         expectation = self.following.from_nodes(segment, self.used)
         if not expectation.relies_on:
@@ -121,23 +123,23 @@ class Charges:
             is_trivial = self.following.is_trivial(segment, expectation.vector)
             return marked if is_trivial else self.the_better(marked, expectation, against)
         # Every earlier step is within what a hand may miss: this step alone counts.
-        mark = against(expectation.vector, expectation.reach, expectation.se)
+        mark = against(expectation.vector, expectation.uncertainty, expectation.se)
         if not mark.is_better(marked.mark):
             return marked
         reasons = () if mark.is_full else original.mark.reasons
         return replace(original, mark=MarkRange(mark.share, mark.worst, mark.best, reasons))
 
-    def the_better(self, marked: Marked, expectation: Expectation, against: Against) -> Marked:
+    def the_better(self, marked: ComparedMark, expectation: Expectation, against: Against) -> ComparedMark:
         """What was found so far, or what follows where that leaves more."""
         candidate = self.allowed(
-            expectation.relies_on, against(expectation.vector, expectation.reach, expectation.se)
+            expectation.relies_on, against(expectation.vector, expectation.uncertainty, expectation.se)
         )
         if not candidate.is_better(marked.mark):
             return marked
-        return Marked(
+        return ComparedMark(
             the_better(candidate, marked.mark, *self.why(expectation)),
             expectation.vector,
-            expectation.reach,
+            expectation.uncertainty,
             is_followed=True,
         )
 
@@ -162,16 +164,16 @@ class Charges:
 
     # What is wrong --------------------------------------------------------------------------------
 
-    def is_off(self, node: str) -> bool:
+    def is_wrong(self, node: str) -> bool:
         """Whether an own node is further from its right place than a hand may miss it."""
-        if node not in self.known_off:
-            self.known_off[node] = self._is_off(node)
-        return self.known_off[node]
+        if node not in self.known_wrong:
+            self.known_wrong[node] = self._is_off(node)
+        return self.known_wrong[node]
 
     def _is_off(self, node: str) -> bool:
         """Where it is beyond the plain tolerance, what a careful hand makes of it counts."""
         task = self.task
-        own = self.own_place(node)
+        own = self.own_position(node)
         if own is None:
             return False
         exact = task.nodes(self.used)[node]
@@ -180,8 +182,8 @@ class Charges:
         off = own - exact
         if abs(off) <= task.tolerance_at(node).length_at(abs(exact)):
             return False
-        reach = scaled(spread(task.traced(self.used).nodes[node].moved, off), task.rubric.hand.sigmas)
-        return abs(off) > reach.along
+        uncertainty = scaled(spread(task.traced(self.used).nodes[node].shifts, off), task.rubric.hand.sigmas)
+        return abs(off) > uncertainty.along
 
     def is_by_length(self, segment: TaskSegment) -> bool:
         """Whether only the length is known of a vector that is laid off: its sense may be wrong."""
@@ -189,7 +191,7 @@ class Charges:
         is_laid_off = isinstance(self.task.construction.step(segment.head), Given)
         return is_laid_off and drawn is not None and drawn.direction_rad is None
 
-    def own_place(self, node: str) -> complex | None:
+    def own_position(self, node: str) -> complex | None:
         """An own node as read or measured, or as lengths lead to it."""
         if node in self.evidence.nodes:
             return self.evidence.nodes[node]
@@ -203,7 +205,7 @@ class Charges:
         blamed = relies_on & (self.charged | self.inherited)
         open_ones = relies_on - blamed - (self.cleared - self.by_length)
         nodes = known(self.following.own(self.used)) | self.evidence.nodes.keys()
-        return blamed | {name for name in open_ones if name not in nodes or self.is_off(name)}
+        return blamed | {name for name in open_ones if name not in nodes or self.is_wrong(name)}
 
     def allowed(self, relies_on: frozenset[str], mark: MarkRange) -> MarkRange:
         """Credit for following only where the earlier mistake has been charged; else it is charged here."""

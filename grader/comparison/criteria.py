@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from grader.comparison import verdicts
-from grader.comparison.charges import Against, Charges, Marked, new_charges
+from grader.comparison.charges import Against, Charges, ComparedMark, new_charges
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
 from grader.comparison.follow_through import NO_SPREAD, Explain, ReplayResult, nothing_explained
 from grader.comparison.scales import Scale, settle
@@ -41,16 +41,16 @@ from reference.construction.graph import AngularRate
 from reference.construction.steps import Given
 from reference.construction.uncertainty import EndSpread
 
-SO_MANY = 3
+LEAST_VALUES = 3
 """Values that are off by one factor were made with a wrong scale; fewer may be so by chance."""
-ALIKE = 0.02
+SAME_FACTOR = 0.02
 """Relative: how near to each other their factors are, with rounding on the way."""
 HALF = 0.5
 """The share of a criterion that a right drawing keeps where the rubric has no band of partial points."""
 
 
 def mark_of_value(
-    charges: Charges, criterion: CriterionTable, value: float, marked: Marked, drawn: DrawnVector
+    charges: Charges, criterion: CriterionTable, value: float, marked: ComparedMark, drawn: DrawnVector
 ) -> MarkRange | None:
     """The mark on a computed value beside its drawing; None where it is right, or right by the drawing.
 
@@ -72,7 +72,7 @@ def mark_of_value(
     if best.is_full:
         return None
     if factor is not None:
-        charges.charged.add(_name(one.scale))
+        charges.charged.add(_charge_of(one.scale))
     keeps = max(best.share, table.all_bands[0][1] if table.all_bands else HALF)
     return MarkRange(keeps, keeps, keeps, best.reasons)
 
@@ -94,23 +94,23 @@ def _common_factor(charges: Charges, scale: str) -> float | None:
         length = abs(task.drawn(name, charges.used)) if drawn is None else drawn.length_mm
         if length > task.rubric.tolerance_of(name).least_mm:
             factors.append(abs(evidence.values[name]) / (length * charges.used[scale]))
-    if len(factors) < SO_MANY:
+    if len(factors) < LEAST_VALUES:
         return None
     factor = statistics.median(factors)
-    near = [each for each in factors if abs(each - factor) <= ALIKE * factor]
-    is_off = abs(factor - 1.0) > 2.0 * task.rubric.tolerance_of(scale).scale_relative
-    return factor if is_off and len(near) >= max(SO_MANY, len(factors) - 1) else None
+    near = [each for each in factors if abs(each - factor) <= SAME_FACTOR * factor]
+    is_wrong = abs(factor - 1.0) > 2.0 * task.rubric.tolerance_of(scale).scale_relative
+    return factor if is_wrong and len(near) >= max(LEAST_VALUES, len(factors) - 1) else None
 
 
-def _name(scale: str) -> str:
+def _charge_of(scale: str) -> str:
     return f"values by {scale}"
 
 
 def _is_charged(charges: Charges, scale: str) -> bool:
-    return _name(scale) in charges.charged
+    return _charge_of(scale) in charges.charged
 
 
-def value_alone(charges: Charges, criterion: CriterionTable) -> Outcome:
+def value_outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
     """A vector of which only the computed value was handed in, or nothing."""
     one, values = charges.task.segments[criterion.name], charges.evidence.values
     scale = charges.used[one.scale]
@@ -119,16 +119,21 @@ def value_alone(charges: Charges, criterion: CriterionTable) -> Outcome:
         return absent(charges, criterion, verdicts.expected_quantity(one.name, exact, scale, 0.0))
     value, unit = abs(values[one.name]), unit_of(one.name)
 
-    def allowed(expected: complex, reach: EndSpread) -> Tolerance:
+    def allowed(expected: complex, uncertainty: EndSpread) -> Tolerance:
         plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(expected), with_direction=False)
-        if reach is NO_SPREAD:
+        if uncertainty is NO_SPREAD:
             return Tolerance(value=(plain.length_mm or 0.0) * scale)
-        wider = widened(plain, abs(expected), reach, charges.task.rubric.hand.at_most)
+        wider = widened(plain, abs(expected), uncertainty, charges.task.rubric.hand.at_most)
         return Tolerance(value=(wider.length_mm or 0.0) * scale, widened=wider.widened)
 
-    def against(expected: complex, reach: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD) -> MarkRange:
+    def against(
+        expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
+    ) -> MarkRange:
         del se
-        limit, table = allowed(expected, reach).value or 0.0, charges.task.rubric.tolerance_of(criterion)
+        limit, table = (
+            allowed(expected, uncertainty).value or 0.0,
+            charges.task.rubric.tolerance_of(criterion),
+        )
         plain = table.length_at(abs(expected)) * scale
         return mark_value(value, abs(expected) * scale, limit, plain, table, unit)
 
@@ -142,24 +147,24 @@ def value_alone(charges: Charges, criterion: CriterionTable) -> Outcome:
         marked.mark,
         measured,
         Quantity(value=right, unit=unit),
-        allowed(marked.expected, marked.reach),
+        allowed(marked.expected, marked.uncertainty),
         followed=marked.is_followed,
     )
 
 
-def _by_factor(charges: Charges, scale: str, marked: Marked, against: Against) -> Marked:
+def _by_factor(charges: Charges, scale: str, marked: ComparedMark, against: Against) -> ComparedMark:
     """A value that is off by the factor of all, after the first of them."""
     factor, exact = common_factor(charges, scale), marked.expected
     if factor is None:
         return marked
     mark = against(exact * factor)
     if not _is_charged(charges, scale):
-        charges.charged.add(_name(scale))
+        charges.charged.add(_charge_of(scale))
         return marked
     if not mark.is_better(marked.mark):
         return marked
     told = Reason("follows", {"what": "scale", "of": scale})
-    return Marked(the_better(mark, marked.mark, told), exact * factor, is_followed=True)
+    return ComparedMark(the_better(mark, marked.mark, told), exact * factor, is_followed=True)
 
 
 # What was not handed in, or not read -------------------------------------------------------------
@@ -278,7 +283,7 @@ def _judged(charges: Charges, criterion: CriterionTable) -> Outcome:
     outcomes = [segment(charges, criterion, drawn) for drawn in sources if drawn is not None]
     if len(outcomes) == 2:
         return verdicts.both(outcomes[0], outcomes[1], charges.task.rubric.tolerance_of(criterion).length_mm)
-    return outcomes[0] if outcomes else value_alone(charges, criterion)
+    return outcomes[0] if outcomes else value_outcome(charges, criterion)
 
 
 def _scale(charges: Charges, criterion: CriterionTable) -> Outcome:
@@ -324,7 +329,7 @@ def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> 
         mark,
         verdicts.quantity(one.name, drawn.length_mm, on_sheet, value),
         verdicts.expected_quantity(one.name, marked.expected, scale, drawn.turn_rad),
-        _allowed(criterion, charges, marked, with_direction=with_direction),
+        _full_tolerance(criterion, charges, marked, with_direction=with_direction),
         confidence=drawn.confidence,
         followed=marked.is_followed,
         mistake="arithmetic" if is_arithmetic else None,
@@ -339,17 +344,21 @@ def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
     is_read = drawn is charges.evidence.drawn.get(criterion.name)
     written = charges.evidence.written.get(criterion.name) if is_read else None
 
-    def against(expected: complex, reach: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD) -> MarkRange:
+    def against(
+        expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
+    ) -> MarkRange:
         size = abs(expected)
         plain = tolerances(table, size, with_direction=with_direction)
-        if reach is NO_SPREAD:
+        if uncertainty is NO_SPREAD:
             mark = mark_vector(drawn, expected, plain, table, se)
         else:
-            mark = mark_vector(drawn, expected, widened(plain, size, reach, rubric.hand.at_most), table, se)
+            mark = mark_vector(
+                drawn, expected, widened(plain, size, uncertainty, rubric.hand.at_most), table, se
+            )
             if not mark.is_full:
-                by_hand = mark_vector(drawn, expected, widened(plain, size, reach), table, se)
-                mark = left_open(mark, ALL_RIGHT if _is_boundless(reach, size) else by_hand)
-        mark = held_against_written(mark, drawn, written, table, least)
+                by_hand = mark_vector(drawn, expected, widened(plain, size, uncertainty), table, se)
+                mark = left_open(mark, ALL_RIGHT if _is_boundless(uncertainty, size) else by_hand)
+        mark = compared_with_cells(mark, drawn, written, table, least)
         return verdicts.with_confidence(mark, drawn.confidence, least)
 
     return against
@@ -360,20 +369,20 @@ BOUNDLESS_MM, BOUNDLESS_SHARE = 20.0, 0.5
 hand may miss by anything."""
 
 
-def _is_boundless(reach: EndSpread, size_mm: float) -> bool:
+def _is_boundless(uncertainty: EndSpread, size_mm: float) -> bool:
     """Whether lines cross so badly that nothing tells how far a careful hand may miss."""
-    return max(reach.along, reach.across) > max(BOUNDLESS_MM, BOUNDLESS_SHARE * size_mm)
+    return max(uncertainty.along, uncertainty.across) > max(BOUNDLESS_MM, BOUNDLESS_SHARE * size_mm)
 
 
-def _allowed(
-    criterion: CriterionTable, charges: Charges, marked: Marked, *, with_direction: bool
+def _full_tolerance(
+    criterion: CriterionTable, charges: Charges, marked: ComparedMark, *, with_direction: bool
 ) -> Tolerance:
     """What full marks allow, for the report."""
     size = abs(marked.expected)
     plain = tolerances(charges.task.rubric.tolerance_of(criterion), size, with_direction=with_direction)
-    if marked.reach is NO_SPREAD:
+    if marked.uncertainty is NO_SPREAD:
         return plain
-    return widened(plain, size, marked.reach, charges.task.rubric.hand.at_most)
+    return widened(plain, size, marked.uncertainty, charges.task.rubric.hand.at_most)
 
 
 # Angular quantities ------------------------------------------------------------------------------
@@ -394,11 +403,11 @@ def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     allowed = Tolerance(value=plain)
     mark, followed = mark_value(value, right, plain, plain, table, unit), False
     if not mark.is_full:
-        allowed = _widened(charges, criterion, segment, per_mm)
+        allowed = _widened_rate(charges, criterion, segment, per_mm)
         mark = mark_value(value, right, allowed.value or 0.0, plain, table, unit)
     charges.remember(name, mark)
     follows = task.rubric.follows_through(criterion)
-    own = from_rate(task, charges.evidence, turned, scale) if follows and not mark.is_full else None
+    own = rate_from_vector(task, charges.evidence, turned, scale) if follows and not mark.is_full else None
     factor = common_factor(charges, segment.scale)
     if own is None and factor is not None and follows and not mark.is_full:
         own = right
@@ -416,12 +425,14 @@ def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     return verdicts.outcome(criterion, mark, measured, expected, allowed, followed=followed)
 
 
-def _widened(charges: Charges, criterion: CriterionTable, segment: TaskSegment, per_mm: float) -> Tolerance:
+def _widened_rate(
+    charges: Charges, criterion: CriterionTable, segment: TaskSegment, per_mm: float
+) -> Tolerance:
     """The tolerance with what a careful hand may miss of the vector that turns the link."""
     exact = segment.drawn(charges.used)
     plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(exact), with_direction=False)
-    reach = charges.following.whole_reach(segment, exact)
-    wider = widened(plain, abs(exact), reach, charges.task.rubric.hand.at_most)
+    uncertainty = charges.following.uncertainty_of(segment, exact)
+    wider = widened(plain, abs(exact), uncertainty, charges.task.rubric.hand.at_most)
     return Tolerance(value=(wider.length_mm or 0.0) * per_mm, widened=wider.widened)
 
 
@@ -443,7 +454,7 @@ def _is_given(task: Task, rate: AngularRate) -> bool:
     return not any(isinstance(one, Normal) and one.measured == rate.link for one in lengths)
 
 
-def from_rate(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -> float | None:
+def rate_from_vector(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -> float | None:
     """The angular rate that the student's own vector gives; None without one, or a trivial one.
 
     Arguments: `scale` is the vector's, real units per drawn millimetre. Where the own vector's direction
@@ -452,10 +463,10 @@ def from_rate(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -
     own = evidence.vector(rate.vector)
     if own is None or own.length_mm < task.rubric.tolerance_of(rate.vector).least_mm:
         return None
-    return _sense(task, evidence, rate) * own.length_mm * scale / own_length(task, evidence, rate)
+    return _own_sense(task, evidence, rate) * own.length_mm * scale / own_length(task, evidence, rate)
 
 
-def _sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
+def _own_sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
     """+1 where the own vector turns its link counter-clockwise: the link as drawn where it was read."""
     own, along = evidence.vector(rate.vector), task.real[rate.vector]
     sense = math.copysign(1.0, task.rates[rate.name])
@@ -472,7 +483,7 @@ def _sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
 # The length that the student wrote into the sheet's cells ----------------------------------------
 
 
-def held_against_written(
+def compared_with_cells(
     mark: MarkRange,
     drawn: DrawnVector,
     written: tuple[float, float] | None,

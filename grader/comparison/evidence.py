@@ -128,11 +128,11 @@ class _Sheets:
             self.lengths.extend(_yardstick(self.task, sketch))
             self.see(_links(self.task, sketch, turn, se_turn))
             joints = _mechanism_nodes(self.task, sketch, turn)
-            self.keep(joints, sketch)
+            self.remember(joints, sketch)
         for figure, read in reading.figures.items():
             if figure != MECHANISM:
                 self.see(_vectors(self.task, figure, read, turn, se_turn))
-                self.keep(_plan_nodes(self.task, figure, read, turn), read)
+                self.remember(_plan_nodes(self.task, figure, read, turn), read)
                 if joints:
                     self.sketches.setdefault(figure, joints)
 
@@ -142,9 +142,9 @@ class _Sheets:
             if name not in self.drawn or vector.confidence > self.drawn[name].confidence:
                 self.drawn[name] = vector
 
-    def keep(self, places: Mapping[str, complex], read: Figure) -> None:
+    def remember(self, positions: Mapping[str, complex], read: Figure) -> None:
         """Nodes that are not known yet."""
-        for name, place in places.items():
+        for name, place in positions.items():
             if name not in self.nodes:
                 self.nodes[name] = place
                 self.se_mm[name] = read.nodes[name].se_mm
@@ -275,28 +275,28 @@ def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
         for name, node in sketch.nodes.items()
         if name in exact and node.confidence >= task.rubric.least_confidence
     }
-    for nodes in _without_one(task, sure):
+    for nodes in _subsets(task, sure):
         fit = _fit(nodes, exact)
         if fit is not None and fit[2] <= FIT_MM:
-            return (0.0, fit[1]) if _is_hands(task, nodes, fit[0]) else (fit[0], fit[1])
+            return (0.0, fit[1]) if _is_drafting_error(task, nodes, fit[0]) else (fit[0], fit[1])
     ground = _fit({name: node for name, node in sure.items() if name in task.ground}, exact)
     return (ground[0], ground[1]) if ground is not None else (0.0, 0.0)
 
 
-def _is_hands(task: Task, nodes: Iterable[str], turn: float) -> bool:
+def _is_drafting_error(task: Task, nodes: Iterable[str], turn: float) -> bool:
     """Whether a turn is no more than a careful hand's errors make of an upright sketch."""
     if abs(turn) <= CERTAINLY_UPRIGHT_RAD:
         return True
     drawn = task.traced(task.rule_scales).nodes
-    places = {name: drawn[name] for name in nodes}
-    centre = sum(one.at for one in places.values()) / len(places)
-    arms = np.array([one.at - centre for one in places.values()])
-    moved = np.array([one.moved for one in places.values()])
-    turned = np.imag(np.conj(arms) @ (moved - moved.mean(axis=0))) / np.sum(np.abs(arms) ** 2)
+    positions = {name: drawn[name] for name in nodes}
+    centre = sum(one.at for one in positions.values()) / len(positions)
+    arms = np.array([one.at - centre for one in positions.values()])
+    shifts = np.array([one.shifts for one in positions.values()])
+    turned = np.imag(np.conj(arms) @ (shifts - shifts.mean(axis=0))) / np.sum(np.abs(arms) ** 2)
     return bool(abs(turn) <= task.rubric.hand.sigmas * np.sqrt(np.sum(turned**2)))
 
 
-def _without_one(task: Task, sure: Mapping[str, ReadNode]) -> Iterator[Mapping[str, ReadNode]]:
+def _subsets(task: Task, sure: Mapping[str, ReadNode]) -> Iterator[Mapping[str, ReadNode]]:
     """All nodes, then what is left without one of them and all that are drawn from it, most first."""
     yield sure
     upstream = {name: task.construction.upstream(name) for name in sure}

@@ -38,7 +38,7 @@ class Expectation:
     vector : complex millimetres
     what, of : ``nodes``, ``scale``, ``vector`` or ``value``, and its name, for the reason `follows`
     relies_on : the nodes, scales and computed angular velocities of the student's that it follows from
-    reach : how far a careful hand may miss it, the rubric's number of standard deviations, millimetres
+    uncertainty : how far a careful hand may miss it, the rubric's number of standard deviations, millimetres
     se : its standard errors, from the reading of what it follows from
     """
 
@@ -46,7 +46,7 @@ class Expectation:
     what: str
     of: str
     relies_on: frozenset[str]
-    reach: EndSpread = NO_SPREAD
+    uncertainty: EndSpread = NO_SPREAD
     se: EndSpread = NO_SPREAD
 
 
@@ -56,12 +56,12 @@ class ReplayResult:
 
     Attributes
     ----------
-    accounts : the ways in which the drawing may have been made, the likeliest first; none where it may
+    explanations : the ways in which the drawing may have been made, the likeliest first; none where it may
         have been made rightly
     basis : what the plans were drawn by instead, where that is certain
     """
 
-    accounts: tuple[Replay, ...] = ()
+    explanations: tuple[Replay, ...] = ()
     basis: PlanBasis | None = None
 
 
@@ -87,7 +87,7 @@ class FollowThrough:
     """What the search for what was done came to, once it was asked for, and"""
     instead: PlanBasis | None = None
     """what the plans were drawn by instead of the right mechanism."""
-    places: dict[tuple[object, ...], Nodes] = field(default_factory=dict)
+    positions: dict[tuple[object, ...], Nodes] = field(default_factory=dict)
     traces: dict[tuple[object, ...], TracedDrawing] = field(default_factory=dict)
 
     @property
@@ -100,9 +100,9 @@ class FollowThrough:
     def own(self, scales: Mapping[str, float], basis: PlanBasis | None = None) -> Nodes:
         """The student's own nodes, by figure; measured ones as they lie in plans drawn by the basis."""
         key = (*(scales[name] for name in SCALE_NAMES), "" if basis is None else basis.name)
-        if key not in self.places:
-            self.places[key] = own_nodes(self.task, self.evidence, basis or self.right(scales))
-        return self.places[key]
+        if key not in self.positions:
+            self.positions[key] = own_nodes(self.task, self.evidence, basis or self.right(scales))
+        return self.positions[key]
 
     def right(self, scales: Mapping[str, float]) -> PlanBasis:
         """The right construction, the mechanism at the scale that it follows."""
@@ -139,12 +139,14 @@ class FollowThrough:
         relies_on = (known(own) & upstream) - {segment.head}
         if not relies_on and basis is None:
             exact = segment.drawn(scales)
-            return Expectation(exact, "nodes", "", relies_on, self.whole_reach(segment, exact))
+            return Expectation(exact, "nodes", "", relies_on, self.uncertainty_of(segment, exact))
         vector = found.vector(segment.tail, segment.head)
-        reach, se = self.spreads(found.moved(segment.tail, segment.head), found.hand, vector)
-        return Expectation(vector, "nodes", "", relies_on, reach, se)
+        uncertainty, se = self.spreads(found.shifts(segment.tail, segment.head), found.drafting_count, vector)
+        return Expectation(vector, "nodes", "", relies_on, uncertainty, se)
 
-    def spreads(self, moved: ComplexArray, hand: int, along: complex) -> tuple[EndSpread, EndSpread]:
+    def spreads(
+        self, shifts: ComplexArray, drafting_count: int, along: complex
+    ) -> tuple[EndSpread, EndSpread]:
         """How far a hand may miss, and the standard errors of reading.
 
         Measuring by hand is the student's, and part of what a hand may miss; reading is the program's.
@@ -153,8 +155,10 @@ class FollowThrough:
             return NO_SPREAD, NO_SPREAD
         sigmas = self.task.rubric.hand.sigmas
         if self.evidence.has_sheets:
-            return scaled(spread(moved[:hand], along), sigmas), spread(moved[hand:], along)
-        return scaled(self.with_ruler(spread(moved, along), along), sigmas), NO_SPREAD
+            return scaled(spread(shifts[:drafting_count], along), sigmas), spread(
+                shifts[drafting_count:], along
+            )
+        return scaled(self.with_ruler(spread(shifts, along), along), sigmas), NO_SPREAD
 
     def with_ruler(self, found: EndSpread, along: complex) -> EndSpread:
         """With the errors of measuring the vector itself, where it was measured by hand."""
@@ -170,7 +174,7 @@ class FollowThrough:
         if segment.scale not in wrong:
             return None
         exact = segment.drawn(self.followed)
-        return Expectation(exact, "scale", segment.scale, wrong, self.whole_reach(segment, exact))
+        return Expectation(exact, "scale", segment.scale, wrong, self.uncertainty_of(segment, exact))
 
     def expectations(self, segment: TaskSegment) -> Iterator[Expectation]:
         """What follows from a turned plan, other scales, a wrong mechanism, and own lengths and values."""
@@ -223,8 +227,8 @@ class FollowThrough:
         if quarters and abs(off - quarters * math.pi / 2.0) <= slack:
             head = task.construction.vectors[crank].head
             turned = segment.drawn(self.followed) * 1j**quarters
-            reach = self.whole_reach(segment, turned)
-            yield Expectation(turned, "vector", crank, frozenset({head}), reach)
+            uncertainty = self.uncertainty_of(segment, turned)
+            yield Expectation(turned, "vector", crank, frozenset({head}), uncertainty)
             figure = task.construction.figure_of(head)
             right = self.right(self.followed)
             mistake = Mistake("figure_rotated", figure, quarters=quarters % 4)
@@ -233,17 +237,17 @@ class FollowThrough:
             one = self.from_nodes(segment, self.followed, basis)
             yield replace(one, what="vector", of=crank, relies_on=one.relies_on | {head})
 
-    def whole_reach(self, segment: TaskSegment, along: complex) -> EndSpread:
+    def uncertainty_of(self, segment: TaskSegment, along: complex) -> EndSpread:
         """How far a hand may miss a vector from the start of the drawing."""
         task, scales = self.task, (self.used["kv"], self.used["ka"])
         key = ("reach", segment.name, abs(along), cmath.phase(along), *scales, self.evidence.has_sheets)
-        if key not in task.memory:
-            task.keep(key, self._whole_reach(segment, along))
-        return task.memory[key]  # type: ignore[return-value]
+        if key not in task.cache:
+            task.remember(key, self._uncertainty_of(segment, along))
+        return task.cache[key]  # type: ignore[return-value]
 
-    def _whole_reach(self, segment: TaskSegment, along: complex) -> EndSpread:
-        moved = self.task.traced(self.used).moved(segment.tail, segment.head)
-        found = spread(moved * np.exp(1j * (cmath.phase(along) - cmath.phase(segment.real))), along)
+    def _uncertainty_of(self, segment: TaskSegment, along: complex) -> EndSpread:
+        shifts = self.task.traced(self.used).shifts(segment.tail, segment.head)
+        found = spread(shifts * np.exp(1j * (cmath.phase(along) - cmath.phase(segment.real))), along)
         if not self.evidence.has_sheets:
             found = self.with_ruler(found, along)
         return scaled(found, self.task.rubric.hand.sigmas)

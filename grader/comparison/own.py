@@ -48,20 +48,20 @@ def own_nodes(task: Task, evidence: Evidence, sketch: PlanBasis) -> Nodes:
 def _from_sheets(task: Task, evidence: Evidence) -> Nodes:
     """As read; a plan with the sketch that is beside it."""
     names = [name for name in evidence.nodes if name not in task.construction.poles.values()]
-    moved = {name: np.zeros(2 * len(names), np.complex128) for name in names}
+    shifts = {name: np.zeros(2 * len(names), np.complex128) for name in names}
     for column, name in enumerate(names):
-        moved[name][2 * column : 2 * column + 2] = evidence.se_mm.get(name, 0.0) * np.array([1.0, 1j])
-    places = {name: OwnNode(evidence.nodes[name], moved[name]) for name in names}
-    found = dict(_by_figure(task, places))
+        shifts[name][2 * column : 2 * column + 2] = evidence.se_mm.get(name, 0.0) * np.array([1.0, 1j])
+    positions = {name: OwnNode(evidence.nodes[name], shifts[name]) for name in names}
+    found = dict(_by_figure(task, positions))
     for plan, joints in evidence.sketches.items():
-        sketch = {name: OwnNode(place, moved.get(name)) for name, place in joints.items()}
+        sketch = {name: OwnNode(place, shifts.get(name)) for name, place in joints.items()}
         found[plan] = {**found.get(plan, {}), **sketch}
     return found
 
 
-def _by_figure(task: Task, places: Mapping[str, OwnNode]) -> dict[str, dict[str, OwnNode]]:
+def _by_figure(task: Task, positions: Mapping[str, OwnNode]) -> dict[str, dict[str, OwnNode]]:
     found: dict[str, dict[str, OwnNode]] = {}
-    for name, place in places.items():
+    for name, place in positions.items():
         found.setdefault(task.construction.figure_of(name), {})[name] = place
     return found
 
@@ -69,7 +69,7 @@ def _by_figure(task: Task, places: Mapping[str, OwnNode]) -> dict[str, dict[str,
 def known(nodes: Nodes) -> frozenset[str]:
     """The names of all own nodes."""
     return frozenset(
-        name for figure, places in nodes.items() for name in places if figure != MECHANISM
+        name for figure, positions in nodes.items() for name in positions if figure != MECHANISM
     ) | frozenset(nodes.get(MECHANISM, ()))
 
 
@@ -151,14 +151,14 @@ class _LengthBranches:
         elif len(seen) == 1:
             self.part(step.node, self._along(step, made, seen[0]), made, seen, seen)
         else:
-            pair, places = self._meeting(seen)
-            self.part(step.node, places, made, pair, seen)
+            pair, positions = self._meeting(seen)
+            self.part(step.node, positions, made, pair, seen)
 
     def _along(self, step: Step, made: ComplexArray, one: _Measured) -> list[ComplexArray]:
         """By one length along the direction of the step; normal components the other way round too."""
         start = self.nodes[one.vector.tail]
-        reach = made - start
-        along = np.where(np.abs(reach) > 1e-9, reach / np.abs(reach), np.nan)
+        uncertainty = made - start
+        along = np.where(np.abs(uncertainty) > 1e-9, uncertainty / np.abs(uncertainty), np.nan)
         senses = (1.0, -1.0) if isinstance(step, Given) else (1.0,)
         return [start + sense * one.drawn.length_mm * along for sense in senses]
 
@@ -173,15 +173,15 @@ class _LengthBranches:
     def part(
         self,
         node: str,
-        places: Sequence[ComplexArray],
+        positions: Sequence[ComplexArray],
         made: ComplexArray,
         sources: Sequence[_Measured],
         seen: Sequence[_Measured],
     ) -> None:
         """Go on with each place, and where none is as expected, with the node where its step puts it."""
-        count, ways = len(self.cost), len(places) + 1
-        every, index = np.concatenate([*places, made]), np.tile(np.arange(count), ways)
-        is_known = np.arange(len(index)) < count * len(places)
+        count, ways = len(self.cost), len(positions) + 1
+        every, index = np.concatenate([*positions, made]), np.tile(np.arange(count), ways)
+        is_known = np.arange(len(index)) < count * len(positions)
         off = np.abs(every - made[index]) / self.sigma_mm
         is_expected = off <= AS_EXPECTED
         total = self.cost[index] + np.where(is_expected, off**2, OFF) + np.where(is_known, 0.0, UNKNOWN)
@@ -198,8 +198,8 @@ class _LengthBranches:
 
     def take(self, index: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> None:
         """Only these accounts, in this order."""
-        for name, places in self.nodes.items():
-            self.nodes[name] = places[index]
+        for name, positions in self.nodes.items():
+            self.nodes[name] = positions[index]
         for name, flags in self.is_known.items():
             self.is_known[name] = flags[index]
 
@@ -207,40 +207,40 @@ class _LengthBranches:
         """The nodes of the cheapest account that are known in it."""
         columns = {name: 2 * index for index, name in enumerate(self.measured)}
         found: dict[str, OwnNode] = {}
-        moved: dict[str, ComplexArray] = {
+        shifts: dict[str, ComplexArray] = {
             pole: np.zeros(2 * len(columns), np.complex128) for pole in self.task.construction.poles.values()
         }
         for name, sources in self.sources.items():
             place = complex(self.nodes[name][0])
-            if self.is_known[name][0] and all(one.vector.tail in moved for one in sources):
-                moved[name] = self._moved(place, sources, columns, moved)
-                found[name] = OwnNode(place, moved[name])
+            if self.is_known[name][0] and all(one.vector.tail in shifts for one in sources):
+                shifts[name] = self._shifts(place, sources, columns, shifts)
+                found[name] = OwnNode(place, shifts[name])
         return found
 
-    def _moved(
+    def _shifts(
         self,
         place: complex,
         sources: Sequence[_Measured],
         columns: Mapping[str, int],
-        moved: Mapping[str, ComplexArray],
+        shifts: Mapping[str, ComplexArray],
     ) -> ComplexArray:
         """What one standard deviation of each measurement makes of a node."""
         hand = self.task.rubric.hand
         rows = []
         for one in sources:
-            reach = place - complex(self.nodes[one.vector.tail][0])
-            along = reach / abs(reach) if abs(reach) > 0.0 else 1.0 + 0j
-            row = np.array(moved[one.vector.tail])
+            uncertainty = place - complex(self.nodes[one.vector.tail][0])
+            along = uncertainty / abs(uncertainty) if abs(uncertainty) > 0.0 else 1.0 + 0j
+            row = np.array(shifts[one.vector.tail])
             column = columns[one.vector.name]
             row[column] += hand.ruler_mm * along
-            rows.append((along, row, column, reach))
+            rows.append((along, row, column, uncertainty))
         if not rows:
             return np.zeros(2 * len(columns), np.complex128)
         if len(rows) == 1:
-            along, row, column, reach = rows[0]
+            along, row, column, uncertainty = rows[0]
             # Across, its direction's error: measured, or the hand's in drawing it.
             deg = hand.protractor_deg if sources[0].drawn.direction_rad is not None else hand.angle_deg
-            row[column + 1] += 1j * reach * math.radians(deg)
+            row[column + 1] += 1j * uncertainty * math.radians(deg)
             return row
         (u, first, _, p), (v, second, column, q) = rows
         # |x - p| and |x - q| are given: u.dx = u.dp + dr, v.dx = v.dq + ds.
@@ -329,13 +329,13 @@ class _Plans:
 def _tried(task: Task, scales: Mapping[str, float]) -> list[tuple[str, _Plans]]:
     """The plans for the right mechanism and for every wrong one."""
     key = ("plans", *(scales[name] for name in SCALE_NAMES))
-    if key not in task.memory:
+    if key not in task.cache:
         right = task.at(scales)
         found = [("right", _plans(task.construction, right))]
         found += [("assembly", _plans(one, right)) for one in _other_assemblies(task.construction)]
         found += [("variant", _plans(task.construction, one)) for one in _other_variants(task, scales)]
-        task.keep(key, found)
-    return task.memory[key]  # type: ignore[return-value]
+        task.remember(key, found)
+    return task.cache[key]  # type: ignore[return-value]
 
 
 def _plans(construction: Construction, parameters: Parameters) -> _Plans:
@@ -355,9 +355,9 @@ def _other_assemblies(construction: Construction) -> list[Construction]:
 def _other_variants(task: Task, scales: Mapping[str, float]) -> list[Parameters]:
     """All other variants' data, at the scales given and at their own: arrays over variants."""
     key = ("variants",)
-    if key not in task.memory:
-        task.keep(key, _variants(task))
-    together: Parameters = task.memory[key]  # type: ignore[assignment]
+    if key not in task.cache:
+        task.remember(key, _variants(task))
+    together: Parameters = task.cache[key]  # type: ignore[assignment]
     if not together:
         return []
     fixed = {name: np.asarray(scales[name]) for name in SCALE_NAMES}

@@ -50,7 +50,7 @@ def settle(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> dict[
     """The three scales, in the order in which each may follow from those before."""
     settled: dict[str, Scale] = {}
     for name in SCALE_NAMES:
-        settled[name] = _settle_one(task, evidence, name, declared.get(name), settled)
+        settled[name] = _settled_scale(task, evidence, name, declared.get(name), settled)
     return settled
 
 
@@ -64,7 +64,7 @@ def followed_scales(settled: Mapping[str, Scale]) -> dict[str, float]:
     return {name: scale.other or scale.used.used for name, scale in settled.items()}
 
 
-def _settle_one(
+def _settled_scale(
     task: Task, evidence: Evidence, name: str, text: str | None, before: Mapping[str, Scale]
 ) -> Scale:
     parsed = _parsed(task, name, text)
@@ -110,22 +110,22 @@ def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Sca
     """The assignment's rule; a length scale from the drawn yardstick where that was read."""
     known = followed_scales(before)
     if name == "kL":
-        witness = _witness(task, evidence, name)
-        if witness is not None:
+        shown = _evidence_of(task, evidence, name)
+        if shown is not None:
             # A crank that agrees with the scale proposed was drawn at that one, a little off.
             proposed = task.rule_scales["kL"]
-            return proposed if _is_witnessed(task, evidence, name, proposed) else witness[0] / witness[1]
+            return proposed if _is_confirmed(task, evidence, name, proposed) else shown[0] / shown[1]
     key = ("rule", *known.items())
-    if key not in task.memory:
+    if key not in task.cache:
         found = task.assignment.scales([task.variant], **known)
-        task.keep(key, float(getattr(found, name)[0]))
-    return task.memory[key]  # type: ignore[return-value]
+        task.remember(key, float(getattr(found, name)[0]))
+    return task.cache[key]  # type: ignore[return-value]
 
 
 # What the drawing says ----------------------------------------------------------------------------
 
 
-def _witness(task: Task, evidence: Evidence, name: str) -> tuple[float, float, float] | None:
+def _evidence_of(task: Task, evidence: Evidence, name: str) -> tuple[float, float, float] | None:
     """What is known of a scale: real value, drawn millimetres, standard error."""
     if name == "kL":
         if task.yardstick is None or evidence.yardstick_mm is None:
@@ -142,12 +142,12 @@ def _witness(task: Task, evidence: Evidence, name: str) -> tuple[float, float, f
 
 def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> float | None:
     """The scale that the drawing follows, where more of it fits that one than the one used."""
-    witness = _witness(task, evidence, name)
-    if witness is None or name == "kL":
+    shown = _evidence_of(task, evidence, name)
+    if shown is None or name == "kL":
         return None
-    if _is_witnessed(task, evidence, name, used):
+    if _is_confirmed(task, evidence, name, used):
         return None
-    other = witness[0] / witness[1]
+    other = shown[0] / shown[1]
     return other if _fitting(task, evidence, name, other) > _fitting(task, evidence, name, used) else None
 
 
@@ -187,8 +187,8 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
     """
     tolerance = task.rubric.tolerance_of(name)
     is_rule = abs(scale.used - rule) <= tolerance.scale_relative * rule
-    witness = _witness(task, evidence, name)
-    if witness is None:
+    shown = _evidence_of(task, evidence, name)
+    if shown is None:
         if _is_unseen(task, evidence, name, scale.used):
             why = f"{name[1]}_{task.pin}, which tells it, was not read for certain"
             return Scale(scale, None, MarkRange(NONE, NONE, FULL, (Reason("unread", {"reason": why}),)))
@@ -196,11 +196,11 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
     other = _followed_instead(task, evidence, name, scale.used, None if is_rule else rule)
     if other is None:
         return Scale(scale, None, mark([]))
-    real, drawn_mm, se_mm = witness
+    real, drawn_mm, se_mm = shown
     told: dict[str, float | str] = {"declared": scale.used, "expected": other, "unit": unit_of(name)}
     limit = Limit(
         what="scale",
-        off=abs(real / scale.used - drawn_mm),
+        residual=abs(real / scale.used - drawn_mm),
         tolerance=_allowed_mm(task, evidence, name, drawn_mm),
         plain=tolerance.length_at(drawn_mm),
         se=se_mm,
@@ -223,27 +223,27 @@ def _followed_instead(
 
     Arguments: `rule` is the assignment's, None where the declared one is that.
     """
-    witness = _witness(task, evidence, name)
-    if witness is None or _is_witnessed(task, evidence, name, declared):
+    shown = _evidence_of(task, evidence, name)
+    if shown is None or _is_confirmed(task, evidence, name, declared):
         return None
-    other = witness[0] / witness[1]
+    other = shown[0] / shown[1]
     if name == "kL":
         # A crank drawn too long beside links that are right is a wrong crank, no wrong scale.
         return None if _links_at(task, evidence, declared) > _links_at(task, evidence, other) else other
     # Where nothing else tells, a drawing that follows the rule tells that the declaration does not.
-    follows_rule = rule is not None and _is_witnessed(task, evidence, name, rule)
+    follows_rule = rule is not None and _is_confirmed(task, evidence, name, rule)
     return other if follows_rule else _contradiction(task, evidence, name, declared)
 
 
-def _is_witnessed(task: Task, evidence: Evidence, name: str, scale: float) -> bool:
+def _is_confirmed(task: Task, evidence: Evidence, name: str, scale: float) -> bool:
     """Whether a scale makes the real value of what was drawn."""
-    witness = _witness(task, evidence, name)
-    if witness is None:
+    shown = _evidence_of(task, evidence, name)
+    if shown is None:
         return False
-    expected_mm = witness[0] / scale
-    off = abs(expected_mm - witness[1])
+    expected_mm = shown[0] / scale
+    residual = abs(expected_mm - shown[1])
     plain = task.rubric.tolerance_of(name).length_at(expected_mm)
-    return off <= plain or off <= _allowed_mm(task, evidence, name, expected_mm)
+    return residual <= plain or residual <= _allowed_mm(task, evidence, name, expected_mm)
 
 
 def _allowed_mm(task: Task, evidence: Evidence, name: str, expected_mm: float) -> float:
@@ -253,10 +253,10 @@ def _allowed_mm(task: Task, evidence: Evidence, name: str, expected_mm: float) -
     if ends is None:
         return plain
     drawn = task.traced(task.rule_scales)
-    reach = hand.sigmas * spread(drawn.moved(*ends), drawn.vector(*ends)).along
+    uncertainty = hand.sigmas * spread(drawn.shifts(*ends), drawn.vector(*ends)).along
     if not evidence.has_sheets:
-        reach = math.hypot(reach, hand.sigmas * hand.ruler_mm)
-    return max(plain, min(reach, hand.at_most * plain))
+        uncertainty = math.hypot(uncertainty, hand.sigmas * hand.ruler_mm)
+    return max(plain, min(uncertainty, hand.at_most * plain))
 
 
 def _ends(task: Task, name: str) -> tuple[str, str] | None:

@@ -25,9 +25,9 @@ UNITS: Mapping[str, str] = {
     "epsilon": "rad/s^2",
 }
 """By scale, or by the part of a name before its first underscore."""
-KEPT = 64
+CACHE_SIZE = 64
 """Drawings at scales of students' own that a task keeps."""
-TASKS = 256
+TASK_CACHE_SIZE = 256
 """That are kept: students of the same variant have the same task."""
 
 
@@ -80,7 +80,7 @@ class Task:
     pin : of the driven link
     yardstick : the crank; where a slider drives, the first link of given length; None without any
     omega : of the crank, None where a slider drives
-    memory : what has been drawn already, by what it depends on
+    cache : what has been drawn already, by what it depends on
     """
 
     assignment: Assignment
@@ -96,7 +96,7 @@ class Task:
     yardstick: Yardstick | None
     omega: float | None
     ground: Mapping[str, complex]
-    memory: dict[tuple[object, ...], object] = field(
+    cache: dict[tuple[object, ...], object] = field(
         init=False, repr=False, compare=False, default_factory=dict
     )
 
@@ -136,11 +136,11 @@ class Task:
     def nodes(self, scales: Mapping[str, float]) -> Mapping[str, complex]:
         """All nodes at these scales."""
         key = ("nodes", *(scales[name] for name in SCALE_NAMES))
-        found = self.memory.get(key)
+        found = self.cache.get(key)
         if found is None:
             places = evaluate(self.construction, self.at(scales))
             found = {name: complex(np.ravel(node)[0]) for name, node in places.items()}
-            self.keep(key, found)
+            self.remember(key, found)
         return found  # type: ignore[return-value]
 
     def traced(self, scales: Mapping[str, float]) -> TracedDrawing:
@@ -149,32 +149,32 @@ class Task:
         The sketch at the rule's: its size changes next to nothing in how far a hand may miss.
         """
         key = ("traced", scales["kv"], scales["ka"], self.skill)
-        found = self.memory.get(key)
+        found = self.cache.get(key)
         if found is None:
             rule = {**scales, "kL": float(self.parameters["kL"])}
             found = trace(self.construction, self.at(rule), self.skill)
-            self.keep(key, found)
+            self.remember(key, found)
         return found  # type: ignore[return-value]
 
     @property
     def by_similarity(self) -> Construction:
         """The construction with every image of a plate's point found by similarity."""
-        found = self.memory.get(("by similarity",))
+        found = self.cache.get(("by similarity",))
         if found is None:
             found = self.construction
             for image in self.construction.images.values():
                 found = found.with_step(image)
-            self.keep(("by similarity",), found)
+            self.remember(("by similarity",), found)
         return found  # type: ignore[return-value]
 
-    def keep(self, key: tuple[object, ...], found: object) -> None:
+    def remember(self, key: tuple[object, ...], found: object) -> None:
         """Remember what was drawn, by what it depends on."""
-        if len(self.memory) >= KEPT:
-            self.memory.clear()
-        self.memory[key] = found
+        if len(self.cache) >= CACHE_SIZE:
+            self.cache.clear()
+        self.cache[key] = found
 
 
-_tasks: deque[Task] = deque(maxlen=TASKS)
+_tasks: deque[Task] = deque(maxlen=TASK_CACHE_SIZE)
 
 
 def task_of(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:

@@ -24,7 +24,7 @@ class Limit:
     Attributes
     ----------
     what : ``length``, ``direction``, ``value`` or ``scale``
-    off : deviation without its sign, in the unit of `tolerance`
+    residual : deviation without its sign, in the unit of `tolerance`
     plain : the tolerance without what it was widened by
     se : standard error of the deviation
     table : the rubric's: bands of partial marks, and how many standard errors a verdict must be away
@@ -33,7 +33,7 @@ class Limit:
     """
 
     what: str
-    off: float
+    residual: float
     tolerance: float
     plain: float
     se: float
@@ -43,25 +43,25 @@ class Limit:
     @property
     def share(self) -> float:
         """The mark on the deviation as it is."""
-        return self.share_at(self.off)
+        return self.share_at(self.residual)
 
     @property
     def worst(self) -> float:
         """The mark at the far end of its error."""
-        return self.share_at(self.off + self.table.certain_errors * self.se)
+        return self.share_at(self.residual + self.table.certain_errors * self.se)
 
     @property
     def best(self) -> float:
         """The mark at the near end of its error."""
-        return self.share_at(max(self.off - self.table.certain_errors * self.se, 0.0))
+        return self.share_at(max(self.residual - self.table.certain_errors * self.se, 0.0))
 
-    def share_at(self, off: float) -> float:
+    def share_at(self, residual: float) -> float:
         """The share of the points at a deviation; bands are as wide as the plain tolerance says."""
         slack = 1.0 + ROUNDING
-        if off <= self.tolerance * slack:
+        if residual <= self.tolerance * slack:
             return FULL
         for factor, share in self.table.all_bands:
-            if off <= (self.tolerance + (factor - 1.0) * self.plain) * slack:
+            if residual <= (self.tolerance + (factor - 1.0) * self.plain) * slack:
                 return share
         return NONE
 
@@ -109,7 +109,7 @@ def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> MarkRange
     near = tuple(
         Reason(
             "near_limit",
-            {"what": limit.what, "off": limit.off, "tolerance": limit.tolerance, "se": limit.se},
+            {"what": limit.what, "off": limit.residual, "tolerance": limit.tolerance, "se": limit.se},
         )
         for limit in by_loss
         if limit.worst != limit.best
@@ -164,19 +164,21 @@ def tolerances(tolerance: ToleranceTable, expected_mm: float, *, with_direction:
     return Tolerance(tolerance.length_at(expected_mm), turn)
 
 
-def widened(plain: Tolerance, expected_mm: float, reach: EndSpread, at_most: float = math.inf) -> Tolerance:
-    """The tolerance of a vector that a careful hand may miss by `reach`, millimetres, where that is more.
+def widened(
+    plain: Tolerance, expected_mm: float, uncertainty: EndSpread, at_most: float = math.inf
+) -> Tolerance:
+    """The tolerance of a vector, widened to its propagated drafting error (mm) where that is more.
 
     What the end is off across a vector makes it longer too, and a zero vector as long as it is off.
 
     Arguments: `at_most` bounds it to so many times the plain one.
     """
     plain_mm, plain_deg = plain.length_mm or 0.0, plain.direction_deg
-    length_mm = math.hypot(expected_mm + reach.along, reach.across) - expected_mm
+    length_mm = math.hypot(expected_mm + uncertainty.along, uncertainty.across) - expected_mm
     length_mm = max(plain_mm, min(length_mm, at_most * plain_mm))
     direction = plain_deg
     if plain_deg is not None:
-        turned = math.degrees(math.atan2(reach.across, expected_mm))
+        turned = math.degrees(math.atan2(uncertainty.across, expected_mm))
         direction = max(plain_deg, min(turned, at_most * plain_deg))
     is_wider = length_mm > plain_mm or direction != plain_deg
     return Tolerance(length_mm, direction, widened=is_wider)
@@ -190,32 +192,32 @@ def mark_vector(
     Arguments: `allowed` has a direction where one is judged; `se` are standard errors of what is expected.
     """
     expected_mm = abs(expected)
-    off_mm = drawn.length_mm - expected_mm
+    residual_mm = drawn.length_mm - expected_mm
     se_mm = math.hypot(drawn.se_mm, se.along)
     is_asked = allowed.direction_deg is not None and drawn.direction_rad is not None
     is_judged = is_asked and drawn.length_mm >= table.least_mm
-    off_deg = se_deg = 0.0
+    residual_deg = se_deg = 0.0
     if is_judged and drawn.direction_rad is not None:
-        off_deg = math.degrees(math.remainder(drawn.direction_rad - cmath.phase(expected), math.tau))
+        residual_deg = math.degrees(math.remainder(drawn.direction_rad - cmath.phase(expected), math.tau))
         se_deg = (
             math.hypot(drawn.se_deg, math.degrees(se.across / expected_mm)) if se.across else drawn.se_deg
         )
     length_mm, direction_deg = allowed.length_mm or 0.0, allowed.direction_deg or math.inf
     margin = table.certain_errors
     if (
-        abs(off_mm) + margin * se_mm <= length_mm
+        abs(residual_mm) + margin * se_mm <= length_mm
         and is_judged
-        and abs(off_deg) + margin * se_deg <= direction_deg
+        and abs(residual_deg) + margin * se_deg <= direction_deg
     ):
         return ALL_RIGHT
     plain = tolerances(table, expected_mm, with_direction=True)
     reason = _length_reason(drawn, expected_mm, length_mm)
-    limits = [Limit("length", abs(off_mm), length_mm, plain.length_mm or 0.0, se_mm, table, reason)]
+    limits = [Limit("length", abs(residual_mm), length_mm, plain.length_mm or 0.0, se_mm, table, reason)]
     remarks: tuple[Reason, ...] = ()
     if is_judged:
-        reason = _direction_reason(drawn, expected, off_deg, direction_deg)
+        reason = _direction_reason(drawn, expected, residual_deg, direction_deg)
         plain_deg = plain.direction_deg or direction_deg
-        limits.append(Limit("direction", abs(off_deg), direction_deg, plain_deg, se_deg, table, reason))
+        limits.append(Limit("direction", abs(residual_deg), direction_deg, plain_deg, se_deg, table, reason))
     elif drawn.direction_rad is not None and min(expected_mm, drawn.length_mm) < table.least_mm:
         shorter = min(expected_mm, drawn.length_mm)
         remarks = (Reason("too_short_to_judge", {"length_mm": shorter, "least_mm": table.least_mm}),)
@@ -223,24 +225,26 @@ def mark_vector(
 
 
 def _length_reason(drawn: DrawnVector, expected_mm: float, allowed_mm: float) -> Reason:
-    off = drawn.length_mm - expected_mm
+    residual = drawn.length_mm - expected_mm
     told: dict[str, float | str] = {"measured_mm": drawn.length_mm, "tolerance_mm": allowed_mm}
     if expected_mm <= 1e-9 * allowed_mm:
         return Reason("should_be_zero", told)
-    told |= {"expected_mm": expected_mm, "off_mm": abs(off)}
-    return Reason("too_long" if off > 0.0 else "too_short", told)
+    told |= {"expected_mm": expected_mm, "off_mm": abs(residual)}
+    return Reason("too_long" if residual > 0.0 else "too_short", told)
 
 
-def _direction_reason(drawn: DrawnVector, expected: complex, off_deg: float, allowed_deg: float) -> Reason:
+def _direction_reason(
+    drawn: DrawnVector, expected: complex, residual_deg: float, allowed_deg: float
+) -> Reason:
     told: dict[str, float | str] = {
         "measured_deg": degrees((drawn.direction_rad or 0.0) + drawn.turn_rad),
         "expected_deg": degrees(cmath.phase(expected) + drawn.turn_rad),
-        "off_deg": abs(off_deg),
+        "off_deg": abs(residual_deg),
         "tolerance_deg": allowed_deg,
     }
-    if abs(off_deg) >= 180.0 - REVERSED_WITHIN_DEG:
+    if abs(residual_deg) >= 180.0 - REVERSED_WITHIN_DEG:
         return Reason("reversed", told)
-    return Reason("turned_left" if off_deg > 0.0 else "turned_right", told)
+    return Reason("turned_left" if residual_deg > 0.0 else "turned_right", told)
 
 
 def degrees(angle_rad: float) -> float:
@@ -255,17 +259,17 @@ def mark_value(
 
     Arguments: `plain` is the tolerance without what it was widened by.
     """
-    off = abs(value - expected)
-    if off <= allowed:
+    residual = abs(value - expected)
+    if residual <= allowed:
         return ALL_RIGHT
     told: dict[str, float | str] = {"measured": value, "expected": expected, "unit": unit}
     if value * expected < 0.0:
         reason = Reason("value_reversed", told)
     else:
-        told |= {"off": off, "tolerance": allowed}
+        told |= {"off": residual, "tolerance": allowed}
         large = abs(value) > abs(expected)
         reason = Reason("value_too_large" if large else "value_too_small", told)
-    return mark([Limit("value", off, allowed, plain, 0.0, table, reason)])
+    return mark([Limit("value", residual, allowed, plain, 0.0, table, reason)])
 
 
 RANKS: dict[Verdict, int] = {"none": 0, "partial": 1, "follow_through": 2, "full": 2}

@@ -44,13 +44,15 @@ SCALES = frozenset({"kL", "kv", "ka"})
 Key = tuple[str, str]
 
 
-def sure_of(accounts: Sequence[Replay], least: float) -> list[Mistake]:
+def sure_of(explanations: Sequence[Replay], least: float) -> list[Mistake]:
     """The mistakes of the likeliest account that are this sure, unless they are slight."""
-    if not accounts:
+    if not explanations:
         return []
-    shares = _Shares(accounts)
+    shares = _Shares(explanations)
     return [
-        one for one in accounts[0].made if shares.of(_key(one)) >= least and not _is_slight(one, accounts[0])
+        one
+        for one in explanations[0].made
+        if shares.of(_key(one)) >= least and not _is_slight(one, explanations[0])
     ]
 
 
@@ -62,12 +64,12 @@ class Lost:
     scales: Mapping[str, str]
 
 
-def named(accounts: Sequence[Replay], construction: Construction, lost: Lost) -> tuple[NamedMistake, ...]:
+def named(explanations: Sequence[Replay], construction: Construction, lost: Lost) -> tuple[NamedMistake, ...]:
     """The mistakes of the likeliest account that are sure enough, in the order of construction."""
-    if not accounts:
+    if not explanations:
         return ()
-    best, shares = accounts[0], _Shares(accounts)
-    explains, mistakes = _explained(best, construction, lost), []
+    best, shares = explanations[0], _Shares(explanations)
+    explains, mistakes = _losses_explained(best, construction, lost), []
     for mistake in _in_order(best.made, construction):
         key, share = _key(mistake), shares.of(_key(mistake))
         rivals = shares.rivals(key, {_key(one) for one in best.made})
@@ -83,36 +85,36 @@ def _key(mistake: Mistake) -> Key:
     return mistake.code, mistake.at
 
 
-def _is_slight(mistake: Mistake, account: Replay) -> bool:
+def _is_slight(mistake: Mistake, explanation: Replay) -> bool:
     """Whether the step that it was made at is not far off: nothing that a hand could not do."""
     if mistake.code in OF_THE_WHOLE:
         return False
-    return SUSPICIOUS < account.right.get(mistake.at, 0.0) < GROSS
+    return SUSPICIOUS < explanation.right.get(mistake.at, 0.0) < GROSS
 
 
 class _Shares:
     """What share of the probability accounts with a mistake have."""
 
-    def __init__(self, accounts: Sequence[Replay]) -> None:
-        least = accounts[0].cost
-        weights = [math.exp((least - account.cost) / 2.0) for account in accounts]
+    def __init__(self, explanations: Sequence[Replay]) -> None:
+        least = explanations[0].cost
+        weights = [math.exp((least - explanation.cost) / 2.0) for explanation in explanations]
         whole = sum(weights)
-        self._accounts = [
-            ({_key(one): one for one in account.made}, weight / whole)
-            for account, weight in zip(accounts, weights, strict=True)
+        self._weights = [
+            ({_key(one): one for one in explanation.made}, weight / whole)
+            for explanation, weight in zip(explanations, weights, strict=True)
         ]
 
     def of(self, key: Key) -> float:
         """Of a mistake."""
-        return sum(weight for made, weight in self._accounts if key in made)
+        return sum(weight for made, weight in self._weights if key in made)
 
     def instead(self, key: Key, other: Key) -> float:
         """Of another mistake without the first."""
-        return sum(weight for made, weight in self._accounts if other in made and key not in made)
+        return sum(weight for made, weight in self._weights if other in made and key not in made)
 
     def rivals(self, key: Key, best: set[Key]) -> list[Mistake]:
         """The mistakes that stand in a mistake's place elsewhere, the likeliest first."""
-        others = {name: one for made, _ in self._accounts if key not in made for name, one in made.items()}
+        others = {name: one for made, _ in self._weights if key not in made for name, one in made.items()}
         likely = [name for name in others if name not in best and self.instead(key, name) >= LEAST_RIVAL]
         likely.sort(key=lambda name: -self.instead(key, name))
         return [others[name] for name in likely[:MOST_RIVALS]]
@@ -124,9 +126,11 @@ def _in_order(made: Sequence[Mistake], construction: Construction) -> list[Mista
     return sorted(made, key=lambda one: order.index(one.at) if one.at in order else -1)
 
 
-def _explained(account: Replay, construction: Construction, lost: Lost) -> dict[Mistake, list[str]]:
+def _losses_explained(
+    explanation: Replay, construction: Construction, lost: Lost
+) -> dict[Mistake, list[str]]:
     """Which of the criteria lost each mistake explains: the nearest one before it in the construction."""
-    made = _in_order(account.made, construction)
+    made = _in_order(explanation.made, construction)
     explains: dict[Mistake, list[str]] = {
         mistake: [name for scale, name in lost.scales.items() if _is_about(mistake, scale)]
         for mistake in made
@@ -134,7 +138,7 @@ def _explained(account: Replay, construction: Construction, lost: Lost) -> dict[
     reach = {mistake: affected(mistake, construction) for mistake in made}
     for name, criterion in lost.vectors.items():
         vector = construction.vectors[name]
-        if vector.head in account.unexplained:
+        if vector.head in explanation.unexplained:
             continue
         touching = [
             one for one in made if _touches(one, vector.scale, {vector.tail, vector.head}, reach[one])
@@ -208,7 +212,7 @@ BEYOND_DOUBT = 20.0
 LEAST_WRONG = 0.06
 """A scale off by a smaller share than this is nobody's mistake by name: a hand may draw so."""
 USUAL = 1.0
-HANDS = (0.6, USUAL, 1.6, 2.5, 4.0)
+CARES = (0.6, USUAL, 1.6, 2.5, 4.0)
 """The hands supposed, as multiples of a usual one's standard deviations."""
 
 
@@ -219,7 +223,7 @@ class Case:
     Attributes
     ----------
     drawing : how it should have been drawn, at the scales declared
-    work : what was drawn
+    observations : what was drawn
     assignment, variant : whose plan it should be
     skill : of a usual hand
     followed : scales that the drawing follows although others were declared
@@ -227,7 +231,7 @@ class Case:
     """
 
     drawing: Drawing
-    work: Observations
+    observations: Observations
     assignment: Assignment
     variant: Variant
     skill: Skill
@@ -241,22 +245,22 @@ def explained(case: Case) -> tuple[Replay, ...]:
     There are none where a right drawing is to be believed.
     """
     roots = [Root(), *_other_scales(case)]
-    accounts = replay(case.drawing, case.work, roots, case.skill, cares=HANDS)
-    innocent = _innocent(accounts)
-    if accounts and not _is_clear(accounts, case):
-        accounts = _looked_into(case, roots, accounts)
-    if not accounts or innocent - accounts[0].cost < BEYOND_DOUBT:
+    explanations = replay(case.drawing, case.observations, roots, case.skill, cares=CARES)
+    innocent = _cost_if_right(explanations)
+    if explanations and not _is_clear(explanations, case):
+        explanations = _searched_further(case, roots, explanations)
+    if not explanations or innocent - explanations[0].cost < BEYOND_DOUBT:
         return ()
-    return tuple(accounts)
+    return tuple(explanations)
 
 
-def drawn_instead(accounts: Sequence[Replay], case: Case) -> tuple[Drawing, frozenset[str]]:
+def drawn_instead(explanations: Sequence[Replay], case: Case) -> tuple[Drawing, frozenset[str]]:
     """The drawing with those mistakes in it that are certain, and the nodes at which it is wrong.
 
     Of a wrong mechanism that is the mechanism as a whole; of the right drawing there are none.
     """
     joints = {step.node for step in case.drawing.construction.figures[MECHANISM]}
-    certain = [one for one in sure_of(accounts, CERTAIN) if one.code not in NO_STEPS]
+    certain = [one for one in sure_of(explanations, CERTAIN) if one.code not in NO_STEPS]
     wrong = {MECHANISM if one.at in joints or one.code == "other_variant" else one.at for one in certain}
     return _with(certain, case.drawing), frozenset(wrong)
 
@@ -271,44 +275,50 @@ def _with(mistakes: Sequence[Mistake], drawing: Drawing) -> Drawing:
     return drawing
 
 
-def _looked_into(case: Case, roots: Sequence[Root], accounts: Sequence[Replay]) -> list[Replay]:
+def _searched_further(case: Case, roots: Sequence[Root], explanations: Sequence[Replay]) -> list[Replay]:
     """The accounts with mistakes of the whole drawing among them, and with guesses at what was not seen.
 
     A careless hand is also taken for a usual one that has made some mistake. What one mistake explains,
     places and all, is not sought in the whole drawing.
     """
-    best = accounts[0]
-    if not _is_explained(best) or not all(one.has_direction for one in case.work.seen):
+    best = explanations[0]
+    if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
         roots = [*roots, *_of_the_whole(case)]
     cares = sorted({best.care, min(best.care, USUAL)})
-    found = replay(case.drawing, case.work, roots, case.skill, cares=cares, blind=True) or [*accounts]
+    found = replay(case.drawing, case.observations, roots, case.skill, cares=cares, blind=True) or [
+        *explanations
+    ]
     for swap in _swaps(case.drawing, found[0]):
-        root, work = Root((swap,), cost=RARITY[swap.code]), _renamed(case.work, swap.other)
-        found += replay(case.drawing, work, [root], case.skill, cares=cares)
-    return sorted(found, key=lambda account: account.cost)
+        root, observations = Root((swap,), cost=RARITY[swap.code]), _renamed(case.observations, swap.other)
+        found += replay(case.drawing, observations, [root], case.skill, cares=cares)
+    return sorted(found, key=lambda explanation: explanation.cost)
 
 
-def _is_explained(account: Replay) -> bool:
+def _is_explained(explanation: Replay) -> bool:
     """Whether a usual hand and one mistake at most explain everything."""
-    return not account.unexplained and len(account.made) <= 1 and account.care <= USUAL
+    return not explanation.unexplained and len(explanation.made) <= 1 and explanation.care <= USUAL
 
 
-def _innocent(accounts: Sequence[Replay]) -> float:
+def _cost_if_right(explanations: Sequence[Replay]) -> float:
     """What the account costs in which everything was made rightly; infinite where it is beyond belief."""
-    return min((account.cost for account in accounts if account.is_innocent), default=math.inf)
+    return min(
+        (explanation.cost for explanation in explanations if explanation.is_innocent), default=math.inf
+    )
 
 
-def _is_clear(accounts: Sequence[Replay], case: Case) -> bool:
+def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
     """Whether a usual hand made everything rightly, or one mistake at a step whose beginnings were seen.
 
     What goes wrong in a mechanism that nobody saw shows in more than one step.
     """
-    best, construction = accounts[0], case.drawing.construction
+    best, construction = explanations[0], case.drawing.construction
     if not _is_explained(best):
         return False
     if not best.made:
         return True
-    places = {one.node for one in case.work.seen if one.has_direction} | {*construction.poles.values()}
+    places = {one.node for one in case.observations.entries if one.has_direction} | {
+        *construction.poles.values()
+    }
     joints = {step.node for step in construction.figures[MECHANISM]}
     step = next((one for one in construction.steps if one.node == best.made[0].at), None)
     return step is not None and places.issuperset({step.node, *step.needs} - joints)
@@ -372,10 +382,10 @@ def _other_variants(case: Case) -> Iterator[Root]:
             yield Root((other,), parameters, cost=RARITY["other_variant"])
 
 
-def _swaps(drawing: Drawing, account: Replay) -> Iterator[Mistake]:
+def _swaps(drawing: Drawing, explanation: Replay) -> Iterator[Mistake]:
     """Two images of a plan with each other's letters, both of which are off by the likeliest account."""
     construction = drawing.construction
-    off = {*account.unexplained, *(mistake.at for mistake in account.made)}
+    off = {*explanation.unexplained, *(mistake.at for mistake in explanation.made)}
     for figure, pole in construction.poles.items():
         images = sorted(
             v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
@@ -385,11 +395,11 @@ def _swaps(drawing: Drawing, account: Replay) -> Iterator[Mistake]:
                 yield Mistake("labels_swapped", pair[0], other=pair)
 
 
-def _renamed(work: Observations, pair: tuple[str, ...]) -> Observations:
+def _renamed(observations: Observations, pair: tuple[str, ...]) -> Observations:
     """What was drawn, under the right names where two letters were swapped."""
     other = {pair[0]: pair[1], pair[1]: pair[0]}
-    seen = (
+    entries = (
         replace(one, node=other.get(one.node, one.node), tail=other.get(one.tail or "", one.tail))
-        for one in work.seen
+        for one in observations.entries
     )
-    return replace(work, seen=tuple(seen))
+    return replace(observations, entries=tuple(entries))

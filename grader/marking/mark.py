@@ -112,20 +112,20 @@ class _Total:
         return self.low * self.scale, self.high * self.scale
 
 
-LEAST_MISS_MM = 0.15
+LEAST_ERROR_MM = 0.15
 """However well a hand draws, and however well its drawing is read."""
-NOTHING: ComplexArray = np.zeros(0, np.complex128)
+NO_ERRORS: ComplexArray = np.zeros(0, np.complex128)
 
 
 def explain(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> ReplayResult:
     """What was done, most likely, and what the plans were drawn by where that is certain."""
     case = case_of(task, evidence, settled)
-    accounts = explained(case)
-    drawn, wrong = drawn_instead(accounts, case)
+    explanations = explained(case)
+    drawn, wrong = drawn_instead(explanations, case)
     # Where a sheet shows the mechanism as it was drawn, and no plan is turned, the own nodes tell the rest.
     is_needed = wrong and (wrong & task.construction.poles.keys() or not evidence.has_sheets)
     basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong) if is_needed else None
-    return ReplayResult(accounts, basis)
+    return ReplayResult(explanations, basis)
 
 
 def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Case:
@@ -139,7 +139,7 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Cas
     parameters = {**task.parameters, **used}
     return Case(
         drawing=Drawing(task.construction, parameters),
-        work=Observations(tuple(_seen(task, evidence, parameters)), evidence.sketches),
+        observations=Observations(tuple(_observations(task, evidence, parameters)), evidence.sketches),
         assignment=task.assignment,
         variant=task.variant,
         skill=task.skill,
@@ -152,12 +152,12 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Cas
     )
 
 
-def _seen(task: Task, evidence: Evidence, parameters: Parameters) -> list[Observation]:
+def _observations(task: Task, evidence: Evidence, parameters: Parameters) -> list[Observation]:
     """The student's own nodes, and the vectors that lead to none of them."""
     construction = task.construction
     given = {*construction.poles.values(), *task.ground}
-    seen = [
-        Observation(name, None, place, _missed_by(task, evidence, name))
+    entries = [
+        Observation(name, None, place, _reading_covariance(task, evidence, name))
         for name, place in evidence.nodes.items()
         if name not in given
     ]
@@ -166,23 +166,23 @@ def _seen(task: Task, evidence: Evidence, parameters: Parameters) -> list[Observ
         drawn = evidence.vector(name)
         if drawn is None or drawn.confidence < task.rubric.least_confidence or vector.head in evidence.nodes:
             continue
-        value, read_mm = drawn.as_complex, math.hypot(LEAST_MISS_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
+        value, read_mm = drawn.as_complex, math.hypot(LEAST_ERROR_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
         if value is not None:
-            seen.append(Observation(vector.head, vector.tail, value, _spread(NOTHING, read_mm)))
+            entries.append(Observation(vector.head, vector.tail, value, _covariance(NO_ERRORS, read_mm)))
             continue
         # What leads to a length is not seen: all earlier errors are in it.
         traced = traced or trace(construction, parameters, task.skill)
-        spread = _spread(traced.moved(vector.tail, vector.head), read_mm)
-        seen.append(Observation(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
-    return seen
+        spread = _covariance(traced.shifts(vector.tail, vector.head), read_mm)
+        entries.append(Observation(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
+    return entries
 
 
-def _missed_by(task: Task, evidence: Evidence, node: str) -> Covariance:
+def _reading_covariance(task: Task, evidence: Evidence, node: str) -> Covariance:
     """How far a node may be missed by being read, or by the measurements that lead to it."""
     vectors = [one for one in task.construction.vectors.values() if one.head == node]
     hand = task.rubric.hand
-    rows: list[ComplexArray] = [NOTHING]
-    each_mm = LEAST_MISS_MM if evidence.has_sheets else hand.ruler_mm
+    rows: list[ComplexArray] = [NO_ERRORS]
+    each_mm = LEAST_ERROR_MM if evidence.has_sheets else hand.ruler_mm
     for vector in vectors[:1]:
         drawn = evidence.vector(vector.name)
         along = None if drawn is None else drawn.as_complex
@@ -195,7 +195,7 @@ def _missed_by(task: Task, evidence: Evidence, node: str) -> Covariance:
         if along:
             share = _computed_within(task, evidence, node, math.sqrt(2.0) * each_mm)
             rows.append(np.array([along * share], np.complex128))
-    return _spread(np.concatenate(rows), LEAST_MISS_MM)
+    return _covariance(np.concatenate(rows), LEAST_ERROR_MM)
 
 
 def _computed_within(task: Task, evidence: Evidence, node: str, each_mm: float) -> float:
@@ -219,9 +219,9 @@ def _computed_within(task: Task, evidence: Evidence, node: str, each_mm: float) 
     return math.hypot(*errors)
 
 
-def _spread(moved: ComplexArray, least_mm: float) -> Covariance:
+def _covariance(shifts: ComplexArray, least_mm: float) -> Covariance:
     """What independent errors make of an end together: variance along x, covariance, variance along y."""
-    x, y = moved.real, moved.imag
+    x, y = shifts.real, shifts.imag
     return float(x @ x) + least_mm**2, float(x @ y), float(y @ y) + least_mm**2
 
 
@@ -234,7 +234,7 @@ def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission, explain)
     mistakes = _named(task, comparison)
-    mistakes = (*mistakes, *_swaps_seen(task, submission, mistakes), *_not_drawn(task, comparison))
+    mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes), *_not_drawn(task, comparison))
     outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
 
@@ -249,10 +249,10 @@ def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
     if not by_vector and not is_other_scale:
         return ()
     explanation = comparison.explanation or explain(task, comparison.evidence, scales)
-    return named(explanation.accounts, task.construction, Lost(by_vector, by_scale))
+    return named(explanation.explanations, task.construction, Lost(by_vector, by_scale))
 
 
-def _swaps_seen(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:
+def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:
     """Letters seen at each other's node on a sheet: lines tell nothing of them, so diagnosis cannot."""
     vectors = task.construction.vectors
     told = {one.mistake.other for one in known if one.code == "labels_swapped"}

@@ -36,7 +36,7 @@ from reference.construction.derive import construction_of
 from reference.construction.elements import View
 from reference.construction.graph import Construction
 from reference.construction.steps import Coincide, Pivot, Pole, Step
-from reference.construction.uncertainty import SMALL, hand_errors
+from reference.construction.uncertainty import SMALL, step_errors
 from reference.geometry import ComplexArray
 from reference.plan import exact_plan
 
@@ -276,7 +276,7 @@ def _laid_over(drawn: ComplexArray, proper: ComplexArray) -> tuple[ComplexArray,
 
 def _covariance(step: Step, view: View, expected: ComplexArray) -> FloatArray:
     """(rows, 2, 2) covariance of a node under a usual hand's errors in the acts that make it, mm^2."""
-    errors = hand_errors(step, USUAL)
+    errors = step_errors(step, USUAL)
     placed = np.asarray(step.place(View(view.nodes, view.parameters, errors)))
     count = len(next(iter(errors.values())))
     change = (np.broadcast_to(placed, (count, len(expected))) - expected) / SMALL

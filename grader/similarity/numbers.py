@@ -18,7 +18,7 @@ from grader.similarity.drawings import LEAST_CLASS
 from grader.similarity.submission import USUAL, ComparedSubmission, scales_used
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.graph import evaluate
-from reference.construction.uncertainty import SMALL, hand_errors
+from reference.construction.uncertainty import SMALL, step_errors
 from reference.geometry import ComplexArray
 from reference.plan import exact_plan
 
@@ -189,7 +189,7 @@ def _exact(
     }
     changes: dict[str, list[ComplexArray]] = {name: [] for name in vectors}
     for step in plan.construction.steps:
-        errors = hand_errors(step, USUAL)
+        errors = step_errors(step, USUAL)
         if not errors:
             continue
         nodes = evaluate(plan.construction, plan.drawing.parameters, errors=errors)

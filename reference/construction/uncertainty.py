@@ -90,7 +90,7 @@ def acts(construction: Construction) -> tuple[Act, ...]:
     return tuple((step.node, slot, kind) for step in construction.steps for slot, kind in acts_of(step))
 
 
-def hand_errors(step: Step, skill: Skill) -> Errors:
+def step_errors(step: Step, skill: Skill) -> Errors:
     """The errors of one step's acts, arrays (acts + 1, 1): none in the first row, then one in each.
 
     They are as small as `SMALL` says, in standard deviations.
@@ -110,11 +110,11 @@ class OwnNode:
     Attributes
     ----------
     at : complex millimetres
-    moved : (r,) how it is moved by one standard deviation of each error of measuring; None without any
+    shifts : (r,) how it is moved by one standard deviation of each error of measuring; None without any
     """
 
     at: complex
-    moved: ComplexArray | None = None
+    shifts: ComplexArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,11 +124,11 @@ class TracedNode:
     Attributes
     ----------
     at : complex millimetres
-    moved : (m,) by one standard deviation of each error of the hand, then of each of measuring
+    shifts : (m,) by one standard deviation of each error of the hand, then of each of measuring
     """
 
     at: complex
-    moved: ComplexArray
+    shifts: ComplexArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,20 +147,20 @@ class TracedDrawing:
     ----------
     made : each node as its step makes it from the nodes before it, own ones where they are known
     nodes : each node as it is: the own one where it is known, else as made
-    hand : how many of the errors that may move them are the hand's; those of measuring come after
+    drafting_count : how many of the errors that may move them are the hand's; those of measuring come after
     """
 
     made: Mapping[str, TracedNode]
     nodes: Mapping[str, TracedNode]
-    hand: int
+    drafting_count: int
 
     def vector(self, tail: str, head: str) -> complex:
         """What the step of `head` makes of a vector."""
         return self.made[head].at - self.nodes[tail].at
 
-    def moved(self, tail: str, head: str) -> ComplexArray:
+    def shifts(self, tail: str, head: str) -> ComplexArray:
         """How its end is moved, by one standard deviation of each error."""
-        return np.asarray(self.made[head].moved - self.nodes[tail].moved)
+        return np.asarray(self.made[head].shifts - self.nodes[tail].shifts)
 
 
 NO_OWN: Mapping[str, Mapping[str, OwnNode]] = {}
@@ -186,12 +186,12 @@ def trace(
     with np.errstate(all="ignore"):
         for figure, steps in construction.figures.items():
             drawing.trace(figure, steps)
-    made = {name: drawing.told(place) for name, place in drawing.made.items()}
+    made = {name: drawing.as_traced(place) for name, place in drawing.made.items()}
     nodes = {
-        name: made[name] if place is drawing.made[name] else drawing.told(place)
+        name: made[name] if place is drawing.made[name] else drawing.as_traced(place)
         for name, place in drawing.nodes.items()
     }
-    return TracedDrawing(made, nodes, drawing.hand)
+    return TracedDrawing(made, nodes, drawing.drafting_count)
 
 
 @dataclass(slots=True)
@@ -203,53 +203,55 @@ class _Tracing:
     skill: Skill
     own: Mapping[str, Mapping[str, OwnNode]]
     errors: Errors = field(init=False)
-    hand: int = field(init=False)
-    measuring: int = field(init=False)
+    drafting_count: int = field(init=False)
+    measuring_count: int = field(init=False)
     made: dict[str, ComplexArray] = field(default_factory=dict)
     nodes: dict[str, ComplexArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         every = acts(self.construction)
         counts = (
-            len(one.moved) for nodes in self.own.values() for one in nodes.values() if one.moved is not None
+            len(one.shifts) for nodes in self.own.values() for one in nodes.values() if one.shifts is not None
         )
-        self.hand, self.measuring = len(every), max(counts, default=0)
-        rows = SMALL * np.eye(self.hand, 1 + self.hand + self.measuring, 1)
+        self.drafting_count, self.measuring_count = len(every), max(counts, default=0)
+        rows = SMALL * np.eye(self.drafting_count, 1 + self.drafting_count + self.measuring_count, 1)
         self.errors = {act: row * self.skill.deviation(act[2]) for act, row in zip(every, rows, strict=True)}
 
     def trace(self, figure: str, steps: tuple[Step, ...]) -> None:
         """One figure, from the own nodes as it was drawn from them."""
         own = {name: self.placed(one) for name, one in self.own.get(figure, {}).items()}
         view = View({**self.nodes, **own}, self.parameters, self.errors)
-        seen: dict[str, ComplexArray] = view.nodes  # type: ignore[assignment]
+        known: dict[str, ComplexArray] = view.nodes  # type: ignore[assignment]
         for step in steps:
             node = step.node
             mark = view.error(node, 0, "x") + 1j * view.error(node, 0, "y")
             self.made[node] = np.asarray(step.place(view) + mark)
-            seen[node] = self.nodes[node] = own.get(node, self.made[node])
+            known[node] = self.nodes[node] = own.get(node, self.made[node])
 
     def placed(self, one: OwnNode) -> ComplexArray:
         """An own node, with its errors of measuring."""
-        place = np.full(1 + self.hand + self.measuring, one.at)
-        if one.moved is not None:
-            place[1 + self.hand : 1 + self.hand + len(one.moved)] += SMALL * one.moved
+        place = np.full(1 + self.drafting_count + self.measuring_count, one.at)
+        if one.shifts is not None:
+            place[1 + self.drafting_count : 1 + self.drafting_count + len(one.shifts)] += SMALL * one.shifts
         return place
 
-    def told(self, place: ComplexArray) -> TracedNode:
+    def as_traced(self, place: ComplexArray) -> TracedNode:
         """A node's place without errors, and how each moves it."""
         if place.ndim == 0:
-            return TracedNode(complex(place), np.zeros(self.hand + self.measuring, np.complex128))
-        moved = (place[1:] - place[0]) / SMALL
-        return TracedNode(complex(place[0]), np.where(np.isfinite(moved), moved, 0.0))
+            return TracedNode(
+                complex(place), np.zeros(self.drafting_count + self.measuring_count, np.complex128)
+            )
+        shifts = (place[1:] - place[0]) / SMALL
+        return TracedNode(complex(place[0]), np.where(np.isfinite(shifts), shifts, 0.0))
 
 
-def spread(moved: ComplexArray, along: complex) -> EndSpread:
+def spread(shifts: ComplexArray, along: complex) -> EndSpread:
     """The standard deviations of an end that independent errors move, about a vector's direction.
 
     Arguments: `along` is the vector; for a zero vector both are what the end is off in any direction.
     """
     if along == 0.0:
-        whole = float(np.sqrt(np.sum(np.abs(moved) ** 2)))
+        whole = float(np.sqrt(np.sum(np.abs(shifts) ** 2)))
         return EndSpread(whole, whole)
-    turned = moved * np.conj(along / abs(along))
+    turned = shifts * np.conj(along / abs(along))
     return EndSpread(float(np.sqrt(np.sum(turned.real**2))), float(np.sqrt(np.sum(turned.imag**2))))

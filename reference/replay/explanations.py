@@ -16,7 +16,7 @@ from reference.construction.elements import Coriolis, Errors, Normal, View
 from reference.construction.graph import Construction
 from reference.construction.mistakes import Mistake, changed_step, mistakes_of_step
 from reference.construction.steps import Given, Step, TwoLines
-from reference.construction.uncertainty import SMALL, Skill, hand_errors
+from reference.construction.uncertainty import SMALL, Skill, step_errors
 from reference.geometry import ComplexArray, FloatArray
 from reference.numbers import dot
 
@@ -44,9 +44,9 @@ ANYWHERE = 2.0 * math.log(100.0)
 """A length may then be anything within some 100 mm; a place costs twice that."""
 SUSPECT = 9.0
 """From this squared misfit on (three standard errors) wrong ways are tried."""
-WITHIN = 24.0
+COST_WINDOW = 24.0
 """Accounts dearer than the cheapest by a hand of the same care by more than this are dropped."""
-AT_MOST = 40
+MOST_BRANCHES = 40
 """Accounts kept by a hand of one care."""
 
 
@@ -87,19 +87,19 @@ class Observations:
 
     Attributes
     ----------
-    seen : its nodes and vectors
+    entries : its nodes and vectors
     sketches : by plan, the mechanism's joints as drawn beside it, where that is a sketch of its own
     """
 
-    seen: tuple[Observation, ...]
+    entries: tuple[Observation, ...]
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
 
 
-def by_node(construction: Construction, seen: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
+def by_node(construction: Construction, entries: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
     """What was seen, by the end that is made later; vectors seen the other way round are turned."""
     order = {step.node: index for index, step in enumerate(construction.steps)}
     found: dict[str, tuple[Observation, ...]] = {}
-    for one in seen:
+    for one in entries:
         if one.tail is not None and order[one.tail] > order[one.node]:
             value = -one.value if one.has_direction else one.value
             one = replace(one, node=one.tail, tail=one.node, value=value)  # noqa: PLW2901 - the same vector
@@ -107,9 +107,11 @@ def by_node(construction: Construction, seen: Iterable[Observation]) -> dict[str
     return found
 
 
-def seen_later(construction: Construction, seen: Mapping[str, tuple[Observation, ...]]) -> frozenset[str]:
+def needed_nodes(
+    construction: Construction, entries: Mapping[str, tuple[Observation, ...]]
+) -> frozenset[str]:
     """The nodes that were seen, or that something seen is made from or reckoned from, rightly or wrongly."""
-    wanted = set(seen) | {one.tail for ones in seen.values() for one in ones if one.tail is not None}
+    wanted = set(entries) | {one.tail for ones in entries.values() for one in ones if one.tail is not None}
     # A wrong line may be taken by any link, and through a pole.
     wanted.update(step.node for step in construction.figures["mechanism"])
     wanted.update(construction.poles.values())
@@ -129,12 +131,12 @@ class NodeObservations:
     care : (branches,) how many times a usual hand's standard deviations
     """
 
-    seen: tuple[Observation, ...]
+    entries: tuple[Observation, ...]
     turned: ComplexArray | None
     care: FloatArray
 
     def __bool__(self) -> bool:
-        return bool(self.seen)
+        return bool(self.entries)
 
     def value(self, one: Observation) -> ComplexArray | complex:
         """As it would stand in a plan that is not turned."""
@@ -143,37 +145,37 @@ class NodeObservations:
         return np.asarray(one.value / self.turned)
 
     @property
-    def tells_place(self) -> bool:
+    def fixes_place(self) -> bool:
         """Whether what was seen leaves the node only one place."""
-        return any(one.has_direction for one in self.seen)
+        return any(one.has_direction for one in self.entries)
 
     @property
     def freedom(self) -> int:
         """How many numbers were seen."""
-        return sum(2 if one.has_direction else 1 for one in self.seen)
+        return sum(2 if one.has_direction else 1 for one in self.entries)
 
     @property
     def anywhere(self) -> float:
         """What any place at all costs."""
         return SOMETHING_ELSE + ANYWHERE * min(self.freedom, 2)
 
-    def held_against(
-        self, place: ComplexArray, moved: ComplexArray | None, nodes: Mapping[str, ComplexArray]
+    def misfit_and_cost(
+        self, place: ComplexArray, shifts: ComplexArray | None, nodes: Mapping[str, ComplexArray]
     ) -> tuple[FloatArray, FloatArray]:
         """The squared misfit of places in standard deviations, infinite where there is none, and its cost.
 
         The cost is -2 log of the density of what was seen, millimetres: wide errors make each place rarer.
 
-        Arguments: `place` (ways, branches); `moved` (ways, acts, branches) is how far the acts of a usual
+        Arguments: `place` (ways, branches); `shifts` (ways, acts, branches) is how far the acts of a usual
         hand move it.
         """
         misfit, width = np.zeros(place.shape), np.zeros(place.shape)
-        for one in self.seen:
+        for one in self.entries:
             vector = place if one.tail is None else place - nodes[one.tail]
             if one.has_direction:
-                squared, variance = _off(self.value(one) - vector, one.spread, moved)
+                squared, variance = _squared_residual(self.value(one) - vector, one.spread, shifts)
             else:
-                squared, variance = _off_length(abs(one.value), vector, one.spread)
+                squared, variance = _squared_length_residual(abs(one.value), vector, one.spread)
             misfit += squared
             width += np.log(variance)
         misfit /= self.care**2
@@ -183,23 +185,23 @@ class NodeObservations:
 
     def settled(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> ComplexArray:
         """Places moved to what was seen, by as little as possible where that leaves it open."""
-        first = self.seen[0]
+        first = self.entries[0]
         if first.has_direction:
             tail = 0.0 if first.tail is None else nodes[first.tail]
             return np.broadcast_to(tail + self.value(first), place.shape)
         for _ in range(SETTLING):
-            moved = place + self._shift(place, nodes)
-            place = np.where(np.isfinite(moved), moved, place)
+            shifts = place + self._shift(place, nodes)
+            place = np.where(np.isfinite(shifts), shifts, place)
         return place
 
     def _shift(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> ComplexArray:
         """A Gauss-Newton step towards the lengths seen."""
-        tails = [one.tail for one in self.seen]
+        tails = [one.tail for one in self.entries]
         vectors = np.array([place if tail is None else place - nodes[tail] for tail in tails])
         lengths = np.abs(vectors)
         is_long = lengths > TINY
         along = np.where(is_long, vectors / np.maximum(lengths, TINY), 0.0)
-        wanted = np.array([abs(one.value) for one in self.seen])[:, None]
+        wanted = np.array([abs(one.value) for one in self.entries])[:, None]
         pull = (along * (wanted - lengths)).sum(axis=0)
         x, y = along.real, along.imag
         xx, yy, xy = (x * x).sum(axis=0) + STIFFNESS, (y * y).sum(axis=0) + STIFFNESS, (x * y).sum(axis=0)
@@ -207,12 +209,14 @@ class NodeObservations:
         return np.asarray(((yy * x - xy * y) + 1j * (xx * y - xy * x)) / (xx * yy - xy**2))
 
 
-def _off(off: ComplexArray, spread: Covariance, moved: ComplexArray | None) -> tuple[FloatArray, FloatArray]:
+def _squared_residual(
+    residual: ComplexArray, spread: Covariance, shifts: ComplexArray | None
+) -> tuple[FloatArray, FloatArray]:
     """Deviations squared, in standard deviations, and the determinants of their covariances."""
-    x, y = off.real, off.imag
+    x, y = residual.real, residual.imag
     xx, xy, yy = (np.asarray(one) for one in spread)
-    if moved is not None:
-        across, up = moved.real, moved.imag
+    if shifts is not None:
+        across, up = shifts.real, shifts.imag
         xx = xx + np.einsum("kah,kah->kh", across, across)
         xy = xy + np.einsum("kah,kah->kh", across, up)
         yy = yy + np.einsum("kah,kah->kh", up, up)
@@ -220,13 +224,15 @@ def _off(off: ComplexArray, spread: Covariance, moved: ComplexArray | None) -> t
     return np.asarray((yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant), np.asarray(determinant)
 
 
-def _off_length(seen_mm: float, vector: ComplexArray, spread: Covariance) -> tuple[FloatArray, FloatArray]:
+def _squared_length_residual(
+    drawn_mm: float, vector: ComplexArray, spread: Covariance
+) -> tuple[FloatArray, FloatArray]:
     """Deviations of lengths squared, in standard deviations, and their variances."""
     length, x, y = np.abs(vector), vector.real, vector.imag
     xx, xy, yy = spread
     along = (xx * x * x + 2.0 * xy * x * y + yy * y * y) / np.maximum(length, TINY) ** 2
     variance = np.where(length > TINY, along, xx + yy)
-    return np.asarray((seen_mm - length) ** 2 / variance), variance
+    return np.asarray((drawn_mm - length) ** 2 / variance), variance
 
 
 LEAST_FACTOR, MOST_FACTOR = 0.02, 30.0
@@ -255,22 +261,22 @@ class Repertoire:
     def errors(self, step: Step) -> Errors:
         """The errors of a step's acts."""
         if step.node not in self._errors:
-            self._errors[step.node] = hand_errors(step, self.skill)
+            self._errors[step.node] = step_errors(step, self.skill)
         return self._errors[step.node]
 
 
-KEPT = 32
+CACHE_SIZE = 32
 """So many constructions' repertoires are kept: a class draws one, or one for each position."""
-_kept: deque[Repertoire] = deque(maxlen=KEPT)
+_repertoires: deque[Repertoire] = deque(maxlen=CACHE_SIZE)
 
 
 def repertoire_of(construction: Construction, skill: Skill) -> Repertoire:
     """The repertoire of a construction, kept: a class draws one and the same."""
-    for repertoire in _kept:
+    for repertoire in _repertoires:
         if repertoire.construction is construction and repertoire.skill == skill:
             return repertoire
     repertoire = Repertoire(construction, skill)
-    _kept.append(repertoire)
+    _repertoires.append(repertoire)
     return repertoire
 
 
@@ -294,18 +300,18 @@ class StepAlternatives:
     factors: FloatArray | None = None
     others: int = 0
 
-    def made(self, way: int, branch: int) -> tuple[Mistake, ...]:
+    def made(self, choice: int, branch: int) -> tuple[Mistake, ...]:
         """The mistake of a way in a branch, as a tuple of one or none."""
-        mistake = self.mistakes[way]
+        mistake = self.mistakes[choice]
         if mistake is None:
             return ()
         if mistake.code == SLIP and self.factors is not None:
             mistake = replace(mistake, factor=float(self.factors[branch]))
         return (mistake,)
 
-    def is_something_else(self, way: int) -> bool:
+    def is_something_else(self, choice: int) -> bool:
         """Whether nobody knows what was done."""
-        return way >= len(self.mistakes) - self.others
+        return choice >= len(self.mistakes) - self.others
 
     def __add__(self, more: "StepAlternatives") -> "StepAlternatives":
         return StepAlternatives(
@@ -324,67 +330,69 @@ class StepContext:
 
     nodes: Mapping[str, ComplexArray]
     known: Mapping[str, FloatArray]
-    sight: NodeObservations
+    observed: NodeObservations
     repertoire: Repertoire
 
     @property
     def count(self) -> int:
         """How many branches there are."""
-        return len(self.sight.care)
+        return len(self.observed.care)
 
     def right(self, step: Step) -> StepAlternatives:
         """The step as it should be made."""
-        return self._ways(step, [(None, step)])
+        return self._alternatives(step, [(None, step)])
 
     def wrong(self, step: Step) -> StepAlternatives:
         """The step with each mistake in it."""
-        return self._ways(step, self.repertoire.wrong(step))
+        return self._alternatives(step, self.repertoire.wrong(step))
 
     def slips(self, step: Given) -> StepAlternatives | None:
         """The right direction with a length that was computed wrongly, as long as it was drawn."""
-        seen, view = self.sight.seen, View(self.nodes, self.known)
-        one = next((one for one in seen if one.tail == step.start or one.has_direction), None)
+        entries, view = self.observed.entries, View(self.nodes, self.known)
+        one = next((one for one in entries if one.tail == step.start or one.has_direction), None)
         if one is None or not isinstance(step.length, Normal | Coriolis):
             return None
         right = step.factor * step.length.at(view)
         if one.has_direction:
             tail = 0.0 if one.tail is None else self.nodes[one.tail]
-            drawn = dot(tail + self.sight.value(one) - self.nodes[step.start], step.along.at(view))
+            drawn = dot(tail + self.observed.value(one) - self.nodes[step.start], step.along.at(view))
         else:
             drawn = np.abs(one.value) * np.sign(right)
         factors = np.asarray(drawn / right)
         is_within = (factors > LEAST_FACTOR) & (factors < MOST_FACTOR)
         factors = np.broadcast_to(np.where(is_within, factors, np.nan), (self.count,))
         changed = replace(step, factor=step.factor * factors)  # type: ignore[arg-type]
-        return replace(self._ways(step, [(Mistake(SLIP, step.node), changed)]), factors=factors)
+        return replace(self._alternatives(step, [(Mistake(SLIP, step.node), changed)]), factors=factors)
 
     def something_else(self, right: StepAlternatives) -> StepAlternatives:
         """The node where it was drawn, whatever made it; from lengths alone on either side."""
-        sight, nodes = self.sight, self.nodes
+        observed, nodes = self.observed, self.nodes
         start = np.where(np.isfinite(right.place[0]), right.place[0], 0.0)
         starts = [start]
-        if not sight.tells_place and len(sight.seen) > 1:
-            tails = [0.0 if one.tail is None else nodes[one.tail] for one in sight.seen[:2]]
+        if not observed.fixes_place and len(observed.entries) > 1:
+            tails = [0.0 if one.tail is None else nodes[one.tail] for one in observed.entries[:2]]
             base = np.asarray(tails[1] - tails[0])
             along = np.where(np.abs(base) > 0.0, base / np.abs(base), 1.0)
             starts.append(np.asarray(tails[0] + along**2 * np.conj(start - tails[0])))
-        place = np.array([sight.settled(one, nodes) for one in starts])
+        place = np.array([observed.settled(one, nodes) for one in starts])
         zero = np.zeros(place.shape)
-        return StepAlternatives(place, zero + sight.anywhere, zero, (None,) * len(starts), others=len(starts))
+        return StepAlternatives(
+            place, zero + observed.anywhere, zero, (None,) * len(starts), others=len(starts)
+        )
 
-    def _ways(self, step: Step, steps: Sequence[tuple[Mistake | None, Step]]) -> StepAlternatives:
+    def _alternatives(self, step: Step, steps: Sequence[tuple[Mistake | None, Step]]) -> StepAlternatives:
         mistakes = tuple(mistake for mistake, _ in steps)
         if not steps:
             empty = np.zeros((0, self.count))
             return StepAlternatives(empty.astype(np.complex128), empty, empty, ())
-        place, moved = self._placed(step, [changed for _, changed in steps])
-        misfit, cost = self.sight.held_against(place, moved, self.nodes)
+        place, shifts = self._placed(step, [changed for _, changed in steps])
+        misfit, cost = self.observed.misfit_and_cost(place, shifts, self.nodes)
         rarity = np.array([0.0 if one is None else RARITY[one.code] for one in mistakes])
         return StepAlternatives(place, cost + rarity[:, None], misfit, mistakes)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:
         """Where each puts the node, and how far each act of a usual hand moves it (ways, acts, branches)."""
-        errors = self.repertoire.errors(step) if self.sight.tells_place else {}
+        errors = self.repertoire.errors(step) if self.observed.fixes_place else {}
         view = View(self.nodes, self.known, errors)
         if not errors:
             return np.array([_shaped(one, (self.count,)) for one in _places(steps, view)]), None

@@ -21,17 +21,17 @@ from reference.construction.steps import Given, Step
 from reference.construction.uncertainty import Skill
 from reference.geometry import ComplexArray, FloatArray
 from reference.replay.explanations import (
-    AT_MOST,
+    COST_WINDOW,
+    MOST_BRANCHES,
     SUSPECT,
-    WITHIN,
     NodeObservations,
     Observation,
     Observations,
     StepAlternatives,
     StepContext,
     by_node,
+    needed_nodes,
     repertoire_of,
-    seen_later,
 )
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
@@ -87,7 +87,7 @@ class Replay:
 
 def replay(
     drawing: Drawing,
-    work: Observations,
+    observations: Observations,
     roots: Sequence[Root],
     skill: Skill,
     *,
@@ -103,44 +103,50 @@ def replay(
     cares : the hands supposed, as multiples of its standard deviations
     blind : mistakes are also tried at steps of which what was seen tells no place, one to an account
     """
-    construction, told = drawing.construction, by_node(drawing.construction, work.seen)
+    construction, by_name = drawing.construction, by_node(drawing.construction, observations.entries)
     branches = _open(drawing, roots, cares)
-    needed = seen_later(construction, told)
+    needed = needed_nodes(construction, by_name)
     repertoire = repertoire_of(construction, skill)
     with np.errstate(all="ignore"):
         for figure, steps in construction.figures.items():
-            sketch = {name: np.asarray(place) for name, place in work.sketches.get(figure, {}).items()}
+            sketch = {
+                name: np.asarray(place) for name, place in observations.sketches.get(figure, {}).items()
+            }
             for step in steps:
                 if step.node in needed:
-                    here, nodes = told.get(step.node, ()), ChainMap(sketch, branches.nodes)
-                    bench = StepContext(nodes, branches.known, branches.sight(here, figure), repertoire)
-                    branches.go_on(step, figure, here, _ways(step, bench, branches.is_blind, blind=blind))
-    return branches.accounts()
+                    here, nodes = by_name.get(step.node, ()), ChainMap(sketch, branches.nodes)
+                    context = StepContext(nodes, branches.known, branches.observed(here, figure), repertoire)
+                    branches.go_on(
+                        step, figure, here, _alternatives(step, context, branches.is_blind, blind=blind)
+                    )
+    return branches.explanations()
 
 
-def _ways(step: Step, bench: StepContext, has_guessed: BoolArray, *, blind: bool) -> StepAlternatives:
+def _alternatives(
+    step: Step, context: StepContext, has_guessed: BoolArray, *, blind: bool
+) -> StepAlternatives:
     """The right way to make a step, and the wrong ones where that does not explain what was seen.
 
     Arguments: `has_guessed` tells the branches that suppose a mistake that nothing told of.
     """
-    right, sight = bench.right(step), bench.sight
+    right, observed = context.right(step), context.observed
     is_suspect = right.misfit[0] > SUSPECT
-    is_guess = blind and not sight.tells_place
+    is_guess = blind and not observed.fixes_place
     if not is_guess and not is_suspect.any():
         return right
-    wrong = bench.wrong(step)
+    wrong = context.wrong(step)
     if is_guess:
         wrong.cost[:, has_guessed & ~is_suspect] = np.inf
-    ways = right + wrong
-    if not sight or not is_suspect.any():
-        return ways
-    slips = bench.slips(step) if isinstance(step, Given) else None
+    alternatives = right + wrong
+    if not observed or not is_suspect.any():
+        return alternatives
+    slips = context.slips(step) if isinstance(step, Given) else None
     if slips is not None:
-        ways += slips
-        if not sight.tells_place:
+        alternatives += slips
+        if not observed.fixes_place:
             # Of a computed length seen as a length alone, whatever it is may be a slip.
-            return ways
-    return ways + bench.something_else(right)
+            return alternatives
+    return alternatives + context.something_else(right)
 
 
 @dataclass(slots=True)
@@ -157,44 +163,46 @@ class _Branches:
     unexplained: list[tuple[str, ...]]
     right: dict[str, FloatArray]
 
-    def sight(self, seen: tuple[Observation, ...], figure: str) -> NodeObservations:
+    def observed(self, entries: tuple[Observation, ...], figure: str) -> NodeObservations:
         """What was seen of a node of a figure."""
-        return NodeObservations(seen, self.turned.get(figure), self.care)
+        return NodeObservations(entries, self.turned.get(figure), self.care)
 
-    def go_on(self, step: Step, figure: str, seen: tuple[Observation, ...], ways: StepAlternatives) -> None:
+    def go_on(
+        self, step: Step, figure: str, entries: tuple[Observation, ...], alternatives: StepAlternatives
+    ) -> None:
         """Each way in each branch: the likeliest of them."""
-        costs, place, right = self.cost + ways.cost, ways.place[0], ways.misfit[0]
-        if len(ways.mistakes) == 1:
+        costs, place, right = self.cost + alternatives.cost, alternatives.place[0], alternatives.misfit[0]
+        if len(alternatives.mistakes) == 1:
             self.cost = costs[0]
         else:
             which, index = self._likeliest(costs)
-            place, right = ways.place[which, index], right[index]
+            place, right = alternatives.place[which, index], right[index]
             self._take(index)
             self.cost = costs[which, index]
-            if not any(one.has_direction for one in seen):
+            if not any(one.has_direction for one in entries):
                 self.is_blind = self.is_blind | ((which > 0) & (right <= SUSPECT))
-            for row, (way, branch) in enumerate(zip(which.tolist(), index.tolist(), strict=True)):
-                self.made[row] += ways.made(way, branch)
-                if ways.is_something_else(way):
+            for row, (choice, branch) in enumerate(zip(which.tolist(), index.tolist(), strict=True)):
+                self.made[row] += alternatives.made(choice, branch)
+                if alternatives.is_something_else(choice):
                     self.unexplained[row] += (step.node,)
-        if seen:
-            sight = self.sight(seen, figure)
-            place = sight.settled(place, self.nodes)
-            self.right[step.node] = np.sqrt(right / sight.freedom)
+        if entries:
+            observed = self.observed(entries, figure)
+            place = observed.settled(place, self.nodes)
+            self.right[step.node] = np.sqrt(right / observed.freedom)
         self.nodes[step.node] = place
 
     def _likeliest(self, costs: FloatArray) -> tuple[IntArray, IntArray]:
         """The ways and branches that go on, by hands of each care the likeliest first."""
-        kept = []
+        chosen = []
         for care in np.unique(self.care):
             columns = np.flatnonzero(self.care == care)
             own = costs[:, columns]
-            order = np.argsort(own, axis=None)[:AT_MOST]
+            order = np.argsort(own, axis=None)[:MOST_BRANCHES]
             least = own.flat[order[0]]
-            order = order[own.flat[order] <= least + WITHIN] if np.isfinite(least) else order[:1]
-            way, column = np.unravel_index(order, own.shape)
-            kept.append((way, columns[column]))
-        which, index = (np.concatenate(parts) for parts in zip(*kept, strict=True))
+            order = order[own.flat[order] <= least + COST_WINDOW] if np.isfinite(least) else order[:1]
+            choice, column = np.unravel_index(order, own.shape)
+            chosen.append((choice, columns[column]))
+        which, index = (np.concatenate(parts) for parts in zip(*chosen, strict=True))
         return which, index
 
     def _take(self, index: IntArray) -> None:
@@ -206,7 +214,7 @@ class _Branches:
         self.made = [self.made[i] for i in index]
         self.unexplained = [self.unexplained[i] for i in index]
 
-    def accounts(self) -> list[Replay]:
+    def explanations(self) -> list[Replay]:
         """What the branches have come to, the likeliest first."""
         return [
             Replay(float(self.cost[i]), float(self.care[i]), self.made[i], self.unexplained[i], self, i)
