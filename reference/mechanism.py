@@ -222,7 +222,7 @@ class Mechanism:
         return joint in self.ground_m
 
 
-def moved(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
+def translated(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
     """The whole mechanism moved on the ground, metres."""
 
     def onward(guide: Guide) -> Any:  # noqa: ANN401 - of the kind that it is given

@@ -41,166 +41,6 @@ from reference.construction.graph import AngularRate
 from reference.construction.steps import Given
 from reference.construction.uncertainty import EndSpread
 
-LEAST_VALUES = 3
-"""Values that are off by one factor were made with a wrong scale; fewer may be so by chance."""
-SAME_FACTOR = 0.02
-"""Relative: how near to each other their factors are, with rounding on the way."""
-HALF = 0.5
-"""The share of a criterion that a right drawing keeps where the rubric has no band of partial points."""
-
-
-def mark_of_value(
-    charges: Charges, criterion: CriterionTable, value: float, marked: ComparedMark, drawn: DrawnVector
-) -> MarkRange | None:
-    """The mark on a computed value beside its drawing; None where it is right, or right by the drawing.
-
-    A wrong value costs only the value: what the rubric's nearest band takes. A wrong factor in all
-    values of a scale costs once.
-    """
-    one, table = charges.task.segments[criterion.name], charges.task.rubric.tolerance_of(criterion)
-    scale = charges.used[one.scale]
-    rights = [abs(one.real), abs(marked.expected) * scale, drawn.length_mm * scale]
-    factor = common_factor(charges, one.scale)
-    if factor is not None and _is_charged(charges, one.scale):
-        rights += [right * factor for right in rights]
-    limits = [table.length_at(right / scale) * scale for right in rights]
-    marks = [
-        mark_value(value, right, limit, limit, table, unit_of(one.name))
-        for right, limit in zip(rights, limits, strict=True)
-    ]
-    best = max(marks, key=lambda mark: mark.share)
-    if best.is_full:
-        return None
-    if factor is not None:
-        charges.charged.add(_charge_of(one.scale))
-    keeps = max(best.share, table.all_bands[0][1] if table.all_bands else HALF)
-    return MarkRange(keeps, keeps, keeps, best.reasons)
-
-
-def common_factor(charges: Charges, scale: str) -> float | None:
-    """The factor by which all values of a scale are off, where they are off by one."""
-    if scale not in charges.factors:
-        charges.factors[scale] = _common_factor(charges, scale)
-    return charges.factors[scale]
-
-
-def _common_factor(charges: Charges, scale: str) -> float | None:
-    task, evidence = charges.task, charges.evidence
-    factors = []
-    for name, vector in task.construction.vectors.items():
-        if vector.scale != scale or name not in evidence.values:
-            continue
-        drawn = evidence.vector(name)
-        length = abs(task.drawn(name, charges.used)) if drawn is None else drawn.length_mm
-        if length > task.rubric.tolerance_of(name).least_mm:
-            factors.append(abs(evidence.values[name]) / (length * charges.used[scale]))
-    if len(factors) < LEAST_VALUES:
-        return None
-    factor = statistics.median(factors)
-    near = [each for each in factors if abs(each - factor) <= SAME_FACTOR * factor]
-    is_wrong = abs(factor - 1.0) > 2.0 * task.rubric.tolerance_of(scale).scale_relative
-    return factor if is_wrong and len(near) >= max(LEAST_VALUES, len(factors) - 1) else None
-
-
-def _charge_of(scale: str) -> str:
-    return f"values by {scale}"
-
-
-def _is_charged(charges: Charges, scale: str) -> bool:
-    return _charge_of(scale) in charges.charged
-
-
-def value_outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
-    """A vector of which only the computed value was handed in, or nothing."""
-    one, values = charges.task.segments[criterion.name], charges.evidence.values
-    scale = charges.used[one.scale]
-    if one.name not in values:
-        exact = one.drawn(charges.used)
-        return absent(charges, criterion, verdicts.expected_quantity(one.name, exact, scale, 0.0))
-    value, unit = abs(values[one.name]), unit_of(one.name)
-
-    def allowed(expected: complex, uncertainty: EndSpread) -> Tolerance:
-        plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(expected), with_direction=False)
-        if uncertainty is NO_SPREAD:
-            return Tolerance(value=(plain.length_mm or 0.0) * scale)
-        wider = widened(plain, abs(expected), uncertainty, charges.task.rubric.hand.at_most)
-        return Tolerance(value=(wider.length_mm or 0.0) * scale, widened=wider.widened)
-
-    def against(
-        expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
-    ) -> MarkRange:
-        del se
-        limit, table = (
-            allowed(expected, uncertainty).value or 0.0,
-            charges.task.rubric.tolerance_of(criterion),
-        )
-        plain = table.length_at(abs(expected)) * scale
-        return mark_value(value, abs(expected) * scale, limit, plain, table, unit)
-
-    follows = charges.task.rubric.follows_through(criterion)
-    marked = charges.best(one, against, follows_through=follows)
-    if not marked.mark.is_full and follows:
-        marked = _by_factor(charges, one.scale, marked, against)
-    measured, right = Quantity(value=values[one.name], unit=unit), abs(marked.expected) * scale
-    return verdicts.outcome(
-        criterion,
-        marked.mark,
-        measured,
-        Quantity(value=right, unit=unit),
-        allowed(marked.expected, marked.uncertainty),
-        followed=marked.is_followed,
-    )
-
-
-def _by_factor(charges: Charges, scale: str, marked: ComparedMark, against: Against) -> ComparedMark:
-    """A value that is off by the factor of all, after the first of them."""
-    factor, exact = common_factor(charges, scale), marked.expected
-    if factor is None:
-        return marked
-    mark = against(exact * factor)
-    if not _is_charged(charges, scale):
-        charges.charged.add(_charge_of(scale))
-        return marked
-    if not mark.is_better(marked.mark):
-        return marked
-    told = Reason("follows", {"what": "scale", "of": scale})
-    return ComparedMark(the_better(mark, marked.mark, told), exact * factor, is_followed=True)
-
-
-# What was not handed in, or not read -------------------------------------------------------------
-
-
-def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> Outcome:
-    """The outcome of a criterion that there is nothing to hold against."""
-    unread = _why_unread(charges, criterion)
-    reason = Reason("not_measured") if unread is None else Reason("unread", {"reason": unread})
-    if criterion.optional:
-        return verdicts.unjudged(criterion, "not_judged", (Reason("optional"), reason), expected=expected)
-    if criterion.link is not None and not charges.evidence.has_sketch:
-        # Links are drawn, not measured: without a sketch that was read nothing is asked of them.
-        return verdicts.unjudged(criterion, "not_judged", (reason,), expected=expected)
-    least, length = charges.task.rubric.tolerance_of(criterion).least_mm, expected.length_mm
-    if length is not None and length < least:
-        short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
-        return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
-    segment = charges.task.segments.get(criterion.name)
-    if segment is not None:
-        # Later criteria may hang on what nobody has seen.
-        charges.doubtful.add(segment.head)
-    verdict = charges.task.rubric.missing if unread is None else "review"
-    return verdicts.unjudged(criterion, verdict, (reason,), expected=expected)
-
-
-def _why_unread(charges: Charges, criterion: CriterionTable) -> str | None:
-    """Why a vector or link was not read, None where no sheet could show it."""
-    segment, evidence = charges.task.segments.get(criterion.name), charges.evidence
-    if segment is None or not evidence.has_sheets:
-        return None
-    for name in (segment.name, segment.head, segment.tail):
-        if name in evidence.unread:
-            return evidence.unread[name]
-    return f"{segment.name} was not found on the sheets"
-
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
@@ -301,7 +141,7 @@ def _scale(charges: Charges, criterion: CriterionTable) -> Outcome:
     return verdicts.outcome(criterion, scale.mark, measured, expected, allowed)
 
 
-# Vectors and links -------------------------------------------------------------------------------
+# Vectors and links ---------------------------------------------------------------------------------
 
 
 def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> Outcome:
@@ -385,7 +225,195 @@ def _full_tolerance(
     return widened(plain, size, marked.uncertainty, charges.task.rubric.hand.at_most)
 
 
-# Angular quantities ------------------------------------------------------------------------------
+def compared_with_cells(
+    mark: MarkRange,
+    drawn: DrawnVector,
+    written: tuple[float, float] | None,
+    tolerance: ToleranceTable,
+    least: float,
+) -> MarkRange:
+    """The mark, open where the two lengths contradict each other: a person must look.
+
+    Either the drawing is misread, or the cells, or the student has measured something else; nothing
+    here says which. A ruler errs by no more than the tolerance of a length.
+
+    Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
+    `least` the probability from which it counts.
+    """
+    if written is None or written[1] < least:
+        return mark
+    length_mm = written[0]
+    allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
+    if abs(drawn.length_mm - length_mm) <= allowed:
+        return mark
+    told: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
+    return open_between(NONE, FULL, mark, Reason("written_disagrees", told))
+
+
+# Computed values -----------------------------------------------------------------------------------
+
+LEAST_VALUES = 3
+"""Values that are off by one factor were made with a wrong scale; fewer may be so by chance."""
+SAME_FACTOR = 0.02
+"""Relative: how near to each other their factors are, with rounding on the way."""
+HALF = 0.5
+"""The share of a criterion that a right drawing keeps where the rubric has no band of partial points."""
+
+
+def mark_of_value(
+    charges: Charges, criterion: CriterionTable, value: float, marked: ComparedMark, drawn: DrawnVector
+) -> MarkRange | None:
+    """The mark on a computed value beside its drawing; None where it is right, or right by the drawing.
+
+    A wrong value costs only the value: what the rubric's nearest band takes. A wrong factor in all
+    values of a scale costs once.
+    """
+    one, table = charges.task.segments[criterion.name], charges.task.rubric.tolerance_of(criterion)
+    scale = charges.used[one.scale]
+    rights = [abs(one.real), abs(marked.expected) * scale, drawn.length_mm * scale]
+    factor = common_factor(charges, one.scale)
+    if factor is not None and _is_charged(charges, one.scale):
+        rights += [right * factor for right in rights]
+    limits = [table.length_at(right / scale) * scale for right in rights]
+    marks = [
+        mark_value(value, right, limit, limit, table, unit_of(one.name))
+        for right, limit in zip(rights, limits, strict=True)
+    ]
+    best = max(marks, key=lambda mark: mark.share)
+    if best.is_full:
+        return None
+    if factor is not None:
+        charges.charged.add(_charge_of(one.scale))
+    keeps = max(best.share, table.all_bands[0][1] if table.all_bands else HALF)
+    return MarkRange(keeps, keeps, keeps, best.reasons)
+
+
+def value_outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
+    """A vector of which only the computed value was handed in, or nothing."""
+    one, values = charges.task.segments[criterion.name], charges.evidence.values
+    scale = charges.used[one.scale]
+    if one.name not in values:
+        exact = one.drawn(charges.used)
+        return absent(charges, criterion, verdicts.expected_quantity(one.name, exact, scale, 0.0))
+    value, unit = abs(values[one.name]), unit_of(one.name)
+
+    def allowed(expected: complex, uncertainty: EndSpread) -> Tolerance:
+        plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(expected), with_direction=False)
+        if uncertainty is NO_SPREAD:
+            return Tolerance(value=(plain.length_mm or 0.0) * scale)
+        wider = widened(plain, abs(expected), uncertainty, charges.task.rubric.hand.at_most)
+        return Tolerance(value=(wider.length_mm or 0.0) * scale, widened=wider.widened)
+
+    def against(
+        expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
+    ) -> MarkRange:
+        del se
+        limit, table = (
+            allowed(expected, uncertainty).value or 0.0,
+            charges.task.rubric.tolerance_of(criterion),
+        )
+        plain = table.length_at(abs(expected)) * scale
+        return mark_value(value, abs(expected) * scale, limit, plain, table, unit)
+
+    follows = charges.task.rubric.follows_through(criterion)
+    marked = charges.best(one, against, follows_through=follows)
+    if not marked.mark.is_full and follows:
+        marked = _by_factor(charges, one.scale, marked, against)
+    measured, right = Quantity(value=values[one.name], unit=unit), abs(marked.expected) * scale
+    return verdicts.outcome(
+        criterion,
+        marked.mark,
+        measured,
+        Quantity(value=right, unit=unit),
+        allowed(marked.expected, marked.uncertainty),
+        followed=marked.is_followed,
+    )
+
+
+def _by_factor(charges: Charges, scale: str, marked: ComparedMark, against: Against) -> ComparedMark:
+    """A value that is off by the factor of all, after the first of them."""
+    factor, exact = common_factor(charges, scale), marked.expected
+    if factor is None:
+        return marked
+    mark = against(exact * factor)
+    if not _is_charged(charges, scale):
+        charges.charged.add(_charge_of(scale))
+        return marked
+    if not mark.is_better(marked.mark):
+        return marked
+    told = Reason("follows", {"what": "scale", "of": scale})
+    return ComparedMark(the_better(mark, marked.mark, told), exact * factor, is_followed=True)
+
+
+def common_factor(charges: Charges, scale: str) -> float | None:
+    """The factor by which all values of a scale are off, where they are off by one."""
+    if scale not in charges.factors:
+        charges.factors[scale] = _common_factor(charges, scale)
+    return charges.factors[scale]
+
+
+def _common_factor(charges: Charges, scale: str) -> float | None:
+    task, evidence = charges.task, charges.evidence
+    factors = []
+    for name, vector in task.construction.vectors.items():
+        if vector.scale != scale or name not in evidence.values:
+            continue
+        drawn = evidence.vector(name)
+        length = abs(task.drawn(name, charges.used)) if drawn is None else drawn.length_mm
+        if length > task.rubric.tolerance_of(name).least_mm:
+            factors.append(abs(evidence.values[name]) / (length * charges.used[scale]))
+    if len(factors) < LEAST_VALUES:
+        return None
+    factor = statistics.median(factors)
+    near = [each for each in factors if abs(each - factor) <= SAME_FACTOR * factor]
+    is_wrong = abs(factor - 1.0) > 2.0 * task.rubric.tolerance_of(scale).scale_relative
+    return factor if is_wrong and len(near) >= max(LEAST_VALUES, len(factors) - 1) else None
+
+
+def _charge_of(scale: str) -> str:
+    return f"values by {scale}"
+
+
+def _is_charged(charges: Charges, scale: str) -> bool:
+    return _charge_of(scale) in charges.charged
+
+
+# What was not handed in, or not read ---------------------------------------------------------------
+
+
+def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> Outcome:
+    """The outcome of a criterion that there is nothing to hold against."""
+    unread = _why_unread(charges, criterion)
+    reason = Reason("not_measured") if unread is None else Reason("unread", {"reason": unread})
+    if criterion.optional:
+        return verdicts.unjudged(criterion, "not_judged", (Reason("optional"), reason), expected=expected)
+    if criterion.link is not None and not charges.evidence.has_sketch:
+        # Links are drawn, not measured: without a sketch that was read nothing is asked of them.
+        return verdicts.unjudged(criterion, "not_judged", (reason,), expected=expected)
+    least, length = charges.task.rubric.tolerance_of(criterion).least_mm, expected.length_mm
+    if length is not None and length < least:
+        short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
+        return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
+    segment = charges.task.segments.get(criterion.name)
+    if segment is not None:
+        # Later criteria may hang on what nobody has seen.
+        charges.doubtful.add(segment.head)
+    verdict = charges.task.rubric.missing if unread is None else "review"
+    return verdicts.unjudged(criterion, verdict, (reason,), expected=expected)
+
+
+def _why_unread(charges: Charges, criterion: CriterionTable) -> str | None:
+    """Why a vector or link was not read, None where no sheet could show it."""
+    segment, evidence = charges.task.segments.get(criterion.name), charges.evidence
+    if segment is None or not evidence.has_sheets:
+        return None
+    for name in (segment.name, segment.head, segment.tail):
+        if name in evidence.unread:
+            return evidence.unread[name]
+    return f"{segment.name} was not found on the sheets"
+
+
+# Angular quantities --------------------------------------------------------------------------------
 
 
 def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
@@ -436,7 +464,16 @@ def _widened_rate(
     return Tolerance(value=(wider.length_mm or 0.0) * per_mm, widened=wider.widened)
 
 
-# From the own vector ----------------------------------------------------------------------------
+def rate_from_vector(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -> float | None:
+    """The angular rate that the student's own vector gives; None without one, or a trivial one.
+
+    Arguments: `scale` is the vector's, real units per drawn millimetre. Where the own vector's direction
+    is not known, the sense is the right one's.
+    """
+    own = evidence.vector(rate.vector)
+    if own is None or own.length_mm < task.rubric.tolerance_of(rate.vector).least_mm:
+        return None
+    return _own_sense(task, evidence, rate) * own.length_mm * scale / own_length(task, evidence, rate)
 
 
 def own_length(task: Task, evidence: Evidence, rate: AngularRate) -> float:
@@ -454,18 +491,6 @@ def _is_given(task: Task, rate: AngularRate) -> bool:
     return not any(isinstance(one, Normal) and one.measured == rate.link for one in lengths)
 
 
-def rate_from_vector(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -> float | None:
-    """The angular rate that the student's own vector gives; None without one, or a trivial one.
-
-    Arguments: `scale` is the vector's, real units per drawn millimetre. Where the own vector's direction
-    is not known, the sense is the right one's.
-    """
-    own = evidence.vector(rate.vector)
-    if own is None or own.length_mm < task.rubric.tolerance_of(rate.vector).least_mm:
-        return None
-    return _own_sense(task, evidence, rate) * own.length_mm * scale / own_length(task, evidence, rate)
-
-
 def _own_sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
     """+1 where the own vector turns its link counter-clockwise: the link as drawn where it was read."""
     own, along = evidence.vector(rate.vector), task.real[rate.vector]
@@ -478,31 +503,3 @@ def _own_sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
     if tail is not None and head is not None:
         return math.copysign(1.0, math.sin(own.direction_rad - cmath.phase(head - tail)))
     return sense * math.copysign(1.0, math.cos(own.direction_rad - cmath.phase(along)))
-
-
-# The length that the student wrote into the sheet's cells ----------------------------------------
-
-
-def compared_with_cells(
-    mark: MarkRange,
-    drawn: DrawnVector,
-    written: tuple[float, float] | None,
-    tolerance: ToleranceTable,
-    least: float,
-) -> MarkRange:
-    """The mark, open where the two lengths contradict each other: a person must look.
-
-    Either the drawing is misread, or the cells, or the student has measured something else; nothing
-    here says which. A ruler errs by no more than the tolerance of a length.
-
-    Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
-    `least` the probability from which it counts.
-    """
-    if written is None or written[1] < least:
-        return mark
-    length_mm = written[0]
-    allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
-    if abs(drawn.length_mm - length_mm) <= allowed:
-        return mark
-    told: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
-    return open_between(NONE, FULL, mark, Reason("written_disagrees", told))

@@ -73,8 +73,7 @@ def known(nodes: Nodes) -> frozenset[str]:
     ) | frozenset(nodes.get(MECHANISM, ()))
 
 
-# From measured vectors ---------------------------------------------------------------------------
-
+# From measured lengths -----------------------------------------------------------------------------
 
 LEAST_SINE = 0.2
 """Of the angle at which two lengths meet: of a flatter triangle only its line tells where the corner is."""
@@ -280,6 +279,8 @@ def _crossing(
     base = np.where(misses_mm > MISS_MM, np.nan, base)
     return p + base * (along + 1j * across), p + base * (along - 1j * across), sine
 
+
+# Another mechanism that the vectors fit ------------------------------------------------------------
 
 BETTER_BY = 3
 """So many more vectors a wrong mechanism must explain."""

@@ -122,7 +122,7 @@ def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Sca
     return task.cache[key]  # type: ignore[return-value]
 
 
-# What the drawing says ----------------------------------------------------------------------------
+# What the drawing shows ----------------------------------------------------------------------------
 
 
 def _evidence_of(task: Task, evidence: Evidence, name: str) -> tuple[float, float, float] | None:
@@ -177,7 +177,7 @@ def _fits(drawn: DrawnVector, expected_mm: float, tolerance: ToleranceTable) -> 
     return is_telling and abs(drawn.length_mm - expected_mm) <= tolerance.length_at(expected_mm)
 
 
-# Declared scales ----------------------------------------------------------------------------------
+# A declared scale compared with the drawing --------------------------------------------------------
 
 
 def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, rule: float) -> Scale:
@@ -267,6 +267,8 @@ def _ends(task: Task, name: str) -> tuple[str, str] | None:
     return None if vector is None else (vector.tail, vector.head)
 
 
+# Which of the declarations count -------------------------------------------------------------------
+
 LIKELY, BEYOND_DOUBT = 0.2, 0.985
 """Confidence at which a box is believed where the drawing or the rule has the very scale (a misreading
 would hit it once in hundreds), and where they have another; `SURE` where they have nearly that scale."""
@@ -275,6 +277,12 @@ SAME = 0.005
 BORNE_OUT = 0.02
 """Relative: as near as that the drawing or the rule bears a scale out."""
 Source = Literal["roster", "measurements", "box"]
+SOURCES: Mapping[Source, str] = {
+    "roster": "the roster",
+    "measurements": "the measurements",
+    "box": "the box",
+}
+"""What messages call them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -368,17 +376,6 @@ def _contradicts(name: str, box: Written, text: str, source: Source) -> Problem:
 def _differ(name: str, given: Sequence[tuple[str, Source]]) -> Problem:
     texts = ", ".join(dict.fromkeys(f"'{text}' in {SOURCES[source]}" for text, source in given))
     return Problem("scale_disagrees", f"{name} is {texts}: none is used; correct one of them")
-
-
-SOURCES: Mapping[Source, str] = {
-    "roster": "the roster",
-    "measurements": "the measurements",
-    "box": "the box",
-}
-"""What messages call them."""
-
-
-# Values -------------------------------------------------------------------------------------------
 
 
 def _parsed_text(task: Task, name: str, text: str) -> ParsedScale:

@@ -17,6 +17,9 @@ ROUNDING = 1e-9
 """Relative: a deviation this little above its tolerance is on it."""
 
 
+# Limits and marks ----------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True, slots=True)
 class Limit:
     """A deviation held against its tolerance.
@@ -154,6 +157,15 @@ def the_worse(first: MarkRange, other: MarkRange) -> MarkRange:
     )
 
 
+def with_confidence(mark: MarkRange, confidence: float, least: float) -> MarkRange:
+    """Anything is possible where the reading is less certain than the rubric asks."""
+    if confidence >= least:
+        return mark
+    return open_between(NONE, FULL, mark, Reason("doubtful", {"confidence": confidence}))
+
+
+# Vectors and values --------------------------------------------------------------------------------
+
 REVERSED_WITHIN_DEG = 20.0
 """A direction this near the opposite one is told as reversed, not as turned by so much."""
 
@@ -272,14 +284,9 @@ def mark_value(
     return mark([Limit("value", residual, allowed, plain, 0.0, table, reason)])
 
 
+# Outcomes ------------------------------------------------------------------------------------------
+
 RANKS: dict[Verdict, int] = {"none": 0, "partial": 1, "follow_through": 2, "full": 2}
-
-
-def with_confidence(mark: MarkRange, confidence: float, least: float) -> MarkRange:
-    """Anything is possible where the reading is less certain than the rubric asks."""
-    if confidence >= least:
-        return mark
-    return open_between(NONE, FULL, mark, Reason("doubtful", {"confidence": confidence}))
 
 
 def quantity(name: str, length_mm: float, direction_rad: float | None, value: float) -> Quantity:

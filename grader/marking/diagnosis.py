@@ -26,6 +26,219 @@ from reference.construction.uncertainty import Skill
 from reference.replay.explanations import RARITY, Observations
 from reference.replay.replay import Replay, Root, replay
 
+OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
+SCALES = frozenset({"kL", "kv", "ka"})
+
+
+# The explanations of a drawing ---------------------------------------------------------------------
+
+FURTHER_SCALE = 4.0
+"""What it costs to suppose a further wrong scale: it often comes from the first."""
+BEYOND_DOUBT = 20.0
+"""A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
+LEAST_WRONG = 0.06
+"""A scale off by a smaller share than this is nobody's mistake by name: a hand may draw so."""
+USUAL = 1.0
+CARES = (0.6, USUAL, 1.6, 2.5, 4.0)
+"""The hands supposed, as multiples of a usual one's standard deviations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A drawing to explain.
+
+    Attributes
+    ----------
+    drawing : how it should have been drawn, at the scales declared
+    observations : what was drawn
+    assignment, variant : whose plan it should be
+    skill : of a usual hand
+    followed : scales that the drawing follows although others were declared
+    assumed : scales that nobody declared
+    """
+
+    drawing: Drawing
+    observations: Observations
+    assignment: Assignment
+    variant: Variant
+    skill: Skill
+    followed: Mapping[str, float] = field(default_factory=dict)
+    assumed: frozenset[str] = frozenset()
+
+
+def explained(case: Case) -> tuple[Replay, ...]:
+    """The ways in which a drawing may have been made, the likeliest first.
+
+    There are none where a right drawing is to be believed.
+    """
+    roots = [Root(), *_other_scales(case)]
+    explanations = replay(case.drawing, case.observations, roots, case.skill, cares=CARES)
+    innocent = _cost_if_right(explanations)
+    if explanations and not _is_clear(explanations, case):
+        explanations = _searched_further(case, roots, explanations)
+    if not explanations or innocent - explanations[0].cost < BEYOND_DOUBT:
+        return ()
+    return tuple(explanations)
+
+
+def _searched_further(case: Case, roots: Sequence[Root], explanations: Sequence[Replay]) -> list[Replay]:
+    """The accounts with mistakes of the whole drawing among them, and with guesses at what was not seen.
+
+    A careless hand is also taken for a usual one that has made some mistake. What one mistake explains,
+    places and all, is not sought in the whole drawing.
+    """
+    best = explanations[0]
+    if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
+        roots = [*roots, *_of_the_whole(case)]
+    cares = sorted({best.care, min(best.care, USUAL)})
+    found = replay(case.drawing, case.observations, roots, case.skill, cares=cares, blind=True) or [
+        *explanations
+    ]
+    for swap in _swaps(case.drawing, found[0]):
+        root, observations = Root((swap,), cost=RARITY[swap.code]), _renamed(case.observations, swap.other)
+        found += replay(case.drawing, observations, [root], case.skill, cares=cares)
+    return sorted(found, key=lambda explanation: explanation.cost)
+
+
+def _is_explained(explanation: Replay) -> bool:
+    """Whether a usual hand and one mistake at most explain everything."""
+    return not explanation.unexplained and len(explanation.made) <= 1 and explanation.care <= USUAL
+
+
+def _cost_if_right(explanations: Sequence[Replay]) -> float:
+    """What the account costs in which everything was made rightly; infinite where it is beyond belief."""
+    return min(
+        (explanation.cost for explanation in explanations if explanation.is_innocent), default=math.inf
+    )
+
+
+def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
+    """Whether a usual hand made everything rightly, or one mistake at a step whose beginnings were seen.
+
+    What goes wrong in a mechanism that nobody saw shows in more than one step.
+    """
+    best, construction = explanations[0], case.drawing.construction
+    if not _is_explained(best):
+        return False
+    if not best.made:
+        return True
+    places = {one.node for one in case.observations.entries if one.has_direction} | {
+        *construction.poles.values()
+    }
+    joints = {step.node for step in construction.figures[MECHANISM]}
+    step = next((one for one in construction.steps if one.node == best.made[0].at), None)
+    return step is not None and places.issuperset({step.node, *step.needs} - joints)
+
+
+def _other_scales(case: Case) -> Iterator[Root]:
+    """The drawing at the scales that it follows, where others were declared.
+
+    A plan may be drawn to another scale throughout, or start from a crank's vector that is, while what is
+    computed from it is computed at the scale declared.
+    """
+    factors = {
+        name: float(case.drawing.parameters[name]) / followed for name, followed in case.followed.items()
+    }
+    made = tuple(
+        Mistake("scale_wrong", name, factor=factor)
+        for name, factor in factors.items()
+        if abs(math.log(factor)) > LEAST_WRONG
+    )
+    if not made:
+        return
+    scales = {name: np.asarray(followed) for name, followed in case.followed.items()}
+    starts = {
+        name: value * factor
+        for name, value in case.drawing.parameters.items()
+        for scale, factor in factors.items()
+        if name.startswith(f"{scale[1]}_")
+    }
+    for parameters in (scales, starts):
+        yield Root(made, parameters, cost=RARITY["scale_wrong"] + FURTHER_SCALE * (len(made) - 1))
+
+
+def _of_the_whole(case: Case) -> Iterator[Root]:
+    """A plan turned as a whole; another variant's data."""
+    for plan in case.drawing.construction.poles:
+        for quarters in (1, 2, 3):
+            turned = Mistake("figure_rotated", plan, quarters=quarters)
+            yield Root((turned,), turned={plan: 1j**quarters}, cost=RARITY["figure_rotated"])
+    yield from _other_variants(case)
+
+
+def _other_variants(case: Case) -> Iterator[Root]:
+    """Another student's data, all else right."""
+    variants = case.assignment.variants()
+    scales = case.assignment.scales(variants, kL=float(case.drawing.parameters["kL"]))
+    together = parameters_of(case.assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
+    table = {
+        name: np.broadcast_to(value, (len(variants),))
+        for name, value in together.items()
+        if name not in SCALES - case.assumed and np.ndim(value) and np.ptp(value) > 0.0
+    }
+    for index, variant in enumerate(variants):
+        if variant != case.variant and table:
+            parameters = {name: np.asarray(value[index]) for name, value in table.items()}
+            other = Mistake(
+                "other_variant", "mechanism", n=variant.n, position=variant.position, parameters=parameters
+            )
+            yield Root((other,), parameters, cost=RARITY["other_variant"])
+
+
+def _swaps(drawing: Drawing, explanation: Replay) -> Iterator[Mistake]:
+    """Two images of a plan with each other's letters, both of which are off by the likeliest account."""
+    construction = drawing.construction
+    off = {*explanation.unexplained, *(mistake.at for mistake in explanation.made)}
+    for figure, pole in construction.poles.items():
+        images = sorted(
+            v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
+        )
+        for pair in combinations(images, 2):
+            if off >= set(pair):
+                yield Mistake("labels_swapped", pair[0], other=pair)
+
+
+def _renamed(observations: Observations, pair: tuple[str, ...]) -> Observations:
+    """What was drawn, under the right names where two letters were swapped."""
+    other = {pair[0]: pair[1], pair[1]: pair[0]}
+    entries = (
+        replace(one, node=other.get(one.node, one.node), tail=other.get(one.tail or "", one.tail))
+        for one in observations.entries
+    )
+    return replace(observations, entries=tuple(entries))
+
+
+# What was drawn by mistake, where that is certain --------------------------------------------------
+
+CERTAIN = 0.9
+"""From this confidence on what follows from a mistake that nothing else shows is credited."""
+NO_STEPS = frozenset({"scale_wrong", "labels_swapped"})
+"""Mistakes that change no step: what follows from them is told by the scales and by the letters."""
+
+
+def drawn_instead(explanations: Sequence[Replay], case: Case) -> tuple[Drawing, frozenset[str]]:
+    """The drawing with those mistakes in it that are certain, and the nodes at which it is wrong.
+
+    Of a wrong mechanism that is the mechanism as a whole; of the right drawing there are none.
+    """
+    joints = {step.node for step in case.drawing.construction.figures[MECHANISM]}
+    certain = [one for one in sure_of(explanations, CERTAIN) if one.code not in NO_STEPS]
+    wrong = {MECHANISM if one.at in joints or one.code == "other_variant" else one.at for one in certain}
+    return _with(certain, case.drawing), frozenset(wrong)
+
+
+def _with(mistakes: Sequence[Mistake], drawing: Drawing) -> Drawing:
+    """A drawing with mistakes in it, at its own scales."""
+    for one in mistakes:
+        if one.code == "other_variant":
+            drawing = Drawing(drawing.construction, {**drawing.parameters, **one.parameters})
+        else:
+            drawing = commit(one, drawing)
+    return drawing
+
+
+# The mistakes that are named -----------------------------------------------------------------------
+
 LEAST_CONFIDENCE = 0.6
 """An explanation less certain than this is not named."""
 SURE_TOGETHER = 0.8
@@ -36,24 +249,7 @@ MOST_RIVALS = 3
 SUSPICIOUS, GROSS = 2.0, 5.0
 """Standard deviations of this hand: what is off by less than the latter at a step is no mistake to be
 named. (Where it is not off at all, the mistake showed elsewhere.)"""
-OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
-RPM_WITHIN = 0.03
-"""Relative: a scale off by 30/pi (squared for accelerations) this nearly was made from rev/min."""
-SCALES = frozenset({"kL", "kv", "ka"})
-
 Key = tuple[str, str]
-
-
-def sure_of(explanations: Sequence[Replay], least: float) -> list[Mistake]:
-    """The mistakes of the likeliest account that are this sure, unless they are slight."""
-    if not explanations:
-        return []
-    shares = _Shares(explanations)
-    return [
-        one
-        for one in explanations[0].made
-        if shares.of(_key(one)) >= least and not _is_slight(one, explanations[0])
-    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +275,18 @@ def named(explanations: Sequence[Replay], construction: Construction, lost: Lost
             others = tuple(_record(one, construction, (), shares.instead(key, _key(one))) for one in rivals)
             mistakes.append(_record(mistake, construction, tuple(explains[mistake]), share, others))
     return tuple(mistakes)
+
+
+def sure_of(explanations: Sequence[Replay], least: float) -> list[Mistake]:
+    """The mistakes of the likeliest account that are this sure, unless they are slight."""
+    if not explanations:
+        return []
+    shares = _Shares(explanations)
+    return [
+        one
+        for one in explanations[0].made
+        if shares.of(_key(one)) >= least and not _is_slight(one, explanations[0])
+    ]
 
 
 def _key(mistake: Mistake) -> Key:
@@ -161,7 +369,9 @@ def _is_about(mistake: Mistake, scale: str) -> bool:
     return mistake.at == scale or mistake.code == "other_variant"
 
 
-# The record ---------------------------------------------------------------------------------------
+RPM_WITHIN = 0.03
+"""Relative: a scale off by 30/pi (squared for accelerations) this nearly was made from rev/min."""
+LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
 
 
 def _record(
@@ -176,9 +386,6 @@ def _record(
     is_line = mistake.code in LINE_MISTAKES
     line = _line_of(construction.step(mistake.at), mistake.slot) if is_line else {}
     return NamedMistake(mistake, explains, min(confidence, 1.0), line, rivals)
-
-
-LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
 
 
 def _line_of(step: Step, slot: int) -> dict[str, str]:
@@ -199,207 +406,3 @@ def _code_of_scale(name: str, factor: float) -> str:
     powers = {"kv": 1, "ka": 2}
     rpm = RPM_FACTOR ** powers.get(name, 0)
     return "rpm_not_converted" if name in powers and abs(factor / rpm - 1.0) <= RPM_WITHIN else "scale_wrong"
-
-
-FURTHER_SCALE = 4.0
-"""What it costs to suppose a further wrong scale: it often comes from the first."""
-CERTAIN = 0.9
-"""From this confidence on what follows from a mistake that nothing else shows is credited."""
-NO_STEPS = frozenset({"scale_wrong", "labels_swapped"})
-"""Mistakes that change no step: what follows from them is told by the scales and by the letters."""
-BEYOND_DOUBT = 20.0
-"""A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
-LEAST_WRONG = 0.06
-"""A scale off by a smaller share than this is nobody's mistake by name: a hand may draw so."""
-USUAL = 1.0
-CARES = (0.6, USUAL, 1.6, 2.5, 4.0)
-"""The hands supposed, as multiples of a usual one's standard deviations."""
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A drawing to explain.
-
-    Attributes
-    ----------
-    drawing : how it should have been drawn, at the scales declared
-    observations : what was drawn
-    assignment, variant : whose plan it should be
-    skill : of a usual hand
-    followed : scales that the drawing follows although others were declared
-    assumed : scales that nobody declared
-    """
-
-    drawing: Drawing
-    observations: Observations
-    assignment: Assignment
-    variant: Variant
-    skill: Skill
-    followed: Mapping[str, float] = field(default_factory=dict)
-    assumed: frozenset[str] = frozenset()
-
-
-def explained(case: Case) -> tuple[Replay, ...]:
-    """The ways in which a drawing may have been made, the likeliest first.
-
-    There are none where a right drawing is to be believed.
-    """
-    roots = [Root(), *_other_scales(case)]
-    explanations = replay(case.drawing, case.observations, roots, case.skill, cares=CARES)
-    innocent = _cost_if_right(explanations)
-    if explanations and not _is_clear(explanations, case):
-        explanations = _searched_further(case, roots, explanations)
-    if not explanations or innocent - explanations[0].cost < BEYOND_DOUBT:
-        return ()
-    return tuple(explanations)
-
-
-def drawn_instead(explanations: Sequence[Replay], case: Case) -> tuple[Drawing, frozenset[str]]:
-    """The drawing with those mistakes in it that are certain, and the nodes at which it is wrong.
-
-    Of a wrong mechanism that is the mechanism as a whole; of the right drawing there are none.
-    """
-    joints = {step.node for step in case.drawing.construction.figures[MECHANISM]}
-    certain = [one for one in sure_of(explanations, CERTAIN) if one.code not in NO_STEPS]
-    wrong = {MECHANISM if one.at in joints or one.code == "other_variant" else one.at for one in certain}
-    return _with(certain, case.drawing), frozenset(wrong)
-
-
-def _with(mistakes: Sequence[Mistake], drawing: Drawing) -> Drawing:
-    """A drawing with mistakes in it, at its own scales."""
-    for one in mistakes:
-        if one.code == "other_variant":
-            drawing = Drawing(drawing.construction, {**drawing.parameters, **one.parameters})
-        else:
-            drawing = commit(one, drawing)
-    return drawing
-
-
-def _searched_further(case: Case, roots: Sequence[Root], explanations: Sequence[Replay]) -> list[Replay]:
-    """The accounts with mistakes of the whole drawing among them, and with guesses at what was not seen.
-
-    A careless hand is also taken for a usual one that has made some mistake. What one mistake explains,
-    places and all, is not sought in the whole drawing.
-    """
-    best = explanations[0]
-    if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
-        roots = [*roots, *_of_the_whole(case)]
-    cares = sorted({best.care, min(best.care, USUAL)})
-    found = replay(case.drawing, case.observations, roots, case.skill, cares=cares, blind=True) or [
-        *explanations
-    ]
-    for swap in _swaps(case.drawing, found[0]):
-        root, observations = Root((swap,), cost=RARITY[swap.code]), _renamed(case.observations, swap.other)
-        found += replay(case.drawing, observations, [root], case.skill, cares=cares)
-    return sorted(found, key=lambda explanation: explanation.cost)
-
-
-def _is_explained(explanation: Replay) -> bool:
-    """Whether a usual hand and one mistake at most explain everything."""
-    return not explanation.unexplained and len(explanation.made) <= 1 and explanation.care <= USUAL
-
-
-def _cost_if_right(explanations: Sequence[Replay]) -> float:
-    """What the account costs in which everything was made rightly; infinite where it is beyond belief."""
-    return min(
-        (explanation.cost for explanation in explanations if explanation.is_innocent), default=math.inf
-    )
-
-
-def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
-    """Whether a usual hand made everything rightly, or one mistake at a step whose beginnings were seen.
-
-    What goes wrong in a mechanism that nobody saw shows in more than one step.
-    """
-    best, construction = explanations[0], case.drawing.construction
-    if not _is_explained(best):
-        return False
-    if not best.made:
-        return True
-    places = {one.node for one in case.observations.entries if one.has_direction} | {
-        *construction.poles.values()
-    }
-    joints = {step.node for step in construction.figures[MECHANISM]}
-    step = next((one for one in construction.steps if one.node == best.made[0].at), None)
-    return step is not None and places.issuperset({step.node, *step.needs} - joints)
-
-
-# Mistakes of the whole drawing --------------------------------------------------------------------
-
-
-def _other_scales(case: Case) -> Iterator[Root]:
-    """The drawing at the scales that it follows, where others were declared.
-
-    A plan may be drawn to another scale throughout, or start from a crank's vector that is, while what is
-    computed from it is computed at the scale declared.
-    """
-    factors = {
-        name: float(case.drawing.parameters[name]) / followed for name, followed in case.followed.items()
-    }
-    made = tuple(
-        Mistake("scale_wrong", name, factor=factor)
-        for name, factor in factors.items()
-        if abs(math.log(factor)) > LEAST_WRONG
-    )
-    if not made:
-        return
-    scales = {name: np.asarray(followed) for name, followed in case.followed.items()}
-    starts = {
-        name: value * factor
-        for name, value in case.drawing.parameters.items()
-        for scale, factor in factors.items()
-        if name.startswith(f"{scale[1]}_")
-    }
-    for parameters in (scales, starts):
-        yield Root(made, parameters, cost=RARITY["scale_wrong"] + FURTHER_SCALE * (len(made) - 1))
-
-
-def _of_the_whole(case: Case) -> Iterator[Root]:
-    """A plan turned as a whole; another variant's data."""
-    for plan in case.drawing.construction.poles:
-        for quarters in (1, 2, 3):
-            turned = Mistake("figure_rotated", plan, quarters=quarters)
-            yield Root((turned,), turned={plan: 1j**quarters}, cost=RARITY["figure_rotated"])
-    yield from _other_variants(case)
-
-
-def _other_variants(case: Case) -> Iterator[Root]:
-    """Another student's data, all else right."""
-    variants = case.assignment.variants()
-    scales = case.assignment.scales(variants, kL=float(case.drawing.parameters["kL"]))
-    together = parameters_of(case.assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
-    table = {
-        name: np.broadcast_to(value, (len(variants),))
-        for name, value in together.items()
-        if name not in SCALES - case.assumed and np.ndim(value) and np.ptp(value) > 0.0
-    }
-    for index, variant in enumerate(variants):
-        if variant != case.variant and table:
-            parameters = {name: np.asarray(value[index]) for name, value in table.items()}
-            other = Mistake(
-                "other_variant", "mechanism", n=variant.n, position=variant.position, parameters=parameters
-            )
-            yield Root((other,), parameters, cost=RARITY["other_variant"])
-
-
-def _swaps(drawing: Drawing, explanation: Replay) -> Iterator[Mistake]:
-    """Two images of a plan with each other's letters, both of which are off by the likeliest account."""
-    construction = drawing.construction
-    off = {*explanation.unexplained, *(mistake.at for mistake in explanation.made)}
-    for figure, pole in construction.poles.items():
-        images = sorted(
-            v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
-        )
-        for pair in combinations(images, 2):
-            if off >= set(pair):
-                yield Mistake("labels_swapped", pair[0], other=pair)
-
-
-def _renamed(observations: Observations, pair: tuple[str, ...]) -> Observations:
-    """What was drawn, under the right names where two letters were swapped."""
-    other = {pair[0]: pair[1], pair[1]: pair[0]}
-    entries = (
-        replace(one, node=other.get(one.node, one.node), tail=other.get(one.tail or "", one.tail))
-        for one in observations.entries
-    )
-    return replace(observations, entries=tuple(entries))

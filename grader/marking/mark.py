@@ -23,20 +23,90 @@ from reference.construction.uncertainty import trace
 from reference.geometry import ComplexArray
 from reference.replay.explanations import Covariance, Observation, Observations
 
+CHARGED = frozenset({"none", "partial"})
+LOST = CHARGED | {"follow_through", "review"}
+"""Verdicts whose cause is looked for: also where a person has still to decide."""
+LEAST_LEFT_OUT_MM = 5.0
+"""A shorter one may hide in its ends' marks."""
+LEFT_OUT = 0.9
+"""How sure it is: of 368 vectors drawn between two ends read for certain, none was overlooked."""
+
+
+def judge(task: Task, submission: Submission) -> Judgement:
+    """Verdicts, mistakes and points of one submission for one variant."""
+    comparison = compare(task, submission, explain)
+    mistakes = _named(task, comparison)
+    mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes), *_not_drawn(task, comparison))
+    outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
+    return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
+
+
+def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
+    """The mistakes that explain what was lost, or may be."""
+    scales, vectors = comparison.settled, task.construction.vectors
+    lost = [one for one in comparison.outcomes if one.verdict in LOST]
+    by_vector = {one.name: one.criterion for one in lost if one.name in vectors}
+    by_scale = {one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED}
+    is_other_scale = any(scale.other and not scale.used.assumed for scale in scales.values())
+    if not by_vector and not is_other_scale:
+        return ()
+    explanation = comparison.explanation or explain(task, comparison.evidence, scales)
+    return named(explanation.explanations, task.construction, Lost(by_vector, by_scale))
+
+
+def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:
+    """Letters seen at each other's node on a sheet: lines tell nothing of them, so diagnosis cannot."""
+    vectors = task.construction.vectors
+    told = {one.mistake.other for one in known if one.code == "labels_swapped"}
+    found = []
+    for swap in (swap for reading in submission.readings for swap in reading.swapped):
+        pair = swap.first, swap.second
+        if swap.confidence < LEAST_CONFIDENCE or {pair, pair[::-1]} & told:
+            continue
+        told.add(pair)
+        explains = tuple(
+            one.id
+            for one in task.rubric.criterion
+            if one.name in vectors and {vectors[one.name].tail, vectors[one.name].head} & set(pair)
+        )
+        mistake = Mistake("labels_swapped", swap.first, other=pair)
+        found.append(NamedMistake(mistake, explains, swap.confidence))
+    return found
+
+
+def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
+    """Vectors that are asked for, long enough, and not on the sheet although both their ends were read.
+
+    What was not measured says nothing: nobody need measure everything.
+    """
+    evidence, construction = comparison.evidence, task.construction
+    known = {*evidence.nodes, *construction.poles.values()} if evidence.has_sheets else set()
+    found = []
+    for one in comparison.outcomes:
+        vector = construction.vectors.get(one.name)
+        if vector is None or one.verdict not in {"none", "review"} or evidence.vector(one.name) is not None:
+            continue
+        is_left_out = {vector.tail, vector.head} <= known
+        if is_left_out and (one.expected.length_mm or 0.0) >= LEAST_LEFT_OUT_MM:
+            mistake = Mistake("vector_missing", one.name)
+            found.append(NamedMistake(mistake, (one.criterion,), LEFT_OUT))
+    return found
+
+
+def _with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
+    """The outcome with the mistake that explains its loss."""
+    if outcome.verdict not in {"none", "partial"}:
+        return outcome
+    found = next((one for one in mistakes if outcome.criterion in one.explains), None)
+    if found is None or outcome.mistake is not None:
+        return outcome
+    return replace(outcome, mistake=found.code, cause=found)
+
+
+# Points --------------------------------------------------------------------------------------------
+
 DECIMALS = 6
 """Points are told to so many decimals; more is the computer's rounding."""
-
-
-def share_of(rubric: RubricFile, criterion: CriterionTable, verdict: Verdict) -> float:
-    """The share of a criterion's points that a verdict gives: of a partial one, that of the nearest band."""
-    bands = rubric.tolerance_of(criterion).all_bands
-    shares: Mapping[str, float] = {
-        "full": 1.0,
-        "follow_through": 1.0,
-        "partial": bands[0][1] if bands else 0.0,
-        "none": 0.0,
-    }
-    return shares[verdict]
 
 
 def score(rubric: RubricFile, outcomes: Sequence[Outcome]) -> Score:
@@ -70,6 +140,18 @@ def score(rubric: RubricFile, outcomes: Sequence[Outcome]) -> Score:
     )
     is_open = any(outcome.verdict == "review" for outcome in outcomes)
     return Score(points, None if is_open else low, low, high, maximum)
+
+
+def share_of(rubric: RubricFile, criterion: CriterionTable, verdict: Verdict) -> float:
+    """The share of a criterion's points that a verdict gives: of a partial one, that of the nearest band."""
+    bands = rubric.tolerance_of(criterion).all_bands
+    shares: Mapping[str, float] = {
+        "full": 1.0,
+        "follow_through": 1.0,
+        "partial": bands[0][1] if bands else 0.0,
+        "none": 0.0,
+    }
+    return shares[verdict]
 
 
 def _shares(rubric: RubricFile, criterion: CriterionTable, outcome: Outcome) -> tuple[float, float]:
@@ -111,6 +193,8 @@ class _Total:
         """What it gives at worst and at best."""
         return self.low * self.scale, self.high * self.scale
 
+
+# What was drawn, for the diagnosis -----------------------------------------------------------------
 
 LEAST_ERROR_MM = 0.15
 """However well a hand draws, and however well its drawing is read."""
@@ -223,85 +307,3 @@ def _covariance(shifts: ComplexArray, least_mm: float) -> Covariance:
     """What independent errors make of an end together: variance along x, covariance, variance along y."""
     x, y = shifts.real, shifts.imag
     return float(x @ x) + least_mm**2, float(x @ y), float(y @ y) + least_mm**2
-
-
-CHARGED = frozenset({"none", "partial"})
-LOST = CHARGED | {"follow_through", "review"}
-"""Verdicts whose cause is looked for: also where a person has still to decide."""
-
-
-def judge(task: Task, submission: Submission) -> Judgement:
-    """Verdicts, mistakes and points of one submission for one variant."""
-    comparison = compare(task, submission, explain)
-    mistakes = _named(task, comparison)
-    mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes), *_not_drawn(task, comparison))
-    outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
-    return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
-
-
-def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
-    """The mistakes that explain what was lost, or may be."""
-    scales, vectors = comparison.settled, task.construction.vectors
-    lost = [one for one in comparison.outcomes if one.verdict in LOST]
-    by_vector = {one.name: one.criterion for one in lost if one.name in vectors}
-    by_scale = {one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED}
-    is_other_scale = any(scale.other and not scale.used.assumed for scale in scales.values())
-    if not by_vector and not is_other_scale:
-        return ()
-    explanation = comparison.explanation or explain(task, comparison.evidence, scales)
-    return named(explanation.explanations, task.construction, Lost(by_vector, by_scale))
-
-
-def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:
-    """Letters seen at each other's node on a sheet: lines tell nothing of them, so diagnosis cannot."""
-    vectors = task.construction.vectors
-    told = {one.mistake.other for one in known if one.code == "labels_swapped"}
-    found = []
-    for swap in (swap for reading in submission.readings for swap in reading.swapped):
-        pair = swap.first, swap.second
-        if swap.confidence < LEAST_CONFIDENCE or {pair, pair[::-1]} & told:
-            continue
-        told.add(pair)
-        explains = tuple(
-            one.id
-            for one in task.rubric.criterion
-            if one.name in vectors and {vectors[one.name].tail, vectors[one.name].head} & set(pair)
-        )
-        mistake = Mistake("labels_swapped", swap.first, other=pair)
-        found.append(NamedMistake(mistake, explains, swap.confidence))
-    return found
-
-
-def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
-    """Vectors that are asked for, long enough, and not on the sheet although both their ends were read.
-
-    What was not measured says nothing: nobody need measure everything.
-    """
-    evidence, construction = comparison.evidence, task.construction
-    known = {*evidence.nodes, *construction.poles.values()} if evidence.has_sheets else set()
-    found = []
-    for one in comparison.outcomes:
-        vector = construction.vectors.get(one.name)
-        if vector is None or one.verdict not in {"none", "review"} or evidence.vector(one.name) is not None:
-            continue
-        is_left_out = {vector.tail, vector.head} <= known
-        if is_left_out and (one.expected.length_mm or 0.0) >= LEAST_LEFT_OUT_MM:
-            mistake = Mistake("vector_missing", one.name)
-            found.append(NamedMistake(mistake, (one.criterion,), LEFT_OUT))
-    return found
-
-
-LEAST_LEFT_OUT_MM = 5.0
-"""A shorter one may hide in its ends' marks."""
-LEFT_OUT = 0.9
-"""How sure it is: of 368 vectors drawn between two ends read for certain, none was overlooked."""
-
-
-def _with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
-    """The outcome with the mistake that explains its loss."""
-    if outcome.verdict not in {"none", "partial"}:
-        return outcome
-    found = next((one for one in mistakes if outcome.criterion in one.explains), None)
-    if found is None or outcome.mistake is not None:
-        return outcome
-    return replace(outcome, mistake=found.code, cause=found)

@@ -114,9 +114,9 @@ def compare_drawings(assignment: Assignment, submissions: Sequence[ComparedSubmi
     variants = list(dict.fromkeys(each.variant for each in submissions))
     variant = np.array([variants.index(each.variant) for each in submissions])
     printed = np.array([each.printed for each in submissions])
-    places, layout = place_chance(drawn, printed, variant)
+    places, layout = position_chance(drawn, printed, variant)
     rows = _rows(submissions, fits, places)
-    together = _together(rows, submissions)
+    together = _compared_rows(rows, submissions)
     cosines, counts, log_agreement = _agreement(
         drafting_errors(assignment, submissions, drawn, rows), together
     )
@@ -126,7 +126,7 @@ def compare_drawings(assignment: Assignment, submissions: Sequence[ComparedSubmi
     (compared,) = _by_student(rows, len(submissions), np.where(together, -1.0, 0.0))
     people = np.array([each.student_id for each in submissions])
     return DrawingSimilarity(
-        log_chance=np.where(compared < 0.0, _both(log_errors, places), 0.0),
+        log_chance=np.where(compared < 0.0, _fisher_combined(log_errors, places), 0.0),
         log_errors=log_errors,
         log_places=np.where(compared < 0.0, places, 0.0),
         log_layout=layout,
@@ -153,7 +153,7 @@ def _rows(
     return list(dict.fromkeys(rows))
 
 
-def _together(rows: Sequence[Row], submissions: Sequence[ComparedSubmission]) -> NDArray[np.bool_]:
+def _compared_rows(rows: Sequence[Row], submissions: Sequence[ComparedSubmission]) -> NDArray[np.bool_]:
     """(rows, rows) which rows are compared: of one variant, and of two people."""
     variants = list(dict.fromkeys(row.variant for row in rows))
     variant = np.array([variants.index(row.variant) for row in rows])
@@ -177,7 +177,7 @@ def _by_student(
     return by_student
 
 
-def _both(first: FloatArray, second: FloatArray) -> FloatArray:
+def _fisher_combined(first: FloatArray, second: FloatArray) -> FloatArray:
     """Fisher's rule: log of the chance that two independent pieces of evidence are so rare together."""
     both = gammaincc(2.0, -(first + second))
     with np.errstate(divide="ignore"):
@@ -383,7 +383,7 @@ def log_chance(cosine: FloatArray, dimensions: FloatArray) -> FloatArray:
 # Places on the sheet ------------------------------------------------------------------------------
 
 
-def place_chance(
+def position_chance(
     drawn: Mapping[str, Drawn], printed: NDArray[np.bool_], variant: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Log of the chance that two placements come so near, and of what a layout explains.

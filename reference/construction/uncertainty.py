@@ -1,10 +1,9 @@
-"""How far a hand may miss each node: the derivative of the one construction by the hand's errors.
+"""Propagated drafting errors: the derivative of the construction by the error of each act of drawing.
 
-Each act of drawing (a line set along a direction, a length transferred, a point marked) has an error
-of its own. One evaluation on arrays, an element for each act, tells how each error moves each node;
-they are independent, so that a vector's variance is the sum of their squares. The same evaluation
-with a student's own nodes in place of computed ones tells what follows from these, and how far the
-later acts alone may miss it.
+Each act (a line set along a direction, a length transferred, a point marked) has an independent error.
+One evaluation on arrays, an element for each act, gives how each error moves each node; a vector's
+variance is the sum of the squares. The same evaluation with a student's own nodes in place of computed
+ones gives what follows from these, with the errors of the later acts alone.
 """
 
 from collections.abc import Mapping
@@ -91,9 +90,9 @@ def acts(construction: Construction) -> tuple[Act, ...]:
 
 
 def step_errors(step: Step, skill: Skill) -> Errors:
-    """The errors of one step's acts, arrays (acts + 1, 1): none in the first row, then one in each.
+    """The errors of one step's acts, arrays (acts + 1, 1): none in the first row, then one in each row.
 
-    They are as small as `SMALL` says, in standard deviations.
+    Each is `SMALL` standard deviations.
     """
     own = acts_of(step)
     rows = SMALL * np.eye(len(own), 1 + len(own), 1)[:, :, None]
@@ -105,12 +104,12 @@ def step_errors(step: Step, skill: Skill) -> Errors:
 
 @dataclass(frozen=True, slots=True)
 class OwnNode:
-    """A node as a student has drawn it, or as measurements lead to it.
+    """A node as a student has drawn it, or as measurements give it.
 
     Attributes
     ----------
     at : complex millimetres
-    shifts : (r,) how it is moved by one standard deviation of each error of measuring; None without any
+    shifts : (r,) how one standard deviation of each error of measuring moves it; None without any
     """
 
     at: complex
@@ -119,12 +118,12 @@ class OwnNode:
 
 @dataclass(frozen=True, slots=True)
 class TracedNode:
-    """A node with all that may move it.
+    """A node with its derivative by all errors.
 
     Attributes
     ----------
     at : complex millimetres
-    shifts : (m,) by one standard deviation of each error of the hand, then of each of measuring
+    shifts : (m,) by one standard deviation of each drafting error, then of each error of measuring
     """
 
     at: complex
@@ -146,8 +145,8 @@ class TracedDrawing:
     Attributes
     ----------
     made : each node as its step makes it from the nodes before it, own ones where they are known
-    nodes : each node as it is: the own one where it is known, else as made
-    drafting_count : how many of the errors that may move them are the hand's; those of measuring come after
+    nodes : the own node where it is known, else as made
+    drafting_count : how many of the errors are drafting errors; those of measuring come after them
     """
 
     made: Mapping[str, TracedNode]
@@ -155,11 +154,11 @@ class TracedDrawing:
     drafting_count: int
 
     def vector(self, tail: str, head: str) -> complex:
-        """What the step of `head` makes of a vector."""
+        """The vector to `head` as the step of `head` makes it, complex mm."""
         return self.made[head].at - self.nodes[tail].at
 
     def shifts(self, tail: str, head: str) -> ComplexArray:
-        """How its end is moved, by one standard deviation of each error."""
+        """How one standard deviation of each error moves the vector's end, complex mm."""
         return np.asarray(self.made[head].shifts - self.nodes[tail].shifts)
 
 
@@ -172,7 +171,7 @@ def trace(
     skill: Skill,
     own: Mapping[str, Mapping[str, OwnNode]] = NO_OWN,
 ) -> TracedDrawing:
-    """Draw a construction with a hand's errors, from a student's own nodes where they are known.
+    """Draw a construction with drafting errors, from a student's own nodes where they are known.
 
     Arguments
     ---------
@@ -180,7 +179,7 @@ def trace(
     own : the student's nodes as each figure is drawn from them, by figure and node: with two sheets the
         second has a sketch of its own
 
-    A node that has no place is nan; what an error moves to no place is taken as not moved by it.
+    A node without a solution is nan; an error that leaves no solution counts as no shift.
     """
     drawing = _Tracing(construction, parameters, skill, own)
     with np.errstate(all="ignore"):
@@ -218,7 +217,7 @@ class _Tracing:
         self.errors = {act: row * self.skill.deviation(act[2]) for act, row in zip(every, rows, strict=True)}
 
     def trace(self, figure: str, steps: tuple[Step, ...]) -> None:
-        """One figure, from the own nodes as it was drawn from them."""
+        """Trace one figure, from the own nodes that belong to it."""
         own = {name: self.placed(one) for name, one in self.own.get(figure, {}).items()}
         view = View({**self.nodes, **own}, self.parameters, self.errors)
         known: dict[str, ComplexArray] = view.nodes  # type: ignore[assignment]
@@ -229,14 +228,14 @@ class _Tracing:
             known[node] = self.nodes[node] = own.get(node, self.made[node])
 
     def placed(self, one: OwnNode) -> ComplexArray:
-        """An own node, with its errors of measuring."""
+        """An own node as an array over the errors."""
         place = np.full(1 + self.drafting_count + self.measuring_count, one.at)
         if one.shifts is not None:
             place[1 + self.drafting_count : 1 + self.drafting_count + len(one.shifts)] += SMALL * one.shifts
         return place
 
     def as_traced(self, place: ComplexArray) -> TracedNode:
-        """A node's place without errors, and how each moves it."""
+        """A node's position without errors, and its shift by each of them."""
         if place.ndim == 0:
             return TracedNode(
                 complex(place), np.zeros(self.drafting_count + self.measuring_count, np.complex128)
@@ -246,9 +245,9 @@ class _Tracing:
 
 
 def spread(shifts: ComplexArray, along: complex) -> EndSpread:
-    """The standard deviations of an end that independent errors move, about a vector's direction.
+    """The standard deviations of a vector's end along the vector and across it, from independent errors.
 
-    Arguments: `along` is the vector; for a zero vector both are what the end is off in any direction.
+    Arguments: `along` is the vector; for a zero vector both are the root of the sum over both axes.
     """
     if along == 0.0:
         whole = float(np.sqrt(np.sum(np.abs(shifts) ** 2)))

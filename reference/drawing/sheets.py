@@ -50,8 +50,8 @@ def lay_out(figures: Sequence[DrawnFigure], room: Bounds, column: Bounds) -> tup
     its right.
     """
     beside = (room[0], room[1], column[0], room[3])
-    found = _in_rows(figures, beside) or _where_there_is_room(figures, room, column)
-    return (found, True) if found else (_one_on_another(figures, room), False)
+    found = _in_rows(figures, beside) or _packed_by_size(figures, room, column)
+    return (found, True) if found else (_stacked(figures, room), False)
 
 
 def _sizes(figures: Sequence[DrawnFigure]) -> list[tuple[float, float]]:
@@ -63,8 +63,8 @@ def _in_rows(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point] | None
 
     None where every way leaves too little.
     """
-    ways = [_rows(figures, breaks, room) for breaks in product((False, True), repeat=len(figures) - 1)]
-    gap, moves = max(ways, key=lambda way: way[0])
+    layouts = [_rows(figures, breaks, room) for breaks in product((False, True), repeat=len(figures) - 1)]
+    gap, moves = max(layouts, key=lambda layout: layout[0])
     return moves if gap >= LEAST_GAP_MM else None
 
 
@@ -90,9 +90,7 @@ def _rows(figures: Sequence[DrawnFigure], breaks: Sequence[bool], room: Bounds) 
     return gap, moves
 
 
-def _where_there_is_room(
-    figures: Sequence[DrawnFigure], room: Bounds, kept_free: Bounds
-) -> list[Point] | None:
+def _packed_by_size(figures: Sequence[DrawnFigure], room: Bounds, reserved: Bounds) -> list[Point] | None:
     """The largest figure in the middle or in a corner, each other where it keeps farthest from all there.
 
     Of these ways the one whose figures keep farthest apart; None where none has room for all.
@@ -100,17 +98,17 @@ def _where_there_is_room(
     sizes = _sizes(figures)
     if any(width > room[2] - room[0] or height > room[3] - room[1] for width, height in sizes):
         return None
-    ways = [_packed(figures, room, kept_free, corner) for corner in CORNERS]
-    gap, moves = max(ways, key=lambda way: way[0])
+    layouts = [_packed(figures, room, reserved, corner) for corner in CORNERS]
+    gap, moves = max(layouts, key=lambda layout: layout[0])
     return moves if gap > 0.0 else None
 
 
 def _packed(
-    figures: Sequence[DrawnFigure], room: Bounds, kept_free: Bounds, corner: tuple[float, float] | None
+    figures: Sequence[DrawnFigure], room: Bounds, reserved: Bounds, corner: tuple[float, float] | None
 ) -> tuple[float, list[Point]]:
     """How far the figures keep apart, zero where one has no place, and their moves."""
     taken = np.zeros((int((room[3] - room[1]) / CELL_MM), int((room[2] - room[0]) / CELL_MM)), dtype=bool)
-    x0, y0, x1, y1 = (int((side - room[k % 2]) / CELL_MM) for k, side in enumerate(kept_free))
+    x0, y0, x1, y1 = (int((side - room[k % 2]) / CELL_MM) for k, side in enumerate(reserved))
     taken[y0 : y1 + 1, x0 : x1 + 1] = True
     moves: dict[int, Point] = {}
     least = np.inf
@@ -174,7 +172,7 @@ def _roomiest(taken: Mask, mask: Mask, corner: tuple[float, float] | None) -> tu
     return (int(row), int(column)), float(depth[row, column])
 
 
-def _one_on_another(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point]:
+def _stacked(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point]:
     """All from the room's top left corner: what does not fit is at least seen."""
     return [(room[0] - box[0], room[1] - box[1]) for box in (figure.bounds for figure in figures)]
 
@@ -314,11 +312,11 @@ def reference_drawing(
         if not figures.keys().isdisjoint(page.figures)
     ]
     return (
-        asked if all(sheet.fits for sheet in asked) else _one_after_another(subject, list(figures.values()))
+        asked if all(sheet.fits for sheet in asked) else _on_several_sheets(subject, list(figures.values()))
     )
 
 
-def _one_after_another(subject: Subject, figures: Sequence[DrawnFigure]) -> list[DrawnSheet]:
+def _on_several_sheets(subject: Subject, figures: Sequence[DrawnFigure]) -> list[DrawnSheet]:
     """Sheets with as many figures each, in their order, as fit."""
     sheets: list[tuple[DrawnSheet, list[DrawnFigure]]] = []
     for figure in figures:

@@ -16,7 +16,7 @@ from reference.geometry import FloatArray
 from reference.mechanism import Crank, DrivenSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
 
 RADIUS_MM, SWEEP, THRUST_MM = 9.0, 0.9, 10.0
-_DRIVE_LETTER_MM = 3.4
+DRIVE_LETTER_MM = 3.4
 CLEAR_MM = 0.8
 STARTS = (0.25, -0.25 - SWEEP, 1.5, -1.5 - SWEEP, 2.5)
 """Where a turning arrow may start, from the crank on in its sense, the best first."""
@@ -27,7 +27,7 @@ Turn = tuple[float, float, float]
 def drive_arrow(subject: Subject, nodes: dict[str, complex]) -> Iterator[Shape]:
     """The arrow, unless the driven link stands still."""
     driver = subject.plan.mechanism.driver
-    if _stands(subject):
+    if _stands_still(subject):
         return
     if isinstance(driver, DrivenSlider):
         yield from symbols.arrow(*_thrust(subject, driver, nodes), THIN_MM, INK)
@@ -38,16 +38,16 @@ def drive_arrow(subject: Subject, nodes: dict[str, complex]) -> Iterator[Shape]:
 def drive_letter(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted]:
     """The angular velocity or the velocity that the arrow stands for."""
     driver = subject.plan.mechanism.driver
-    if _stands(subject):
+    if _stands_still(subject):
         return
     if isinstance(driver, DrivenSlider):
         at = point(sum(_thrust(subject, driver, nodes)) / 2.0)
-        yield Wanted(driver.pin, at, subject.letter(f"v_{driver.pin}"), _DRIVE_LETTER_MM, INK, 0.6)
+        yield Wanted(driver.pin, at, subject.letter(f"v_{driver.pin}"), DRIVE_LETTER_MM, INK, 0.6)
     else:
         radius, start, sweep = _turn(subject, driver, nodes)
         outward = complex(np.exp(1j * (start + 0.5 * sweep)))
         at = point(nodes[driver.pivot] + radius * outward)
-        yield Wanted(driver.pin, at, pieces_of(f"omega_{driver.link}"), _DRIVE_LETTER_MM, INK, 0.6, outward)
+        yield Wanted(driver.pin, at, pieces_of(f"omega_{driver.link}"), DRIVE_LETTER_MM, INK, 0.6, outward)
 
 
 def _rate(subject: Subject) -> float:
@@ -56,7 +56,7 @@ def _rate(subject: Subject) -> float:
     return subject.number(np.asarray(driver.speed if isinstance(driver, DrivenSlider) else driver.omega))
 
 
-def _stands(subject: Subject) -> bool:
+def _stands_still(subject: Subject) -> bool:
     return _rate(subject) == 0.0
 
 
@@ -72,8 +72,8 @@ def _thrust(subject: Subject, driver: DrivenSlider, nodes: dict[str, complex]) -
         for ahead in (-length, 2.0, -THRUST_MM - 2.0)
     )
     links = _links(subject, nodes)
-    ways = [(start, start + THRUST_MM * along) for start in starts]
-    return min(ways, key=lambda way: _meets(Curve((point(way[0]), point(way[1]))), links))
+    arrows = [(start, start + THRUST_MM * along) for start in starts]
+    return min(arrows, key=lambda arrow: _meets(Curve((point(arrow[0]), point(arrow[1]))), links))
 
 
 def _turn(subject: Subject, crank: Crank, nodes: dict[str, complex]) -> Turn:
@@ -177,7 +177,10 @@ def _guides(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
         rod = complex(np.conj(along) * block.rod)
         side = below if _before_rod(rod, below) >= SHORTEST_GUIDE_MM else -below
         behind, ahead = (
-            min(_reach(at, sign * along, nodes), _before_rod(rod, side) if rod.real * sign > 0.0 else np.inf)
+            min(
+                _guide_length(at, sign * along, nodes),
+                _before_rod(rod, side) if rod.real * sign > 0.0 else np.inf,
+            )
             for sign in (-1, 1)
         )
         for shape in symbols.guide(at, along, side, (behind, ahead)):
@@ -192,7 +195,7 @@ def _before_rod(rod: complex, side: int) -> float:
     return (symbols.BLOCK_MM[1] - ROD_CLEAR_MM) * abs(rod.real / rod.imag)
 
 
-def _reach(at: complex, along: complex, nodes: dict[str, complex]) -> float:
+def _guide_length(at: complex, along: complex, nodes: dict[str, complex]) -> float:
     """How far a guide goes: short of a joint that lies near its line."""
     reach = GUIDE_REACH_MM
     for place in nodes.values():
@@ -293,7 +296,7 @@ def _beside(parts: Sequence[Bar], nodes: dict[str, complex]) -> complex:
     return max(places, key=lambda at: min(10.0, *(abs(at - place) for place in nodes.values())))
 
 
-_NODE_LETTER_MM, _SMALL_NODE_LETTER_MM = 4.2, 3.4
+NODE_LETTER_MM, SMALL_NODE_LETTER_MM = 4.2, 3.4
 OVERRUN_MM = 5.0
 """A construction line goes on past its foot and past the node that it finds."""
 ABSOLUTE_MM, RELATIVE_MM = 0.5, 0.3
@@ -306,7 +309,7 @@ def polygon(subject: Subject, figure: str) -> DrawnFigure:
     drawn = [*_lines(subject, figure, nodes), *_vectors(subject, figure, nodes)]
     pole = subject.plan.construction.poles[figure]
     drawn.append(Part(pole, symbols.marked_point(nodes[pole], colour)))
-    style = Style(_NODE_LETTER_MM, _SMALL_NODE_LETTER_MM, colour, symbols.POINT_RADIUS_MM)
+    style = Style(NODE_LETTER_MM, SMALL_NODE_LETTER_MM, colour, symbols.POINT_RADIUS_MM)
     named = letters(subject, nodes, [part.shape for part in drawn], style)
     return captioned(subject, figure, (*drawn, *named), colour)
 

@@ -41,7 +41,7 @@ from reference.mechanism import (
     Slider,
     SlottedLink,
     Yoke,
-    moved,
+    translated,
 )
 from reference.numbers import cross, larger
 
@@ -140,7 +140,7 @@ def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismErr
                 gap, reach = _gap(group, before), max(abs(one.position) for one in before.joints.values())
                 # A gap of rounding alone: the group is flat, and its data say so as well as they can.
                 if gap > ROUNDING * reach:
-                    return _open(group, gap, where, driven)
+                    return _does_not_close(group, gap, where, driven)
                 return _singular(group, where, driven)
             if not np.isfinite(node.amplification * np.abs(node.acceleration + node.velocity)):
                 break
@@ -155,7 +155,7 @@ def _quiet(number: complex) -> np.generic:
     return scalar
 
 
-def _open(group: Group, gap_m: float, where: str, driven: str) -> MechanismError:
+def _does_not_close(group: Group, gap_m: float, where: str, driven: str) -> MechanismError:
     return MechanismError(
         "does_not_assemble",
         f"the group of {group.node} does not assemble: its links miss each other by {{gap}}{where};"
@@ -241,7 +241,7 @@ def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> 
     count, origin = _count(mechanism.driver), _origin(mechanism)
     if origin.any():
         # Far from the coordinates' origin, differences of places lose digits: solved about the driven link.
-        motion = _in_doubles(moved(mechanism, -origin), count, accelerations)
+        motion = _in_doubles(translated(mechanism, -origin), count, accelerations)
         motion.position.update({name: place + origin for name, place in motion.position.items()})
     else:
         motion = _in_doubles(mechanism, count, accelerations)
@@ -263,14 +263,14 @@ def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
     sine = reduce(np.minimum, motion.transmission.values(), np.ones(predicted.shape))
     motion.recomputed[:], solutions = refined(mechanism, predicted, sine, accelerations=accelerations)
     for solution, rows in solutions:
-        _put(motion, solution, rows)
+        _replace_rows(motion, solution, rows)
     broken = np.isinf(predicted)
     for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
         for values in rates.values():
             values[broken] = np.nan
 
 
-def _put(motion: Motion, solution: Solution, rows: NDArray[np.intp]) -> None:
+def _replace_rows(motion: Motion, solution: Solution, rows: NDArray[np.intp]) -> None:
     """Take the solution of some variants over into the motion."""
     for name, joint in solution.joints.items():
         motion.position[name][rows] = _rounded(joint.position)
@@ -295,7 +295,7 @@ def _count(driver: Driver) -> int:
 
 def _in_doubles(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
     if count <= FEW:
-        return _one_by_one(mechanism, count, accelerations)
+        return _in_python_numbers(mechanism, count, accelerations)
     with np.errstate(all="ignore"):
         return _on_arrays(mechanism, count, accelerations)
 
@@ -334,7 +334,7 @@ def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
     )
 
 
-def _one_by_one(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+def _in_python_numbers(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
     """The same on Python's numbers, a variant after another; where they divide by zero, on arrays."""
     try:
         solutions = [

@@ -36,26 +36,24 @@ RARITY: Mapping[str, float] = {
     "scale_wrong": 10.0,
     "arithmetic": 22.0,
 }
-"""One step in a hundred or so goes wrong, in one of ten or so ways; a slip in a computation may give any
-length."""
+"""Cost of each mistake: one step in about a hundred goes wrong, in one of about ten ways; a slip in a
+computation may give any length."""
 SOMETHING_ELSE = 9.0
-"""What a step costs that went wrong in a way nobody knows, beside what it makes likely: any place."""
+"""Cost of a step that went wrong in an unknown way, without the cost of its position."""
 ANYWHERE = 2.0 * math.log(100.0)
-"""A length may then be anything within some 100 mm; a place costs twice that."""
+"""Cost of each unknown coordinate or length: it may be anything within some 100 mm."""
 SUSPECT = 9.0
-"""From this squared misfit on (three standard errors) wrong ways are tried."""
+"""From this squared misfit on (three standard errors) mistakes are tried."""
 COST_WINDOW = 24.0
-"""Accounts dearer than the cheapest by a hand of the same care by more than this are dropped."""
+"""Explanations that cost more than the cheapest one of the same care by more than this are dropped."""
 MOST_BRANCHES = 40
-"""Accounts kept by a hand of one care."""
-
-
+"""Explanations of one care that are continued."""
 STIFFNESS = 1e-3
-"""How little a node is held to where its step puts it, against what was seen of it."""
+"""Weight of where the step puts a node, relative to what was observed of it."""
 TINY = 1e-6
 """Millimetres; a shorter vector has no direction."""
 SETTLING = 2
-"""Steps in which a node is moved to the lengths seen of it."""
+"""Steps in which a node is moved to the observed lengths."""
 
 Covariance = tuple[float, float, float]
 """mm^2: variance along x, covariance, variance along y."""
@@ -63,15 +61,14 @@ Covariance = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """A node, or a vector that ends in it, as drawn.
+    """The position of a node, or a vector that ends in it, as drawn.
 
     Attributes
     ----------
-    node : where it ends
-    tail : the node from which it is seen; None for a place about the figure's origin
-    value : complex millimetres, or a length where it has no direction
-    spread : how far it may be missed; of what has a direction by its reading alone, the hand's own errors
-        come to it
+    node : the node, or the vector's head
+    tail : the vector's tail; None for a position about the figure's origin
+    value : complex millimetres, or a length where the direction is not known
+    spread : its covariance; with a direction that of the reading alone, without drafting errors
     """
 
     node: str
@@ -83,12 +80,12 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class Observations:
-    """What somebody drew.
+    """A drawing as read or measured.
 
     Attributes
     ----------
     entries : its nodes and vectors
-    sketches : by plan, the mechanism's joints as drawn beside it, where that is a sketch of its own
+    sketches : by plan, the mechanism's joints as drawn beside it, where that is another sketch
     """
 
     entries: tuple[Observation, ...]
@@ -96,7 +93,7 @@ class Observations:
 
 
 def by_node(construction: Construction, entries: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
-    """What was seen, by the end that is made later; vectors seen the other way round are turned."""
+    """The observations by the node that is made later; vectors that end at the earlier node are reversed."""
     order = {step.node: index for index, step in enumerate(construction.steps)}
     found: dict[str, tuple[Observation, ...]] = {}
     for one in entries:
@@ -110,7 +107,7 @@ def by_node(construction: Construction, entries: Iterable[Observation]) -> dict[
 def needed_nodes(
     construction: Construction, entries: Mapping[str, tuple[Observation, ...]]
 ) -> frozenset[str]:
-    """The nodes that were seen, or that something seen is made from or reckoned from, rightly or wrongly."""
+    """The observed nodes and all from which these may be made, with the right steps or with wrong ones."""
     wanted = set(entries) | {one.tail for ones in entries.values() for one in ones if one.tail is not None}
     # A wrong line may be taken by any link, and through a pole.
     wanted.update(step.node for step in construction.figures["mechanism"])
@@ -123,12 +120,12 @@ def needed_nodes(
 
 @dataclass(frozen=True, slots=True)
 class NodeObservations:
-    """What was seen of one node. Arrays of places end in the branches' axis.
+    """The observations of one node; the last axis of arrays is that of the branches.
 
     Attributes
     ----------
     turned : (branches,) factor by which its plan is turned as a whole, None where in no branch
-    care : (branches,) how many times a usual hand's standard deviations
+    care : (branches,) drafting errors as multiples of the usual ones
     """
 
     entries: tuple[Observation, ...]
@@ -139,35 +136,35 @@ class NodeObservations:
         return bool(self.entries)
 
     def value(self, one: Observation) -> ComplexArray | complex:
-        """As it would stand in a plan that is not turned."""
+        """The observed value in a plan that is not turned."""
         if self.turned is None or not one.has_direction:
             return one.value
         return np.asarray(one.value / self.turned)
 
     @property
     def fixes_place(self) -> bool:
-        """Whether what was seen leaves the node only one place."""
+        """Whether the observations leave only one position for the node."""
         return any(one.has_direction for one in self.entries)
 
     @property
     def freedom(self) -> int:
-        """How many numbers were seen."""
+        """The number of observed coordinates and lengths."""
         return sum(2 if one.has_direction else 1 for one in self.entries)
 
     @property
     def anywhere(self) -> float:
-        """What any place at all costs."""
+        """The cost of any position, made in an unknown way."""
         return SOMETHING_ELSE + ANYWHERE * min(self.freedom, 2)
 
     def misfit_and_cost(
         self, place: ComplexArray, shifts: ComplexArray | None, nodes: Mapping[str, ComplexArray]
     ) -> tuple[FloatArray, FloatArray]:
-        """The squared misfit of places in standard deviations, infinite where there is none, and its cost.
+        """The squared misfit of positions in standard deviations (inf where there is none), and its cost.
 
-        The cost is -2 log of the density of what was seen, millimetres: wide errors make each place rarer.
+        The cost is -2 log of the density of the observations per mm: wide errors make each position rarer.
 
-        Arguments: `place` (ways, branches); `shifts` (ways, acts, branches) is how far the acts of a usual
-        hand move it.
+        Arguments: `place` (alternatives, branches); `shifts` (alternatives, acts, branches) is how far each
+        usual drafting error moves it.
         """
         misfit, width = np.zeros(place.shape), np.zeros(place.shape)
         for one in self.entries:
@@ -184,18 +181,18 @@ class NodeObservations:
         return np.where(is_there, misfit, np.inf), np.where(is_there, whole, np.inf)
 
     def settled(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> ComplexArray:
-        """Places moved to what was seen, by as little as possible where that leaves it open."""
+        """Positions moved to the observations, by as little as possible where lengths alone are known."""
         first = self.entries[0]
         if first.has_direction:
             tail = 0.0 if first.tail is None else nodes[first.tail]
             return np.broadcast_to(tail + self.value(first), place.shape)
         for _ in range(SETTLING):
-            shifts = place + self._shift(place, nodes)
-            place = np.where(np.isfinite(shifts), shifts, place)
+            settled = place + self._shift(place, nodes)
+            place = np.where(np.isfinite(settled), settled, place)
         return place
 
     def _shift(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> ComplexArray:
-        """A Gauss-Newton step towards the lengths seen."""
+        """A Gauss-Newton step towards the observed lengths."""
         tails = [one.tail for one in self.entries]
         vectors = np.array([place if tail is None else place - nodes[tail] for tail in tails])
         lengths = np.abs(vectors)
@@ -235,15 +232,17 @@ def _squared_length_residual(
     return np.asarray((drawn_mm - length) ** 2 / variance), variance
 
 
+# Mistakes of a step, and their costs ---------------------------------------------------------------
+
 LEAST_FACTOR, MOST_FACTOR = 0.02, 30.0
-"""A computed length off by more than that is something else than a slip."""
+"""A computed length that is wrong by a larger or smaller factor is no slip in its computation."""
 SLIP = "arithmetic"
 
 WrongSteps = tuple[tuple[Mistake, Step], ...]
 
 
 class Repertoire:
-    """The wrong ways of a construction's steps and a usual hand's errors in them, kept for a whole class."""
+    """The mistakes in the steps of a construction and their usual drafting errors, computed once."""
 
     def __init__(self, construction: Construction, skill: Skill) -> None:
         self.construction = construction
@@ -266,12 +265,12 @@ class Repertoire:
 
 
 CACHE_SIZE = 32
-"""So many constructions' repertoires are kept: a class draws one, or one for each position."""
+"""Repertoires in the cache: a class draws one construction, or one for each position."""
 _repertoires: deque[Repertoire] = deque(maxlen=CACHE_SIZE)
 
 
 def repertoire_of(construction: Construction, skill: Skill) -> Repertoire:
-    """The repertoire of a construction, kept: a class draws one and the same."""
+    """The repertoire of a construction, from the cache where it is there."""
     for repertoire in _repertoires:
         if repertoire.construction is construction and repertoire.skill == skill:
             return repertoire
@@ -282,15 +281,16 @@ def repertoire_of(construction: Construction, skill: Skill) -> Repertoire:
 
 @dataclass(frozen=True, slots=True)
 class StepAlternatives:
-    """Ways to make a step in each branch, the right one first; arrays (ways, branches).
+    """The alternatives for a step in each branch, the right one first; arrays (alternatives, branches).
 
     Attributes
     ----------
-    cost : of what was seen by each way, with how rare it is
-    misfit : squared, of what was seen; zero for something else, that fits anything
-    mistakes : by way; None for the right one and for something else
+    place : the node's position, complex mm
+    cost : of the observations, with the cost of the mistake
+    misfit : squared, of the observations; zero for an unknown way, which fits anything
+    mistakes : by alternative; None for the right one and for an unknown way
     factors : of a slip, by branch
-    others : how many ways at the end are something else
+    others : how many alternatives at the end are unknown ways
     """
 
     place: ComplexArray
@@ -301,7 +301,7 @@ class StepAlternatives:
     others: int = 0
 
     def made(self, choice: int, branch: int) -> tuple[Mistake, ...]:
-        """The mistake of a way in a branch, as a tuple of one or none."""
+        """The mistake of an alternative in a branch, as a tuple of one or none."""
         mistake = self.mistakes[choice]
         if mistake is None:
             return ()
@@ -310,7 +310,7 @@ class StepAlternatives:
         return (mistake,)
 
     def is_something_else(self, choice: int) -> bool:
-        """Whether nobody knows what was done."""
+        """Whether an alternative is an unknown way."""
         return choice >= len(self.mistakes) - self.others
 
     def __add__(self, more: "StepAlternatives") -> "StepAlternatives":
@@ -326,7 +326,7 @@ class StepAlternatives:
 
 @dataclass(frozen=True, slots=True)
 class StepContext:
-    """Where a step is made: the nodes so far in each branch, and what was seen of the new one."""
+    """What a step is compared with: the nodes so far in each branch, and the observations of the new one."""
 
     nodes: Mapping[str, ComplexArray]
     known: Mapping[str, FloatArray]
@@ -347,7 +347,7 @@ class StepContext:
         return self._alternatives(step, self.repertoire.wrong(step))
 
     def slips(self, step: Given) -> StepAlternatives | None:
-        """The right direction with a length that was computed wrongly, as long as it was drawn."""
+        """The right direction with a wrongly computed length, as drawn; None where none is computed."""
         entries, view = self.observed.entries, View(self.nodes, self.known)
         one = next((one for one in entries if one.tail == step.start or one.has_direction), None)
         if one is None or not isinstance(step.length, Normal | Coriolis):
@@ -365,7 +365,7 @@ class StepContext:
         return replace(self._alternatives(step, [(Mistake(SLIP, step.node), changed)]), factors=factors)
 
     def something_else(self, right: StepAlternatives) -> StepAlternatives:
-        """The node where it was drawn, whatever made it; from lengths alone on either side."""
+        """The node where it was drawn, made in an unknown way; from lengths alone both possible positions."""
         observed, nodes = self.observed, self.nodes
         start = np.where(np.isfinite(right.place[0]), right.place[0], 0.0)
         starts = [start]
@@ -391,7 +391,7 @@ class StepContext:
         return StepAlternatives(place, cost + rarity[:, None], misfit, mistakes)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:
-        """Where each puts the node, and how far each act of a usual hand moves it (ways, acts, branches)."""
+        """Where each step puts the node, and how each usual error moves it (steps, acts, branches)."""
         errors = self.repertoire.errors(step) if self.observed.fixes_place else {}
         view = View(self.nodes, self.known, errors)
         if not errors:
@@ -407,7 +407,7 @@ def _shaped(place: ComplexArray, shape: tuple[int, ...]) -> ComplexArray:
 
 
 def _places(steps: Sequence[Step], view: View) -> Iterator[ComplexArray]:
-    """Where each of a step's versions puts its node; a line that several share is drawn once."""
+    """Where each of the alternative steps puts the node; a line that several share is drawn once."""
     drawn: dict[tuple[int, int], tuple[ComplexArray, ComplexArray]] = {}
     for step in steps:
         if not isinstance(step, TwoLines):

@@ -1,12 +1,11 @@
-"""A finished drawing replayed step by step: at each step the right way first, then the wrong ones.
+"""A finished drawing replayed step by step, to find how each step was made.
 
-The same construction once more, with what was drawn beside it. Every branch of the replay is one
-explanation of the drawing: how each step was made, and where its node came to lie. A step that the
-right way explains is left alone; where it does not, each mistake that
-`reference.construction.mistakes` knows for that step opens a branch, and "something else" one more.
-Later steps start from what was drawn, as the student did, so that one mistake does not hide the next.
-Branches are arrays: all are drawn at once, for drafting errors of every size. The ways to make one
-step and what each costs are in `reference.replay.explanations`.
+Every branch of the replay is one explanation of the drawing: how each step was made, and where its node
+lies. Where the right step does not explain what was drawn, each mistake that
+`reference.construction.mistakes` has for that step opens a branch, and an unknown way one more. Later
+steps start from what was drawn, as the student did, so that one mistake does not hide the next.
+Branches are arrays and are evaluated together, for drafting errors of several sizes. The alternatives
+for one step and their costs are in `reference.replay.explanations`.
 """
 
 from collections import ChainMap
@@ -40,13 +39,13 @@ BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 @dataclass(frozen=True, slots=True)
 class Root:
-    """Where an account begins: mistakes of the whole drawing, and what they change.
+    """The start of an explanation: mistakes of the whole drawing, and what they change.
 
     Attributes
     ----------
     parameters : those that differ
     turned : by plan, the factor by which it is turned as a whole
-    cost : of supposing it
+    cost : of these mistakes
     """
 
     made: tuple[Mistake, ...] = ()
@@ -57,14 +56,14 @@ class Root:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """One way in which the drawing may have been made.
+    """One explanation of a drawing.
 
     Attributes
     ----------
-    care : how many times a usual hand's standard deviations
+    care : drafting errors as a multiple of the usual ones
     made : the mistakes, in the order of construction
-    unexplained : nodes whose steps went wrong in no known way
-    branches, index : the replay that it comes from, and which of its branches it is
+    unexplained : nodes whose steps were made in an unknown way
+    branches, index : all branches of the replay, and which of them this is
     """
 
     cost: float
@@ -76,12 +75,12 @@ class Replay:
 
     @property
     def is_innocent(self) -> bool:
-        """Whether everything was made rightly."""
+        """Whether it has no mistake and no unexplained step."""
         return not self.made and not self.unexplained
 
     @property
     def right(self) -> Mapping[str, float]:
-        """By node seen, root mean square misfit in standard deviations if its step were made rightly."""
+        """By observed node, the root mean square misfit of the right step in standard deviations."""
         return {node: float(misfit[self.index]) for node, misfit in self.branches.right.items()}
 
 
@@ -94,14 +93,14 @@ def replay(
     cares: Sequence[float] = (1.0,),
     blind: bool = False,
 ) -> list[Replay]:
-    """The accounts of a drawing, the likeliest first.
+    """The explanations of a drawing, the likeliest first.
 
     Arguments
     ---------
     drawing : the right one at its scales, parameters scalar
-    skill : of a usual hand
-    cares : the hands supposed, as multiples of its standard deviations
-    blind : mistakes are also tried at steps of which what was seen tells no place, one to an account
+    skill : usual drafting errors
+    cares : the sizes of drafting errors that are tried, as multiples of the usual ones
+    blind : try mistakes also at steps whose node's position was not observed, one to an explanation
     """
     construction, by_name = drawing.construction, by_node(drawing.construction, observations.entries)
     branches = _open(drawing, roots, cares)
@@ -125,9 +124,9 @@ def replay(
 def _alternatives(
     step: Step, context: StepContext, has_guessed: BoolArray, *, blind: bool
 ) -> StepAlternatives:
-    """The right way to make a step, and the wrong ones where that does not explain what was seen.
+    """The right step, and the wrong ones where it does not explain the observations.
 
-    Arguments: `has_guessed` tells the branches that suppose a mistake that nothing told of.
+    Arguments: `has_guessed` marks the branches that already have a mistake without an observation.
     """
     right, observed = context.right(step), context.observed
     is_suspect = right.misfit[0] > SUSPECT
@@ -144,14 +143,14 @@ def _alternatives(
     if slips is not None:
         alternatives += slips
         if not observed.fixes_place:
-            # Of a computed length seen as a length alone, whatever it is may be a slip.
+            # Where a computed length alone is observed, any value may be a slip.
             return alternatives
     return alternatives + context.something_else(right)
 
 
 @dataclass(slots=True)
 class _Branches:
-    """All accounts so far, arrays of shape (branches,)."""
+    """All explanations so far, arrays of shape (branches,)."""
 
     nodes: dict[str, ComplexArray]
     known: dict[str, FloatArray]
@@ -164,13 +163,13 @@ class _Branches:
     right: dict[str, FloatArray]
 
     def observed(self, entries: tuple[Observation, ...], figure: str) -> NodeObservations:
-        """What was seen of a node of a figure."""
+        """The observations of a node of a figure, with the turn and the care of each branch."""
         return NodeObservations(entries, self.turned.get(figure), self.care)
 
     def go_on(
         self, step: Step, figure: str, entries: tuple[Observation, ...], alternatives: StepAlternatives
     ) -> None:
-        """Each way in each branch: the likeliest of them."""
+        """Continue with the likeliest pairs of an alternative and a branch."""
         costs, place, right = self.cost + alternatives.cost, alternatives.place[0], alternatives.misfit[0]
         if len(alternatives.mistakes) == 1:
             self.cost = costs[0]
@@ -192,7 +191,7 @@ class _Branches:
         self.nodes[step.node] = place
 
     def _likeliest(self, costs: FloatArray) -> tuple[IntArray, IntArray]:
-        """The ways and branches that go on, by hands of each care the likeliest first."""
+        """The alternatives and branches that go on, the likeliest first within each care."""
         chosen = []
         for care in np.unique(self.care):
             columns = np.flatnonzero(self.care == care)
@@ -206,7 +205,7 @@ class _Branches:
         return which, index
 
     def _take(self, index: IntArray) -> None:
-        """Only these branches, in this order; one may be taken several times."""
+        """Keep these branches, in this order; one may be taken several times."""
         arrays: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]
         for arrays in (self.nodes, self.known, self.turned, self.right):  # type: ignore[assignment]
             arrays.update({name: array[index] for name, array in arrays.items() if np.ndim(array)})
@@ -215,7 +214,7 @@ class _Branches:
         self.unexplained = [self.unexplained[i] for i in index]
 
     def explanations(self) -> list[Replay]:
-        """What the branches have come to, the likeliest first."""
+        """The branches as explanations, the likeliest first."""
         return [
             Replay(float(self.cost[i]), float(self.care[i]), self.made[i], self.unexplained[i], self, i)
             for i in np.argsort(self.cost, kind="stable").tolist()
@@ -224,7 +223,7 @@ class _Branches:
 
 
 def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float]) -> _Branches:
-    """A branch for each root and hand."""
+    """A branch for each root and care."""
     starts = [(root, care) for care in cares for root in roots]
     known = {name: np.asarray(value) for name, value in drawing.parameters.items()}
     for name in {name for root in roots for name in root.parameters}:
