@@ -223,7 +223,7 @@ class Mechanism:
 
 
 def translated(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
-    """The whole mechanism moved on the ground, metres."""
+    """The whole mechanism translated by a vector, complex metres."""
 
     def onward(guide: Guide) -> Any:  # noqa: ANN401 - of the kind that it is given
         return replace(guide, through_m=guide.through_m + by) if isinstance(guide, FixedGuide) else guide

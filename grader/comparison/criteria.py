@@ -1,11 +1,10 @@
 """All criteria of a rubric, in the order of construction, so that earlier mistakes are known.
 
-`compare(task, submission)` is the whole of it. Each criterion is marked against the original data
-at the student's scales first, then against what follows from the student's own earlier values; the
-better counts. The mistake that later ones follow from costs once: where it was made, or, where no
-criterion asks for that, at the first criterion that shows it. Small errors that are each within
-their tolerance and add up in a later node are no mistake. Verdicts are `Outcome`s with structured
-reasons (`grader.outcomes`); nothing here speaks a human language.
+`compare(task, submission)` marks each criterion against the original data at the student's scales
+first, then against what follows from the student's own earlier values; the better counts. A mistake
+from which later values follow costs once: where it was made, or, where no criterion asks for that, at
+the first criterion that shows it. Small errors that are each within their tolerance and add up in a
+later node are no mistake. Verdicts are `Outcome`s with reasons as data (`grader.outcomes`).
 """
 
 import cmath
@@ -44,14 +43,14 @@ from reference.construction.uncertainty import EndSpread
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All outcomes in the rubric's order, the scales used, and the evidence they rest on."""
+    """All outcomes in the rubric's order, the scales used, and the evidence."""
 
     outcomes: tuple[Outcome, ...]
     scales: Mapping[str, UsedScale]
     evidence: Evidence
     settled: Mapping[str, Scale]
     explanation: ReplayResult | None
-    """What the drawing was explained by, where that was asked for."""
+    """The result of the search for what was done, where it was needed."""
 
 
 def compare(task: Task, submission: Submission, explain: Explain = nothing_explained) -> Comparison:
@@ -73,7 +72,7 @@ def compare(task: Task, submission: Submission, explain: Explain = nothing_expla
 
 
 def _in_order(task: Task, scales: tuple[str, ...]) -> list[CriterionTable]:
-    """As things are drawn and found: scales, the sketch, velocities, angular ones, accelerations."""
+    """The criteria as they are drawn: scales, sketch, velocities, omega, accelerations, epsilon."""
     construction = task.construction
     steps = {step.node: place for place, step in enumerate(construction.steps)}
     kinds = ("v", "omega", "a", "epsilon")
@@ -89,7 +88,7 @@ def _in_order(task: Task, scales: tuple[str, ...]) -> list[CriterionTable]:
 
 
 def _outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
-    """The verdict on one criterion, open where it rests on something entered that cannot be used."""
+    """The verdict on one criterion, open where it depends on an entry that cannot be used."""
     outcome = _judged(charges, criterion)
     entry = charges.evidence.refused.get(criterion.name)
     if entry is None and outcome.verdict in {"none", "partial"}:
@@ -101,7 +100,7 @@ def _outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
 
 
 def _refused_below(charges: Charges, name: str) -> str | None:
-    """What was entered for the scale, or for a node that a vector is made from, and cannot be used."""
+    """The entry for the scale, or for a node from which a vector is made, that cannot be used."""
     task, evidence = charges.task, charges.evidence
     turned = task.construction.rates.get(name)
     segment = task.segments.get(name if turned is None else turned.vector)
@@ -114,7 +113,7 @@ def _refused_below(charges: Charges, name: str) -> str | None:
 
 
 def _judged(charges: Charges, criterion: CriterionTable) -> Outcome:
-    """The verdict on what can be used; what it costs is remembered for the later ones."""
+    """The verdict on what can be used; its cost is recorded in the charges."""
     if criterion.scale is not None:
         return _scale(charges, criterion)
     if criterion.angular is not None:
@@ -127,7 +126,7 @@ def _judged(charges: Charges, criterion: CriterionTable) -> Outcome:
 
 
 def _scale(charges: Charges, criterion: CriterionTable) -> Outcome:
-    """A declared scale, as it was settled."""
+    """The outcome of a declared scale."""
     name, unit = criterion.name, unit_of(criterion.name)
     scale, right = charges.settled[name], charges.followed[name]
     expected = Quantity(value=right, unit=unit)
@@ -145,7 +144,7 @@ def _scale(charges: Charges, criterion: CriterionTable) -> Outcome:
 
 
 def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> Outcome:
-    """A vector that was drawn (or measured), or a link of the sketch."""
+    """The outcome of a vector that was drawn (or measured), or of a link of the sketch."""
     one, rubric = charges.task.segments[criterion.name], charges.task.rubric
     follows = rubric.follows_through(criterion)
     with_direction = criterion.direction and drawn.direction_rad is not None
@@ -177,7 +176,7 @@ def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> 
 
 
 def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> Against:
-    """How a drawn vector is marked against an expectation, as the rubric and the sheet's cells have it."""
+    """A function that marks a drawn vector against an expectation, by the rubric and the sheet's cells."""
     rubric = charges.task.rubric
     table, least = rubric.tolerance_of(criterion), rubric.least_confidence
     with_direction = criterion.direction and drawn.direction_rad is not None
@@ -205,12 +204,12 @@ def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
 
 
 BOUNDLESS_MM, BOUNDLESS_SHARE = 20.0, 0.5
-"""A reach of so much, and of such a share of the vector: there errors no longer grow in proportion, and a
-hand may miss by anything."""
+"""Propagated uncertainty larger than this, and than this share of the vector: the linear propagation no
+longer holds, and the error may be anything."""
 
 
 def _is_boundless(uncertainty: EndSpread, size_mm: float) -> bool:
-    """Whether lines cross so badly that nothing tells how far a careful hand may miss."""
+    """Whether lines cross so badly that the propagated uncertainty has no bound."""
     return max(uncertainty.along, uncertainty.across) > max(BOUNDLESS_MM, BOUNDLESS_SHARE * size_mm)
 
 
@@ -232,10 +231,10 @@ def compared_with_cells(
     tolerance: ToleranceTable,
     least: float,
 ) -> MarkRange:
-    """The mark, open where the two lengths contradict each other: a person must look.
+    """The mark, open where the drawn length and the one written into the sheet's cells contradict.
 
-    Either the drawing is misread, or the cells, or the student has measured something else; nothing
-    here says which. A ruler errs by no more than the tolerance of a length.
+    Either of them may be misread, or the student has measured something else. A ruler's error is no
+    more than the tolerance of a length.
 
     Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
     `least` the probability from which it counts.
@@ -246,16 +245,16 @@ def compared_with_cells(
     allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
     if abs(drawn.length_mm - length_mm) <= allowed:
         return mark
-    told: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
-    return open_between(NONE, FULL, mark, Reason("written_disagrees", told))
+    params: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
+    return open_between(NONE, FULL, mark, Reason("written_disagrees", params))
 
 
 # Computed values -----------------------------------------------------------------------------------
 
 LEAST_VALUES = 3
-"""Values that are off by one factor were made with a wrong scale; fewer may be so by chance."""
+"""So many values with one common factor were computed with a wrong scale; fewer may agree by chance."""
 SAME_FACTOR = 0.02
-"""Relative: how near to each other their factors are, with rounding on the way."""
+"""Relative difference up to which two factors are the same, with rounding on the way."""
 HALF = 0.5
 """The share of a criterion that a right drawing keeps where the rubric has no band of partial points."""
 
@@ -331,7 +330,7 @@ def value_outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
 
 
 def _by_factor(charges: Charges, scale: str, marked: ComparedMark, against: Against) -> ComparedMark:
-    """A value that is off by the factor of all, after the first of them."""
+    """The mark of a value that has the common factor: full marks from the second such value on."""
     factor, exact = common_factor(charges, scale), marked.expected
     if factor is None:
         return marked
@@ -341,12 +340,12 @@ def _by_factor(charges: Charges, scale: str, marked: ComparedMark, against: Agai
         return marked
     if not mark.is_better(marked.mark):
         return marked
-    told = Reason("follows", {"what": "scale", "of": scale})
-    return ComparedMark(the_better(mark, marked.mark, told), exact * factor, is_followed=True)
+    follows = Reason("follows", {"what": "scale", "of": scale})
+    return ComparedMark(the_better(mark, marked.mark, follows), exact * factor, is_followed=True)
 
 
 def common_factor(charges: Charges, scale: str) -> float | None:
-    """The factor by which all values of a scale are off, where they are off by one."""
+    """The common factor by which all values of a scale are wrong; None where there is none."""
     if scale not in charges.factors:
         charges.factors[scale] = _common_factor(charges, scale)
     return charges.factors[scale]
@@ -382,7 +381,7 @@ def _is_charged(charges: Charges, scale: str) -> bool:
 
 
 def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> Outcome:
-    """The outcome of a criterion that there is nothing to hold against."""
+    """The outcome of a criterion for which nothing was handed in or read."""
     unread = _why_unread(charges, criterion)
     reason = Reason("not_measured") if unread is None else Reason("unread", {"reason": unread})
     if criterion.optional:
@@ -396,7 +395,7 @@ def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> O
         return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
     segment = charges.task.segments.get(criterion.name)
     if segment is not None:
-        # Later criteria may hang on what nobody has seen.
+        # Later criteria may depend on what was not read.
         charges.doubtful.add(segment.head)
     verdict = charges.task.rubric.missing if unread is None else "review"
     return verdicts.unjudged(criterion, verdict, (reason,), expected=expected)
@@ -440,15 +439,15 @@ def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     if own is None and factor is not None and follows and not mark.is_full:
         own = right
     if own is not None:
-        # Values that are all off by one factor give an angular one off by it, too.
+        # A common factor of all values is also that of the angular one.
         own = own if factor is None else min(own, own * factor, key=lambda one: abs(one - value))
         limit = table.length_at(abs(own) / per_mm) * per_mm
         candidate = charges.allowed(
             frozenset({segment.head}), mark_value(value, own, limit, limit, table, unit)
         )
         if candidate.is_better(mark):
-            told = Reason("follows", {"what": "vector", "of": turned.vector})
-            mark, right, followed = the_better(candidate, mark, told), own, True
+            follows_from = Reason("follows", {"what": "vector", "of": turned.vector})
+            mark, right, followed = the_better(candidate, mark, follows_from), own, True
     measured, expected = Quantity(value=value, unit=unit), Quantity(value=right, unit=unit)
     return verdicts.outcome(criterion, mark, measured, expected, allowed, followed=followed)
 
@@ -456,7 +455,7 @@ def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
 def _widened_rate(
     charges: Charges, criterion: CriterionTable, segment: TaskSegment, per_mm: float
 ) -> Tolerance:
-    """The tolerance with what a careful hand may miss of the vector that turns the link."""
+    """The tolerance of an angular quantity, widened by the uncertainty of the vector that turns the link."""
     exact = segment.drawn(charges.used)
     plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(exact), with_direction=False)
     uncertainty = charges.following.uncertainty_of(segment, exact)

@@ -1,4 +1,4 @@
-"""What is asked: one variant's exact plan, its construction, and the rubric."""
+"""The task of one variant: its exact plan, its construction, and the rubric."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -26,9 +26,9 @@ UNITS: Mapping[str, str] = {
 }
 """By scale, or by the part of a name before its first underscore."""
 CACHE_SIZE = 64
-"""Drawings at scales of students' own that a task keeps."""
+"""Results in the cache of one task, at students' own scales."""
 TASK_CACHE_SIZE = 256
-"""That are kept: students of the same variant have the same task."""
+"""Tasks in the cache: students of the same variant have the same one."""
 
 
 def unit_of(name: str) -> str:
@@ -38,7 +38,7 @@ def unit_of(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Yardstick:
-    """A link of given length, whose drawing tells the scale of lengths, from joint `tail` to `head`."""
+    """A link of given length whose drawn length shows the scale kL, from joint `tail` to `head`."""
 
     tail: str
     head: str
@@ -80,7 +80,7 @@ class Task:
     pin : of the driven link
     yardstick : the crank; where a slider drives, the first link of given length; None without any
     omega : of the crank, None where a slider drives
-    cache : what has been drawn already, by what it depends on
+    cache : results, by everything on which they depend
     """
 
     assignment: Assignment
@@ -101,9 +101,9 @@ class Task:
     )
 
     def tolerance_at(self, node: str) -> ToleranceTable:
-        """The tolerance of the place of a node: that of the vector or link asked for that ends there.
+        """The tolerance of a node's position: that of the vector or link asked for that ends there.
 
-        The vector from the pole comes first; where nothing asked for ends there, it is the rubric's.
+        The vector from the pole comes first; where none ends there, it is the rubric's.
         """
         asked = {criterion.name for criterion in self.rubric.criterion}
         ends = [one for one in self.segments.values() if one.head == node and one.name in asked]
@@ -112,7 +112,7 @@ class Task:
 
     @property
     def skill(self) -> Skill:
-        """The hand that tolerances are widened for."""
+        """The drafting errors for which tolerances are widened."""
         hand = self.rubric.hand
         return Skill(hand.angle_deg, hand.place_mm, hand.mark_mm)
 
@@ -144,9 +144,9 @@ class Task:
         return found  # type: ignore[return-value]
 
     def traced(self, scales: Mapping[str, float]) -> TracedDrawing:
-        """The whole drawing with what a hand's errors make of it, at these scales.
+        """The whole drawing with its propagated drafting errors, at these scales.
 
-        The sketch at the rule's: its size changes next to nothing in how far a hand may miss.
+        The sketch is at the rule's scale: its size hardly changes the errors of the plans.
         """
         key = ("traced", scales["kv"], scales["ka"], self.skill)
         found = self.cache.get(key)
@@ -168,7 +168,7 @@ class Task:
         return found  # type: ignore[return-value]
 
     def remember(self, key: tuple[object, ...], found: object) -> None:
-        """Remember what was drawn, by what it depends on."""
+        """Put a result into the cache, under everything on which it depends."""
         if len(self.cache) >= CACHE_SIZE:
             self.cache.clear()
         self.cache[key] = found

@@ -1,11 +1,11 @@
-"""Which mistakes explain what is off: the drawing replayed with and without them.
+"""Diagnosis: which mistakes explain the residuals of a drawing.
 
-`reference.replay.replay` gives explanations of the drawing, each with the mistakes that it supposes; the
-simplest one that fits is told. First the drawing is replayed step by step. Only where that leaves
-something off are mistakes of the whole drawing tried as well (another variant's data, a plan turned as
-a whole, letters swapped) and mistakes at steps of which nothing was seen. How sure a mistake is, is its
-share among all explanations; what cannot be told apart from it is named as its rival. Drafting errors
-are measured on the drawing itself: a drawing that is right is never accused.
+`reference.replay.replay` gives explanations of the drawing, each with its mistakes. First the drawing is
+replayed step by step. Only where that leaves residuals, mistakes of the whole drawing are tried as well
+(another variant's data, a plan turned as a whole, letters swapped) and mistakes at steps without an
+observation. The confidence in a mistake is its share of the probability of all explanations; a mistake
+that the evidence does not distinguish from it is its rival. The size of drafting errors is estimated on
+the drawing itself, so that a right drawing has no mistake named.
 """
 
 import math
@@ -37,10 +37,10 @@ FURTHER_SCALE = 4.0
 BEYOND_DOUBT = 20.0
 """A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
 LEAST_WRONG = 0.06
-"""A scale off by a smaller share than this is nobody's mistake by name: a hand may draw so."""
+"""Of a scale's logarithm: a smaller error is no mistake to be named, drafting errors reach it."""
 USUAL = 1.0
 CARES = (0.6, USUAL, 1.6, 2.5, 4.0)
-"""The hands supposed, as multiples of a usual one's standard deviations."""
+"""The sizes of drafting errors that are tried, as multiples of the usual ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +50,9 @@ class Case:
     Attributes
     ----------
     drawing : how it should have been drawn, at the scales declared
-    observations : what was drawn
-    assignment, variant : whose plan it should be
-    skill : of a usual hand
+    observations : the drawing as read or measured
+    assignment, variant : the student's
+    skill : usual drafting errors
     followed : scales that the drawing follows although others were declared
     assumed : scales that nobody declared
     """
@@ -67,10 +67,7 @@ class Case:
 
 
 def explained(case: Case) -> tuple[Replay, ...]:
-    """The ways in which a drawing may have been made, the likeliest first.
-
-    There are none where a right drawing is to be believed.
-    """
+    """The explanations of a drawing, the likeliest first; none where it may well be right."""
     roots = [Root(), *_other_scales(case)]
     explanations = replay(case.drawing, case.observations, roots, case.skill, cares=CARES)
     innocent = _cost_if_right(explanations)
@@ -82,10 +79,10 @@ def explained(case: Case) -> tuple[Replay, ...]:
 
 
 def _searched_further(case: Case, roots: Sequence[Root], explanations: Sequence[Replay]) -> list[Replay]:
-    """The accounts with mistakes of the whole drawing among them, and with guesses at what was not seen.
+    """The explanations with mistakes of the whole drawing, and at steps without an observation.
 
-    A careless hand is also taken for a usual one that has made some mistake. What one mistake explains,
-    places and all, is not sought in the whole drawing.
+    Large drafting errors are also tried as usual ones with some mistake. Where one mistake explains all, and
+    directions were observed, mistakes of the whole drawing are not tried.
     """
     best = explanations[0]
     if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
@@ -101,21 +98,22 @@ def _searched_further(case: Case, roots: Sequence[Root], explanations: Sequence[
 
 
 def _is_explained(explanation: Replay) -> bool:
-    """Whether a usual hand and one mistake at most explain everything."""
+    """Whether usual drafting errors and one mistake at most explain everything."""
     return not explanation.unexplained and len(explanation.made) <= 1 and explanation.care <= USUAL
 
 
 def _cost_if_right(explanations: Sequence[Replay]) -> float:
-    """What the account costs in which everything was made rightly; infinite where it is beyond belief."""
+    """The least cost of an explanation without mistakes; infinite where there is none."""
     return min(
         (explanation.cost for explanation in explanations if explanation.is_innocent), default=math.inf
     )
 
 
 def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
-    """Whether a usual hand made everything rightly, or one mistake at a step whose beginnings were seen.
+    """Whether the best explanation needs no further search.
 
-    What goes wrong in a mechanism that nobody saw shows in more than one step.
+    It has no mistake, or one at a step whose node and sources were observed: a mistake in a mechanism
+    that was not handed in shows in more than one step.
     """
     best, construction = explanations[0], case.drawing.construction
     if not _is_explained(best):
@@ -131,10 +129,10 @@ def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
 
 
 def _other_scales(case: Case) -> Iterator[Root]:
-    """The drawing at the scales that it follows, where others were declared.
+    """Roots with the scales that the drawing follows, where others were declared.
 
-    A plan may be drawn to another scale throughout, or start from a crank's vector that is, while what is
-    computed from it is computed at the scale declared.
+    A plan may be drawn to another scale throughout, or only its crank's vector, while what is computed
+    from that is computed at the declared scale.
     """
     factors = {
         name: float(case.drawing.parameters[name]) / followed for name, followed in case.followed.items()
@@ -158,7 +156,7 @@ def _other_scales(case: Case) -> Iterator[Root]:
 
 
 def _of_the_whole(case: Case) -> Iterator[Root]:
-    """A plan turned as a whole; another variant's data."""
+    """Roots with a plan turned as a whole, or with another variant's data."""
     for plan in case.drawing.construction.poles:
         for quarters in (1, 2, 3):
             turned = Mistake("figure_rotated", plan, quarters=quarters)
@@ -167,7 +165,7 @@ def _of_the_whole(case: Case) -> Iterator[Root]:
 
 
 def _other_variants(case: Case) -> Iterator[Root]:
-    """Another student's data, all else right."""
+    """Roots with another variant's data, all else right."""
     variants = case.assignment.variants()
     scales = case.assignment.scales(variants, kL=float(case.drawing.parameters["kL"]))
     together = parameters_of(case.assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
@@ -186,7 +184,7 @@ def _other_variants(case: Case) -> Iterator[Root]:
 
 
 def _swaps(drawing: Drawing, explanation: Replay) -> Iterator[Mistake]:
-    """Two images of a plan with each other's letters, both of which are off by the likeliest account."""
+    """Pairs of images in one plan that may have each other's letters: both are wrong in the explanation."""
     construction = drawing.construction
     off = {*explanation.unexplained, *(mistake.at for mistake in explanation.made)}
     for figure, pole in construction.poles.items():
@@ -199,7 +197,7 @@ def _swaps(drawing: Drawing, explanation: Replay) -> Iterator[Mistake]:
 
 
 def _renamed(observations: Observations, pair: tuple[str, ...]) -> Observations:
-    """What was drawn, under the right names where two letters were swapped."""
+    """The observations with the names of two nodes exchanged."""
     other = {pair[0]: pair[1], pair[1]: pair[0]}
     entries = (
         replace(one, node=other.get(one.node, one.node), tail=other.get(one.tail or "", one.tail))
@@ -213,13 +211,13 @@ def _renamed(observations: Observations, pair: tuple[str, ...]) -> Observations:
 CERTAIN = 0.9
 """From this confidence on what follows from a mistake that nothing else shows is credited."""
 NO_STEPS = frozenset({"scale_wrong", "labels_swapped"})
-"""Mistakes that change no step: what follows from them is told by the scales and by the letters."""
+"""Mistakes that change no step: scales and letters already say what follows from them."""
 
 
 def drawn_instead(explanations: Sequence[Replay], case: Case) -> tuple[Drawing, frozenset[str]]:
     """The drawing with those mistakes in it that are certain, and the nodes at which it is wrong.
 
-    Of a wrong mechanism that is the mechanism as a whole; of the right drawing there are none.
+    A wrong mechanism counts as a whole (`MECHANISM`); the right drawing has no wrong nodes.
     """
     joints = {step.node for step in case.drawing.construction.figures[MECHANISM]}
     certain = [one for one in sure_of(explanations, CERTAIN) if one.code not in NO_STEPS]
@@ -240,21 +238,21 @@ def _with(mistakes: Sequence[Mistake], drawing: Drawing) -> Drawing:
 # The mistakes that are named -----------------------------------------------------------------------
 
 LEAST_CONFIDENCE = 0.6
-"""An explanation less certain than this is not named."""
+"""A mistake less certain than this is not named."""
 SURE_TOGETHER = 0.8
-"""A mistake and its rivals are told together when one of them it is, this surely."""
+"""A mistake is named with its rivals where their probability together is at least this."""
 LEAST_RIVAL = 0.1
 """A rival less likely than this is not named."""
 MOST_RIVALS = 3
 SUSPICIOUS, GROSS = 2.0, 5.0
-"""Standard deviations of this hand: what is off by less than the latter at a step is no mistake to be
-named. (Where it is not off at all, the mistake showed elsewhere.)"""
+"""RMS misfits of a step in standard deviations of this drawing's errors: between the two a mistake is too
+slight to be named. (Below the first the mistake shows elsewhere.)"""
 Key = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """The criteria that lost points, or may lose some, by the vectors and by the scales that they ask for."""
+    """The criteria that lost points, or may lose some, by the vector and by the scale they ask for."""
 
     vectors: Mapping[str, str]
     scales: Mapping[str, str]
@@ -294,14 +292,14 @@ def _key(mistake: Mistake) -> Key:
 
 
 def _is_slight(mistake: Mistake, explanation: Replay) -> bool:
-    """Whether the step that it was made at is not far off: nothing that a hand could not do."""
+    """Whether the residual at the mistake's step is small enough for drafting errors."""
     if mistake.code in OF_THE_WHOLE:
         return False
     return SUSPICIOUS < explanation.right.get(mistake.at, 0.0) < GROSS
 
 
 class _Shares:
-    """What share of the probability accounts with a mistake have."""
+    """The share of the probability that explanations with a mistake have."""
 
     def __init__(self, explanations: Sequence[Replay]) -> None:
         least = explanations[0].cost
@@ -313,15 +311,15 @@ class _Shares:
         ]
 
     def of(self, key: Key) -> float:
-        """Of a mistake."""
+        """The share of the explanations with a mistake."""
         return sum(weight for made, weight in self._weights if key in made)
 
     def instead(self, key: Key, other: Key) -> float:
-        """Of another mistake without the first."""
+        """The share of the explanations with another mistake and without the first."""
         return sum(weight for made, weight in self._weights if other in made and key not in made)
 
     def rivals(self, key: Key, best: set[Key]) -> list[Mistake]:
-        """The mistakes that stand in a mistake's place elsewhere, the likeliest first."""
+        """The mistakes of explanations without a mistake, the likeliest first."""
         others = {name: one for made, _ in self._weights if key not in made for name, one in made.items()}
         likely = [name for name in others if name not in best and self.instead(key, name) >= LEAST_RIVAL]
         likely.sort(key=lambda name: -self.instead(key, name))
@@ -337,7 +335,7 @@ def _in_order(made: Sequence[Mistake], construction: Construction) -> list[Mista
 def _losses_explained(
     explanation: Replay, construction: Construction, lost: Lost
 ) -> dict[Mistake, list[str]]:
-    """Which of the criteria lost each mistake explains: the nearest one before it in the construction."""
+    """The lost criteria that each mistake explains: each is given to the last mistake upstream."""
     made = _in_order(explanation.made, construction)
     explains: dict[Mistake, list[str]] = {
         mistake: [name for scale, name in lost.scales.items() if _is_about(mistake, scale)]
@@ -370,7 +368,7 @@ def _is_about(mistake: Mistake, scale: str) -> bool:
 
 
 RPM_WITHIN = 0.03
-"""Relative: a scale off by 30/pi (squared for accelerations) this nearly was made from rev/min."""
+"""Relative: a scale wrong by 30/pi (squared for accelerations) this nearly was computed from rev/min."""
 LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
 
 
@@ -389,17 +387,17 @@ def _record(
 
 
 def _line_of(step: Step, slot: int) -> dict[str, str]:
-    """Which line of a step it is: where it starts, the link that gives its direction, if a guide does."""
+    """The parameters that describe a step's line: ``from`` a node, its ``link``, ``line`` of a guide."""
     line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None
     if not isinstance(line, Line):
         return {}
-    told = {"from": line.through}
+    params = {"from": line.through}
     if line.along.quarters % 2 == 0:
-        # Perpendiculars are of turning links, all else is along what something slides on.
-        told["line"] = "guide"
+        # Perpendiculars belong to turning links, all other lines are along guides.
+        params["line"] = "guide"
     if isinstance(line.along, Along):
-        told["link"] = line.along.tail + line.along.head
-    return told
+        params["link"] = line.along.tail + line.along.head
+    return params
 
 
 def _code_of_scale(name: str, factor: float) -> str:

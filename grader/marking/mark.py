@@ -25,11 +25,11 @@ from reference.replay.explanations import Covariance, Observation, Observations
 
 CHARGED = frozenset({"none", "partial"})
 LOST = CHARGED | {"follow_through", "review"}
-"""Verdicts whose cause is looked for: also where a person has still to decide."""
+"""Verdicts for which the diagnosis seeks a cause, also where a person has still to decide."""
 LEAST_LEFT_OUT_MM = 5.0
-"""A shorter one may hide in its ends' marks."""
+"""A shorter vector may be hidden by the marks of its ends."""
 LEFT_OUT = 0.9
-"""How sure it is: of 368 vectors drawn between two ends read for certain, none was overlooked."""
+"""Confidence that it was not drawn: of 368 vectors between two ends read for certain, none was missed."""
 
 
 def judge(task: Task, submission: Submission) -> Judgement:
@@ -42,7 +42,7 @@ def judge(task: Task, submission: Submission) -> Judgement:
 
 
 def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
-    """The mistakes that explain what was lost, or may be."""
+    """The mistakes that explain lost points, or points that may be lost."""
     scales, vectors = comparison.settled, task.construction.vectors
     lost = [one for one in comparison.outcomes if one.verdict in LOST]
     by_vector = {one.name: one.criterion for one in lost if one.name in vectors}
@@ -55,15 +55,15 @@ def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
 
 
 def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:
-    """Letters seen at each other's node on a sheet: lines tell nothing of them, so diagnosis cannot."""
+    """Letters read at each other's node on a sheet; the diagnosis uses lines alone and cannot find them."""
     vectors = task.construction.vectors
-    told = {one.mistake.other for one in known if one.code == "labels_swapped"}
+    pairs = {one.mistake.other for one in known if one.code == "labels_swapped"}
     found = []
     for swap in (swap for reading in submission.readings for swap in reading.swapped):
         pair = swap.first, swap.second
-        if swap.confidence < LEAST_CONFIDENCE or {pair, pair[::-1]} & told:
+        if swap.confidence < LEAST_CONFIDENCE or {pair, pair[::-1]} & pairs:
             continue
-        told.add(pair)
+        pairs.add(pair)
         explains = tuple(
             one.id
             for one in task.rubric.criterion
@@ -77,7 +77,7 @@ def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMi
 def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
     """Vectors that are asked for, long enough, and not on the sheet although both their ends were read.
 
-    What was not measured says nothing: nobody need measure everything.
+    Missing measurements are no evidence: nobody need measure everything.
     """
     evidence, construction = comparison.evidence, task.construction
     known = {*evidence.nodes, *construction.poles.values()} if evidence.has_sheets else set()
@@ -106,7 +106,7 @@ def _with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome
 # Points --------------------------------------------------------------------------------------------
 
 DECIMALS = 6
-"""Points are told to so many decimals; more is the computer's rounding."""
+"""Decimals of points; further ones are rounding errors."""
 
 
 def score(rubric: RubricFile, outcomes: Sequence[Outcome]) -> Score:
@@ -173,47 +173,47 @@ class _Total:
     is_weighted: bool = False
 
     def add(self, worth: float, worst: float, best: float) -> float:
-        """Count one criterion; its points at worst."""
+        """Count one criterion; returns its points at worst."""
         self.low, self.high = self.low + worst * worth, self.high + best * worth
         self.judged += worth
         return round(worst * worth, DECIMALS)
 
     @property
     def scale(self) -> float:
-        """What its points are multiplied by for what was not judged of it."""
+        """The factor that makes up for the criteria that were not judged."""
         return self.whole / self.judged if self.is_weighted and self.judged else 1.0
 
     @property
     def in_full(self) -> float:
-        """What it could give."""
+        """The points it could give."""
         return self.judged * self.scale
 
     @property
     def ends(self) -> tuple[float, float]:
-        """What it gives at worst and at best."""
+        """The points it gives at worst and at best."""
         return self.low * self.scale, self.high * self.scale
 
 
 # What was drawn, for the diagnosis -----------------------------------------------------------------
 
 LEAST_ERROR_MM = 0.15
-"""However well a hand draws, and however well its drawing is read."""
+"""Least standard error of a node, however well it is drawn and read."""
 NO_ERRORS: ComplexArray = np.zeros(0, np.complex128)
 
 
 def explain(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> ReplayResult:
-    """What was done, most likely, and what the plans were drawn by where that is certain."""
+    """The explanations of a drawing, and the basis of its plans where that is certain."""
     case = case_of(task, evidence, settled)
     explanations = explained(case)
     drawn, wrong = drawn_instead(explanations, case)
-    # Where a sheet shows the mechanism as it was drawn, and no plan is turned, the own nodes tell the rest.
+    # Where a sheet shows the drawn mechanism and no plan is turned, the own nodes are enough.
     is_needed = wrong and (wrong & task.construction.poles.keys() or not evidence.has_sheets)
     basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong) if is_needed else None
     return ReplayResult(explanations, basis)
 
 
 def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Case:
-    """The drawing to explain, at the scales used, with what contradicts them."""
+    """The drawing to explain at the scales used, with the scales that the drawing follows instead."""
     assumed = frozenset(name for name, scale in settled.items() if scale.used.assumed)
     others = {name: scale.other for name, scale in settled.items() if scale.other}
     used = {
@@ -254,7 +254,7 @@ def _observations(task: Task, evidence: Evidence, parameters: Parameters) -> lis
         if value is not None:
             entries.append(Observation(vector.head, vector.tail, value, _covariance(NO_ERRORS, read_mm)))
             continue
-        # What leads to a length is not seen: all earlier errors are in it.
+        # The nodes before a length are not known: it contains all earlier errors.
         traced = traced or trace(construction, parameters, task.skill)
         spread = _covariance(traced.shifts(vector.tail, vector.head), read_mm)
         entries.append(Observation(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
@@ -262,7 +262,7 @@ def _observations(task: Task, evidence: Evidence, parameters: Parameters) -> lis
 
 
 def _reading_covariance(task: Task, evidence: Evidence, node: str) -> Covariance:
-    """How far a node may be missed by being read, or by the measurements that lead to it."""
+    """The covariance (mm^2) of a node by reading, or by the measurements that give it."""
     vectors = [one for one in task.construction.vectors.values() if one.head == node]
     hand = task.rubric.hand
     rows: list[ComplexArray] = [NO_ERRORS]
@@ -283,7 +283,7 @@ def _reading_covariance(task: Task, evidence: Evidence, node: str) -> Covariance
 
 
 def _computed_within(task: Task, evidence: Evidence, node: str, each_mm: float) -> float:
-    """The relative error of a component that is computed from velocities as they were read or measured."""
+    """The relative error of a component that is computed from read or measured velocities."""
     sources: tuple[tuple[str, str, float], ...]
     match task.construction.step(node):
         case Given(length=Normal(tail=tail, head=head)):
@@ -304,6 +304,6 @@ def _computed_within(task: Task, evidence: Evidence, node: str, each_mm: float) 
 
 
 def _covariance(shifts: ComplexArray, least_mm: float) -> Covariance:
-    """What independent errors make of an end together: variance along x, covariance, variance along y."""
+    """The covariance (mm^2) of an end from independent errors, and a least error along both axes."""
     x, y = shifts.real, shifts.imag
     return float(x @ x) + least_mm**2, float(x @ y), float(y @ y) + least_mm**2
