@@ -259,7 +259,7 @@ class Lost:
 
 
 def named(explanations: Sequence[Replay], construction: Construction, lost: Lost) -> tuple[NamedMistake, ...]:
-    """The mistakes of the likeliest account that are sure enough, in the order of construction."""
+    """The mistakes of the likeliest explanation that are sure enough, in the order of construction."""
     if not explanations:
         return ()
     best, shares = explanations[0], _Shares(explanations)
@@ -276,7 +276,7 @@ def named(explanations: Sequence[Replay], construction: Construction, lost: Lost
 
 
 def sure_of(explanations: Sequence[Replay], least: float) -> list[Mistake]:
-    """The mistakes of the likeliest account that are this sure, unless they are slight."""
+    """The mistakes of the likeliest explanation that are this sure, unless they are slight."""
     if not explanations:
         return []
     shares = _Shares(explanations)
