@@ -237,8 +237,6 @@ class _Tracing:
 
     def told(self, place: ComplexArray) -> TracedNode:
         """A node's place without errors, and how each moves it."""
-        if place.ndim == 0:
-            return TracedNode(complex(place), np.zeros(self.hand + self.measuring, np.complex128))
         moved = (place[1:] - place[0]) / SMALL
         return TracedNode(complex(place[0]), np.where(np.isfinite(moved), moved, 0.0))
 
