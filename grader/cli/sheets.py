@@ -22,8 +22,8 @@ from grader.inputs.roster import read_roster
 from grader.printed.answer_sheet import make_calibration, make_sheets
 from grader.records import FloatArray, PageRef, Problem, Unread
 from grader.rubric import rubric_of
-from grader.scan.calibration import calibrate, residual_map
 from grader.scan.decode.pages import count_pages
+from grader.scan.register.calibration import calibrate, residual_map
 from reference.authored.assignment import Variant, load_assignment
 from reference.errors import CallError, InputFileError
 
