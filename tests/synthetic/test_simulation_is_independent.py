@@ -41,6 +41,4 @@ def test_the_forbidden_modules_are_recognised(tmp_path):
     file = tmp_path / "student.py"
     text = "from reference.construction.uncertainty import Skill\nimport grader.rubric\n"
     file.write_text(text, encoding="utf-8")
-        "from reference.construction.uncertainty import Skill\nimport grader.rubric\n", encoding="utf-8"
-    )
     assert list(imports_of(file)) == ["reference.construction.uncertainty.Skill", "grader.rubric"]
