@@ -1,4 +1,4 @@
-"""Languages of what students and instructors read: English, Romanian, Russian.
+r"""Languages of what students and instructors read: English, Romanian, Russian.
 
 English texts stand in the code and are the keys; `locale/<lang>/LC_MESSAGES/planmark.po` holds the
 other languages. After a text has changed (more in `docs/translating.md`)::

@@ -22,7 +22,7 @@ SLOW = (
     "bench", "docs/test_readme", "functional", "fuzz", "laws", "samples", "synthetic", "unit/bench",
     "unit/folder/test_workers", "unit/older", "unit/reading", "unit/reference/test_exact_plan",
     "unit/scan/decode/test_hostile", "unit/scan/handwriting", "unit/scan/register", "unit/scan/strokes",
-    "unit/scan/test_calibration", "unit/similarity",
+    "unit/similarity",
 )  # fmt: skip
 """Where tests run the whole program, read scans, or try many cases; the others are the quick set."""
 

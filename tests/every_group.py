@@ -4,6 +4,13 @@
 
 import tomllib
 
+import numpy as np
+
+from reference.authored.assembly import build_mechanism
+from reference.authored.mechanism import MechanismFile, check_mechanism
+from reference.authored.toml_file import validate
+from reference.mechanism import Mechanism
+
 MECHANISM = """
 schema_version = 1
 id = "every"
@@ -45,3 +52,12 @@ def mechanism_table() -> dict:
 def assignment_table() -> dict:
     """The assignment, fresh, without its mechanism."""
     return tomllib.loads(ASSIGNMENT)
+
+
+def mechanism(*more: dict) -> Mechanism:
+    """The mechanism of the assignment's first variant, with more groups."""
+    table = mechanism_table()
+    table["group"] += more
+    file = validate(MechanismFile, table, "every group")
+    assert not list(check_mechanism(file))
+    return build_mechanism(file, {"n": np.ones(1)}, 1)

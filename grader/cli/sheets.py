@@ -10,7 +10,7 @@ import typer
 
 from grader.authoring.lint import lint
 from grader.authoring.round_scales import suggestions
-from grader.cli.app import check_language, progress
+from grader.cli.commands import check_language, progress
 from grader.documents import CalibrationDocument
 from grader.files import write_whole
 from grader.folder.cache import PageCache
@@ -22,8 +22,8 @@ from grader.inputs.roster import read_roster
 from grader.printed.answer_sheet import make_calibration, make_sheets
 from grader.records import FloatArray, PageRef, Problem, Unread
 from grader.rubric import rubric_of
-from grader.scan.calibration import calibrate, residual_map
 from grader.scan.decode.pages import count_pages
+from grader.scan.register.calibration import calibrate, residual_map
 from reference.authored.assignment import Variant, load_assignment
 from reference.errors import CallError, InputFileError
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 
@@ -10,7 +11,6 @@ from reference.authored.mechanism import (
     AnyGroupTable,
     CrankTable,
     CrossSliderTable,
-    DrivenSliderTable,
     DyadTable,
     FixedGuideTable,
     GuideTable,
@@ -20,7 +20,6 @@ from reference.authored.mechanism import (
     PointTable,
     SliderTable,
     SlottedLinkTable,
-    YokeTable,
 )
 from reference.authored.toml_file import LENGTH_UNITS_M
 from reference.geometry import ComplexArray, FloatArray
@@ -148,39 +147,34 @@ def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _LinkA
 
 
 def _driver(file: MechanismFile, numbers: _Numbers) -> Driver:
-    zero = np.zeros(1)
-    match file.crank or file.driven_slider:
-        case CrankTable() as table:
-            return Crank(
-                link=table.link,
-                pivot=table.pivot,
-                pin=table.pin,
-                length_m=numbers.length(table.length, "crank"),
-                angle_rad=numbers.angle(table.angle_deg),
-                omega=_speed(table, numbers),
-                epsilon=zero if table.epsilon is None else numbers.number(table.epsilon),
-                accelerated=table.epsilon is not None,
-            )
-        case DrivenSliderTable() as table:
-            return DrivenSlider(
-                link=table.link,
-                pin=table.pin,
-                guide_m=numbers.point(table.guide.through),
-                guide_rad=numbers.angle(table.guide.angle_deg),
-                displacement_m=numbers.distance(table.displacement),
-                speed=numbers.distance(table.speed),
-                acceleration=zero if table.acceleration is None else numbers.distance(table.acceleration),
-            )
-    raise ValueError("a mechanism has one driven link")
+    zero, table = np.zeros(1), file.driver
+    if isinstance(table, CrankTable):
+        return Crank(
+            link=table.link,
+            pivot=table.pivot,
+            pin=table.pin,
+            length_m=numbers.length(table.length, "crank"),
+            angle_rad=numbers.angle(table.angle_deg),
+            omega=_omega(table, numbers),
+            epsilon=zero if table.epsilon is None else numbers.number(table.epsilon),
+            accelerated=table.epsilon is not None,
+        )
+    return DrivenSlider(
+        link=table.link,
+        pin=table.pin,
+        guide_m=numbers.point(table.guide.through),
+        guide_rad=numbers.angle(table.guide.angle_deg),
+        displacement_m=numbers.distance(table.displacement),
+        speed=numbers.distance(table.speed),
+        acceleration=zero if table.acceleration is None else numbers.distance(table.acceleration),
+    )
 
 
-def _speed(crank: CrankTable, numbers: _Numbers) -> FloatArray:
-    """The crank's angular velocity, directly or from rev/min through a gear."""
+def _omega(crank: CrankTable, numbers: _Numbers) -> FloatArray:
+    """The crank's angular velocity, rad/s, directly or from rev/min through a gear."""
     if crank.omega is not None:
         return numbers.number(crank.omega)
-    if crank.rpm is None:
-        raise ValueError("a crank has omega or rpm")
-    rpm = numbers.number(crank.rpm)
+    rpm = numbers.number(cast("Formula", crank.rpm))  # the table has one of the two
     if crank.gear_ratio is not None:
         ratio = numbers.number(crank.gear_ratio)
         if np.any(ratio == 0.0):
@@ -190,9 +184,9 @@ def _speed(crank: CrankTable, numbers: _Numbers) -> FloatArray:
 
 
 def _fixed(guide: FixedGuideTable | GuideTable, numbers: _Numbers) -> FixedGuide:
-    if guide.through is None or guide.angle_deg is None:
-        raise ValueError("a fixed guide has a point and a direction")
-    return FixedGuide(numbers.point(guide.through), numbers.angle(guide.angle_deg))
+    # A table without joints has a point and a direction.
+    through, angle_deg = cast("list[Formula]", guide.through), cast("Formula", guide.angle_deg)
+    return FixedGuide(numbers.point(through), numbers.angle(angle_deg))
 
 
 def _guide(guide: GuideTable, numbers: _Numbers, bodies: _LinkAxes) -> Guide:
@@ -224,7 +218,7 @@ def _group(table: AnyGroupTable, numbers: _Numbers, bodies: _LinkAxes) -> Group:
         case CrossSliderTable():
             first_guide, second_guide = (_guide(guide, numbers, bodies) for guide in table.guides)
             return CrossSlider(node, (first_guide, second_guide))
-        case YokeTable():
+        case _:
             return Yoke(node, table.pin, numbers.angle(table.slot_deg), _fixed(table.guide, numbers))
 
 
@@ -264,7 +258,7 @@ def _link_point(
             if table.side is None and np.any(shape.imag != 0.0):
                 detail = f"{node} may lie to the left or to the right of {p} -> {q}; say which: side"
                 raise FormulaError(f"side of {node} is missing: {detail}")
-        case PointTable():
+        case _:
             local = numbers.point(table.at)
             shape = np.asarray(local / np.abs(base))
             if np.all(shape.imag == 0.0):

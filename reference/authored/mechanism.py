@@ -7,7 +7,7 @@ all at once, each with its path in the file.
 import difflib
 from collections.abc import Iterator
 from itertools import permutations
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
@@ -218,6 +218,11 @@ class MechanismFile(Authored):
             raise ValueError("needs one driven link: either [crank] or [driven_slider]")
         return self
 
+    @property
+    def driver(self) -> CrankTable | DrivenSliderTable:
+        """The driven link."""
+        return cast("CrankTable | DrivenSliderTable", self.crank or self.driven_slider)
+
 
 Keyed = Iterator[tuple[str, str]]
 """A key of the group's table, and the joint that stands there."""
@@ -263,12 +268,11 @@ def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
         if file.crank.pivot not in file.ground:
             yield Finding("$.crank.pivot", _unknown(file.crank.pivot, set(file.ground), "a ground pivot"))
         bodies.links[file.crank.link] = {file.crank.pivot, file.crank.pin}
-    driven = file.crank or file.driven_slider
-    if driven is not None:
-        if driven.pin in placed:
-            where = "$.crank.pin" if file.crank else "$.driven_slider.pin"
-            yield Finding(where, f"{driven.pin} is a ground pivot already")
-        placed.add(driven.pin)
+    pin = file.driver.pin
+    if pin in placed:
+        where = "$.crank.pin" if file.crank else "$.driven_slider.pin"
+        yield Finding(where, f"{pin} is a ground pivot already")
+    placed.add(pin)
     for index, group in enumerate(file.group):
         where = f"$.group[{index}]"
         for key, joint in _needed(group):

@@ -45,8 +45,6 @@ class Authored(BaseModel):
 
 
 def _read_formula(value: object) -> Formula:
-    if isinstance(value, Formula):
-        return value
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError('a number or a formula in quotes, such as "2*(30+n)", is expected')  # noqa: TRY004
     return formula.parse(value)

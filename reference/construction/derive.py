@@ -347,17 +347,20 @@ def _in_order(draft: Draft) -> list[str]:
 
 
 def _draw_driver(draft: Draft, driver: Driver) -> None:
-    match driver:
-        case Crank():
-            _draw_crank(draft, driver)
-        case DrivenSlider(pin=pin):
-            guide = FixedLine(f"guide {pin}")
-            draft.sketch.append(OnGuide(pin, guide, Scaled(f"s {pin}", "kL")))
-            a, a_primed = draft.image(pin), draft.image(pin, primed=True)
-            speed, acceleration = Scaled(f"v_{pin}", "kv"), Scaled(f"a_{pin}", "ka")
-            draft.velocity.append(Given(a, VELOCITY_POLE, speed, guide.along))
-            draft.acceleration.append(Given(a_primed, ACCELERATION_POLE, acceleration, guide.along))
-            absolute(draft, pin)
+    if isinstance(driver, Crank):
+        _draw_crank(draft, driver)
+    else:
+        _draw_driven_slider(draft, driver)
+
+
+def _draw_driven_slider(draft: Draft, slider: DrivenSlider) -> None:
+    pin, guide = slider.pin, FixedLine(f"guide {slider.pin}")
+    draft.sketch.append(OnGuide(pin, guide, Scaled(f"s {pin}", "kL")))
+    a, a_primed = draft.image(pin), draft.image(pin, primed=True)
+    speed, acceleration = Scaled(f"v_{pin}", "kv"), Scaled(f"a_{pin}", "ka")
+    draft.velocity.append(Given(a, VELOCITY_POLE, speed, guide.along))
+    draft.acceleration.append(Given(a_primed, ACCELERATION_POLE, acceleration, guide.along))
+    absolute(draft, pin)
 
 
 def _draw_crank(draft: Draft, crank: Crank) -> None:
@@ -411,7 +414,7 @@ def _draw_group(draft: Draft, group: Group) -> None:
             images_at(draft, node, [in_slot(draft, node, pin, slot), *slides(draft, node, (guide,))])
         case SlottedLink():
             _draw_slotted_link(draft, group)
-        case SlotPoint(node=node):
+        case _:
             _draw_slot_point(draft, group)
 
 

@@ -36,7 +36,6 @@ from reference.construction.steps import (
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import (
     Crank,
-    DrivenSlider,
     Driver,
     Dyad,
     FixedGuide,
@@ -76,23 +75,21 @@ def parameters_of(
 
 def _driver_parameters(driver: Driver) -> dict[str, FloatArray]:
     pin = driver.pin
-    match driver:
-        case Crank(length_m=arm):
-            return {
-                "angle crank": driver.angle_rad,
-                pair(driver.pivot, pin): arm,
-                f"v_{pin}": driver.omega * arm,
-                f"a_{pin}_n": driver.omega**2 * arm,
-                f"a_{pin}_t": driver.epsilon * arm,
-            }
-        case DrivenSlider():
-            guide = FixedGuide(driver.guide_m, driver.guide_rad)
-            return {
-                f"s {pin}": driver.displacement_m,
-                f"v_{pin}": driver.speed,
-                f"a_{pin}": driver.acceleration,
-                **_guide_parameters(pin, guide),
-            }
+    if isinstance(driver, Crank):
+        arm = driver.length_m
+        return {
+            "angle crank": driver.angle_rad,
+            pair(driver.pivot, pin): arm,
+            f"v_{pin}": driver.omega * arm,
+            f"a_{pin}_n": driver.omega**2 * arm,
+            f"a_{pin}_t": driver.epsilon * arm,
+        }
+    return {
+        f"s {pin}": driver.displacement_m,
+        f"v_{pin}": driver.speed,
+        f"a_{pin}": driver.acceleration,
+        **_guide_parameters(pin, FixedGuide(driver.guide_m, driver.guide_rad)),
+    }
 
 
 def _guide_parameters(node: str, guide: Guide) -> dict[str, FloatArray]:

@@ -236,10 +236,6 @@ class _Tracing:
 
     def as_traced(self, place: ComplexArray) -> TracedNode:
         """A node's position without errors, and its shift by each of them."""
-        if place.ndim == 0:
-            return TracedNode(
-                complex(place), np.zeros(self.drafting_count + self.measuring_count, np.complex128)
-            )
         shifts = (place[1:] - place[0]) / SMALL
         return TracedNode(complex(place[0]), np.where(np.isfinite(shifts), shifts, 0.0))
 

@@ -102,7 +102,7 @@ def _followed(mechanism: Mechanism) -> tuple[Continuation, int]:
     """The mechanism followed over its whole cycle, and in how many turns that closes."""
     driver = mechanism.driver
     if not isinstance(driver, Crank):
-        start, reach = float(driver.displacement_m[0]), _largest_travel(mechanism)
+        start, reach = float(driver.displacement_m[0]), _largest_travel(mechanism, driver)
         return follow(mechanism, start, start - reach, start + reach), 0
     start = float(driver.angle_rad[0]) % TURN
     following = follow(mechanism, start, start - TURN, start + 2.0 * TURN)
@@ -132,17 +132,14 @@ def _shifted(following: Continuation, by: float) -> Continuation:
     )
 
 
-def _largest_travel(mechanism: Mechanism) -> float:
-    """How far a driven slider may go at most: all lengths in line, and all distances on the ground."""
+def _largest_travel(mechanism: Mechanism, driver: DrivenSlider) -> float:
+    """How far a driven slider may go at most, metres: all lengths in line, all distances on the ground."""
     take = one_variant(0)
     places = [complex(take(place)) for place in mechanism.ground_m.values()]
     guides = [guide for group in mechanism.groups for guide in guides_of(group)]
     places += [complex(take(guide.through_m)) for guide in guides if isinstance(guide, FixedGuide)]
-    driver = mechanism.driver
-    total = 0.0
-    if isinstance(driver, DrivenSlider):
-        total += abs(float(take(driver.displacement_m)))
-        total += sum(abs(place - complex(take(driver.guide_m))) for place in places)
+    total = abs(float(take(driver.displacement_m)))
+    total += sum(abs(place - complex(take(driver.guide_m))) for place in places)
     return 2.0 * (total + sum(_lengths(group) for group in mechanism.groups)) or 1.0
 
 
@@ -189,11 +186,11 @@ def _motion(
 def _elsewhere(following: Continuation) -> tuple[tuple[float, float], ...]:
     """Other ranges in which the mechanism assembles as authored, to full accuracy."""
     authored = replace(following, changes={})
-    is_crank = isinstance(following.mechanism.driver, Crank)
-    if is_crank:
+    driver = following.mechanism.driver
+    if isinstance(driver, Crank):
         outside = [(following.high, following.low + TURN)]
     else:
-        reach = _largest_travel(following.mechanism)
+        reach = _largest_travel(following.mechanism, driver)
         outside = [
             (following.start - reach, following.low),
             (following.high, following.start + reach),

@@ -161,7 +161,7 @@ def _add(solution: Solution, group: Group) -> None:
             _add_crossing(solution, node, (rail_of(solution, group.guide), slot))
         case SlotPoint():
             _add_slot_point(solution, group, solution.take(group.local_m))
-        case Plate() | PointOnLine():
+        case _:
             _add_point(solution, group)
 
 

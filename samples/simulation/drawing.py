@@ -1,7 +1,7 @@
 """A construction drawn step by step with instruments: each step starts from what is on the paper.
 
-What is to be drawn is data (`reference.construction.graph`): which node comes from which, by what. How a person
-does it stands here. Lengths that must be computed (normal and Coriolis components, sides of similar
+What is to be drawn is data (`reference.construction.graph`): which node comes from which, by what. How a
+person does it stands here. Lengths that must be computed (normal and Coriolis components, sides of similar
 triangles) come from what the ruler says of the lines drawn so far.
 """
 

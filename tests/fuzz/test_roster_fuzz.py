@@ -5,7 +5,7 @@ import contextlib
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.folder.draft_roster import Draft, draft_csv
+from grader.folder.draft_roster import RosterDraft, draft_csv
 from grader.inputs.roster import Roster, RosterRow, ScanRef, parse_roster, parse_scan, read_roster
 from reference.errors import AuthoredFileError, Finding
 
@@ -61,7 +61,7 @@ def test_a_draft_read_back_is_the_roster_it_was_made_of(students, scans):
         )
         for number, name in enumerate(students)
     ]
-    again = parse_roster(draft_csv(Roster("roster.csv", tuple(rows)), Draft(())))
+    again = parse_roster(draft_csv(Roster("roster.csv", tuple(rows)), RosterDraft(())))
     assert [(row.student_id, row.name, row.n, row.scans) for row in again.rows] == [
         (row.student_id, row.name, row.n, row.scans) for row in rows
     ]

@@ -39,5 +39,6 @@ def test_no_module_of_the_simulation_imports_the_graders_model(path):
 
 def test_the_forbidden_modules_are_recognised(tmp_path):
     file = tmp_path / "student.py"
-    file.write_text("from reference.hand import Skill\nimport grader.rubric\n", encoding="utf-8")
+    text = "from reference.construction.uncertainty import Skill\nimport grader.rubric\n"
+    file.write_text(text, encoding="utf-8")
     assert list(imports_of(file)) == ["reference.construction.uncertainty.Skill", "grader.rubric"]

@@ -9,14 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reference.authored.assembly import build_mechanism
 from reference.authored.assignment import (
     Assignment,
     AssignmentFile,
+    Variant,
     _check_formulas,
     built_in,
     library,
     load_assignment,
 )
+from reference.authored.formula import FormulaError
 from reference.authored.mechanism import MechanismFile, check_mechanism
 from reference.authored.toml_file import load, validate
 from reference.drawing.canvas import svg
@@ -398,6 +401,26 @@ def test_a_file_changed_on_disk_is_read_again(assignment):
     path.write_text(path.read_text(encoding="utf-8").replace("to = 30", "to = 12"), encoding="utf-8")
     os.utime(path, ns=(1, 1))
     assert len(load_assignment(path).variants()) == 12
+
+
+def test_a_plate_that_is_not_flat_needs_its_side():
+    table = every_group.mechanism_table()
+    plate = next(group for group in table["group"] if group["type"] == "plate")
+    del plate["side"]
+    file = validate(MechanismFile, table, "the file")
+    with pytest.raises(FormulaError, match=r"group\[4\]: side of C is missing: C may lie .* of A -> B"):
+        build_mechanism(file, {"n": np.ones(1)}, 1)
+
+
+def test_names_that_are_no_table_are_a_fault_of_the_file():
+    data = {**every_group.assignment_table(), "mechanism": every_group.mechanism_table()}
+    assert set(findings(AssignmentFile, {**data, "names": 3})) == {"$.names"}
+
+
+def test_a_variant_is_told_by_what_it_has():
+    assert str(Variant(7, 2)) == "n = 7, position = 2"
+    assert str(Variant(position=2)) == "position = 2"
+    assert str(Variant()) == "the only variant"
 
 
 def test_texts_fall_back_to_english():

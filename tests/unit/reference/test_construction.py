@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from reference.authored.assignment import load_assignment
+from reference.construction import derive
 from reference.construction.derive import construction_of
-from reference.construction.graph import ancestors, evaluate
+from reference.construction.graph import ancestors, bars, evaluate, parameters_of
 from reference.construction.steps import Similar
 from reference.plan import exact_plan
+from tests import every_group
 
 BUILT_IN = ["pump", "pump-230", "pump-collinear", "engine", "press", "shaper", "piston"]
 SHARE_OF_PLAN = 1e-12
@@ -178,3 +180,31 @@ def test_a_turned_sketch_turns_the_plans_with_it():
     turned = evaluate(plan.construction, {**plan.drawing.parameters, "turn": np.asarray(turn)})
     for node, place in drawn.items():
         np.testing.assert_allclose(turned[node], place * np.exp(1j * turn), atol=1e-9)
+
+
+def test_a_flat_plate_on_a_link_with_a_ground_pivot_divides_its_image():
+    flat = {"type": "plate", "node": "M", "base": ["O3", "B"], "link": "7", "lengths": [100, 150]}
+    whole = every_group.mechanism(flat)
+    construction = construction_of(whole)
+    scale = np.ones(1)
+    drawn = evaluate(construction, parameters_of(whole, scale, scale, scale))
+    np.testing.assert_allclose(drawn["m"], 0.4 * drawn["b"], rtol=1e-12)
+    np.testing.assert_allclose(drawn["m'"], 0.4 * drawn["b'"], rtol=1e-12)
+    assert [name for name in construction.vectors if name.startswith("v_M")] == ["v_M", "v_MB"]
+
+
+def test_bars_are_links_and_slots_and_guides_are_none():
+    told = "O1-A O2-A3 O2-D D-E A-B O3-B A-C B-C O3-F C-G B-K O1-P O1-C9 A-L B-L"
+    drawn = bars(construction_of(every_group.mechanism()))
+    assert sorted("-".join(bar) for bar in drawn) == sorted(told.split())
+
+
+def test_no_more_constructions_are_kept_than_are_asked_for(monkeypatch):
+    monkeypatch.setattr(derive, "CACHED", 1)
+    monkeypatch.setattr(derive, "_cache", {})
+    pump, press = (load_assignment(name) for name in ("pump", "press"))
+    first = construction_of(pump.mechanism(pump.variants()[:1]))
+    assert construction_of(pump.mechanism(pump.variants()[1:2])) is first
+    construction_of(press.mechanism(press.variants()[:1]))
+    assert len(derive._cache) == 1
+    assert construction_of(pump.mechanism(pump.variants()[:1])) == first

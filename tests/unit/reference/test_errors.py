@@ -7,7 +7,7 @@ import pytest
 from reference.authored.assembly import build_mechanism
 from reference.authored.mechanism import MechanismFile
 from reference.authored.toml_file import validate
-from reference.errors import AuthoredFileError, CallError, Finding, MechanismError
+from reference.errors import AuthoredFileError, CallError, Finding, MechanismError, near_names
 from reference.kinematics.motion import move
 
 
@@ -72,3 +72,8 @@ def test_a_rod_square_to_its_guide_is_singular_and_named():
     with pytest.raises(MechanismError, match="group of B are not determined") as error:
         move(build_mechanism(file, {}, 1))
     assert error.value.code == "singular"
+
+
+def test_a_name_of_endless_length_is_near_to_none():
+    assert near_names("lengt", ["length"]) == ["length"]
+    assert near_names("length" * 1000, ["length" * 1000]) == []

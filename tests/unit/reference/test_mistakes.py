@@ -4,9 +4,19 @@ import numpy as np
 import pytest
 
 from reference.authored.assignment import load_assignment
+from reference.construction.derive import construction_of
 from reference.construction.graph import evaluate
-from reference.construction.mistakes import CODES, RPM_FACTOR, Mistake, affected, commit, single_mistakes
+from reference.construction.mistakes import (
+    CODES,
+    RPM_FACTOR,
+    Mistake,
+    affected,
+    changed_step,
+    commit,
+    single_mistakes,
+)
 from reference.plan import exact_plan
+from tests import every_group
 
 MOVED_MM = 1e-6
 FIGURES = ["mechanism", "velocity_plan", "acceleration_plan"]
@@ -138,6 +148,12 @@ def test_a_mistake_that_cannot_be_made_at_a_step_is_refused():
     plan = a_plan()
     with pytest.raises(ValueError, match="cannot be made at the step of b"):
         commit(Mistake("normal_missing", "b"), plan.drawing)
+
+
+def test_a_guide_on_the_ground_cannot_be_drawn_by_mistake():
+    construction = construction_of(every_group.mechanism())
+    with pytest.raises(ValueError, match="line 1 of H is a guide on the ground"):
+        changed_step(Mistake("parallel_for_perpendicular", "H", slot=1), construction)
 
 
 def test_a_missing_vector_is_missing_by_name_and_moves_nothing():

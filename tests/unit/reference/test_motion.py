@@ -15,6 +15,7 @@ from reference.mechanism import (
     FixedGuide,
     Mechanism,
     MovingGuide,
+    Plate,
     PointOnLine,
     Slider,
     SlottedLink,
@@ -152,3 +153,42 @@ def test_arrays_of_more_variants_than_the_driver_has_are_told():
     many = assignment.mechanism(assignment.variants())
     with pytest.raises(ValueError, match="30 variants in a mechanism whose driver has 1"):
         move(replace(one, groups=many.groups))
+
+
+def test_a_velocity_near_a_singular_position_is_as_exact_without_accelerations():
+    near = mechanism(dyad(1.5, 0.5 + 1e-13))
+    alone, whole = move(near, accelerations=False), move(near)
+    assert alone.recomputed[0]
+    np.testing.assert_array_equal(alone.velocity["B"], whole.velocity["B"])
+
+
+def test_links_that_meet_in_doubles_alone_do_not_assemble():
+    angle, apart = 1.9583015186258488, 0
+    reach = abs(3 - np.exp(1j * angle))
+    for first in np.linspace(0.3, 0.9, 60) * reach:
+        links = dyad(first, np.nextafter(reach - first, 0.0))
+        motion = move_where_possible(mechanism(links, angles=(angle,)))
+        is_solved = np.isfinite(motion.velocity["B"][0])
+        assert is_solved == np.isfinite(motion.predicted_error[0])
+        apart += not is_solved
+    assert apart
+
+
+def test_pins_that_only_rounding_tells_apart_are_refused():
+    ratios = {"B": ("A", 3.0), "C": ("B", 5.0), "D": ("A", 15.0)}
+    points = [PointOnLine(node, ("O1", on), "1", array(ratio)) for node, (on, ratio) in ratios.items()]
+    assert 5.0 * (3.0 * 0.1) != 15.0 * 0.1
+    twice = Dyad("E", ("C", "D"), ("4", "5"), (array(0.05), array(0.05)), 1)
+    short = replace(mechanism(*points, twice), driver=crank(0.0, length_m=array(0.1)))
+    with pytest.raises(MechanismError) as error:
+        move(short)
+    assert error.value.group == "E"
+
+
+def test_near_a_singular_position_a_point_lies_by_its_coordinates_not_by_their_rounded_ratio():
+    local, rounded = array(0.3 + 0.4j), array((0.3 + 0.4j) / 1.5 * (1.0 + 1e-9))
+    plate = Plate("C", ("A", "B"), "3", (array(0.5), array(1.3)), 1, rounded, local)
+    motion = move(mechanism(dyad(1.5, 0.5 + 1e-13), plate))
+    a, b, c = (motion.position[joint][0] for joint in "ABC")
+    assert motion.recomputed[0]
+    assert abs((c - a) * abs(b - a) / (b - a) - local[0]) <= 4 * EPSILON

@@ -11,7 +11,15 @@ from reference.authored.assignment import load_assignment
 from reference.drawing import symbols
 from reference.drawing.canvas import Area, Curve, Label, Stroke, as_pieces, shifted
 from reference.drawing.labels import Wanted, place_labels, segments_of
-from reference.drawing.sheets import CELL_MM, FRAME, LEAST_GAP_MM, figures_of, lay_out, reference_drawing
+from reference.drawing.sheets import (
+    CELL_MM,
+    FRAME,
+    LEAST_GAP_MM,
+    _roomiest,
+    figures_of,
+    lay_out,
+    reference_drawing,
+)
 from reference.drawing.sketch import support_direction
 from reference.drawing.subject import Subject, Wording
 from reference.drawing.symbols import bars
@@ -262,3 +270,10 @@ def test_a_table_too_long_for_the_sheet_is_told():
 def test_an_arc_goes_round_its_centre():
     bow = symbols.arc(2 + 1j, 5.0, 0.0, math.pi, 0.3)
     assert all(math.hypot(x - 2.0, -y - 1.0) == pytest.approx(5.0) for x, y in bow.points)
+
+
+def test_a_figure_larger_than_its_room_has_no_place_in_it():
+    room = np.zeros((20, 30), bool)
+    assert _roomiest(room, np.ones((4, 5), bool), None)[1] > 0.0
+    for rows, columns in ((20, 31), (21, 30)):
+        assert _roomiest(room, np.ones((rows, columns), bool), None)[1] == 0.0

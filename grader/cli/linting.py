@@ -1,0 +1,180 @@
+"""``planmark lint``."""
+
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from grader.authoring.findings import named
+from grader.authoring.lint import Lint, lint, lint_document
+from grader.authoring.round_scales import WELL_READ_MM, Proposal, ends_of, ratio_text
+from grader.cli.commands import new_table
+from grader.documents import LintLeast, LintVariant, LintWorst
+from grader.files import write_whole
+from grader.rubric import load_rubric
+from reference.authored.assignment import Variant, load_assignment
+from reference.drawing.canvas import Label
+from reference.drawing.canvas import svg as as_svg
+from reference.drawing.sheets import FRAME, reference_drawing
+from reference.geometry import FloatArray
+
+SHOWN_ROWS = 40
+"""More variants than that are told in ranges."""
+REASON_MM, REASON_COLOUR = 4.0, "#a03014"
+"""Of the line under the drawing's frame that says why this variant."""
+COLOURS = {"fault": "bold red", "warning": "yellow", "hint": "cyan"}
+
+
+def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
+    """Print every finding on an assignment and its rubric; whether any needs a person."""
+    assignment = load_assignment(name)
+    found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
+    if svg is not None and found.plan is not None and found.worst is not None:
+        worst = _row_variant(found.worst)
+        told = f"{worst}: {found.worst.why}"
+        reason = Label((FRAME[0], FRAME[3] + 1.5 * REASON_MM), told, REASON_MM, colour=REASON_COLOUR)
+        drawing = reference_drawing(assignment, found.plan, found.plan.variants.index(worst))
+        sheets = [(*sheet.shapes, reason) for sheet in drawing]
+        write_whole(svg, as_svg(sheets))
+    if as_json:
+        typer.echo(lint_document(found).model_dump_json(indent=2))
+        return found.needs_a_person
+    console = Console()
+    console.print(f"[bold]{assignment.file.title.en}[/bold]", highlight=False)
+    console.print(_variants_table(found.rows))
+    if found.scales and found.plan is not None:
+        console.print()
+        console.print(_scales_table(found.scales))
+    console.print()
+    _tell_findings(console, found)
+    _tell_end(found, svg)
+    return found.needs_a_person
+
+
+def _variants_table(rows: Sequence[LintVariant]) -> Table:
+    heads = (
+        "transmis-\nsion sine",
+        "crossing\ndegrees",
+        "shortest\nasked mm",
+        "under\n8 mm",
+        "fits\ntimes",
+    )
+    table = new_table("variant", "assembles", *heads, left=("assembles",))
+    table.columns[0].no_wrap = True
+    for group in _ranges(rows):
+        broken = [row for row in group if row.problem]
+        assembles = "yes" if not broken else "no" if len(broken) == len(group) else f"{len(broken)} do not"
+        table.add_row(
+            _named_range(group),
+            f"[red]{assembles}[/red]" if broken else assembles,
+            _worst_of([row.transmission for row in group], "{:.2f}"),
+            _worst_of([row.crossing_deg for row in group], "{:.1f}"),
+            _worst_of([row.shortest_mm for row in group], "{:.2f}"),
+            str(sum(row.under_8_mm for row in group)),
+            _room_of([row.room for row in group]),
+        )
+    return table
+
+
+def _ranges(rows: Sequence[LintVariant]) -> list[list[LintVariant]]:
+    """A row each; of many variants about thirty stretches, all positions of a number in one."""
+    if len(rows) <= SHOWN_ROWS:
+        return [[row] for row in rows]
+    has_both = rows[0].n is not None and rows[0].position is not None
+    units = (
+        [list(unit) for _, unit in groupby(rows, key=lambda row: row.n)]
+        if has_both
+        else [[row] for row in rows]
+    )
+    long = -(-len(units) // 30)
+    return [
+        [row for unit in units[start : start + long] for row in unit] for start in range(0, len(units), long)
+    ]
+
+
+def _named_range(group: Sequence[LintVariant]) -> str:
+    return str(_row_variant(group[0])) if len(group) == 1 else named(map(_row_variant, group))
+
+
+def _row_variant(row: LintVariant | LintWorst) -> Variant:
+    return Variant(row.n, row.position)
+
+
+def _worst_of(figures: Sequence[LintLeast | None], form: str) -> str:
+    known = [figure for figure in figures if figure is not None]
+    if not known:
+        return "-"
+    least = min(known, key=lambda figure: figure.value)
+    return f"{form.format(least.value)} {least.at}"
+
+
+def _room_of(figures: Sequence[LintLeast | None]) -> str:
+    """How the tightest figure fits; on which page, where it does not."""
+    known = [figure for figure in figures if figure is not None]
+    if not known:
+        return "-"
+    least = min(known, key=lambda figure: figure.value)
+    where = least.at.partition(" on ")[2]
+    return f"{least.value:.2f} {where}" if least.value < 1.0 else f"{least.value:.2f}"
+
+
+def _scales_table(scales: Sequence[Proposal]) -> Table:
+    """Quantities in rows: three columns stay readable in a narrow terminal."""
+    told = {"proposed": "as proposed", "round": "round", "round_each": "round, each its own"}
+    table = Table("scales", box=None, header_style="bold")
+    for one in scales:
+        table.add_column(told[one.name], justify="right", no_wrap=True)
+    rows: dict[str, list[str]] = {
+        "kL": ["..".join(_ratios(one.scales.kL)) for one in scales],
+        "kv, (m/s)/mm": [_span(one.scales.kv) for one in scales],
+        "ka, (m/s^2)/mm": [_span(one.scales.ka) for one in scales],
+        "fits, times": [f"{one.room:.2f}" for one in scales],
+        "shortest asked, mm": [
+            "-" if one.shortest_mm is None else f"{one.shortest_mm.value:.2f} {one.shortest_mm.at}"
+            for one in scales
+        ],
+        f"asked under {WELL_READ_MM:g} mm": [f"{one.under_8_mm} of {one.asked}" for one in scales],
+        "shortest link, mm": [f"{one.link_mm:.1f}" for one in scales],
+    }
+    for name, cells in rows.items():
+        table.add_row(name, *cells)
+    return table
+
+
+def _ratios(values: FloatArray) -> list[str]:
+    """The finest and the coarsest scale of lengths, once where they are one."""
+    return list(dict.fromkeys(ratio_text(end) for end in ends_of(values)))
+
+
+def _span(values: FloatArray) -> str:
+    low, high = (f"{end:.0f}" if end >= 1e4 else f"{end:.4g}" for end in ends_of(values))
+    return low if low == high else f"{low}..{high}"
+
+
+def _tell_findings(console: Console, result: Lint) -> None:
+    """A line each, which terminals break and programs can search."""
+    for finding in result.findings:
+        word = f"[{COLOURS[finding.severity]}]{finding.severity:<8}[/]"
+        console.print(f"{word} ", end="")
+        console.print(str(finding), markup=False, highlight=False, soft_wrap=True)
+
+
+def _tell_end(result: Lint, svg: Path | None) -> None:
+    if result.worst is not None and result.plan is not None:
+        typer.echo(f"hardest to draw: {_row_variant(result.worst)}: {result.worst.why}")
+        if svg is not None:
+            typer.echo(f"drawn in {svg}")
+    elif svg is not None:
+        typer.echo("nothing drawn: no variant can be solved")
+    counts = {
+        severity: sum(finding.severity == severity for finding in result.findings)
+        for severity in ("fault", "warning", "hint")
+    }
+    told = ", ".join(
+        f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items() if count
+    )
+    many = "1 variant" if len(result.rows) == 1 else f"{len(result.rows)} variants"
+    typer.echo(f"{result.assignment.id}: {many}, {told or 'no findings'}")

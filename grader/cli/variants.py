@@ -1,0 +1,297 @@
+"""``planmark plan --all`` and ``planmark cycle``: every variant, every position."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import typer
+
+from grader.authoring.variant_checks import broken_findings, broken_variants
+from grader.authoring.variant_table import class_csv
+from grader.cli.commands import check_language, new_table, progress
+from grader.cli.plans import check_crank
+from grader.cycle.quantities import CycleSubject, Extreme, Selection, cycle_csv, extremes, strokes_of
+from grader.files import write_whole
+from grader.language import Tongue, tongue
+from grader.solution.document import plan_documents
+from reference.authored.assignment import Assignment, Variant, load_assignment
+from reference.errors import CallError, MechanismError
+from reference.kinematics.cycle import cycle
+from reference.plan import Plan, exact_plan
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from grader.authoring.variant_table import Tell
+
+
+LONG = 20
+"""So many drawings take seconds: their progress is shown."""
+
+
+def refuse_single(*, every: bool, options: Mapping[str, object]) -> None:
+    """Refuse `--all` with options for one variant, and `--csv` for one."""
+    given = [name for name, value in options.items() if value is not None]
+    if not every:
+        raise CallError("all_or_one", "--csv is a table of all variants: add --all")
+    if given:
+        told = "--all is every variant, and" if given != ["--svg"] else "drawings of --all go into --pdf:"
+        raise CallError("all_or_one", f"{told} {' and '.join(given)} one of them: leave out either")
+
+
+def show_class(
+    name: str,
+    crank_mm: float | None,
+    *,
+    as_json: bool,
+    csv: Path | None,
+    pdf: Path | None,
+    drawings: bool,
+    lang: str,
+) -> bool:
+    """Write the plans of all variants as JSON, as a table, or on pages; without any, a short table.
+
+    Variants that cannot be solved are told and left out; whether there are any.
+    """
+    check_crank(crank_mm)
+    check_language(lang)
+    assignment = load_assignment(name)
+    variants = _sound(assignment)
+    plan = exact_plan(assignment, variants, assignment.scales(variants, crank_mm=crank_mm))
+    is_open = len(variants) < len(assignment.variants())
+    if csv is not None:
+        write_whole(csv, class_csv(plan, decimal_comma=tongue(lang).decimal_mark == ","))
+    if pdf is not None:
+        _print_pages(assignment, plan, pdf, drawings=drawings, lang=lang)
+    if as_json:
+        documents = [one.model_dump(mode="json") for one in plan_documents(assignment, plan)]
+        typer.echo(json.dumps(documents, indent=2, ensure_ascii=False))
+        return is_open
+    if csv is None and pdf is None:
+        _show_table(assignment, plan)
+    for file in (csv, pdf):
+        if file is not None:
+            typer.echo(f"{len(variants)} variants written to {file}")
+    return is_open
+
+
+def _sound(assignment: Assignment) -> list[Variant]:
+    """The variants that can be solved; the others are told."""
+    variants = assignment.variants()
+    broken = broken_variants(assignment, variants)
+    without = {one.variant for one in broken}
+    if len(without) == len(variants):
+        error = broken[0].error
+        told = f"no variant can be solved; {variants[0]}: {error.template}"
+        raise MechanismError(error.code, told, group=error.group, gap_m=error.gap_m)
+    for finding in broken_findings(assignment, broken):
+        typer.secho(f"left out: {finding}", err=True, fg="red")
+    return [variant for variant in variants if variant not in without]
+
+
+def _print_pages(assignment: Assignment, plan: Plan, pdf: Path, *, drawings: bool, lang: str) -> None:
+    from grader.authoring.variant_table import class_pages, numbered, table_pages
+    from grader.solution.pages import pdf as as_pdf
+    from grader.solution.sentences import wording_of
+
+    words = tongue(lang)
+    pages = table_pages(assignment, plan, words)
+    if drawings:
+        with _drawing_progress(len(plan.variants) >= LONG) as tell:
+            pages = class_pages(pages, assignment, plan, wording_of(words), tell)
+    write_whole(pdf, as_pdf(numbered(pages), f"{assignment.file.title.in_language(lang)} ({assignment.id})"))
+
+
+@contextmanager
+def _drawing_progress(is_long: bool) -> "Iterator[Tell | None]":
+    if not is_long:
+        yield None
+        return
+    with progress() as tell:
+        yield lambda done, total: tell("drawings", done, total)
+
+
+def _show_table(assignment: Assignment, plan: Plan) -> None:
+    """Scales, and the drawn lengths of absolute vectors: what is asked for most while correcting."""
+    from rich.console import Console
+
+    console = Console()
+    console.print(f"[bold]{assignment.file.title.en}[/bold], drawn lengths in mm", highlight=False)
+    joints = {joint for joint in plan.motion.position if not plan.mechanism.is_ground(joint)}
+    names = [name for name in plan.vectors_si if name.removeprefix(name[:2]) in joints]
+    table = new_table("variant", "kL\nm/mm", "kv\n(m/s)/mm", "ka\n(m/s^2)/mm", *names)
+    lengths = {name: abs(plan.drawn_mm(name)) for name in names}
+    for index, variant in enumerate(plan.variants):
+        scales = [f"{getattr(plan.scales, name)[index]:.4g}" for name in ("kL", "kv", "ka")]
+        table.add_row(str(variant), *scales, *(f"{lengths[name][index]:.2f}" for name in names))
+    console.print(table)
+    console.print("all vectors, values and directions: --csv FILE, --pdf FILE or --json", style="dim")
+
+
+CONSTANT = 1e-9
+"""What changes by less over a cycle, against the largest of its kind, is constant but for rounding."""
+ZERO = 1e-8
+"""Against the largest of its kind: a least value below it is zero but for rounding."""
+
+
+def show_cycle(
+    name: str,
+    n: int | None,
+    position: int | None,
+    *,
+    of: list[str],
+    samples: int,
+    csv: Path | None,
+    svg: Path | None,
+    pdf: Path | None,
+    lang: str,
+) -> None:
+    """Write a variant's cycle as a table or a diagram; without files, print its extremes and strokes."""
+    words = tongue(lang)
+    assignment = load_assignment(name)
+    variant = assignment.variant(n, position)
+    subject = CycleSubject(cycle(assignment.mechanism([variant]), samples))
+    selection = subject.select([part.strip() for text in of for part in text.split(",") if part.strip()])
+    drawn_in = {kind: file for kind, file in (("svg", svg), ("pdf", pdf)) if file is not None}
+    diagrams = _diagrams(assignment, variant, subject, selection, words, list(drawn_in))
+    if csv is not None:
+        write_whole(csv, cycle_csv(subject, selection, decimal_comma=words.decimal_mark == ","))
+        typer.echo(f"Written to {csv}")
+    for file, diagram in zip(drawn_in.values(), diagrams, strict=True):
+        write_whole(file, diagram)
+        typer.echo(f"Drawn in {file}")
+    if csv is None and not drawn_in:
+        _print(assignment, variant, subject, selection)
+
+
+def _diagrams(
+    assignment: Assignment,
+    variant: Variant,
+    subject: CycleSubject,
+    selection: Selection,
+    words: Tongue,
+    formats: list[str],
+) -> list[bytes]:
+    """The diagram as files of some formats; raises CallError where matplotlib is not installed."""
+    if not formats:
+        return []
+    try:
+        from grader.cycle.diagram import Setting, cycle_diagram
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "matplotlib":
+            raise
+        message = "a diagram of a cycle needs matplotlib: install it with pip install 'planmark[plots]'"
+        raise CallError("matplotlib_needed", message) from error
+    return cycle_diagram(subject, selection, Setting(assignment, variant, words), formats)
+
+
+def _print(assignment: Assignment, variant: Variant, subject: CycleSubject, selection: Selection) -> None:
+    """The range, strokes, and the extremes of the selected quantities."""
+    from rich.console import Console
+
+    console = Console()
+    console.print(f"[bold]{assignment.file.title.en}[/bold], {variant}", highlight=False)
+    for line in (*_range(subject), *_strokes(subject)):
+        console.print(line, highlight=False, soft_wrap=True)
+    where = "at deg" if subject.cycle.is_turned else "at mm"
+    table = new_table("", "unit", "least", where, "largest", where, "here", left=("unit",))
+    for quantity in selection.quantities:
+        least, largest = extremes(subject, quantity)
+        here = float(subject.values_at(quantity, np.array([subject.cycle.start]))[0])
+        unit = quantity.unit.replace("²", "^2")
+        size = subject.size(quantity)
+        if largest.value - least.value <= CONSTANT * size:
+            told = here if abs(here) > ZERO * size else 0.0
+            table.add_row(quantity.name, unit, "constant", "", "", "", f"{told:.6g}")
+            continue
+        cells = (
+            *_extreme_cells(subject, least, size),
+            *_extreme_cells(subject, largest, size),
+            f"{here + 0.0:.6g}",
+        )
+        table.add_row(quantity.name, unit, *cells)
+    for point in selection.points:
+        _path_rows(subject, point, table)
+    console.print(table)
+    console.print("every position: --csv FILE; as a diagram: --svg FILE, --pdf FILE", style="dim")
+
+
+def _path_rows(subject: CycleSubject, point: str, table: "Table") -> None:
+    """How far a point's path reaches each way, by its samples."""
+    place = np.broadcast_to(subject.cycle.motion.position[point], subject.cycle.driven.shape)
+    here = complex(subject.motion_at(np.array([subject.cycle.start])).position[point][0])
+    for axis, values, own in (("x", place.real, here.real), ("y", place.imag, here.imag)):
+        ends = [int(np.nanargmin(values)), int(np.nanargmax(values))]
+        cells = [
+            cell
+            for end in ends
+            for cell in (f"{values[end] + 0.0:.6g}", _number(subject, float(subject.cycle.driven[end])))
+        ]
+        table.add_row(f"{axis}_{point}", "m", *cells, f"{own + 0.0:.6g}")
+
+
+def _extreme_cells(subject: CycleSubject, extreme: Extreme, size: float) -> tuple[str, str]:
+    value = extreme.value if abs(extreme.value) > ZERO * size else 0.0
+    if math.isinf(value):
+        text = "∞" if value > 0.0 else "-∞"
+    else:
+        text = "-" if math.isnan(value) else f"{value + 0.0:.6g}"
+    return text, ", ".join(_number(subject, at) for at in extreme.at)
+
+
+def _at(subject: CycleSubject, driven: float) -> str:
+    """A driven coordinate with its unit."""
+    return f"{_number(subject, driven)} {'deg' if subject.cycle.is_turned else 'mm'}"
+
+
+def _number(subject: CycleSubject, driven: float) -> str:
+    """A driven coordinate in degrees or millimetres, without a minus zero."""
+    if subject.cycle.is_turned:
+        return f"{round(math.degrees(driven), 2) + 0.0:.2f}"
+    return f"{round(1e3 * driven, 3) + 0.0:.3f}"
+
+
+def _range(subject: CycleSubject) -> Iterator[str]:
+    """How far the driven link goes, what stops it, and what it passes."""
+    found = subject.cycle
+    what = "crank" if found.is_turned else "driven slider"
+    here = f"this variant: {_at(subject, found.start)}"
+    if found.turns:
+        yield f"the crank turns fully; {here}"
+    else:
+        ends = [_at(subject, float(end)) for end in (found.driven[0], found.driven[-1])]
+        yield f"the {what} moves from {ends[0]} to {ends[1]}; {here}"
+        for stop in found.following.stops:
+            if stop is None:
+                yield "  nothing stops it on one side"
+            else:
+                yield f"  {_at(subject, stop.at)}: {stop.node}, {stop.why}"
+    if found.turns > 1:
+        yield "after a turn it is in its other assembly: the cycle is two turns"
+    for low, high in found.elsewhere:
+        yield f"it assembles from {_at(subject, low)} to {_at(subject, high)} as well, out of reach from here"
+    flat: dict[str, list[str]] = {}
+    for event in found.passed:
+        flat.setdefault(event.node, []).append(_at(subject, event.at))
+    for node, places in flat.items():
+        yield f"flat position of {node} at {' and '.join(places)}: passed smoothly, nothing is told in it"
+
+
+def _strokes(subject: CycleSubject) -> Iterator[str]:
+    """What goes to and fro."""
+    for stroke in strokes_of(subject):
+        whose = f"link {stroke.name}" if stroke.is_angle else stroke.name
+        places = " and ".join(_at(subject, at) for at in stroke.dead_points)
+        text = f"{whose}: dead point{'s' if len(stroke.dead_points) > 1 else ''} at {places}"
+        if stroke.travel is not None and stroke.time_ratio is not None:
+            far = (
+                f"{math.degrees(stroke.travel):.3f} deg"
+                if stroke.is_angle
+                else f"{1e3 * stroke.travel:.3f} mm"
+            )
+            text += f", travel {far}, time ratio of the strokes {stroke.time_ratio:.4f}"
+        yield text
