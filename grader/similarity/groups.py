@@ -31,36 +31,6 @@ NOTED = log(0.05)
 """Chance below which a part of the evidence is named."""
 MOST_OWNERS = 3
 """A number that more students have does not tell whose drawing it is."""
-
-CELL_MM = 2.5
-"""Side of a map's cell."""
-CELLS = (118, 168)
-"""Rows and columns of an A3 sheet's map; what lies outside is left out."""
-COMMON = 0.3
-"""Share of the sheets with ink in a cell from which it belongs to the sheet, not to the drawing."""
-INKED = 3
-"""Of 255: darker cells have ink, of a hard pencil too."""
-DARKEST = 60.0
-"""A darker cell counts as this one: ink and pencil weigh alike."""
-RUN, RUN_INKED = 32, 0.8
-"""Cells of a straight run (80 mm) that is the page's, and the share of them that have ink."""
-PART = 12
-"""Side of a part in cells: 30 mm, a letter or line with its surroundings, less than a figure."""
-FAINT = 20.0
-"""Norm of a part's ink below which it is dust."""
-LEAST_PARTS = 8
-"""A sheet with ink in fewer parts shows too little to be recognised by."""
-LEAST_SHEETS = 7
-"""Of six sheets two are a third: what they share would be taken for the page's."""
-LEAST_OVERLAP = 0.5
-"""Mean correlation of the parts below which two sheets are never the same drawing."""
-LEAST_SPREAD = 0.015
-"""Least scale of the tail, in inverse hyperbolic tangents: where all pairs are equal there is none."""
-QUANTILES = 0.84, 0.95
-"""The upper one leaves a copied pair out in a class of seven."""
-TAIL_DROP = float(np.log((1.0 - QUANTILES[0]) / (1.0 - QUANTILES[1])))
-"""How far the logarithm of an exponential tail falls between the two quantiles."""
-
 Maps = Sequence[Sequence[NDArray[np.uint8]]]
 
 
@@ -209,7 +179,36 @@ def _document(
     )
 
 
-# Ink ----------------------------------------------------------------------------------------------
+# Similarity of the ink -----------------------------------------------------------------------------
+
+CELL_MM = 2.5
+"""Side of a map's cell."""
+CELLS = (118, 168)
+"""Rows and columns of an A3 sheet's map; what lies outside is left out."""
+COMMON = 0.3
+"""Share of the sheets with ink in a cell from which it belongs to the sheet, not to the drawing."""
+INKED = 3
+"""Of 255: darker cells have ink, of a hard pencil too."""
+DARKEST = 60.0
+"""A darker cell counts as this one: ink and pencil weigh alike."""
+RUN, RUN_INKED = 32, 0.8
+"""Cells of a straight run (80 mm) that is the page's, and the share of them that have ink."""
+PART = 12
+"""Side of a part in cells: 30 mm, a letter or line with its surroundings, less than a figure."""
+FAINT = 20.0
+"""Norm of a part's ink below which it is dust."""
+LEAST_PARTS = 8
+"""A sheet with ink in fewer parts shows too little to be recognised by."""
+LEAST_SHEETS = 7
+"""Of six sheets two are a third: what they share would be taken for the page's."""
+LEAST_OVERLAP = 0.5
+"""Mean correlation of the parts below which two sheets are never the same drawing."""
+LEAST_SPREAD = 0.015
+"""Least scale of the tail, in inverse hyperbolic tangents: where all pairs are equal there is none."""
+QUANTILES = 0.84, 0.95
+"""The upper one leaves a copied pair out in a class of seven."""
+TAIL_DROP = float(np.log((1.0 - QUANTILES[0]) / (1.0 - QUANTILES[1])))
+"""How far the logarithm of an exponential tail falls between the two quantiles."""
 
 
 def ink_map(scan: GreyImage, page_mm: tuple[float, float]) -> NDArray[np.uint8]:

@@ -239,6 +239,8 @@ def _speeds(driver: Driver) -> dict[str, Value]:
     return {"speed": np.abs(driver.speed)}
 
 
+# Files ---------------------------------------------------------------------------------------------
+
 SUFFIXES = {"assignment": ".assignment.toml", "mechanism": ".mechanism.toml", "rubric": ".rubric.toml"}
 
 

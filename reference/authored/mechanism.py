@@ -224,6 +224,9 @@ class MechanismFile(Authored):
         return cast("CrankTable | DrivenSliderTable", self.crank or self.driven_slider)
 
 
+# Checks of joints and links ------------------------------------------------------------------------
+
+
 Keyed = Iterator[tuple[str, str]]
 """A key of the group's table, and the joint that stands there."""
 

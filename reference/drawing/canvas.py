@@ -126,6 +126,9 @@ def wrapped(text: str, size: float, wide: float) -> Sequence[str]:
     return lines
 
 
+# Shapes --------------------------------------------------------------------------------------------
+
+
 A3_MM = (420.0, 297.0)
 
 INK = "#1b1f24"
@@ -247,6 +250,9 @@ def _bounds_of(shape: Shape) -> Bounds:
             points = shape.points
     xs, ys = zip(*points, strict=True)
     return (min(xs), min(ys), max(xs), max(ys))
+
+
+# SVG -----------------------------------------------------------------------------------------------
 
 
 def svg(sheets: Sequence[Sequence[Shape]], page_mm: tuple[float, float] = A3_MM) -> str:

@@ -35,6 +35,88 @@ from reference.drawing.symbols import point, unit
 from reference.drawing.tables import column
 from reference.plan import Plan
 
+FRAME: Bounds = (20.0, 10.0, 410.0, 287.0)
+COLOURS = {"mechanism": INK, **PLAN_COLOURS}
+WARNING_COLOUR, WARNING_MM = "#c00000", 5.0
+ENGLISH = Wording()
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnSheet:
+    """One A3 sheet of the reference drawing; `fits` is False where a figure is too large for it."""
+
+    shapes: tuple[Shape, ...]
+    fits: bool
+
+
+def reference_drawing(
+    assignment: Assignment,
+    plan: Plan,
+    index: int = 0,
+    wording: Wording = ENGLISH,
+    *,
+    altitude: bool = False,
+) -> list[DrawnSheet]:
+    """The drawing of one variant of a plan on A3, true to scale.
+
+    All on one sheet where it fits, else on the sheets that the assignment asks for, else on as many as
+    are needed. A figure that is too large even so at its scales is told in red on the drawing.
+
+    Arguments: `altitude` draws the right triangles of the normal components on the sketch; raises
+    CallError where the scales do not allow that.
+    """
+    subject = Subject(assignment, plan, index, wording, altitude)
+    figures = figures_of(subject)
+    every = _sheet(subject, list(figures.values()))
+    if every.fits:
+        return [every]
+    asked = [
+        _sheet(subject, [figures[name] for name in page.figures if name in figures])
+        for page in assignment.file.page
+        if not figures.keys().isdisjoint(page.figures)
+    ]
+    return (
+        asked if all(sheet.fits for sheet in asked) else _on_several_sheets(subject, list(figures.values()))
+    )
+
+
+def _on_several_sheets(subject: Subject, figures: Sequence[DrawnFigure]) -> list[DrawnSheet]:
+    """Sheets with as many figures each, in their order, as fit."""
+    sheets: list[tuple[DrawnSheet, list[DrawnFigure]]] = []
+    for figure in figures:
+        together = _sheet(subject, [*sheets[-1][1], figure]) if sheets else None
+        if together is not None and together.fits:
+            sheets[-1] = together, [*sheets[-1][1], figure]
+        else:
+            sheets.append((_sheet(subject, [figure]), [figure]))
+    return [sheet for sheet, _ in sheets]
+
+
+def figures_of(subject: Subject) -> dict[str, DrawnFigure]:
+    """Each figure of a plan by its name."""
+    return {
+        name: sketch(subject) if name == "mechanism" else polygon(subject, name)
+        for name in subject.plan.nodes_mm
+    }
+
+
+def _sheet(subject: Subject, figures: Sequence[DrawnFigure]) -> DrawnSheet:
+    left, top, right, bottom = FRAME
+    corners = ((left, top), (right, top), (right, bottom), (left, bottom))
+    shapes: list[Shape] = [Stroke(corner, corners[(i + 1) % 4], 0.7) for i, corner in enumerate(corners)]
+    beside = column(subject, [figure.name for figure in figures], (right, top), bottom)
+    shapes.extend(beside.shapes)
+    moves, placed = lay_out(figures, FRAME, beside.box)
+    for figure, by in zip(figures, moves, strict=True):
+        shapes.extend(shifted(shape, by) for shape in figure.shapes)
+    if not (placed and beside.fits):
+        at = (left + 5, bottom - 5)
+        shapes.append(Label(at, subject.wording.too_large, WARNING_MM, colour=WARNING_COLOUR))
+    return DrawnSheet(tuple(shapes), placed and beside.fits)
+
+
+# Where figures stand on a sheet --------------------------------------------------------------------
+
 LEAST_GAP_MM = 6.0
 CELL_MM = 2.0
 HALF_A_CELL = 0.5
@@ -177,6 +259,8 @@ def _stacked(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point]:
     return [(room[0] - box[0], room[1] - box[1]) for box in (figure.bounds for figure in figures)]
 
 
+# A figure after each of its steps ------------------------------------------------------------------
+
 BEFORE, NOW = "#a3abb3", "#c8380a"
 NOW_WIDTH_MM = 0.3
 """Least width of a line that a step adds."""
@@ -242,21 +326,6 @@ def models(subject: Subject, step: Step) -> Iterator[Shape]:
         yield from (Stroke(p, q, MODEL_MM, NOW) for p, q in pairwise(corners))
 
 
-def centre(subject: Subject, name: str) -> Iterator[Shape]:
-    """An instantaneous centre or acceleration pole, with its triangle on the link that it belongs to."""
-    nodes, at = subject.nodes("mechanism"), subject.centres[name]
-    p, q = (nodes[joint] for joint in subject.plan.construction.centres[name].base)
-    yield Stroke(point(p), point(q), MODEL_MM, NOW)
-    for corner in (p, q):
-        yield Stroke(point(corner), point(at), symbols.HAIR_MM, NOW)
-    yield symbols.marked_point(at, NOW)
-    # On a large picture, which is printed smaller, the letter is larger.
-    size = LETTER_MM * max(1.0, abs(at - p) / LARGE_MM)
-    away = unit(at - (p + q) / 2.0)
-    x, y = point(at + 1.1 * size * away)
-    yield Label((x, y + 0.35 * size), subject.letter(name), size, "middle", NOW, italic=True)
-
-
 def _model_joints(step: Step) -> Iterator[tuple[str, ...]]:
     match step:
         case Similar(model=(p, q, r)):
@@ -271,81 +340,16 @@ def _model_joints(step: Step) -> Iterator[tuple[str, ...]]:
             return
 
 
-FRAME: Bounds = (20.0, 10.0, 410.0, 287.0)
-COLOURS = {"mechanism": INK, **PLAN_COLOURS}
-WARNING_COLOUR, WARNING_MM = "#c00000", 5.0
-ENGLISH = Wording()
-
-
-@dataclass(frozen=True, slots=True)
-class DrawnSheet:
-    """One A3 sheet of the reference drawing; `fits` is False where a figure is too large for it."""
-
-    shapes: tuple[Shape, ...]
-    fits: bool
-
-
-def reference_drawing(
-    assignment: Assignment,
-    plan: Plan,
-    index: int = 0,
-    wording: Wording = ENGLISH,
-    *,
-    altitude: bool = False,
-) -> list[DrawnSheet]:
-    """The drawing of one variant of a plan on A3, true to scale.
-
-    All on one sheet where it fits, else on the sheets that the assignment asks for, else on as many as
-    are needed. A figure that is too large even so at its scales is told in red on the drawing.
-
-    Arguments: `altitude` draws the right triangles of the normal components on the sketch; raises
-    CallError where the scales do not allow that.
-    """
-    subject = Subject(assignment, plan, index, wording, altitude)
-    figures = figures_of(subject)
-    every = _sheet(subject, list(figures.values()))
-    if every.fits:
-        return [every]
-    asked = [
-        _sheet(subject, [figures[name] for name in page.figures if name in figures])
-        for page in assignment.file.page
-        if not figures.keys().isdisjoint(page.figures)
-    ]
-    return (
-        asked if all(sheet.fits for sheet in asked) else _on_several_sheets(subject, list(figures.values()))
-    )
-
-
-def _on_several_sheets(subject: Subject, figures: Sequence[DrawnFigure]) -> list[DrawnSheet]:
-    """Sheets with as many figures each, in their order, as fit."""
-    sheets: list[tuple[DrawnSheet, list[DrawnFigure]]] = []
-    for figure in figures:
-        together = _sheet(subject, [*sheets[-1][1], figure]) if sheets else None
-        if together is not None and together.fits:
-            sheets[-1] = together, [*sheets[-1][1], figure]
-        else:
-            sheets.append((_sheet(subject, [figure]), [figure]))
-    return [sheet for sheet, _ in sheets]
-
-
-def figures_of(subject: Subject) -> dict[str, DrawnFigure]:
-    """Each figure of a plan by its name."""
-    return {
-        name: sketch(subject) if name == "mechanism" else polygon(subject, name)
-        for name in subject.plan.nodes_mm
-    }
-
-
-def _sheet(subject: Subject, figures: Sequence[DrawnFigure]) -> DrawnSheet:
-    left, top, right, bottom = FRAME
-    corners = ((left, top), (right, top), (right, bottom), (left, bottom))
-    shapes: list[Shape] = [Stroke(corner, corners[(i + 1) % 4], 0.7) for i, corner in enumerate(corners)]
-    beside = column(subject, [figure.name for figure in figures], (right, top), bottom)
-    shapes.extend(beside.shapes)
-    moves, placed = lay_out(figures, FRAME, beside.box)
-    for figure, by in zip(figures, moves, strict=True):
-        shapes.extend(shifted(shape, by) for shape in figure.shapes)
-    if not (placed and beside.fits):
-        at = (left + 5, bottom - 5)
-        shapes.append(Label(at, subject.wording.too_large, WARNING_MM, colour=WARNING_COLOUR))
-    return DrawnSheet(tuple(shapes), placed and beside.fits)
+def centre(subject: Subject, name: str) -> Iterator[Shape]:
+    """An instantaneous centre or acceleration pole, with its triangle on the link that it belongs to."""
+    nodes, at = subject.nodes("mechanism"), subject.centres[name]
+    p, q = (nodes[joint] for joint in subject.plan.construction.centres[name].base)
+    yield Stroke(point(p), point(q), MODEL_MM, NOW)
+    for corner in (p, q):
+        yield Stroke(point(corner), point(at), symbols.HAIR_MM, NOW)
+    yield symbols.marked_point(at, NOW)
+    # On a large picture, which is printed smaller, the letter is larger.
+    size = LETTER_MM * max(1.0, abs(at - p) / LARGE_MM)
+    away = unit(at - (p + q) / 2.0)
+    x, y = point(at + 1.1 * size * away)
+    yield Label((x, y + 0.35 * size), subject.letter(name), size, "middle", NOW, italic=True)

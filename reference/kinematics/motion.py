@@ -46,6 +46,165 @@ from reference.mechanism import (
 from reference.numbers import cross, larger
 
 EPSILON = float(np.finfo(np.float64).eps)
+SAFETY = 32.0
+"""Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""
+FEW = 3
+"""So many variants are faster one by one, on Python's numbers."""
+CLASSES = 200
+"""From so many variants on it pays to calculate once what they share."""
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Positions and their derivatives, SI, complex arrays of shape (N,) by joint; links by name.
+
+    Attributes
+    ----------
+    position, velocity, acceleration : by joint; acceleration empty when not asked for
+    omega, epsilon : by link, counter-clockwise positive; epsilon empty when not asked for
+    transmission : |sin| of the angle on which each group's accuracy hangs, by its node: 1 is best,
+        0 is singular
+    predicted_error : (N,) of velocities and accelerations, relative to the largest of each plan;
+        infinite where there is no motion
+    recomputed : (N,) whether the variant was solved again with more digits
+    """
+
+    position: dict[str, ComplexArray]
+    velocity: dict[str, ComplexArray]
+    acceleration: dict[str, ComplexArray]
+    omega: dict[str, FloatArray]
+    epsilon: dict[str, FloatArray]
+    transmission: dict[str, FloatArray]
+    predicted_error: FloatArray
+    recomputed: BoolArray
+
+
+def move(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
+    """Solve the mechanism for every variant at once.
+
+    Raises MechanismError naming the group, the first variant (by its index) and by how much the
+    group does not assemble, or that its velocities are not determined there.
+    """
+    motion = move_where_possible(mechanism, accelerations=accelerations)
+    if np.isinf(motion.predicted_error.max()):
+        raise reason(mechanism, np.isinf(motion.predicted_error))
+    return motion
+
+
+def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
+    """As `move`, but nan (and an infinite predicted error) for variants without a motion."""
+    count, origin = _count(mechanism.driver), _origin(mechanism)
+    if origin.any():
+        # Far from the coordinates' origin, differences of places lose digits: solved about the driven link.
+        motion = _in_doubles(translated(mechanism, -origin), count, accelerations)
+        motion.position.update({name: place + origin for name, place in motion.position.items()})
+    else:
+        motion = _in_doubles(mechanism, count, accelerations)
+    if motion.predicted_error.max() > LOSSY:
+        with np.errstate(all="ignore"):
+            _refine(motion, mechanism, accelerations)
+    return motion
+
+
+def _origin(mechanism: Mechanism) -> ComplexArray:
+    """The driven crank's pivot, or a point of the driven slider's guide."""
+    driver = mechanism.driver
+    return mechanism.ground_m[driver.pivot] if isinstance(driver, Crank) else driver.guide_m
+
+
+def _count(driver: Driver) -> int:
+    """The number of variants: the widest of the driver's numbers."""
+    if isinstance(driver, Crank):
+        return max(driver.angle_rad.size, driver.omega.size, driver.length_m.size, driver.epsilon.size)
+    return max(driver.displacement_m.size, driver.speed.size, driver.acceleration.size)
+
+
+# In doubles: on arrays, or on Python's numbers -----------------------------------------------------
+
+
+def _in_doubles(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+    if count <= FEW:
+        return _in_python_numbers(mechanism, count, accelerations)
+    with np.errstate(all="ignore"):
+        return _on_arrays(mechanism, count, accelerations)
+
+
+def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+    take = as_it_is if count < CLASSES else each_number_once
+    solution = solve(mechanism, take, accelerations=accelerations)
+    shape = (count,)
+
+    def wide(values: Any) -> Any:  # noqa: ANN401 - real or complex, array or number
+        own = np.shape(values) == shape and values.flags.writeable
+        return values if own else np.array(np.broadcast_to(values, shape))
+
+    joints = solution.joints
+    predicted = _predicted_error(wide(_amplification(solution)))
+    return Motion(
+        {name: wide(joint.position) for name, joint in joints.items()},
+        {name: wide(joint.velocity) for name, joint in joints.items()},
+        {name: wide(joint.acceleration) for name, joint in joints.items()} if accelerations else {},
+        {name: wide(+rate) for name, rate in solution.omega.items()},
+        {name: wide(+rate) for name, rate in solution.epsilon.items()} if accelerations else {},
+        {name: wide(sine) for name, sine in solution.transmission.items()},
+        predicted,
+        np.zeros(shape, dtype=np.bool_),
+    )
+
+
+def _in_python_numbers(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+    """The same on Python's numbers, a variant after another; where they divide by zero, on arrays."""
+    try:
+        solutions = [
+            solve(mechanism, one_variant(index, among=count), accelerations=accelerations)
+            for index in range(count)
+        ]
+    except (ZeroDivisionError, OverflowError):
+        with np.errstate(all="ignore"):
+            return _on_arrays(mechanism, count, accelerations)
+    first = solutions[0]
+    grown = [_amplification(solution) for solution in solutions]
+    predicted = [np.inf if math.isnan(times) else SAFETY * EPSILON * times for times in grown]
+    # One array for all that is complex and one for all that is real: faster than one for each joint.
+    states = iter(np.array([_states(solution) for solution in solutions]).T)
+    rates = iter(np.array([_rates(solution, accelerations) for solution in solutions]).T)
+    return Motion(
+        dict(zip(first.joints, states, strict=False)),
+        dict(zip(first.joints, states, strict=False)),
+        dict(zip(first.joints if accelerations else (), states, strict=False)),
+        dict(zip(first.omega, rates, strict=False)),
+        dict(zip(first.epsilon if accelerations else (), rates, strict=False)),
+        dict(zip(first.transmission, rates, strict=False)),
+        np.array(predicted),
+        np.zeros(count, dtype=np.bool_),
+    )
+
+
+def _states(solution: Solution) -> list[complex]:
+    joints = solution.joints.values()
+    positions, velocities = [joint.position for joint in joints], [joint.velocity for joint in joints]
+    return positions + velocities + [joint.acceleration for joint in joints]
+
+
+def _rates(solution: Solution, accelerations: bool) -> list[float]:
+    epsilon = solution.epsilon.values() if accelerations else ()
+    return [*solution.omega.values(), *epsilon, *solution.transmission.values()]
+
+
+def _amplification(solution: Solution) -> Any:  # noqa: ANN401 - an array, or one number
+    """By how much a rounding error may have grown anywhere."""
+    return reduce(larger, [joint.amplification for joint in solution.joints.values()])
+
+
+def _predicted_error(amplification: FloatArray) -> FloatArray:
+    """(N,) what the growth of rounding errors says of the results' error; infinite where it is nan."""
+    predicted = SAFETY * EPSILON * amplification
+    return np.where(np.isnan(predicted), np.inf, predicted)
+
+
+# Again with more digits, near a singular position --------------------------------------------------
+
 EXTENDED = float(np.finfo(np.longdouble).eps)
 """As `EPSILON` where the processor or compiler has no wider floats."""
 LOSSY = 1e-9
@@ -58,6 +217,19 @@ LEAST_SINE = 8e-16
 last digit decides how the mechanism moves."""
 DIGITS = 80
 """Decimal digits of the last resort."""
+
+
+def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
+    """Solve again what has lost digits; nan where a variant has no motion."""
+    predicted = motion.predicted_error
+    sine = reduce(np.minimum, motion.transmission.values(), np.ones(predicted.shape))
+    motion.recomputed[:], solutions = refined(mechanism, predicted, sine, accelerations=accelerations)
+    for solution, rows in solutions:
+        _replace_rows(motion, solution, rows)
+    broken = np.isinf(predicted)
+    for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
+        for values in rates.values():
+            values[broken] = np.nan
 
 
 def refined(
@@ -104,6 +276,24 @@ def _in_digits(mechanism: Mechanism, index: int, accelerations: bool) -> Solutio
     ]
     return solution if all(mp.isfinite(rate) for rate in rates) else None
 
+
+def _replace_rows(motion: Motion, solution: Solution, rows: NDArray[np.intp]) -> None:
+    """Take the solution of some variants over into the motion."""
+    for name, joint in solution.joints.items():
+        motion.position[name][rows] = _rounded(joint.position)
+        motion.velocity[name][rows] = _rounded(joint.velocity)
+        if motion.acceleration:
+            motion.acceleration[name][rows] = _rounded(joint.acceleration)
+    for quantity in ("omega", "epsilon", "transmission"):
+        for name, values in getattr(motion, quantity).items():
+            values[rows] = np.real(_rounded(getattr(solution, quantity)[name]))
+
+
+def _rounded(number: Any) -> Any:  # noqa: ANN401 - of extended floats or of many digits
+    return number if isinstance(number, np.ndarray) else complex(number)
+
+
+# Why there is no motion ----------------------------------------------------------------------------
 
 ROUNDING = 1e-14
 """Relative to the mechanism's reach."""
@@ -188,186 +378,3 @@ def _gap(group: Group, before: Solution) -> float:
         case _:
             gap = 0.0
     return float(gap)
-
-
-SAFETY = 32.0
-"""Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""
-FEW = 3
-"""So many variants are faster one by one, on Python's numbers."""
-CLASSES = 200
-"""From so many variants on it pays to calculate once what they share."""
-BoolArray = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """Positions and their derivatives, SI, complex arrays of shape (N,) by joint; links by name.
-
-    Attributes
-    ----------
-    position, velocity, acceleration : by joint; acceleration empty when not asked for
-    omega, epsilon : by link, counter-clockwise positive; epsilon empty when not asked for
-    transmission : |sin| of the angle on which each group's accuracy hangs, by its node: 1 is best,
-        0 is singular
-    predicted_error : (N,) of velocities and accelerations, relative to the largest of each plan;
-        infinite where there is no motion
-    recomputed : (N,) whether the variant was solved again with more digits
-    """
-
-    position: dict[str, ComplexArray]
-    velocity: dict[str, ComplexArray]
-    acceleration: dict[str, ComplexArray]
-    omega: dict[str, FloatArray]
-    epsilon: dict[str, FloatArray]
-    transmission: dict[str, FloatArray]
-    predicted_error: FloatArray
-    recomputed: BoolArray
-
-
-def move(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
-    """Solve the mechanism for every variant at once.
-
-    Raises MechanismError naming the group, the first variant (by its index) and by how much the
-    group does not assemble, or that its velocities are not determined there.
-    """
-    motion = move_where_possible(mechanism, accelerations=accelerations)
-    if np.isinf(motion.predicted_error.max()):
-        raise reason(mechanism, np.isinf(motion.predicted_error))
-    return motion
-
-
-def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
-    """As `move`, but nan (and an infinite predicted error) for variants without a motion."""
-    count, origin = _count(mechanism.driver), _origin(mechanism)
-    if origin.any():
-        # Far from the coordinates' origin, differences of places lose digits: solved about the driven link.
-        motion = _in_doubles(translated(mechanism, -origin), count, accelerations)
-        motion.position.update({name: place + origin for name, place in motion.position.items()})
-    else:
-        motion = _in_doubles(mechanism, count, accelerations)
-    if motion.predicted_error.max() > LOSSY:
-        with np.errstate(all="ignore"):
-            _refine(motion, mechanism, accelerations)
-    return motion
-
-
-def _origin(mechanism: Mechanism) -> ComplexArray:
-    """The driven crank's pivot, or a point of the driven slider's guide."""
-    driver = mechanism.driver
-    return mechanism.ground_m[driver.pivot] if isinstance(driver, Crank) else driver.guide_m
-
-
-def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
-    """Solve again what has lost digits; nan where a variant has no motion."""
-    predicted = motion.predicted_error
-    sine = reduce(np.minimum, motion.transmission.values(), np.ones(predicted.shape))
-    motion.recomputed[:], solutions = refined(mechanism, predicted, sine, accelerations=accelerations)
-    for solution, rows in solutions:
-        _replace_rows(motion, solution, rows)
-    broken = np.isinf(predicted)
-    for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
-        for values in rates.values():
-            values[broken] = np.nan
-
-
-def _replace_rows(motion: Motion, solution: Solution, rows: NDArray[np.intp]) -> None:
-    """Take the solution of some variants over into the motion."""
-    for name, joint in solution.joints.items():
-        motion.position[name][rows] = _rounded(joint.position)
-        motion.velocity[name][rows] = _rounded(joint.velocity)
-        if motion.acceleration:
-            motion.acceleration[name][rows] = _rounded(joint.acceleration)
-    for quantity in ("omega", "epsilon", "transmission"):
-        for name, values in getattr(motion, quantity).items():
-            values[rows] = np.real(_rounded(getattr(solution, quantity)[name]))
-
-
-def _rounded(number: Any) -> Any:  # noqa: ANN401 - of extended floats or of many digits
-    return number if isinstance(number, np.ndarray) else complex(number)
-
-
-def _count(driver: Driver) -> int:
-    """The number of variants: the widest of the driver's numbers."""
-    if isinstance(driver, Crank):
-        return max(driver.angle_rad.size, driver.omega.size, driver.length_m.size, driver.epsilon.size)
-    return max(driver.displacement_m.size, driver.speed.size, driver.acceleration.size)
-
-
-def _in_doubles(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
-    if count <= FEW:
-        return _in_python_numbers(mechanism, count, accelerations)
-    with np.errstate(all="ignore"):
-        return _on_arrays(mechanism, count, accelerations)
-
-
-def _amplification(solution: Solution) -> Any:  # noqa: ANN401 - an array, or one number
-    """By how much a rounding error may have grown anywhere."""
-    return reduce(larger, [joint.amplification for joint in solution.joints.values()])
-
-
-def _predicted_error(amplification: FloatArray) -> FloatArray:
-    """(N,) what the growth of rounding errors says of the results' error; infinite where it is nan."""
-    predicted = SAFETY * EPSILON * amplification
-    return np.where(np.isnan(predicted), np.inf, predicted)
-
-
-def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
-    take = as_it_is if count < CLASSES else each_number_once
-    solution = solve(mechanism, take, accelerations=accelerations)
-    shape = (count,)
-
-    def wide(values: Any) -> Any:  # noqa: ANN401 - real or complex, array or number
-        own = np.shape(values) == shape and values.flags.writeable
-        return values if own else np.array(np.broadcast_to(values, shape))
-
-    joints = solution.joints
-    predicted = _predicted_error(wide(_amplification(solution)))
-    return Motion(
-        {name: wide(joint.position) for name, joint in joints.items()},
-        {name: wide(joint.velocity) for name, joint in joints.items()},
-        {name: wide(joint.acceleration) for name, joint in joints.items()} if accelerations else {},
-        {name: wide(+rate) for name, rate in solution.omega.items()},
-        {name: wide(+rate) for name, rate in solution.epsilon.items()} if accelerations else {},
-        {name: wide(sine) for name, sine in solution.transmission.items()},
-        predicted,
-        np.zeros(shape, dtype=np.bool_),
-    )
-
-
-def _in_python_numbers(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
-    """The same on Python's numbers, a variant after another; where they divide by zero, on arrays."""
-    try:
-        solutions = [
-            solve(mechanism, one_variant(index, among=count), accelerations=accelerations)
-            for index in range(count)
-        ]
-    except (ZeroDivisionError, OverflowError):
-        with np.errstate(all="ignore"):
-            return _on_arrays(mechanism, count, accelerations)
-    first = solutions[0]
-    grown = [_amplification(solution) for solution in solutions]
-    predicted = [np.inf if math.isnan(times) else SAFETY * EPSILON * times for times in grown]
-    # One array for all that is complex and one for all that is real: faster than one for each joint.
-    states = iter(np.array([_states(solution) for solution in solutions]).T)
-    rates = iter(np.array([_rates(solution, accelerations) for solution in solutions]).T)
-    return Motion(
-        dict(zip(first.joints, states, strict=False)),
-        dict(zip(first.joints, states, strict=False)),
-        dict(zip(first.joints if accelerations else (), states, strict=False)),
-        dict(zip(first.omega, rates, strict=False)),
-        dict(zip(first.epsilon if accelerations else (), rates, strict=False)),
-        dict(zip(first.transmission, rates, strict=False)),
-        np.array(predicted),
-        np.zeros(count, dtype=np.bool_),
-    )
-
-
-def _states(solution: Solution) -> list[complex]:
-    joints = solution.joints.values()
-    positions, velocities = [joint.position for joint in joints], [joint.velocity for joint in joints]
-    return positions + velocities + [joint.acceleration for joint in joints]
-
-
-def _rates(solution: Solution, accelerations: bool) -> list[float]:
-    epsilon = solution.epsilon.values() if accelerations else ()
-    return [*solution.omega.values(), *epsilon, *solution.transmission.values()]
