@@ -196,7 +196,7 @@ class _Cells:
 
 
 @dataclass(frozen=True, slots=True)
-class _Table:
+class _VariantTable:
     """A table as wide as a page: the variants' numbers, then blocks of columns under one name each."""
 
     title: str
@@ -252,7 +252,7 @@ def table_pages(assignment: Assignment, plan: Plan, words: Tongue) -> list[Page]
     return [tuple(page) for page in pages]
 
 
-def _tables(assignment: Assignment, plan: Plan, words: Tongue) -> Iterator[_Table]:
+def _tables(assignment: Assignment, plan: Plan, words: Tongue) -> Iterator[_VariantTable]:
     """Each section's columns, as many at a time as a page is wide."""
     named = tuple(
         _Cells("", words.gettext(name), tuple(str(number) for number in numbers))
@@ -263,7 +263,7 @@ def _tables(assignment: Assignment, plan: Plan, words: Tongue) -> Iterator[_Tabl
     for section in sections_of(plan):
         heading = f"{title} ({assignment.id}). {words.gettext(section.title)}"
         for blocks in _spread(section, assignment, free, words):
-            yield _Table(heading, named, tuple(blocks), len(plan.variants))
+            yield _VariantTable(heading, named, tuple(blocks), len(plan.variants))
 
 
 def _spread(
@@ -296,7 +296,7 @@ def _column(column: Column, assignment: Assignment, words: Tongue) -> _Cells:
     return _Cells(over, under, tuple(texts))
 
 
-def _drawn(table: _Table, rows: range, y: float) -> Iterator[Shape]:
+def _drawn(table: _VariantTable, rows: range, y: float) -> Iterator[Shape]:
     """So many rows of a table, from a height down."""
     top = y + HEAD_MM
     wide = sum(cells.wide_mm for block in (table.named, *table.blocks) for cells in block)

@@ -42,7 +42,7 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
     assignment = load_assignment(name)
     found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
     if svg is not None and found.plan is not None and found.worst is not None:
-        worst = _row_variant(found.worst)
+        worst = _variant_of(found.worst)
         told = f"{worst}: {found.worst.why}"
         reason = Label((FRAME[0], FRAME[3] + 1.5 * REASON_MM), told, REASON_MM, colour=REASON_COLOUR)
         drawing = reference_drawing(assignment, found.plan, found.plan.variants.index(worst))
@@ -105,10 +105,10 @@ def _ranges(rows: Sequence[LintVariant]) -> list[list[LintVariant]]:
 
 
 def _named_range(group: Sequence[LintVariant]) -> str:
-    return str(_row_variant(group[0])) if len(group) == 1 else named(map(_row_variant, group))
+    return str(_variant_of(group[0])) if len(group) == 1 else named(map(_variant_of, group))
 
 
-def _row_variant(row: LintVariant | LintWorst) -> Variant:
+def _variant_of(row: LintVariant | LintWorst) -> Variant:
     return Variant(row.n, row.position)
 
 
@@ -173,7 +173,7 @@ def _tell_findings(console: Console, result: Lint) -> None:
 
 def _tell_end(result: Lint, svg: Path | None) -> None:
     if result.worst is not None and result.plan is not None:
-        typer.echo(f"hardest to draw: {_row_variant(result.worst)}: {result.worst.why}")
+        typer.echo(f"hardest to draw: {_variant_of(result.worst)}: {result.worst.why}")
         if svg is not None:
             typer.echo(f"drawn in {svg}")
     elif svg is not None:

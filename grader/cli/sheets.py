@@ -15,7 +15,7 @@ from grader.documents import CalibrationDocument
 from grader.files import write_whole
 from grader.folder.cache import PageCache
 from grader.folder.draft_roster import SURE, contact_sheet, draft_csv, suggest, thumbnail
-from grader.folder.inventory import submissions, survey_folder
+from grader.folder.inventory import submissions, take_inventory
 from grader.folder.workers import Limits, Workers, result_of
 from grader.inputs.measurements import names_of
 from grader.inputs.roster import read_roster
@@ -147,7 +147,7 @@ def draft_matches(
         Workers(os.cpu_count() or 1, Limits(), __name__) as workers,
     ):
         cache = PageCache(Path(notes))
-        contents = survey_folder(paths, folder, names_of(assignment), workers, tell, cache)
+        contents = take_inventory(paths, folder, names_of(assignment), workers, tell, cache)
         sources = [page for content in contents for page in content.pages]
         draft = suggest(sources, roster, assignment, pages_per_student=pages_per_student)
         loose = [one.source for one in draft.suggestions if not one.sure]

@@ -132,7 +132,7 @@ class Followed:
     criteria: list[tuple[str, int]]
 
 
-def share_followed(results: ResultsDocument) -> Followed:
+def follow_through(results: ResultsDocument) -> Followed:
     """Follow-through granted, with the reports."""
     points, reports, times = 0.0, [], Counter[str]()
     for report in results.reports:
@@ -246,7 +246,7 @@ def index_page(
     """The class's page."""
     speaker = tongue(lang)
     links = _links(results.reports)
-    followed = share_followed(results)
+    followed = follow_through(results)
 
     def link(student: ReportDocument | MovedDocument) -> Link:
         return links.get((student.student_id, student.position), Link(student.student_id))

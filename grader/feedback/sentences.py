@@ -157,7 +157,7 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
 
 RIVALS = N_("What was handed in does not tell this from something else:")
 """Said between a mistake and those that explain the same nearly as well,"""
-OR_RIVAL = N_("or:")
+BETWEEN_RIVALS = N_("or:")
 """each after this."""
 
 
@@ -177,7 +177,7 @@ def mistake_feedback(
     if not others:
         return told
     return " ".join(
-        (told, speaker.gettext(RIVALS), *(f"{speaker.gettext(OR_RIVAL)} {one}" for one in others))
+        (told, speaker.gettext(RIVALS), *(f"{speaker.gettext(BETWEEN_RIVALS)} {one}" for one in others))
     )
 
 

@@ -26,7 +26,7 @@ from grader.folder.cache import (
     store_reading,
 )
 from grader.folder.changes import Inputs, changes_since, earlier, inputs_of, note_inputs, noted_inputs
-from grader.folder.inventory import FileContent, Progress, submissions, survey_folder
+from grader.folder.inventory import FileContent, Progress, submissions, take_inventory
 from grader.folder.owners import Unmatched, assign_pages
 from grader.folder.submissions import Unusable, submissions_of
 from grader.folder.workers import ENDED, Limits, Pool, Workers
@@ -171,7 +171,7 @@ def _graded(
 ) -> ResultsDocument:
     notes = batch.out / CACHE_FOLDER
     names, cache = names_of(batch.assignment), _page_cache(batch)
-    contents = survey_folder(files, batch.folder, names, workers, progress, cache)
+    contents = take_inventory(files, batch.folder, names, workers, progress, cache)
     students, unmatched = _submissions(batch, roster, contents)
     if not students and not unmatched:
         raise _nothing(batch)
@@ -219,7 +219,7 @@ def _submissions(
 ) -> tuple[list[StudentSubmission], list[UnmatchedDocument]]:
     """Every student's submission, and what is nobody's."""
     measured = [row for content in contents for row in content.measurements]
-    ownership = assign_pages(
+    owners = assign_pages(
         [page for content in contents for page in content.pages],
         roster,
         batch.assignment.id,
@@ -229,12 +229,12 @@ def _submissions(
     refused = [(content.refused, content.students) for content in contents if content.refused is not None]
     unusable = [Unusable((Problem(file.code, file.message, file.file),), who) for file, who in refused]
     students, strangers = submissions_of(
-        batch.assignment, roster, ownership, measured, batch.lang, refused=unusable
+        batch.assignment, roster, owners, measured, batch.lang, refused=unusable
     )
-    unmatched = [_unmatched(page) for page in ownership.unmatched]
+    unmatched = [_unmatched(page) for page in owners.unmatched]
     missing = [
         UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
-        for problem in ownership.problems
+        for problem in owners.problems
     ]
     return students, [*(file for file, _ in refused), *unmatched, *strangers, *missing]
 

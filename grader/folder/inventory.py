@@ -110,7 +110,7 @@ class FileContent:
     students: tuple[str, ...] = ()
 
 
-def survey_folder(
+def take_inventory(
     files: Sequence[Path], folder: Path, names: Names, workers: Pool, progress: Progress, cache: PageCache
 ) -> list[FileContent]:
     """What each of a folder's files holds; never raises for a bad file.

@@ -105,7 +105,7 @@ class Unmatched:
 
 
 @dataclass(frozen=True, slots=True)
-class Ownership:
+class PageOwners:
     """What becomes of every page.
 
     Attributes
@@ -136,7 +136,7 @@ def assign_pages(
     *,
     pages_per_student: int | None = None,
     student_ids: Iterable[str] = (),
-) -> Ownership:
+) -> PageOwners:
     """Give every page its owner.
 
     Arguments
@@ -162,7 +162,7 @@ def assign_pages(
         else:
             students = dict.fromkeys(row.student_id for claim in claims for row in claim.rows)
             unmatched.append(Unmatched(page, settled, tuple(students)))
-    return Ownership(tuple(owned), tuple(unmatched), tuple(blank), tuple(_missing_scans(pages, listed)))
+    return PageOwners(tuple(owned), tuple(unmatched), tuple(blank), tuple(_missing_scans(pages, listed)))
 
 
 def student_of_name(file: str, student_ids: Iterable[str]) -> str | None:

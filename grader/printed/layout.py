@@ -257,7 +257,7 @@ MARGIN_MM = 12.0
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class TemplateFit:
     """A template for a page and how well it holds the figures.
 
     Attributes
@@ -331,12 +331,12 @@ def poles_mm(
     return poles
 
 
-def best_template(assignment: Assignment, figures: Sequence[str]) -> Fit:
+def best_template(assignment: Assignment, figures: Sequence[str]) -> TemplateFit:
     """The division with the most room for the figure that has the least; a sketch may be drawn smaller."""
     return template_for(extents_mm(assignment, figures, assignment.variants()))
 
 
-def template_for(extents: Mapping[str, tuple[float, float]]) -> Fit:
+def template_for(extents: Mapping[str, tuple[float, float]]) -> TemplateFit:
     """The same for figures whose largest width and height (millimetres) are known already."""
     figures = tuple(extents)
     need = {figure: (wide + 2 * MARGIN_MM, high + 2 * MARGIN_MM) for figure, (wide, high) in extents.items()}
@@ -352,4 +352,4 @@ def template_for(extents: Mapping[str, tuple[float, float]]) -> Fit:
         return (round(least, 6), min(room(template, figure) for figure in figures))
 
     best = max((template for template in TEMPLATES if template.figures == set(figures)), key=worth)
-    return Fit(best, {figure: room(best, figure) for figure in figures}, need)
+    return TemplateFit(best, {figure: room(best, figure) for figure in figures}, need)

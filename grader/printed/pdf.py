@@ -121,14 +121,14 @@ _FRAME_PEN_MM = 0.7
 
 
 @dataclass(frozen=True, slots=True)
-class Drawing:
+class PdfDrawing:
     """A PDF being drawn."""
 
     canvas: Canvas
     buffer: io.BytesIO
 
     @classmethod
-    def begin(cls, title: str) -> "Drawing":
+    def begin(cls, title: str) -> "PdfDrawing":
         """An empty A3 landscape document. It says the same, byte for byte, for the same input."""
         embed_fonts()
         buffer = io.BytesIO()

@@ -342,7 +342,7 @@ def _crossing(
 
 
 @dataclass(frozen=True, slots=True)
-class Lines:
+class FittedLines:
     """Straight lines y = a + b t, robustly fitted, one per row.
 
     Attributes
@@ -364,7 +364,7 @@ class Lines:
         return np.asarray(ends + shift[:, :, None] * np.column_stack([-u[:, 1], u[:, 0]])[:, None, :])
 
 
-def robust_lines(t: FloatArray, y: FloatArray, weight: FloatArray, noise_floor: float) -> Lines:
+def robust_lines(t: FloatArray, y: FloatArray, weight: FloatArray, noise_floor: float) -> FittedLines:
     """Lines by Tukey's biweight through (k, n) points with prior weights (0 leaves a point out).
 
     Starts from the line through the medians of the outer thirds, so that strays at one side cannot
@@ -386,7 +386,7 @@ def robust_lines(t: FloatArray, y: FloatArray, weight: FloatArray, noise_floor: 
         spread = np.maximum((weights * dt**2).sum(axis=1), 1e-12)
         b = (weights * dt * (y - ym[:, None])).sum(axis=1) / spread
         a = ym - b * tm
-    return Lines(a, b, scale, weights)
+    return FittedLines(a, b, scale, weights)
 
 
 def _through_medians(t: FloatArray, y: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:

@@ -195,14 +195,14 @@ def _tails(name: str, after: tuple[str, ...]) -> Iterable[Move]:
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class ScaleText:
     """A text that may be written, and the logarithm of its likelihood."""
 
     text: str
     log: float
 
 
-def texts_of(lattice: Lattice, name: str) -> tuple[list[Text], float]:
+def texts_of(lattice: Lattice, name: str) -> tuple[list[ScaleText], float]:
     """Texts that the box of a scale may hold, likeliest first; and the log likelihood of signs at will.
 
     The second value is what the ink would be worth if any signs might stand in any order: a text that
@@ -232,7 +232,7 @@ def texts_of(lattice: Lattice, name: str) -> tuple[list[Text], float]:
     for (state, text), score in beams[-1].items():
         if state.is_end:
             ended[text] = max(score, ended.get(text, -np.inf))
-    texts = sorted((Text(text, score) for text, score in ended.items()), key=lambda text: -text.log)
+    texts = sorted((ScaleText(text, score) for text, score in ended.items()), key=lambda text: -text.log)
     return texts, float(free[-1])
 
 
@@ -337,7 +337,7 @@ def read_scale(lattice: Lattice, name: str, bare_unit: str | None = None) -> Wri
     return Written(ranked[0][0], ranked[0][1], tuple(ranked[1:4]))
 
 
-def _by_meaning(texts: list[Text], name: str, bare_unit: str | None) -> dict[object, tuple[str, float]]:
+def _by_meaning(texts: list[ScaleText], name: str, bare_unit: str | None) -> dict[object, tuple[str, float]]:
     """Texts that mean the same put together: the likeliest spelling, and the log of their sum."""
     meanings: dict[object, tuple[str, float]] = {}
     for candidate in texts:

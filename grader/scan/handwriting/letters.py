@@ -89,7 +89,7 @@ def _mask(grey: GreyImage, unit: float) -> GreyImage:
 
 
 @dataclass(frozen=True, slots=True)
-class _Piece:
+class _InkPiece:
     """A connected piece of ink: left, top, width, height in pixels, and 1 where it has ink."""
 
     box: tuple[int, int, int, int]
@@ -101,10 +101,10 @@ class _Piece:
         return slice(y, y + h), slice(x, x + w)
 
 
-def _pieces(mask: GreyImage, unit: float, least_mm: float) -> list[_Piece]:
+def _pieces(mask: GreyImage, unit: float, least_mm: float) -> list[_InkPiece]:
     """The pieces of a mask that are neither too small nor too large for a sign."""
     contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-    pieces: list[_Piece] = []
+    pieces: list[_InkPiece] = []
     for index, contour in enumerate(contours):
         if hierarchy[0, index, 3] >= 0:
             continue
@@ -113,11 +113,11 @@ def _pieces(mask: GreyImage, unit: float, least_mm: float) -> list[_Piece]:
             continue
         own = np.zeros((h, w), dtype=np.uint8)
         cv2.drawContours(own, [contour], 0, 1, cv2.FILLED, offset=(-x, -y))
-        pieces.append(_Piece((x, y, w, h), own & mask[y : y + h, x : x + w]))
+        pieces.append(_InkPiece((x, y, w, h), own & mask[y : y + h, x : x + w]))
     return pieces if len(pieces) <= _MOST else []
 
 
-def _but_words(pieces: list[_Piece]) -> list[_Piece]:
+def _but_words(pieces: list[_InkPiece]) -> list[_InkPiece]:
     """The pieces without those that stand in a line with many others."""
     if len(pieces) <= _WORDS:
         return pieces

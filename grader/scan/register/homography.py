@@ -38,7 +38,7 @@ HALVES_ADVICE = (
 
 
 @dataclass(frozen=True, slots=True)
-class Model:
+class Outline:
     """A rectangle on the upright sheet.
 
     Attributes
@@ -58,13 +58,13 @@ class Model:
         return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
 
 
-PAPER = Model("paper", (0.0, 0.0, *PAGE_MM), 0.35)
-ISO = Model("iso", (*FRAME_MM[:2], FRAME_MM[0] + FRAME_MM[2], FRAME_MM[1] + FRAME_MM[3]), 0.3)
-GOST = Model("gost", (20.0, 5.0, 415.0, 292.0), 0.3)
+PAPER = Outline("paper", (0.0, 0.0, *PAGE_MM), 0.35)
+ISO = Outline("iso", (*FRAME_MM[:2], FRAME_MM[0] + FRAME_MM[2], FRAME_MM[1] + FRAME_MM[3]), 0.3)
+GOST = Outline("gost", (20.0, 5.0, 415.0, 292.0), 0.3)
 FRAMES = (ISO, GOST)
 
 
-def drawable(model: Model | None) -> Box:
+def drawable(model: Outline | None) -> Box:
     """The box inside a frame, or, without one, inside the least margin."""
     x0, y0, x1, y1 = (_MARGIN_MM, _MARGIN_MM, *ISO.box[2:]) if model is None else model.box
     return (x0, y0, x1 - x0, y1 - y0)

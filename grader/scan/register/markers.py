@@ -36,7 +36,7 @@ from grader.scan.pixels import (
     through_corners,
 )
 from grader.scan.register.distortion import find_bend
-from grader.scan.register.fitting import Marked, Projection, fit_projection
+from grader.scan.register.fitting import MarkedPoints, Projection, fit_projection
 from grader.scan.register.homography import rotation_deg
 
 _LONG_SIDES_PX = (1700, 3400)
@@ -118,7 +118,7 @@ _USUAL_LENGTH_MM = 60.0
 """Of a vector: what the map leaves unexplained is an error of lengths over this distance."""
 _FLAT_MM = 0.12
 """Misfit from which paper that is not flat is told; printers and flatbeds stay under 0.1."""
-_SCALE_TOLD = 0.004
+_SCALE_REPORTED = 0.004
 """Printers and scanners together stay below this."""
 _SCALE_NEAR = 0.1
 """Up to here a printed page may pass for the right size."""
@@ -150,12 +150,12 @@ class _Markers:
     """Refined corners of one template's markers, and the marker (n,) that each is of."""
 
     template: Template
-    corners: Marked
+    corners: MarkedPoints
     owner: NDArray[np.intp]
 
     def take(self, keep: BoolArray) -> "_Markers":
         """Some of the corners."""
-        corners = Marked(self.corners.mm[keep], self.corners.px[keep], self.corners.outward[keep])
+        corners = MarkedPoints(self.corners.mm[keep], self.corners.px[keep], self.corners.outward[keep])
         return _Markers(self.template, corners, self.owner[keep])
 
     @property
@@ -229,7 +229,7 @@ def _markers(grey: GreyImage, quads: dict[int, FloatArray]) -> _Markers | None:
     mm = MARKER_CORNERS[places]
     outward = (mm - mm.mean(axis=1, keepdims=True)) / (MARKER_MM / 2.0)
     owner = np.broadcast_to(places[:, None], whole.shape)
-    return _Markers(template, Marked(mm[whole], px[whole], outward[whole]), owner[whole])
+    return _Markers(template, MarkedPoints(mm[whole], px[whole], outward[whole]), owner[whole])
 
 
 def _detector() -> cv2.aruco.ArucoDetector:
@@ -304,7 +304,7 @@ def _sheet(page: Page, markers: _Markers, fit: Projection) -> Sheet:
     )
 
 
-def _lens(page: Page, corners: Marked, plain: Projection, printed_se: float) -> Lens | None:
+def _lens(page: Page, corners: MarkedPoints, plain: Projection, printed_se: float) -> Lens | None:
     bend, fit = find_bend(corners, plain, (page.grey.shape[0], page.grey.shape[1]))
     if not bend:
         return None
@@ -336,7 +336,7 @@ def _against_resolution(page: Page, fit: Projection, px_per_mm: float) -> tuple[
     size = px_per_mm / stated
     if not 1.0 / _SCALE_FAR < size < _SCALE_FAR:
         return _PRINTER_SE, ()
-    if abs(size - 1.0) < _SCALE_TOLD:
+    if abs(size - 1.0) < _SCALE_REPORTED:
         return _printed_se(float(np.log(size))), ()
     message = (
         f"by the file's resolution the printed sheet has {100 * size:.1f} % of its size:"

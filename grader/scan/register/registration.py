@@ -17,7 +17,7 @@ from grader.scan.register.fitting import Fit, affine_of, fit_sides
 from grader.scan.register.homography import (
     HALVES_ADVICE,
     PAPER,
-    Model,
+    Outline,
     drawable,
     drawn_ends,
     looks_a4,
@@ -34,7 +34,7 @@ _LEAST_PX_PER_MM = 3.0
 """Along the long side: below this a pencil's stroke is less than a pixel wide."""
 _USUAL_DPI = (100.0, 150.0, 200.0, 240.0, 250.0, 300.0, 400.0, 500.0, 600.0, 800.0, 1200.0)
 """Resolutions that scanners and copiers for A3 offer."""
-_UNSET_DPI_PLAIN = (72.0, 96.0)
+_DEFAULT_DPI = (72.0, 96.0)
 """What programs write when they do not know; no evidence either way."""
 _A3_SLACK_MM = (40.0, 22.0)
 """A scanner's window may be this much larger than the sheet; paper that is cut off is not A3."""
@@ -86,7 +86,7 @@ def register_plain(page: Page) -> Sheet | Unread:
     ranked = hypotheses(lines, shape, resolution)
     if ranked:
         rival = None if dpi is not None else _rival_scale(ranked)
-        best = _as_told(ranked, page.turn_deg)
+        best = _turned_as_stated(ranked, page.turn_deg)
         sheet = _from_lines(page, best, lines, dpi, problems)
         if isinstance(sheet, Sheet) and rival is not None:
             sheet = _with_rival(sheet, rival)
@@ -98,7 +98,7 @@ def register_plain(page: Page) -> Sheet | Unread:
     return _from_resolution(page, resolution, lines, problems)
 
 
-def _as_told(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
+def _turned_as_stated(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
     """The best reading; of the half turns that the drawing does not tell apart, the one the file asks for."""
     best = [reading for reading in ranked if reading.score > ranked[0].score - _SAME]
     return min(best, key=lambda reading: off_turn_deg(reading.mm_to_px, turn_deg))
@@ -137,7 +137,7 @@ def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
     """The stated resolution where the page is about A3 by it, else a usual one by which it is."""
     if page.dpi is not None and _is_a3(page, page.dpi):
         return Resolution(page.dpi, stated=True)
-    if page.dpi is not None and page.dpi[0] not in _UNSET_DPI_PLAIN:
+    if page.dpi is not None and page.dpi[0] not in _DEFAULT_DPI:
         high, wide = page.grey.shape
         size = f"{wide / page.dpi[0] * MM_PER_INCH:.0f} x {high / page.dpi[1] * MM_PER_INCH:.0f}"
         message = f"by its stated resolution the page is {size} mm, not A3"
@@ -298,7 +298,7 @@ def _tilt(lines: list[LongLine]) -> float:
     return float(np.array(angles)[order][np.searchsorted(cumulated, cumulated[-1] / 2.0)])
 
 
-def _sheet(fit: Fit, frame: Model | None, scale_se: float, problems: list[Problem]) -> Sheet:
+def _sheet(fit: Fit, frame: Outline | None, scale_se: float, problems: list[Problem]) -> Sheet:
     matrix = fit.mm_to_px / fit.mm_to_px[2, 2]
     return Sheet(
         mm_to_px=matrix,
