@@ -31,14 +31,12 @@ from reference.drawing.canvas import (
     width_of,
 )
 from reference.drawing.sheets import ENGLISH, reference_drawing
-from reference.drawing.subject import Wording
+from reference.drawing.subject import SCALE_UNITS, VECTOR_UNITS, Wording
 from reference.geometry import FloatArray
 from reference.plan import Plan
 
-UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}
 Title = Literal["Scales", "Mechanism", "Velocities", "Accelerations"]
 PLANS: dict[Title, str] = {"Velocities": "velocity_plan", "Accelerations": "acceleration_plan"}
-VALUE_UNITS = {"kv": "m/s", "ka": "m/s²"}
 MARGIN_MM = 15.0
 """Inside the drawing frame, 10 mm, on all sides."""
 BOTTOM_MM = A3_MM[1] - MARGIN_MM
@@ -101,7 +99,7 @@ def sections_of(plan: Plan) -> tuple[Section, ...]:
     count = len(plan.variants)
     scales = [
         Column(name, name, unit, np.broadcast_to(getattr(plan.scales, name), (count,)), 5, "g")
-        for name, unit in UNITS.items()
+        for name, unit in SCALE_UNITS.items()
     ]
     rates = [
         Column(
@@ -141,7 +139,7 @@ def _rate(plan: Plan, name: str) -> FloatArray:
 
 def _vector(plan: Plan, name: str) -> tuple[Column, ...]:
     drawn, value, zero = np.abs(plan.drawn_mm(name)), np.abs(plan.vectors_si[name]), is_zero(plan, name)
-    unit = VALUE_UNITS[plan.construction.vectors[name].scale]
+    unit = VECTOR_UNITS[plan.construction.vectors[name].scale]
     return (
         Column(name, name, "mm", np.where(zero, 0.0, drawn), 2),
         Column(f"{name}_value", name, unit, np.where(zero, 0.0, value), 4, "g"),

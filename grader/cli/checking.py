@@ -30,6 +30,8 @@ from reference.drawing.sheets import FRAME, reference_drawing
 from reference.errors import CallError
 from reference.geometry import FloatArray
 
+# lint ---------------------------------------------------------------------------------------------
+
 SHOWN_ROWS = 40
 """More variants than that are told in ranges."""
 REASON_MM, REASON_COLOUR = 4.0, "#a03014"
@@ -189,6 +191,8 @@ def _tell_end(result: Lint, svg: Path | None) -> None:
     typer.echo(f"{result.assignment.id}: {many}, {told or 'no findings'}")
 
 
+# check --------------------------------------------------------------------------------------------
+
 MARKS = {"right": ("✓", "green"), "off": ("✗", "red"), "open": ("?", "magenta")}
 
 
@@ -254,7 +258,6 @@ def _write_page(
 ) -> None:
     """The same as a page, with the plans drawn as measured."""
     from grader.feedback.student_page import About, feedback_page
-    from grader.files import write_whole
     from grader.inputs.measurements import StudentSubmission
     from grader.pipeline import mark
 

@@ -29,7 +29,7 @@ from grader.feedback.words import (
     score_text,
     unmatched_sentence,
 )
-from grader.files import write_whole
+from grader.files import result_folders, write_whole
 from grader.language import N_, Tongue, tongue
 from grader.overlay.scene import COLOURS, MARKS
 
@@ -206,6 +206,8 @@ def _stake(report: ReportDocument) -> float:
     return report.score_range[1] - report.score_range[0]
 
 
+# The page -----------------------------------------------------------------------------------------
+
 _NO_NAMES: Mapping[str, str] = {}
 SHOWN = 12
 """Students named at once; the others unfold."""
@@ -284,17 +286,6 @@ def index_page(
     )  # fmt: skip
 
 
-def folders_of(reports: Sequence[ReportDocument]) -> list[str]:
-    """Each report's folder below the output folder: the student, with several positions also that."""
-    counts = Counter(report.student_id for report in reports)
-    return [
-        report.student_id
-        if counts[report.student_id] == 1
-        else f"{report.student_id}/{'unknown' if report.position is None else report.position}"
-        for report in reports
-    ]
-
-
 # Students -----------------------------------------------------------------------------------------
 
 
@@ -314,7 +305,7 @@ Links = Mapping[tuple[str, int | None], Link]
 def _links(reports: Sequence[ReportDocument]) -> Links:
     count = Counter(report.student_id for report in reports)
     links = {}
-    for report, folder in zip(reports, folders_of(reports), strict=True):
+    for report, folder in zip(reports, result_folders(reports), strict=True):
         student, position = report.student_id, report.position
         text = f"{student}, {position}" if count[student] > 1 else student
         picture = f"{quote(folder)}/overlay.png" if report.reading.sheets else ""

@@ -17,6 +17,8 @@ Level = Literal["symbol", "hint", "full"]
 
 _NO_NAMES: Mapping[str, str] = {}
 
+# Criteria -----------------------------------------------------------------------------------------
+
 UNDECIDED = "scale_undecided"
 """Said for `scale_assumed` and `follows` together, under review: neither alone says what is in doubt."""
 
@@ -155,6 +157,8 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     ]
 
 
+# Mistakes -----------------------------------------------------------------------------------------
+
 RIVALS = N_("What was handed in does not tell this from something else:")
 """Said between a mistake and those that explain the same nearly as well,"""
 BETWEEN_RIVALS = N_("or:")
@@ -227,6 +231,9 @@ PLACES = {
 def place(at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
     """A node, vector, scale or figure as a sentence names it."""
     return speaker.gettext(PLACES[at]) if at in PLACES else names.get(at, at)
+
+
+# Reasons ------------------------------------------------------------------------------------------
 
 
 def reason_sentence(

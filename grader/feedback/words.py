@@ -104,6 +104,8 @@ def score_text(report: ReportDocument, speaker: Tongue) -> str:
     return low if low == high else f"{low}–{high}"
 
 
+# Problems -----------------------------------------------------------------------------------------
+
 PROBLEMS: dict[str, str] = {
     "file_missing": N_("The file could not be opened."),
     "file_empty": N_("The file is empty; hand it in again."),

@@ -1,7 +1,6 @@
 """A folder of submissions: inventory, owners, marking in parallel, results. One bad file stops nothing."""
 
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from grader.documents import AlikeDocument, ReportDocument, ResultsDocument, Unm
 from grader.feedback.class_page import write_index
 from grader.feedback.sentences import Level
 from grader.feedback.student_page import About, write_feedback
-from grader.files import make_folder, write_whole
+from grader.files import make_folder, result_folders, write_whole
 from grader.folder.cache import (
     CELL_STAGE,
     CELLS_OF,
@@ -41,73 +40,6 @@ from grader.similarity.groups import find_similar
 from grader.similarity.submission import compared_submission
 from reference.authored.assignment import Assignment, Variant
 from reference.errors import CallError, PlanmarkError
-
-
-@dataclass(frozen=True, slots=True)
-class Job:
-    """One submission to mark.
-
-    Attributes
-    ----------
-    folder : below the results: the student's, with several positions one for each
-    reading_key : a digest of everything that the reading of its pages depends on
-    key : a digest of everything that its report depends on
-    """
-
-    submission: StudentSubmission
-    folder: str
-    reading_key: str
-    key: str
-
-    @property
-    def name(self) -> str:
-        """Of what is kept of it."""
-        return self.folder.replace("/", "#")
-
-
-def folders_of(submissions: Iterable[StudentSubmission]) -> list[str]:
-    """Each submission's folder below the results: the student's, with several positions one for each."""
-    submissions = list(submissions)
-    count = Counter(submission.student_id for submission in submissions)
-    return [
-        submission.student_id
-        if count[submission.student_id] == 1
-        else f"{submission.student_id}/{_position(submission)}"
-        for submission in submissions
-    ]
-
-
-def _position(submission: StudentSubmission) -> str:
-    position = None if submission.variant is None else submission.variant.position
-    return "unknown" if position is None else str(position)
-
-
-def inputs_of_run(
-    assignment: Assignment, rubric: RubricFile, jobs: Sequence[Job], contents: Sequence[FileContent]
-) -> Inputs:
-    """What this run's marks come from, for the next run to tell what has changed."""
-    files = (assignment.file.model_dump_json(), assignment.mechanism_file.model_dump_json())
-    authored = {
-        "assignment": repr(files),
-        "rubric": rubric.model_dump_json(),
-        "program": stage_digest(MARK_STAGE),
-    }
-    digests = {page.file: page.digest for content in contents for page in content.pages}
-    return inputs_of(authored, [job.submission for job in jobs], [job.folder for job in jobs], digests)
-
-
-def similar_of_run(
-    assignment: Assignment, jobs: Sequence[Job], reports: Sequence[ReportDocument], readings: Path
-) -> list[AlikeDocument]:
-    """The similar sheets among those that were marked."""
-    marked = [
-        (job, compared_submission(report, job.submission.variant, job.submission.measured))
-        for job, report in zip(jobs, reports, strict=True)
-        if job.submission.variant is not None and report.criteria
-    ]
-    maps = [cached_maps(readings, job.name) for job, _ in marked]
-    return find_similar(assignment, [one for _, one in marked], maps)
-
 
 CACHE_FOLDER = ".planmark"
 _PASSING = "file_changed"
@@ -247,6 +179,58 @@ def _unmatched(page: Unmatched) -> UnmatchedDocument:
     )
 
 
+# Jobs ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One submission to mark.
+
+    Attributes
+    ----------
+    folder : below the results: the student's, with several positions one for each
+    reading_key : a digest of everything that the reading of its pages depends on
+    key : a digest of everything that its report depends on
+    """
+
+    submission: StudentSubmission
+    folder: str
+    reading_key: str
+    key: str
+
+    @property
+    def name(self) -> str:
+        """Of what is kept of it."""
+        return self.folder.replace("/", "#")
+
+
+def inputs_of_run(
+    assignment: Assignment, rubric: RubricFile, jobs: Sequence[Job], contents: Sequence[FileContent]
+) -> Inputs:
+    """What this run's marks come from, for the next run to tell what has changed."""
+    files = (assignment.file.model_dump_json(), assignment.mechanism_file.model_dump_json())
+    authored = {
+        "assignment": repr(files),
+        "rubric": rubric.model_dump_json(),
+        "program": stage_digest(MARK_STAGE),
+    }
+    digests = {page.file: page.digest for content in contents for page in content.pages}
+    return inputs_of(authored, [job.submission for job in jobs], [job.folder for job in jobs], digests)
+
+
+def similar_of_run(
+    assignment: Assignment, jobs: Sequence[Job], reports: Sequence[ReportDocument], readings: Path
+) -> list[AlikeDocument]:
+    """The similar sheets among those that were marked."""
+    marked = [
+        (job, compared_submission(report, job.submission.variant, job.submission.measured))
+        for job, report in zip(jobs, reports, strict=True)
+        if job.submission.variant is not None and report.criteria
+    ]
+    maps = [cached_maps(readings, job.name) for job, _ in marked]
+    return find_similar(assignment, [submission for _, submission in marked], maps)
+
+
 # Marking ------------------------------------------------------------------------------------------
 
 
@@ -267,7 +251,7 @@ def _jobs(batch: Batch, cache: PageCache, students: Sequence[StudentSubmission])
     marked = digest_of((stage_digest(MARK_STAGE), *assignment, *settings))
     return [
         _job(submission, folder, (read, marked))
-        for submission, folder in zip(students, folders_of(students), strict=True)
+        for submission, folder in zip(students, result_folders(students), strict=True)
     ]
 
 

@@ -21,6 +21,8 @@ from grader.scan.decode.pages import count_pages, decode
 from grader.scan.register.registration import register
 from reference.errors import InputFileError
 
+# The files handed in ------------------------------------------------------------------------------
+
 _TOOL_NAMES = frozenset(
     {"thumbs.db", "desktop.ini", "layout.json", "results.json", "summary.csv", "index.html", "truth.jsonl"}
 )
@@ -86,6 +88,8 @@ def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
     parts = (part for part in _DIGITS.split(name.lower()) if part)
     return tuple((0, int(part)) if part.isascii() and part.isdigit() else (1, part) for part in parts)
 
+
+# What is in them ----------------------------------------------------------------------------------
 
 MEASUREMENT_TYPES = {".csv", ".json"}
 Progress = Callable[[str, int, int], None]

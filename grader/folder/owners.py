@@ -25,55 +25,6 @@ from typing import TypeVar
 from grader.inputs.roster import Roster, RosterRow, ScanRef, why_no_id
 from grader.records import Identity, PageRef, Problem
 
-Row = TypeVar("Row")
-
-
-@dataclass(frozen=True, slots=True)
-class OrderRefused:
-    """Why the order says nothing. False in a condition."""
-
-    reason: str
-
-    def __bool__(self) -> bool:
-        return False
-
-
-def deal(
-    blank: Sequence[bool], rows: Sequence[Row], waiting: Sequence[Row], each: int
-) -> dict[int, Row] | OrderRefused:
-    """The row of each page, by the page's place in the file from 0; blank pages are dealt to nobody.
-
-    Arguments
-    ---------
-    blank : for each page of the file
-    rows : the roster's rows in order
-    waiting : those of them that have no pages elsewhere; dealt to where all `rows` do not come out even
-    each : pages per row
-    """
-    if each < 1:
-        raise ValueError(f"pages per student must be 1 or more, not {each}")
-    ways = (_drawn(blank), list(range(len(blank))), _fronts(blank))
-    for candidates in (rows, waiting):
-        for places in ways:
-            if candidates and len(places) == each * len(candidates):
-                dealt = zip(places, (row for row in candidates for _ in range(each)), strict=True)
-                return {place: row for place, row in dealt if not blank[place]}
-    drawn = len(_drawn(blank))
-    return OrderRefused(
-        f"{drawn} pages that are not blank cannot be {each} for each of {len(rows)} lines of the roster;"
-        " name the pages in the roster's scans, `planmark match` makes a draft"
-    )
-
-
-def _drawn(blank: Sequence[bool]) -> list[int]:
-    """Places of the pages that are not blank."""
-    return [place for place, empty in enumerate(blank) if not empty]
-
-
-def _fronts(blank: Sequence[bool]) -> list[int]:
-    """Places of the fronts of a duplex scan whose backs are all blank; none for anything else."""
-    return list(range(0, len(blank), 2)) if len(blank) % 2 == 0 and all(blank[1::2]) else []
-
 
 class How(Enum):
     """What says whose a page is, in the order in which they decide."""
@@ -372,3 +323,55 @@ def _why_missing(ref: ScanRef, there: Mapping[str, int]) -> str | None:
     if ref.page is not None and ref.page > there[ref.file]:
         return f"which has {there[ref.file]} page(s)"
     return None
+
+
+# The roster's order over one class file -----------------------------------------------------------
+
+Row = TypeVar("Row")
+
+
+@dataclass(frozen=True, slots=True)
+class OrderRefused:
+    """Why the order says nothing. False in a condition."""
+
+    reason: str
+
+    def __bool__(self) -> bool:
+        return False
+
+
+def deal(
+    blank: Sequence[bool], rows: Sequence[Row], waiting: Sequence[Row], each: int
+) -> dict[int, Row] | OrderRefused:
+    """The row of each page, by the page's place in the file from 0; blank pages are dealt to nobody.
+
+    Arguments
+    ---------
+    blank : for each page of the file
+    rows : the roster's rows in order
+    waiting : those of them that have no pages elsewhere; dealt to where all `rows` do not come out even
+    each : pages per row
+    """
+    if each < 1:
+        raise ValueError(f"pages per student must be 1 or more, not {each}")
+    ways = (_drawn(blank), list(range(len(blank))), _fronts(blank))
+    for candidates in (rows, waiting):
+        for places in ways:
+            if candidates and len(places) == each * len(candidates):
+                dealt = zip(places, (row for row in candidates for _ in range(each)), strict=True)
+                return {place: row for place, row in dealt if not blank[place]}
+    drawn = len(_drawn(blank))
+    return OrderRefused(
+        f"{drawn} pages that are not blank cannot be {each} for each of {len(rows)} lines of the roster;"
+        " name the pages in the roster's scans, `planmark match` makes a draft"
+    )
+
+
+def _drawn(blank: Sequence[bool]) -> list[int]:
+    """Places of the pages that are not blank."""
+    return [place for place, empty in enumerate(blank) if not empty]
+
+
+def _fronts(blank: Sequence[bool]) -> list[int]:
+    """Places of the fronts of a duplex scan whose backs are all blank; none for anything else."""
+    return list(range(0, len(blank), 2)) if len(blank) % 2 == 0 and all(blank[1::2]) else []

@@ -23,6 +23,7 @@ from pydantic import ValidationError
 from grader.documents import MeasurementsDocument
 from grader.inputs.roster import MAX_LINES, delimiter_of, surplus_of, table_lines, whole_number, why_no_id
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
+from grader.inputs.scale_text import SCALE_NAMES
 from grader.records import (
     ACCELERATION_PLAN,
     VELOCITY_PLAN,
@@ -40,7 +41,6 @@ from reference.construction.graph import Construction, coincident
 from reference.errors import MOST_FINDINGS, Finding, InputFileError, lines_of, near_names
 
 KEYS = ("student_id", "n", "position")
-SCALES = ("kL", "kv", "ka")
 TABLES = {"segments_mm": "", "directions_deg": "_deg", "values": "_value"}
 """The tables of a JSON file, and what a CSV file's columns add to the names in them."""
 MAX_BYTES = 1_000_000
@@ -120,6 +120,11 @@ class StudentSubmission:
     name: str = ""
     problems: tuple[Problem, ...] = ()
     has_unusable: bool = False
+
+    @property
+    def position(self) -> int | None:
+        """The variant's position; None where there is none or it is not known."""
+        return None if self.variant is None else self.variant.position
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,7 +330,7 @@ def _parse_csv(text: str, file: str, names: Names) -> Iterator[Measurements]:
 
 
 def _check_header(header: list[str], names: Names) -> Iterator[Finding]:
-    known = frozenset((*KEYS, *SCALES, *_columns(names)))
+    known = frozenset((*KEYS, *SCALE_NAMES, *_columns(names)))
     if "student_id" not in header:
         yield Finding("line 1", "column student_id is missing")
     for index, (name, count) in enumerate(Counter(filter(None, header)).items()):
@@ -360,7 +365,7 @@ def _line(header: list[str], cells: list[str], delimiter: str, entries: _Entries
     for column, text in known.items():
         if column in entries.columns:
             entries.number(column, column, text[:40], _number(text, delimiter))
-    for scale in SCALES:
+    for scale in SCALE_NAMES:
         if scale in known:
             entries.scale(scale, scale, known[scale])
     owner = None if why else student
@@ -497,8 +502,8 @@ def _parse_json(text: str, file: str, names: Names) -> Measurements:
         raise _refuse(file, [Finding("$", "is no table: a file of measurements begins with a brace")])
     entries = _Entries(names, _columns(names), file)
     for name, value in _take(data, "scales"):
-        if name not in SCALES:
-            entries.fault(f"$.scales.{name[:40]}", f"is not known here; there are {', '.join(SCALES)}")
+        if name not in SCALE_NAMES:
+            entries.fault(f"$.scales.{name[:40]}", f"is not known here; there are {', '.join(SCALE_NAMES)}")
         else:
             entries.scale(f"$.scales.{name}", name, str(value) if _is_number(value) else _text(value))
     for table, end in TABLES.items():

@@ -14,6 +14,7 @@ from grader.printed.layout import (
     CODE_MM,
     EASY_FIELDS,
     SCALE_BOXES,
+    SCALE_OF,
     WHOLE_CELLS,
     Layout,
     PageLayout,
@@ -44,8 +45,10 @@ from grader.printed.pdf import (
 )
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity, Problem
 from reference.authored.assignment import Assignment, PageTable, Variant
-from reference.drawing.canvas import Piece, pieces_of
+from reference.drawing.canvas import Piece, pieces_of, scale_pieces
 from reference.errors import AuthoredFileError, CallError, Finding
+
+# One page -----------------------------------------------------------------------------------------
 
 FIGURES = {
     MECHANISM: N_("Mechanism"),
@@ -253,7 +256,7 @@ def _fields(drawing: PdfDrawing, assignment: Assignment, fields: dict[str, Box],
     for name, box in fields.items():
         x, y, _, h = box
         shown = names.get(name, name)
-        label = _scale_label(shown) if name in SCALE_BOXES else pieces_of(shown)
+        label = (*scale_pieces(shown), Piece(" =")) if name in SCALE_BOXES else pieces_of(shown)
         size = 10.0 if name in SCALE_BOXES else 8.0
         wide = pieces_width_mm(label, REGULAR, size)
         drawing.pieces((x - wide - 0.8, y + 0.68 * h), label, size)
@@ -276,11 +279,6 @@ def _comb(drawing: PdfDrawing, box: Box, tongue: Tongue) -> None:
     drawing.text((middle - width_mm(mark, BOLD, 11.0) / 2.0, y + high - 1.0), mark, 11.0, BOLD)
 
 
-def _scale_label(name: str) -> tuple[Piece, ...]:
-    """The letter k with L, v or a below it."""
-    return (Piece(name[:1]), Piece(name[1:], -1), Piece(" =")) if len(name) > 1 else (Piece(f"{name} ="),)
-
-
 def draw_ruler(drawing: PdfDrawing, tongue: Tongue) -> None:
     """A line of exactly 100 mm below the frame, to see at a glance whether the printer shrank the page."""
     x, y, long = _RULER_MM
@@ -291,7 +289,7 @@ def draw_ruler(drawing: PdfDrawing, tongue: Tongue) -> None:
     drawing.text((x + long + 3.0, y + 0.8), words, 6.5, REGULAR, GREY)
 
 
-_SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
+# The sheets of a class ----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -391,7 +389,7 @@ def _plans(
             message = f"page {table.kind}: {len(names)} lengths are too many for boxes; none are printed"
             problems.append(Problem("sheet_boxes", message, str(assignment.path)))
         problems.extend(_too_small(assignment, table, fit))
-        scales = {_SCALE_OF[figure]: SCALE_BOXES[_SCALE_OF[figure]] for figure in figures}
+        scales = {SCALE_OF[figure]: SCALE_BOXES[SCALE_OF[figure]] for figure in figures}
         plans.append(_PagePlan(table, PageForm(fit.template, scales | boxes, dict(construction.poles))))
     return plans, tuple(problems)
 
@@ -446,6 +444,8 @@ def _layout(plan: _PagePlan) -> PageLayout:
         cells=combs_of(plan.form.fields),
     )
 
+
+# The calibration page -----------------------------------------------------------------------------
 
 _PEN_MM = 0.3
 _CALIBRATION_TEXT = N_(

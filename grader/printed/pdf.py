@@ -18,6 +18,8 @@ from grader.printed.layout import FRAME_MM, MARKER_CORNERS, MARKER_MM, PAGE_MM, 
 from grader.records import Box
 from reference.drawing.canvas import Piece
 
+# Markers ------------------------------------------------------------------------------------------
+
 CELLS = 6
 """Cells along a marker's side, its black border included."""
 
@@ -33,6 +35,8 @@ def cells(marker_id: int) -> NDArray[np.bool_]:
     image = cv2.aruco.generateImageMarker(dictionary(), marker_id, CELLS, borderBits=1)
     return np.asarray(image > 127)
 
+
+# Fonts and texts ----------------------------------------------------------------------------------
 
 REGULAR, BOLD = "DejaVuSansCondensed", "DejaVuSansCondensed-Bold"
 _DECIMAL_COMMA = frozenset({"ro", "ru"})
@@ -115,6 +119,8 @@ def fitted(
     cut = lines[: max(room, 1)]
     return size, [*cut[:-1], f"{cut[-1].rstrip('.,;')} …"] if cut else []
 
+
+# Pages --------------------------------------------------------------------------------------------
 
 BLACK, GREY = 0.0, 0.55
 _FRAME_PEN_MM = 0.7

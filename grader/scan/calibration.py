@@ -28,6 +28,7 @@ _SCALE_REPORTED, _UNEQUAL_REPORTED, _SKEW_REPORTED_DEG = 0.003, 0.001, 0.05
 _RESIDUAL_REPORTED_MM = 0.12
 """Markers on a flat page stay below this."""
 _LENGTH_REPORTED_MM = 0.15
+ALL_IS_WELL = "printer and scanner are fit for grading"
 _PHOTO_MM = 0.4
 """Markers farther off a linear map than this are a camera's view, not a scanner's."""
 _NEAR_MM, _NEAR_RAD = 1.5, 0.03
@@ -212,7 +213,7 @@ def _advice(document: CalibrationDocument) -> list[str]:
         advice.append(f"{few}: scan sharper and darker, at 300 dpi")
     elif segments.length_rms_mm is not None and segments.length_rms_mm > _LENGTH_REPORTED_MM:
         advice.append("lengths of the segments scatter: scan at 300 dpi, grey, not black and white")
-    return advice or ["printer and scanner are fit for grading"]
+    return advice or [ALL_IS_WELL]
 
 
 def residual_map(document: CalibrationDocument, magnified: float = 200.0) -> str:

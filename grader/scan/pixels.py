@@ -34,6 +34,9 @@ _TUKEY = 4.685
 """Tukey's constant: 95 % efficient for normal errors."""
 
 
+# Homographies -------------------------------------------------------------------------------------
+
+
 def mapped(homography: FloatArray, points: FloatArray) -> FloatArray:
     """(..., 2) points through a homography."""
     if points.size == 0:
@@ -94,6 +97,9 @@ def cut_out(
     return np.asarray(cut, dtype=np.uint8)
 
 
+# Segments and stretches of lines ------------------------------------------------------------------
+
+
 def reached(spans: FloatArray, start: FloatArray, gap: float) -> BoolArray:
     """Which stretches of a line, (n, 2) low and high, are reached from another (2,) over gaps no wider."""
     low, high = float(start[0]), float(start[1])
@@ -111,6 +117,9 @@ def lengths_and_directions(ends: FloatArray) -> tuple[FloatArray, FloatArray]:
     span = ends[..., 1, :] - ends[..., 0, :]
     length = np.maximum(np.hypot(span[..., 0], span[..., 1]), 1e-9)
     return length, span / length[..., None]
+
+
+# Levelled light -----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +208,9 @@ def shrink(grey: GreyImage, scale: float) -> GreyImage:
     )
 
 
+# Strokes cut across -------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True, slots=True)
 class Cuts:
     """k strokes cut across at n places each along guessed lines; distances in pixels.
@@ -260,15 +272,13 @@ def _cut_part(
 ) -> Cuts:
     """Some of the strokes cut across; `near` holds `capture_px` and `level`."""
     capture_px, level = near
-    span = ends[:, 1] - ends[:, 0]
-    length = np.maximum(np.hypot(span[:, 0], span[:, 1]), 1e-9)
+    length, u = lengths_and_directions(ends)
     share = (np.arange(count) + 0.5) / count
-    u = span / length[:, None]
     normal = np.column_stack([-u[:, 1], u[:, 0]])
     step = float(np.clip(reach_px / _ACROSS_STEPS, *_ACROSS_STEP_PX))
     half = int(np.ceil(reach_px / step))
     across = np.asarray(np.arange(-half, half + 1) * step, dtype=np.float32)
-    middle = ends[:, None, 0] + share[None, :, None] * span[:, None, :]
+    middle = ends[:, None, 0] + share[None, :, None] * (ends[:, 1] - ends[:, 0])[:, None, :]
     contrast = _contrast_across(flat, middle, normal, across)
     k, n, m = contrast.shape
     captured = np.abs(across)[None, :] <= capture_px[:, None]
@@ -339,6 +349,9 @@ def _crossing(
     share = np.clip((level - low) / np.maximum(high - low, np.float32(1e-6)), 0.0, 1.0)
     crossed = across[outside] + share * (across[inside] - across[outside])
     return np.where(beyond, across[outside], crossed).astype(np.float64)
+
+
+# Robust lines -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)

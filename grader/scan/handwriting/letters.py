@@ -51,14 +51,14 @@ def find_letters(ink: Ink, boxes: Sequence[Box] | None = None) -> Letters:
     pieces = _pieces(mask, unit, _LEAST_MM)
     rest = mask.copy()
     for piece in pieces:
-        if drawn[piece.place][piece.own > 0].mean() < _TOUCHED:
-            rest[piece.place] &= 1 - piece.own
+        if drawn[piece.window][piece.own > 0].mean() < _TOUCHED:
+            rest[piece.window] &= 1 - piece.own
     pieces = _but_words(pieces)
     cut = _pieces(_without(rest, drawn, _usual_px(ink)), unit, _STUB_MM)
     whole = np.arange(len(pieces) + len(cut)) < len(pieces)
     pieces = [*pieces, *cut]
     box = np.array([piece.box for piece in pieces], dtype=np.float64).reshape(-1, 4)
-    pictures = [normalised(grey[piece.place] * piece.own) for piece in pieces]
+    pictures = [normalised(grey[piece.window] * piece.own) for piece in pieces]
     probability = recognise(pictures, box[:, 2:], COOLING, STRANGE)
     # A box's edge lies between pixels; the centre of pixel q is at q / unit mm.
     box[:, :2] += [left - 0.5, top - 0.5]
@@ -96,7 +96,7 @@ class _InkPiece:
     own: GreyImage
 
     @property
-    def place(self) -> tuple[slice, slice]:
+    def window(self) -> tuple[slice, slice]:
         x, y, w, h = self.box
         return slice(y, y + h), slice(x, x + w)
 
@@ -125,9 +125,9 @@ def _but_words(pieces: list[_InkPiece]) -> list[_InkPiece]:
     beside = x.T - x - w < _GAP * np.maximum(h, h.T)
     level = np.minimum(y + h, (y + h).T) - np.maximum(y, y.T) > _LEVEL * np.minimum(h, h.T)
     line = np.arange(len(pieces))
-    for one, other in np.argwhere(beside & level & (x < x.T)):
-        if line[one] != line[other]:
-            line[line == line[other]] = line[one]
+    for first, second in np.argwhere(beside & level & (x < x.T)):
+        if line[first] != line[second]:
+            line[line == line[second]] = line[first]
     many = np.bincount(line)[line] > _WORDS
     return [piece for piece, is_word in zip(pieces, many, strict=True) if not is_word]
 

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from grader.records import FloatArray, GreyImage
 from grader.scan.pixels import Float32Array
 
+# Signs --------------------------------------------------------------------------------------------
+
 JUNK = ""
 """No sign at all: pieces of strokes, arrowheads, arcs, crossings, two letters run together."""
 SIGNS: tuple[str, ...] = (
@@ -51,6 +53,8 @@ _OWN = {sign: column for column, sign in enumerate(SIGNS)}
 COLUMN: dict[str, int] = {**_OWN, **{sign: _OWN[twin] for sign, twin in TWINS.items()}}
 """The column of each sign, and of those that look like it, among the probabilities."""
 
+
+# Features -----------------------------------------------------------------------------------------
 
 SIDE_PX = 28
 """Side of the picture that is looked at; the sign's longer side fills all but the margin."""
@@ -129,6 +133,8 @@ def _weights(cells: int) -> Float32Array:
     return np.asarray(np.clip(1.0 - off, 0.0, None), dtype=np.float32)
 
 
+# The network --------------------------------------------------------------------------------------
+
 COOLING, STRANGE = 0.43, 0.02
 """On a drawing, in hands that nobody has seen: what scores are multiplied by, and the share of signs of
 which nothing is known. Fitted to eight handwriting fonts that the network does not know."""
@@ -206,6 +212,8 @@ def recognise(
     known = model.probability(features(pictures, sizes_px))
     return (1.0 - strange) * known + strange / len(SIGNS)
 
+
+# Signs of a line ----------------------------------------------------------------------------------
 
 _LEAST_PEAK = 40
 """Of 255: a line whose darkest ink is fainter is empty."""
@@ -351,18 +359,18 @@ def _may_be_one(pieces: list[_Piece]) -> bool:
     return all(_over(one.box, other.box) or _beside(one.box, other.box) for one, other in pairwise(pieces))
 
 
-def _over(one: _Box, other: _Box) -> bool:
-    shared = min(one[0] + one[2], other[0] + other[2]) - max(one[0], other[0])
-    small, tall = sorted((one, other), key=lambda box: box[3])
+def _over(first: _Box, second: _Box) -> bool:
+    shared = min(first[0] + first[2], second[0] + second[2]) - max(first[0], second[0])
+    small, tall = sorted((first, second), key=lambda box: box[3])
     # A small piece at the foot of a tall one is a point or a comma of its own.
     at_foot = small[3] < 0.5 * tall[3] and small[1] + small[3] / 2.0 > tall[1] + 0.75 * tall[3]
-    return shared >= _SHARED * min(one[2], other[2]) and not at_foot
+    return shared >= _SHARED * min(first[2], second[2]) and not at_foot
 
 
-def _beside(one: _Box, other: _Box) -> bool:
-    shared = min(one[1] + one[3], other[1] + other[3]) - max(one[1], other[1])
-    gap = max(one[0], other[0]) - min(one[0] + one[2], other[0] + other[2])
-    return shared >= _SHARED * min(one[3], other[3]) and gap <= _BROKEN_PX
+def _beside(first: _Box, second: _Box) -> bool:
+    shared = min(first[1] + first[3], second[1] + second[3]) - max(first[1], second[1])
+    gap = max(first[0], second[0]) - min(first[0] + first[2], second[0] + second[2])
+    return shared >= _SHARED * min(first[3], second[3]) and gap <= _BROKEN_PX
 
 
 def _cut(grey: GreyImage, pieces: list[_Piece], box: _Box) -> GreyImage:

@@ -11,7 +11,7 @@ from grader.scan.register.lines import RIDGE, LongLine
 
 _MARGIN_MM = 10.0
 """Around a drawing without a frame: the least that ISO 5457 leaves."""
-_CORNER_MM = (215.0, 80.0)
+TITLE_BLOCK_MM = (215.0, 80.0)
 """Width and height of the corner in which a title block may lie."""
 _INSET_MM = 7.0
 """The frame's own bottom line, and the paper's edge, are no part of the block."""
@@ -95,7 +95,7 @@ def _ruled_mm(ends: FloatArray) -> float:
     span = np.abs(ends[:, 1] - ends[:, 0])
     low, high = ends.min(axis=1), ends.max(axis=1)
     level = span[:, 0] > span[:, 1]
-    near = (low[:, 0] > PAGE_MM[0] - _CORNER_MM[0]) & (low[:, 1] > PAGE_MM[1] - _CORNER_MM[1])
+    near = (low[:, 0] > PAGE_MM[0] - TITLE_BLOCK_MM[0]) & (low[:, 1] > PAGE_MM[1] - TITLE_BLOCK_MM[1])
     inner = (high[:, 0] < PAGE_MM[0]) & (high[:, 1] < PAGE_MM[1] - np.where(level, _INSET_MM, 0.0))
     ruled = near & inner & (span.min(axis=1) < _SQUARE_MM) & (span.max(axis=1) > _LEAST_MM)
     if np.count_nonzero(ruled & level) < _LEAST_LEVEL:

@@ -39,6 +39,8 @@ from grader.scan.register.distortion import find_bend
 from grader.scan.register.fitting import MarkedPoints, Projection, fit_projection
 from grader.scan.register.homography import rotation_deg
 
+# The code -----------------------------------------------------------------------------------------
+
 _LONG_SIDES_PX = (1700, 3400)
 """At about 4 px/mm a module has 3 pixels; a phone's photo may need a closer look."""
 _CLOSE_UP_PX_PER_MM = 10.0
@@ -90,6 +92,8 @@ def _read(grey: GreyImage) -> set[Identity]:
     identities = (identity_of(code.text) for code in codes)
     return {identity for identity in identities if identity is not None}
 
+
+# The markers --------------------------------------------------------------------------------------
 
 _DETECTION_PX = 1600
 """Long side of the picture on which markers are looked for: on A3 a marker's cell has 7 pixels."""
