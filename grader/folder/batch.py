@@ -200,7 +200,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """Of what is kept of it."""
+        """Of its files in the cache."""
         return self.folder.replace("/", "#")
 
 

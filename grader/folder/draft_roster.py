@@ -11,6 +11,7 @@ Students who made mistakes match their own variant less well.
 """
 
 import base64
+import contextlib
 import csv
 import io
 from collections.abc import Callable, Mapping, Sequence
@@ -91,7 +92,7 @@ def suggest(
     if pages_per_student is None:
         settled |= _by_likely_order(pages, roster, assignment, settled)
     variants = _variants(roster, assignment)
-    found: list[Suggestion] = []
+    suggestions: list[Suggestion] = []
     for page in pages:
         first = settled.get(page)
         if first is None and page not in reasons:
@@ -99,8 +100,11 @@ def suggest(
         contested = page in reasons and reasons[page].code in {"owner_disagree", "owner_other_assignment"}
         if (first is None or not first.sure) and not contested and strokes_of is not None and variants:
             first = _by_similarity(page, strokes_of(page), assignment, variants, first) or first
-        found.append(first or Suggestion(page, None, _reason(reasons[page], page), sure=False))
-    return RosterDraft(tuple(_in_order(found, roster)), known.problems)
+        if first is None:
+            why = reasons[page].message.removeprefix(f"{page}: ")
+            first = Suggestion(page, None, why, sure=False)
+        suggestions.append(first)
+    return RosterDraft(tuple(_in_order(suggestions, roster)), known.problems)
 
 
 def _certain(owned: Owned, roster: Roster) -> Suggestion:
@@ -113,13 +117,11 @@ def _certain(owned: Owned, roster: Roster) -> Suggestion:
 
 def _variants(roster: Roster, assignment: Assignment) -> dict[Variant, list[RosterRow]]:
     """The rows of each variant; rows whose variant is unknown have none."""
-    found: dict[Variant, list[RosterRow]] = {}
+    variants: dict[Variant, list[RosterRow]] = {}
     for row in roster.rows:
-        try:
-            found.setdefault(assignment.variant(row.n, row.position), []).append(row)
-        except CallError:
-            continue
-    return found
+        with contextlib.suppress(CallError):
+            variants.setdefault(assignment.variant(row.n, row.position), []).append(row)
+    return variants
 
 
 def _by_similarity(
@@ -185,10 +187,6 @@ def _in_order(suggestions: list[Suggestion], roster: Roster) -> list[Suggestion]
             reached = place[id(row)]
         settled.append(suggestion)
     return settled
-
-
-def _reason(problem: Problem, page: PageRef) -> str:
-    return problem.message.removeprefix(f"{page}: ")
 
 
 def _who(row: RosterRow) -> str:

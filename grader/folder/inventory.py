@@ -47,8 +47,8 @@ def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[
         folder's top is none either
     passed_over : files and folders that are none, such as the folder of results
 
-    A folder that cannot be opened is one, and an empty folder named as a file: somebody must be told.
-    Links that lead out of the folder are passed over: a submission is a file, not a way to others.
+    A folder that cannot be opened counts as a file, and so does an empty folder named as one: both are
+    reported. Links that lead out of the folder are left out.
     """
     top = folder.resolve()
     none = {path.resolve() for path in (*passed_over, *([roster] if roster else []), folder / "roster.csv")}
@@ -68,7 +68,7 @@ def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[
 
 
 def shown_name(path: Path, folder: Path) -> str:
-    """A file's path in the folder as people are told it; bytes that are no text are told by number.
+    """A file's path in the folder, as messages name it; bytes that are no text stand as numbers.
 
     Archives from systems with other alphabets unpack to such names.
     """

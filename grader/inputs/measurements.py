@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeGuard
 
 from pydantic import ValidationError
 
@@ -505,7 +506,10 @@ def _parse_json(text: str, file: str, names: Names) -> Measurements:
         if name not in SCALE_NAMES:
             entries.fault(f"$.scales.{name[:40]}", f"is not known here; there are {', '.join(SCALE_NAMES)}")
         else:
-            entries.scale(f"$.scales.{name}", name, str(value) if _is_number(value) else _text(value))
+            declared = str(value) if _is_number(value) else value
+            if not isinstance(declared, str | _NoValue):
+                declared = _NoValue(_shown(value), "is no number")
+            entries.scale(f"$.scales.{name}", name, declared)
     for table, end in TABLES.items():
         _enter(dict(_take(data, table)), table, end, entries)
     about = _about(data, file)
@@ -521,12 +525,8 @@ def _take(data: dict[str, object], key: str) -> list[tuple[str, object]]:
     return list(table.items())
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _text(value: object) -> "str | _NoValue":
-    return value if isinstance(value, str | _NoValue) else _NoValue(_shown(value), "is no number")
 
 
 def _enter(given: Mapping[str, object], table: str, end: str, entries: _Entries) -> None:
@@ -538,7 +538,7 @@ def _enter(given: Mapping[str, object], table: str, end: str, entries: _Entries)
             near = near_names(name, known) if len(entries.faults) < MOST_FINDINGS else []
             entries.fault(path, f"is not known here{_did_you_mean(near)}")
             entries.unread += [Unread(meant, f"{name}: '{shown}'") for meant in near if meant not in given]
-        elif isinstance(value, int | float) and not isinstance(value, bool):
+        elif _is_number(value):
             entries.number(path, f"{name}{end}", shown, float(value))
         else:
             refused = value if isinstance(value, _NoValue) else _NoValue(shown, "is no number")

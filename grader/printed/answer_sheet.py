@@ -34,7 +34,6 @@ from grader.printed.pdf import (
     GREY,
     REGULAR,
     PdfDrawing,
-    decimal_mark,
     fitted,
     number,
     pieces_width_mm,
@@ -204,7 +203,7 @@ def _given(assignment: Assignment, variant: Variant, tongue: Tongue) -> list[tup
     values = assignment.values([variant])
     data = []
     for datum in assignment.file.given:
-        value = number(float(np.ravel(datum.value(values))[0]), tongue.lang)
+        value = number(float(np.ravel(datum.value(values))[0]), tongue.decimal_mark)
         unit = tongue.unit(datum.unit)
         gap = "" if unit in {"", "°"} else "\N{NO-BREAK SPACE}"
         data.append((*pieces_of(datum.label), Piece(f" = {value}{gap}{unit}")))
@@ -275,7 +274,7 @@ def _comb(drawing: PdfDrawing, box: Box, tongue: Tongue) -> None:
         drawing.box(cell, 0.18, _CELL_GREY)
     x, y, wide, high = cells[WHOLE_CELLS - 1]
     middle = (x + wide + cells[WHOLE_CELLS][0]) / 2.0
-    mark = decimal_mark(tongue.lang)
+    mark = tongue.decimal_mark
     drawing.text((middle - width_mm(mark, BOLD, 11.0) / 2.0, y + high - 1.0), mark, 11.0, BOLD)
 
 

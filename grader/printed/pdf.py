@@ -39,7 +39,6 @@ def cells(marker_id: int) -> NDArray[np.bool_]:
 # Fonts and texts ----------------------------------------------------------------------------------
 
 REGULAR, BOLD = "DejaVuSansCondensed", "DejaVuSansCondensed-Bold"
-_DECIMAL_COMMA = frozenset({"ro", "ru"})
 
 
 @cache
@@ -65,17 +64,12 @@ def unprintable(text: str) -> str:
     )
 
 
-def number(value: float, lang: str) -> str:
-    """A datum to six significant digits, as it is written in a language."""
+def number(value: float, decimal_mark: str) -> str:
+    """A datum to six significant digits, as it is written in a language with this decimal mark."""
     text = f"{value:.6g}"
     if "e" in text and 1e-6 < abs(value) < 1e9:
         text = f"{value:.6f}".rstrip("0").rstrip(".") if abs(value) < 1.0 else f"{value:.0f}"
-    return text.replace(".", decimal_mark(lang))
-
-
-def decimal_mark(lang: str) -> str:
-    """Comma or point."""
-    return "," if lang in _DECIMAL_COMMA else "."
+    return text.replace(".", decimal_mark)
 
 
 def pieces_width_mm(pieces: Iterable[Piece], font: str, size_pt: float) -> float:

@@ -1,4 +1,4 @@
-"""The calibration page read back: what printer and scanner do to millimetres.
+"""The calibration page read: the errors of scale, skew and length of printer and scanner.
 
 The printed markers give the scales along the sheet's axes and their skew by a linear fit to their
 middles, which ink that spreads does not move. Segments of known length, read as strokes of a drawing
@@ -48,7 +48,7 @@ class _Linear:
 
 
 def calibrate(path: Path, number: int = 1) -> CalibrationDocument | Unread:
-    """What one scan of the calibration page says, or why it says nothing.
+    """Measure one scan of the calibration page; Unread with the reason where it cannot be measured.
 
     Raises InputFileError for a file that cannot be used.
     """

@@ -1,6 +1,6 @@
 """Homographies, pictures with their light levelled, and strokes measured across at full resolution.
 
-Shared by the stages that look at pixels (`sheet`, `ink`, `letters`). Pixel coordinates are (x right,
+Shared by registration, strokes and handwriting. Pixel coordinates are (x right,
 y down), the centre of the stored image's top left pixel is (0, 0). A homography is a (3, 3) array.
 """
 

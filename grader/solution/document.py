@@ -151,13 +151,16 @@ def _document(assignment: Assignment, plan: Plan, columns: _Columns, index: int)
                 value=value[name],
                 unit=UNITS[vector.scale],
                 drawn_mm=drawn[name],
-                direction_deg=_known(direction[name]),
+                direction_deg=None if math.isnan(direction[name]) else direction[name],
             )
             for name, vector in plan.construction.vectors.items()
         },
         nodes_mm={figure: points(figure) for figure in plan.construction.poles},
         angular=numbers("rate"),
-        centres_m={name: _known_point(point) for name, point in points("centres").items()},
+        centres_m={
+            name: point if all(map(math.isfinite, point)) else None
+            for name, point in points("centres").items()
+        },
         conditioning=_grouped(numbers("conditioning")),
     )
 
@@ -166,14 +169,6 @@ def _centres(plan: Plan) -> dict[str, ComplexArray]:
     of_plan = (plan.mechanism, plan.construction, plan.motion)
     poles = acceleration_poles(*of_plan) if plan.motion.acceleration else {}
     return {**instantaneous_centres(*of_plan), **poles}
-
-
-def _known_point(point: tuple[float, float]) -> tuple[float, float] | None:
-    return point if all(map(math.isfinite, point)) else None
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
 
 
 def _grouped(values: Mapping[str, float]) -> dict[str, float | dict[str, float]]:

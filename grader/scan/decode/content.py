@@ -1,4 +1,4 @@
-"""What a PDF page would cost to render, counted before any pixel is made."""
+"""The cost of rendering a PDF page, counted before any pixel is made."""
 
 import io
 import math

@@ -57,15 +57,13 @@ COLUMN: dict[str, int] = {**_OWN, **{sign: _OWN[twin] for sign, twin in TWINS.it
 # Features -----------------------------------------------------------------------------------------
 
 SIDE_PX = 28
-"""Side of the picture that is looked at; the sign's longer side fills all but the margin."""
+"""Side of a sign's picture; the sign's longer side fills all but the margin."""
 _MARGIN_PX = 3
 """Around the sign: its border's gradient lies inside the picture."""
 _ORIENTATIONS = 8
 """Directions that borders are sorted by."""
-_CELLS = 6
-"""Cells along a side for the directions of borders,"""
-_ZONES = 7
-"""and for the ink."""
+_CELLS, _ZONES = 6, 7
+"""Cells along a side: for the directions of borders, and for the ink."""
 _LOBE = 0.6
 """A border counts for a direction as far as its part along it exceeds this share of its strength."""
 _LEAST_PX = 1.0
@@ -276,7 +274,9 @@ def lattice_of(grey: GreyImage, px_per_mm: float) -> Lattice:
     for first in range(len(pieces)):
         for last in range(first + 1, min(first + _MERGED, len(pieces)) + 1):
             box = _around(pieces[first:last])
-            if last > first + 1 and not _may_be_one(pieces[first:last]):
+            # The pieces of one sign stand over one another, or side by side without a gap.
+            pairs = pairwise(piece.box for piece in pieces[first:last])
+            if not all(_over(*pair) or _beside(*pair) for pair in pairs):
                 continue
             boxes.append(box)
             crops.append(normalised(_cut(grey, pieces[first:last], box)))
@@ -352,11 +352,6 @@ def _around(pieces: list[_Piece]) -> _Box:
     right = max(piece.box[0] + piece.box[2] for piece in pieces)
     bottom = max(piece.box[1] + piece.box[3] for piece in pieces)
     return left, top, right - left, bottom - top
-
-
-def _may_be_one(pieces: list[_Piece]) -> bool:
-    """Whether pieces stand over one another, or side by side without a gap, as those of one sign do."""
-    return all(_over(one.box, other.box) or _beside(one.box, other.box) for one, other in pairwise(pieces))
 
 
 def _over(first: _Box, second: _Box) -> bool:

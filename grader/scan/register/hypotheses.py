@@ -36,7 +36,8 @@ _FLAT = 1e-9
 """Least determinant of a map that can be inverted."""
 _CAMERA_SE = 0.015
 """How far off a camera's view may be, by the lines' errors: right angle in radians, ratio of the axes."""
-_LOOKED_AT = 80
+_MOST_READINGS = 80
+"""Readings whose sides are compared with the lines, the best first."""
 _BLOCK_MM = 200.0
 """Length of a title block's ruled lines that counts as much as one side that agrees."""
 _BLOCK_WORTH = 3.0
@@ -79,8 +80,10 @@ def hypotheses(
             if trust > 0.0:
                 readings += _in_each_turn(corners, model, trust, shape, resolution)
     drawn = drawn_ends(lines)
-    best = sorted(readings, key=lambda hypothesis: -hypothesis.score)[:_LOOKED_AT]
-    return sorted((_agreed(one, lines, drawn) for one in best), key=lambda hypothesis: -hypothesis.score)
+    best = sorted(readings, key=lambda hypothesis: -hypothesis.score)[:_MOST_READINGS]
+    return sorted(
+        (_agreed(reading, lines, drawn) for reading in best), key=lambda hypothesis: -hypothesis.score
+    )
 
 
 def _agreed(hypothesis: Hypothesis, lines: list[LongLine], drawn: FloatArray) -> Hypothesis:

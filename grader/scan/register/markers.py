@@ -42,7 +42,7 @@ from grader.scan.register.homography import rotation_deg
 # The code -----------------------------------------------------------------------------------------
 
 _LONG_SIDES_PX = (1700, 3400)
-"""At about 4 px/mm a module has 3 pixels; a phone's photo may need a closer look."""
+"""At about 4 px/mm a module has 3 pixels; a phone's photo may need twice as many."""
 _CLOSE_UP_PX_PER_MM = 10.0
 """A module of the code has about 8 pixels."""
 _MARGIN_MM = 3.0
@@ -54,18 +54,16 @@ _BLUR_PX, _SHARPER = 6.0, 1.5
 def identify(page: Page, mm_to_px: FloatArray | None = None) -> Identity | None:
     """What the page's code says; None without a code of ours, or with two that differ.
 
-    Arguments
-    ---------
-    mm_to_px : the printed sheet's map, where known: the code is then looked for in its place first
+    Arguments: `mm_to_px` is the printed sheet's map, where known: its place is then searched first.
     """
-    for look in _looks(page.grey, mm_to_px):
-        identities = _read(look)
+    for picture in _code_pictures(page.grey, mm_to_px):
+        identities = _read(picture)
         if identities:
             return identities.pop() if len(identities) == 1 else None
     return None
 
 
-def _looks(grey: GreyImage, mm_to_px: FloatArray | None) -> Iterator[GreyImage]:
+def _code_pictures(grey: GreyImage, mm_to_px: FloatArray | None) -> Iterator[GreyImage]:
     """Pictures in which the code may be read, the cheapest first."""
     if mm_to_px is not None:
         x, y, wide, high = CODE_MM
@@ -98,7 +96,7 @@ def _read(grey: GreyImage) -> set[Identity]:
 _DETECTION_PX = 1600
 """Long side of the picture on which markers are looked for: on A3 a marker's cell has 7 pixels."""
 _CLOSER_PX = 3200
-"""Second look, for photos in which the sheet is a small part."""
+"""The second time, for photos in which the sheet is a small part."""
 _LEAST_MARKERS = 2
 """One marker settles a map too badly far from it."""
 _LEAST_APART_MM = 100.0

@@ -39,7 +39,7 @@ _BESIDE_MM = 3.0
 def register(page: Page) -> tuple[Sheet | Unread, Identity | None]:
     """The page's map from millimetres to pixels, or why there is none; and whose page it is by its code.
 
-    A printed sheet's code is looked for in its place; elsewhere a quick look must do.
+    A printed sheet's code is searched in its place; on other pages only a reduced picture is searched.
     """
     printed = markers.register(page)
     identity = (None if printed is None else printed.identity) or identify(page)
@@ -55,7 +55,7 @@ def register(page: Page) -> tuple[Sheet | Unread, Identity | None]:
 
 
 def rectify(page: Page) -> Sheet | Unread:
-    """The page's map from millimetres to pixels, or, false in a condition, why there is none."""
+    """The page's map from millimetres to pixels; Unread with the reason where there is none."""
     return register(page)[0]
 
 
@@ -88,15 +88,13 @@ _NO_FIT_MM = 1.5
 """Sides that disagree by more are not those of one A3 sheet."""
 _VAGUE_SE = 0.02
 """A scale less sure than this is no better than a guess."""
-_MOST_SIDES = 3
-"""Sides by which a frame is known,"""
-_SOME_SIDES = 2
-"""and those of the paper that must be seen beside it."""
+_MOST_SIDES, _SOME_SIDES = 3, 2
+"""A frame is known by three of its sides, if two sides of the paper are found too."""
 _ALL_SIDES = 4
 _COPY_SE = 0.012
 """Copiers enlarge or reduce by a per cent or two unless told not to."""
 _SAMPLED, _WHITE = 7, 255
-"""Pixels between those that are looked at, and the value of white ones."""
+"""Every seventh pixel is tested; the value of white ones."""
 _FAR_OFF_MM = 1.5
 """A side farther off after the fit was taken for the wrong line."""
 _EDGE_WITHIN_MM = 6.0
@@ -150,8 +148,8 @@ def _rival_scale(ranked: list[Hypothesis]) -> float | None:
     A sheet's edge may pass for a frame, their sides are nearly in the same ratio; a stated resolution
     tells them apart.
     """
-    likely = [one for one in ranked if one.score > ranked[0].score - _AS_LIKELY]
-    scales = np.log([_px_per_mm(one.mm_to_px, 1.0) for one in likely])
+    likely = [reading for reading in ranked if reading.score > ranked[0].score - _AS_LIKELY]
+    scales = np.log([_px_per_mm(reading.mm_to_px, 1.0) for reading in likely])
     off = float(np.abs(scales - scales[0]).max())
     return off if off > _ANOTHER_SCALE else None
 

@@ -44,11 +44,9 @@ _MAP_PX_PER_MM = 6.0
 
 
 def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> Ink | Unread:
-    """Everything drawn inside the frame of a registered page, or, false in a condition, why it is no drawing.
+    """Everything drawn inside the frame of a registered page; Unread with the reason where it is no drawing.
 
-    Arguments
-    ---------
-    boxes : where to look, in sheet mm; all of `sheet.drawable_mm` by default
+    Arguments: `boxes` is where strokes are searched, sheet mm; all of `sheet.drawable_mm` by default.
     """
     grey = brightness(page, sheet, boxes)
     if grey < _DARK:
@@ -142,7 +140,7 @@ def _too_many(count: int) -> Unread:
 
 def take(strokes: Strokes, which: BoolArray) -> Strokes:
     """The chosen strokes."""
-    return Strokes(*(getattr(strokes, one.name)[which] for one in fields(Strokes)))
+    return Strokes(*(getattr(strokes, column.name)[which] for column in fields(Strokes)))
 
 
 def _lines(full: FloatArray, seeds: Seeds, components: Components, usable: BoolArray, scale: float) -> Pieces:
@@ -237,15 +235,15 @@ def _records(flat: Flat, fitted: Fitted, merged: BoolArray, field: Field) -> Str
 # Hatching -----------------------------------------------------------------------------------------
 
 
-_ALIKE_DEG = 11.0
-"""Short hatching strokes are drawn by free hand,"""
-_LONG_ALIKE_DEG = 5.0
-"""long ones along a set square."""
+_SHORT_PARALLEL_DEG = 11.0
+"""Largest angle between neighbours in hatching: short strokes are drawn freehand."""
+_LONG_PARALLEL_DEG = 5.0
+"""The same of long ones, which are drawn along a set square."""
 _APART_MM = (0.5, 6.0)
 """Nearer strokes are one drawn twice, farther ones no hatching."""
-_LEAST_ALIKE = 4
-"""A family of short strokes has more."""
-_LEAST_LONG_ALIKE = 6
+_MOST_SHORT = 4
+"""A family of short strokes in hatching has more members."""
+_MOST_LONG = 6
 """A slider, its guide and a link along it make five level lines."""
 _LONGEST_MM = 60.0
 """Across the largest plate."""
@@ -264,7 +262,7 @@ def hatching(strokes: Strokes) -> BoolArray:
     length = lengths_and_directions(strokes.ends)[0]
     rows = np.flatnonzero(length < _LONGEST_MM)
     result = np.zeros(len(strokes), dtype=bool)
-    if len(rows) <= _LEAST_ALIKE:
+    if len(rows) <= _MOST_SHORT:
         return result
     weight = (strokes.width * strokes.darkness)[rows]
     first, second, aside = _linked(strokes.ends[rows], length[rows], weight)
@@ -272,7 +270,7 @@ def hatching(strokes: Strokes) -> BoolArray:
     left[first[aside > 0]] = right[first[aside < 0]] = True
     # The last of a family may be the link or the side that runs along it: short ones alone are safe.
     family, short, between = _family_size(first, second, len(rows)), length[rows] < _SHORT_MM, left & right
-    result[rows] = np.where(short, family > _LEAST_ALIKE, (family > _LEAST_LONG_ALIKE) & between)
+    result[rows] = np.where(short, family > _MOST_SHORT, (family > _MOST_LONG) & between)
     return result
 
 
@@ -293,7 +291,9 @@ def _linked(ends: FloatArray, length: FloatArray, weight: FloatArray) -> tuple[R
     first, second = np.divmod(np.concatenate(pairs), count)
     sine = np.abs(u[first, 0] * u[second, 1] - u[first, 1] * u[second, 0])
     shorter, longer = np.minimum(length[first], length[second]), np.maximum(length[first], length[second])
-    limit = np.where(shorter < _SHORT_MM, np.sin(np.radians(_ALIKE_DEG)), np.sin(np.radians(_LONG_ALIKE_DEG)))
+    limit = np.where(
+        shorter < _SHORT_MM, np.sin(np.radians(_SHORT_PARALLEL_DEG)), np.sin(np.radians(_LONG_PARALLEL_DEG))
+    )
     linked = (sine < limit) & (longer < _RATIO * shorter)
     lighter, heavier = np.minimum(weight[first], weight[second]), np.maximum(weight[first], weight[second])
     linked &= heavier < _WEIGHT_RATIO * lighter
