@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from grader.records import Box, FloatArray, Page, Sheet
 from grader.scan.pixels import (
+    TITLE_BLOCK_MM,
     BoolArray,
     Float32Array,
     at_full_size,
@@ -19,7 +20,6 @@ from grader.scan.pixels import (
     parts,
     reached,
 )
-from grader.scan.register.homography import TITLE_BLOCK_MM
 from grader.scan.strokes.seeds import PX_PER_MM, Seeds
 
 _TURN = 0.16
