@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from grader.cli.commands import check_language
+from grader.cli.app import check_language
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
 from grader.feedback.sentences import mistake_feedback, reason_sentence

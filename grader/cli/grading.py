@@ -8,8 +8,8 @@ from pathlib import Path
 
 import typer
 
+from grader.cli.app import check_language, new_table, progress
 from grader.cli.checking import checked_level
-from grader.cli.commands import check_language, new_table, progress
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
 from grader.feedback.class_page import CAUSES, SIGNS, waiting
 from grader.files import samples_folder

@@ -11,7 +11,7 @@ from rich.table import Table
 from grader.authoring.findings import named
 from grader.authoring.lint import Lint, lint, lint_document
 from grader.authoring.round_scales import WELL_READ_MM, Proposal, ends_of, ratio_text
-from grader.cli.commands import new_table
+from grader.cli.app import new_table
 from grader.documents import LintLeast, LintVariant, LintWorst
 from grader.files import write_whole
 from grader.rubric import load_rubric

@@ -10,7 +10,7 @@ import typer
 
 from grader.authoring.lint import lint
 from grader.authoring.round_scales import suggestions
-from grader.cli.commands import check_language, progress
+from grader.cli.app import check_language, progress
 from grader.documents import CalibrationDocument
 from grader.files import write_whole
 from grader.folder.cache import PageCache

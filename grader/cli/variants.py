@@ -12,7 +12,7 @@ import typer
 
 from grader.authoring.variant_checks import broken_findings, broken_variants
 from grader.authoring.variant_table import class_csv
-from grader.cli.commands import check_language, new_table, progress
+from grader.cli.app import check_language, new_table, progress
 from grader.cli.plans import check_crank
 from grader.cycle.quantities import CycleSubject, Extreme, Selection, cycle_csv, extremes, strokes_of
 from grader.files import write_whole
