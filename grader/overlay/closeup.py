@@ -20,7 +20,7 @@ WIDE_TO_HIGH = (1.3, 1.9)
 """Aspects of close-ups that sit well on a page."""
 DETAIL_MARGIN_MM = 8.0
 LEAST_DETAIL_MM = 36.0
-LONG_MM, OFF_BY_LITTLE = 30.0, 0.25
+LONG_MM, LITTLE_SHARE = 30.0, 0.25
 """Of vectors this long that are off by less than this share, only the ends are looked at."""
 SAME_PLACE_MM = 0.05
 CUTS = 64
@@ -105,7 +105,9 @@ def detail(
                 ghost for ghost in picture.scene.ghosts if ghost.name in concerned and ghost.figure == figure
             ),
         )
-        box = _tips_of(part) or _box([*part.arrows, *part.ghosts], part, DETAIL_MARGIN_MM, LEAST_DETAIL_MM)
+        box = _box_of_tips(part) or _box(
+            [*part.arrows, *part.ghosts], part, DETAIL_MARGIN_MM, LEAST_DETAIL_MM
+        )
         if picture.scan and box[2] > MOST_DETAIL_SHARE * part.page_mm[0]:
             return None
         others = [arrow for arrow in _arrows_of(picture.scene, figure) if arrow not in part.arrows]
@@ -115,14 +117,14 @@ def detail(
     return None
 
 
-def _tips_of(part: Scene) -> Box | None:
+def _box_of_tips(part: Scene) -> Box | None:
     """A box around the end of the first vector and where it should be, None where all of it tells more."""
     first = part.arrows[0]
     ends = [arrow for arrow in part.arrows if math.dist(arrow.tip, first.tip) < SAME_PLACE_MM]
     aims = [ghost for ghost in part.ghosts if ghost.name in {arrow.name for arrow in ends}]
     longest = max(arrow.length for arrow in ends)
-    off = max((math.dist(ghost.tip, first.tip) for ghost in aims), default=0.0)
-    if not aims or longest < LONG_MM or off > OFF_BY_LITTLE * longest:
+    residual = max((math.dist(ghost.tip, first.tip) for ghost in aims), default=0.0)
+    if not aims or longest < LONG_MM or residual > LITTLE_SHARE * longest:
         return None
     points = [Ghost("", "", first.tip, ghost.tip) for ghost in aims]
     return _box(points, part, 2 * DETAIL_MARGIN_MM, LEAST_DETAIL_MM)
