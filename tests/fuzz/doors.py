@@ -64,7 +64,8 @@ def enter(door: str, data: bytes) -> str:
         try:
             return _ENTER[door](path)
         except PlanmarkError as error:
-            return f"{error.code}: {' '.join(re.findall(r'[a-z]{4,}', error.message)[:8])}"
+            message = error.message.replace(folder, "")  # its name is another for every file
+            return f"{error.code}: {' '.join(re.findall(r'[a-z]{4,}', message)[:8])}"
 
 
 def _name(door: str, data: bytes) -> str:

@@ -1,0 +1,105 @@
+"""Submissions of which a part is missing: what is judged by the rest, and what is not judged at all."""
+
+import cmath
+import math
+
+import pytest
+
+from grader.comparison.criteria import compare
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.marking.mark import judge
+from grader.records import Figure, ReadVector
+from grader.rubric import CriterionTable
+from reference.authored.toml_file import Text
+from reference.construction.mistakes import Mistake
+from tests.drawn import planned
+from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
+from tests.unit.comparison.rubrics import with_rubric
+from tests.whole_rubric import rubric_for
+
+PUMP, SHAPER = task_for("pump", 7), task_for("shaper", 5)
+
+
+def outcome_of(task, submission, name):
+    return next(one for one in compare(task, submission).outcomes if one.name == name)
+
+
+def test_a_value_with_a_slip_of_its_own_does_not_follow_the_factor_of_all():
+    names = [name for name, vector in PUMP.construction.vectors.items() if vector.scale == "kv"]
+    values = {name: 2.0 * abs(PUMP.real[name]) for name in names}
+    values["v_DC"] *= 3.0
+    reading = without(measured(PUMP), *names)
+    outcomes = {one.name: one for one in compare(PUMP, Submission(measured=reading, values=values)).outcomes}
+    assert outcomes["v_DC"].verdict == "none"
+    assert outcomes["v_D"].verdict == "follow_through"
+
+
+def test_a_link_is_not_judged_without_a_sketch():
+    link = CriterionTable(id="AB", link="AB", points=2.0, title=Text(en="AB"))
+    task = with_rubric(PUMP, criterion=[*PUMP.rubric.criterion, link])
+    assert outcome_of(task, Submission(measured=measured(PUMP)), "AB").verdict == "not_judged"
+    assert outcome_of(task, Submission(readings=(sheet(PUMP),)), "AB").verdict == "full"
+
+
+def test_a_vector_between_two_nodes_that_were_read_is_known_to_be_left_out():
+    whole = judge(PUMP, Submission(readings=(sheet(PUMP),)))
+    part = judge(PUMP, Submission(readings=(without(sheet(PUMP), "v_DC"),)))
+    assert whole.mistakes == ()
+    assert [(one.code, one.at, one.explains) for one in part.mistakes] == [
+        ("vector_missing", "v_DC", ("v_DC",))
+    ]
+
+
+def test_a_scale_of_ones_own_is_open_where_the_vector_that_shows_it_was_not_read():
+    own = 0.7 * rule_scales(PUMP)["kv"]
+    few = [name for name, one in PUMP.construction.vectors.items() if one.scale == "kv" and name != "v_D"]
+    drawn = sheet(PUMP, {**rule_scales(PUMP), "kv": 1.9 * own})
+    declared = {"kv": f"{own!r} (m/s)/mm"}
+    outcome = outcome_of(PUMP, Submission(readings=(without(drawn, *few),), declared=declared), "kv")
+    assert (outcome.verdict, outcome.reasons[0].code) == ("review", "unread")
+
+
+@pytest.mark.parametrize("share", [1.2, 0.8])
+def test_a_coriolis_component_follows_the_own_angular_velocity_where_no_velocity_is_given(share):
+    name = next(name for name, one in SHAPER.construction.vectors.items() if one.part == "c")
+    rate = f"omega_{SHAPER.construction.vectors[name].turning}"
+    velocities = [other for other, one in SHAPER.construction.vectors.items() if one.scale == "kv"]
+    exact = measured(SHAPER)
+    length = share * abs(SHAPER.real[name]) / rule_scales(SHAPER)["ka"]
+    reading = changed(without(exact, *velocities), name, length_mm=length)
+    alone = outcome_of(SHAPER, Submission(measured=reading), name)
+    follows = outcome_of(SHAPER, Submission(measured=reading, values={rate: share * SHAPER.rates[rate]}), name)
+    assert alone.verdict in {"none", "partial"}
+    assert follows.verdict == "follow_through"
+
+
+def test_an_angular_velocity_turns_as_the_own_vector_turns_the_own_link():
+    mistake = Mistake("other_assembly", "B")
+    read = sheet(PUMP, mistakes=(mistake,), turn_deg=20.0)
+    nodes = drawn_nodes(PUMP, mistakes=(mistake,))
+    link, vector = nodes["B"] - nodes["A"], nodes["b"] - nodes["a"]
+    omega = abs(vector) * rule_scales(PUMP)["kv"] / (abs(link) * rule_scales(PUMP)["kL"])
+    sense = math.copysign(1.0, math.sin(cmath.phase(vector) - cmath.phase(link)))
+    rate = next(name for name, one in PUMP.construction.rates.items() if one.vector == "v_BA")
+    for factor, verdicts in ((1.0, {"full", "follow_through"}), (-1.0, {"none"})):
+        submission = Submission(readings=(read,), values={rate: factor * sense * omega})
+        assert outcome_of(PUMP, submission, rate).verdict in verdicts
+
+
+def test_what_is_measured_of_no_known_vector_is_passed_over():
+    reading = changed(measured(PUMP, directions=False), "v_D", length_mm=99.0)
+    plan = reading.figures["velocity_plan"]
+    more = Figure(plan.nodes, {**plan.vectors, "v_XY": ReadVector(50.0, 0.0, None, None, 1.0)})
+    with_it = type(reading)({**reading.figures, "velocity_plan": more})
+    known, unknown = (compare(PUMP, Submission(measured=one)).outcomes for one in (reading, with_it))
+    assert known == unknown
+
+
+def test_of_an_assignment_with_one_variant_no_other_is_named(tmp_path_factory):
+    assignment, plan = planned("yoke", tmp_path_factory.mktemp("one"))
+    task = task_of(assignment, rubric_for("yoke", assignment.file.title, plan.mechanism), plan.variants[0])
+    reading = changed(measured(task), "v_B", length_mm=0.6 * abs(task.real["v_B"]) / rule_scales(task)["kv"])
+    judged = judge(task, Submission(measured=reading))
+    assert {"none", "partial"} & {one.verdict for one in judged.outcomes}
+    assert "other_variant" not in {one.code for one in judged.mistakes}

@@ -1,0 +1,56 @@
+"""Any file at any door: it is taken, or refused with a documented code; nothing else is raised."""
+
+import random
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.fuzz.doors import enter, mutated
+from tests.fuzz.seeds import seeds
+
+DOCUMENTED = "".join(path.read_text("utf-8") for path in (Path(__file__).parents[2] / "docs").glob("*.md"))
+KINDS = {
+    "JPEG": ("pictures", b"\xff\xd8\xff"),
+    "PNG": ("pictures", b"\x89PNG\r\n\x1a\n"),
+    "TIFF": ("pictures", b"II*\x00"),
+    "PDF": ("pictures", b"%PDF-"),
+    "TOML": ("authored", b"schema_version = 1\n"),
+    "CSV of measurements": ("measurements", b"student_id,"),
+    "JSON of measurements": ("measurements", b"{"),
+    "CSV of a class": ("roster", b"student_id,"),
+}
+"""By kind of file: its door, and how such a file begins."""
+EXAMPLES = 25
+"""Of each kind in a run: the whole takes a few seconds."""
+
+
+@cache
+def healthy(kind: str) -> list[bytes]:
+    """Healthy files of the door; those of the very kind where files of it begin alike."""
+    door, head = KINDS[kind]
+    whole = seeds(door)
+    return [data for data in whole if data.startswith(head)] or whole
+
+
+def hand_in(kind: str, data: bytes) -> None:
+    refused = re.match("([a-z_]+): ", enter(KINDS[kind][0], data))
+    assert refused is None or f"`{refused[1]}`" in DOCUMENTED
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=EXAMPLES)
+@given(data=st.binary(max_size=200))
+def test_what_only_begins_like_a_file_is_taken_or_refused(kind, data):
+    hand_in(kind, KINDS[kind][1] + data)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=EXAMPLES)
+@given(seed=st.integers(0, 2**64 - 1))
+def test_a_damaged_file_is_taken_or_refused(kind, seed):
+    dice = random.Random(seed)
+    hand_in(kind, mutated(dice.choice(healthy(kind)), dice.choice(healthy(kind)), dice))
