@@ -1,7 +1,8 @@
-"""What judging a submission leaves behind: structured, without a word in any language.
+"""The results of judging a submission, as data without text in any language.
 
-`comparison` makes an `Outcome` per rubric criterion, `diagnosis` a `NamedMistake` per explanation,
-`scoring` the points; `feedback` turns the `Reason`s into sentences in the student's language.
+`grader.comparison` makes an `Outcome` per rubric criterion, `grader.marking.diagnosis` a `NamedMistake`
+per mistake, `grader.marking.mark` the points; `grader.feedback` turns the `Reason`s into sentences in the
+student's language.
 
 Codes of reasons, with their parameters (numbers in mm, degrees or SI; names as in the assignment):
 
@@ -209,7 +210,7 @@ class Score:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """Everything that marking one submission found."""
+    """All results of marking one submission."""
 
     outcomes: tuple[Outcome, ...]
     mistakes: tuple[NamedMistake, ...]

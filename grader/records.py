@@ -222,7 +222,7 @@ NO_TIPS = Tips(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zer
 
 @dataclass(frozen=True, slots=True)
 class InkMap:
-    """Where there is ink: a coarse map for asking whether something is drawn.
+    """A coarse map of the ink, which shows whether something is drawn.
 
     Attributes
     ----------
@@ -273,7 +273,7 @@ class Letters:
 
 @dataclass(frozen=True, slots=True)
 class Ink:
-    """Everything that was found on a sheet, in millimetres, y down.
+    """All ink of a sheet as shapes, in millimetres, y down.
 
     Attributes
     ----------
@@ -419,7 +419,7 @@ class Backdrop:
 
 @dataclass(frozen=True, slots=True)
 class ScannedPage:
-    """One page and all that is known of it; each step of `grader.pipeline` adds what it finds.
+    """One page with the results of the steps of `grader.pipeline`, each of which adds its own.
 
     Attributes
     ----------

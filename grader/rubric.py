@@ -1,7 +1,7 @@
-"""Rubrics: what is asked for, how many points it gives, and how far a drawing may be off.
+"""Rubrics: what is asked for, the points it gives, and the tolerances.
 
-Everything that judges a student stands here as data: the tolerances on paper and the hand that they
-are widened for, the bands of partial points, what happens with what was not handed in.
+All numbers that judge a student are data of the rubric: the tolerances on paper and the drafting errors
+for which they are widened, the bands of partial points, the verdict on what was not handed in.
 """
 
 import math
@@ -243,7 +243,7 @@ class RubricFile(Authored):
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What is looked for on pages; everything where no figure is named.
+    """The figures and vectors to read on pages; everything where no figure is named.
 
     Attributes
     ----------

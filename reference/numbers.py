@@ -1,7 +1,7 @@
-"""One arithmetic for three kinds of numbers: arrays, Python's own, and many digits.
+"""Functions on three kinds of numbers: arrays, Python's own, and numbers of many digits (mpmath).
 
-The kernels of `reference.kinematics.assur` are written once, with these few functions for what operators do
-not give. A root of a negative number is nan: the figure does not close there.
+With them the closed forms of `reference.kinematics.assur` are written once. A root of a negative number
+is nan: the figure does not close there.
 """
 
 import math
@@ -42,7 +42,7 @@ def nearest(x: Number) -> Number:
 
 
 def _library(x: Number) -> Any:  # noqa: ANN401 - a module, or mpmath's context, which has no types
-    """Whose functions take numbers of this kind, but for Python's own."""
+    """The library whose functions take numbers of this kind (not for Python's own)."""
     return np if isinstance(x, np.ndarray) else _mp()
 
 

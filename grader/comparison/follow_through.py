@@ -245,9 +245,7 @@ class FollowThrough:
         """The propagated drafting error of a vector since the start of the drawing."""
         task, scales = self.task, (self.used["kv"], self.used["ka"])
         key = ("reach", segment.name, abs(along), cmath.phase(along), *scales, self.evidence.has_sheets)
-        if key not in task.cache:
-            task.remember(key, self._uncertainty_of(segment, along))
-        return task.cache[key]  # type: ignore[return-value]
+        return task.cached(key, lambda: self._uncertainty_of(segment, along))
 
     def _uncertainty_of(self, segment: TaskSegment, along: complex) -> EndSpread:
         shifts = self.task.traced(self.used).shifts(segment.tail, segment.head)

@@ -343,13 +343,15 @@ class _Plans:
 def _tried(task: Task, scales: Mapping[str, float]) -> list[tuple[str, _Plans]]:
     """The plans for the right mechanism and for every wrong one."""
     key = ("plans", *(scales[name] for name in SCALE_NAMES))
-    if key not in task.cache:
+
+    def tried() -> list[tuple[str, _Plans]]:
         right = task.at(scales)
         found = [("right", _plans(task.construction, right))]
         found += [("assembly", _plans(one, right)) for one in _other_assemblies(task.construction)]
         found += [("variant", _plans(task.construction, one)) for one in _other_variants(task, scales)]
-        task.remember(key, found)
-    return task.cache[key]  # type: ignore[return-value]
+        return found
+
+    return task.cached(key, tried)
 
 
 def _plans(construction: Construction, parameters: Parameters) -> _Plans:
@@ -368,10 +370,7 @@ def _other_assemblies(construction: Construction) -> list[Construction]:
 
 def _other_variants(task: Task, scales: Mapping[str, float]) -> list[Parameters]:
     """All other variants' data, at the scales given and at their own: arrays over variants."""
-    key = ("variants",)
-    if key not in task.cache:
-        task.remember(key, _variants(task))
-    together: Parameters = task.cache[key]  # type: ignore[assignment]
+    together = task.cached(("variants",), lambda: _variants(task))
     if not together:
         return []
     fixed = {name: np.asarray(scales[name]) for name in SCALE_NAMES}

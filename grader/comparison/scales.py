@@ -114,10 +114,8 @@ def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Sca
             proposed = task.rule_scales["kL"]
             return proposed if _is_confirmed(task, evidence, name, proposed) else shown[0] / shown[1]
     key = ("rule", *known.items())
-    if key not in task.cache:
-        found = task.assignment.scales([task.variant], **known)
-        task.remember(key, float(getattr(found, name)[0]))
-    return task.cache[key]  # type: ignore[return-value]
+    scales = task.cached(key, lambda: task.assignment.scales([task.variant], **known))
+    return float(getattr(scales, name)[0])
 
 
 # What the drawing shows ----------------------------------------------------------------------------

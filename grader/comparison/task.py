@@ -1,8 +1,10 @@
 """The task of one variant: its exact plan, its construction, and the rubric."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import reduce
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -14,6 +16,8 @@ from reference.construction.graph import Construction, evaluate
 from reference.construction.uncertainty import Skill, TracedDrawing, trace
 from reference.mechanism import Crank, Dyad, Mechanism, Slider
 from reference.plan import exact_plan
+
+Made = TypeVar("Made")
 
 UNITS: Mapping[str, str] = {
     "kL": "m/mm",
@@ -135,13 +139,12 @@ class Task:
 
     def nodes(self, scales: Mapping[str, float]) -> Mapping[str, complex]:
         """All nodes at these scales."""
-        key = ("nodes", *(scales[name] for name in SCALE_NAMES))
-        found = self.cache.get(key)
-        if found is None:
-            places = evaluate(self.construction, self.at(scales))
-            found = {name: complex(np.ravel(node)[0]) for name, node in places.items()}
-            self.remember(key, found)
-        return found  # type: ignore[return-value]
+
+        def evaluated() -> Mapping[str, complex]:
+            nodes = evaluate(self.construction, self.at(scales))
+            return {name: complex(np.ravel(node)[0]) for name, node in nodes.items()}
+
+        return self.cached(("nodes", *(scales[name] for name in SCALE_NAMES)), evaluated)
 
     def traced(self, scales: Mapping[str, float]) -> TracedDrawing:
         """The whole drawing with its propagated drafting errors, at these scales.
@@ -149,29 +152,25 @@ class Task:
         The sketch is at the rule's scale: its size hardly changes the errors of the plans.
         """
         key = ("traced", scales["kv"], scales["ka"], self.skill)
-        found = self.cache.get(key)
-        if found is None:
-            rule = {**scales, "kL": float(self.parameters["kL"])}
-            found = trace(self.construction, self.at(rule), self.skill)
-            self.remember(key, found)
-        return found  # type: ignore[return-value]
+        rule = {**scales, "kL": float(self.parameters["kL"])}
+        return self.cached(key, lambda: trace(self.construction, self.at(rule), self.skill))
 
     @property
     def by_similarity(self) -> Construction:
         """The construction with every image of a plate's point found by similarity."""
-        found = self.cache.get(("by similarity",))
-        if found is None:
-            found = self.construction
-            for image in self.construction.images.values():
-                found = found.with_step(image)
-            self.remember(("by similarity",), found)
-        return found  # type: ignore[return-value]
+        images = self.construction.images.values()
+        return self.cached(
+            ("by similarity",), lambda: reduce(Construction.with_step, images, self.construction)
+        )
 
-    def remember(self, key: tuple[object, ...], found: object) -> None:
-        """Put a result into the cache, under everything on which it depends."""
-        if len(self.cache) >= CACHE_SIZE:
-            self.cache.clear()
-        self.cache[key] = found
+    def cached(self, key: tuple[object, ...], make: Callable[[], Made]) -> Made:
+        """A result from the cache, or made now; `key` holds everything on which it depends."""
+        if key not in self.cache:
+            made = make()
+            if len(self.cache) >= CACHE_SIZE:
+                self.cache.clear()
+            self.cache[key] = made
+        return cast("Made", self.cache[key])
 
 
 _tasks: deque[Task] = deque(maxlen=TASK_CACHE_SIZE)

@@ -23,7 +23,7 @@ from grader.feedback.sentences import HINTS, PLACES, Level, place
 from grader.feedback.words import ProblemText, environment, problem_sentence, score_text
 from grader.files import write_whole
 from grader.language import N_, Tongue, tongue
-from grader.overlay.closeup import Look, detail, looks_at, scan_element, svg
+from grader.overlay.closeup import PageView, detail, page_views, scan_element, svg
 from grader.overlay.scene import COLOURS, Picture
 from reference.drawing.subject import SCALE_UNITS
 
@@ -89,7 +89,7 @@ class Action:
     alternatives: tuple[str, ...] = ()
     redo: tuple[str, ...] = ()
     explains: tuple[str, ...] = ()
-    look: Look | None = None
+    view: PageView | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,14 +207,14 @@ class StudentPage:
 
     @property
     def scans(self) -> list[Markup]:
-        """Each scan once, to be shown by its name in every look at it."""
+        """Each scan once; every view of it shows it by its name."""
         return [scan_element(picture, index) for index, picture in enumerate(self.pictures)]
 
     @property
-    def sheets(self) -> list[tuple[str, list[Look]]]:
-        """Each page: what it is, and the looks at it."""
+    def sheets(self) -> list[tuple[str, list[PageView]]]:
+        """Each page: its name, and the views of it."""
         return [
-            (self._source(picture), looks_at(picture, index, self.about.names))
+            (self._source(picture), page_views(picture, index, self.about.names))
             for index, picture in enumerate(self.pictures)
         ]
 
@@ -228,29 +228,29 @@ class StudentPage:
         """Whether any expected vector is drawn."""
         return any(picture.scene.ghosts for picture in self.pictures)
 
-    def draw(self, look: Look) -> Markup:
-        """A look as an element of the page."""
-        return svg(look, self.pictures[look.picture], self.description(look))
+    def draw(self, view: PageView) -> Markup:
+        """A view as an element of the page."""
+        return svg(view, self.pictures[view.picture], self.description(view))
 
-    def description(self, look: Look) -> str:
-        """What is seen in a look, in words: for those who do not see it."""
+    def description(self, view: PageView) -> str:
+        """The description of a view in words, for readers who cannot see it."""
         verdicts = {
             criterion.drawn: self.speaker.gettext(words.VERDICTS[criterion.verdict])
             for criterion in self.criteria
         }
-        parts = (f"{name}: {verdicts[name]}" for name in look.names if name in verdicts)
-        return f"{self._caption(look)}. {'; '.join(parts)}".rstrip(". ")
+        parts = (f"{name}: {verdicts[name]}" for name in view.names if name in verdicts)
+        return f"{self._caption(view)}. {'; '.join(parts)}".rstrip(". ")
 
-    def below(self, look: Look) -> Markup:
-        """The caption as it stands below a look: of a detail, with what is named in it."""
-        caption = self._caption(look)
+    def below(self, view: PageView) -> Markup:
+        """The caption below a view; of a detail with the names in it."""
+        caption = self._caption(view)
         said = Markup.escape(caption[:1].upper() + caption[1:])
-        if look.kind != "detail" or not look.names:
+        if view.kind != "detail" or not view.names:
             return said
-        return Markup("{}: {}").format(said, Markup(", ").join(map(words.symbols, look.names)))
+        return Markup("{}: {}").format(said, Markup(", ").join(map(words.symbols, view.names)))
 
-    def _caption(self, look: Look) -> str:
-        return self.speaker.gettext({**PLACES, "sheet": SHEET, "detail": DETAIL}[look.kind])
+    def _caption(self, view: PageView) -> str:
+        return self.speaker.gettext({**PLACES, "sheet": SHEET, "detail": DETAIL}[view.kind])
 
     def _source(self, picture: Picture) -> str:
         """Which page of which file it is, and for instructors how its millimetres were found."""
@@ -265,7 +265,7 @@ class StudentPage:
                 return f"{page} · {method}, ±{self.speaker.quantity(sheet.residual_mm, 2, 'mm')}"
         return page
 
-    def _detail(self, concerned: AbstractSet[str]) -> Look | None:
+    def _detail(self, concerned: AbstractSet[str]) -> PageView | None:
         return detail(self.pictures, concerned, self.about.names)
 
     # What to put right ----------------------------------------------------------------------------
@@ -304,7 +304,7 @@ class StudentPage:
             alternatives=tuple(rival.feedback for rival in mistake.rivals if rival.feedback),
             redo=tuple(mistake.redo),
             explains=tuple(criteria[name].title if name in criteria else name for name in mistake.explains),
-            look=self._detail(off),
+            view=self._detail(off),
         )
 
     def _others(self, criteria: Sequence[CriterionDocument]) -> Action:
@@ -313,7 +313,7 @@ class StudentPage:
         first = {one.drawn for one in drawn if (one.vector or "")[:1] == (drawn[0].vector or "")[:1]}
         say = self.speaker.gettext
         titles = tuple(criterion.title for criterion in criteria)
-        return Action(say(OTHERS), "", say(OTHERS_SAID), explains=titles, look=self._detail(first))
+        return Action(say(OTHERS), "", say(OTHERS_SAID), explains=titles, view=self._detail(first))
 
     # What waits for a person ----------------------------------------------------------------------
 
@@ -327,15 +327,15 @@ class StudentPage:
         return [(self.speaker.gettext(WAITING[why]), names) for why, names in groups.items()]
 
     @property
-    def waiting_looks(self) -> list[Look]:
-        """A closer look at some of what waits; vectors that meet are seen in one."""
+    def waiting_views(self) -> list[PageView]:
+        """Details of some of what waits for a person; vectors that meet are in one detail."""
         names = [criterion.drawn for criterion in self._open if criterion.drawn]
-        looks: list[Look] = []
+        views: list[PageView] = []
         for name in names:
-            if len(looks) < MOST_WAITING_DETAILS and not any(name in look.names for look in looks):
-                look = self._detail(_near(name, names, self.pictures))
-                looks += [look] if look is not None else []
-        return looks
+            if len(views) < MOST_WAITING_DETAILS and not any(name in view.names for view in views):
+                view = self._detail(_near(name, names, self.pictures))
+                views += [view] if view is not None else []
+        return views
 
     @property
     def _open(self) -> Iterator[CriterionDocument]:

@@ -20,7 +20,7 @@ WIDE_TO_HIGH = (1.3, 1.9)
 """Aspects of close-ups that sit well on a page."""
 DETAIL_MARGIN_MM = 8.0
 LEAST_DETAIL_MM = 36.0
-LONG_MM, OFF_BY_LITTLE = 30.0, 0.25
+LONG_MM, LITTLE_SHARE = 30.0, 0.25
 """Of vectors this long that are off by less than this share, only the ends are looked at."""
 SAME_PLACE_MM = 0.05
 CUTS = 64
@@ -37,8 +37,8 @@ _NO_NAMES: Mapping[str, str] = {}
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
-    """One look at a page.
+class PageView:
+    """A part of a page, or all of it, with its marks.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Look:
     names: tuple[str, ...]
 
 
-def looks_at(picture: Picture, index: int, names: Mapping[str, str] = _NO_NAMES) -> list[Look]:
+def page_views(picture: Picture, index: int, names: Mapping[str, str] = _NO_NAMES) -> list[PageView]:
     """The whole sheet, then each plan that is small on it close up; `names` as students know them."""
     scene = picture.scene
     close_ups = {
@@ -75,23 +75,23 @@ def looks_at(picture: Picture, index: int, names: Mapping[str, str] = _NO_NAMES)
     named = [arrow for arrow in scene.arrows if arrow.figure not in close_ups and arrow.is_named]
     layers = _marks(scene, whole, WHOLE_SIZE_PER_MM, named, names)
     return [
-        Look("sheet", index, whole, layers, tuple(arrow.name for arrow in named)),
+        PageView("sheet", index, whole, layers, tuple(arrow.name for arrow in named)),
         *(_plan(scene, index, figure, box, names) for figure, box in close_ups.items()),
     ]
 
 
-def _plan(scene: Scene, index: int, figure: str, box: Box, names: Mapping[str, str]) -> Look:
+def _plan(scene: Scene, index: int, figure: str, box: Box, names: Mapping[str, str]) -> PageView:
     part = _part(scene, figure)
     layers = _marks(part, box, CLOSE_UP_SIZE_PER_MM, part.arrows, names)
-    return Look(figure, index, box, layers, tuple(arrow.name for arrow in part.arrows))
+    return PageView(figure, index, box, layers, tuple(arrow.name for arrow in part.arrows))
 
 
 def detail(
     pictures: Collection[Picture], concerned: AbstractSet[str], names: Mapping[str, str] = _NO_NAMES
-) -> Look | None:
-    """A look at some vectors and what was expected of them; None where none of them is drawn.
+) -> PageView | None:
+    """A view of some vectors and the expected ones; None where none of them is drawn.
 
-    Long vectors that are off by little are looked at where the first of them ends.
+    Of long vectors with a small error it shows the end of the first.
     """
     for index, picture in enumerate(pictures):
         arrows = [arrow for arrow in picture.scene.arrows if arrow.name in concerned]
@@ -105,24 +105,26 @@ def detail(
                 ghost for ghost in picture.scene.ghosts if ghost.name in concerned and ghost.figure == figure
             ),
         )
-        box = _tips_of(part) or _box([*part.arrows, *part.ghosts], part, DETAIL_MARGIN_MM, LEAST_DETAIL_MM)
+        box = _box_of_tips(part) or _box(
+            [*part.arrows, *part.ghosts], part, DETAIL_MARGIN_MM, LEAST_DETAIL_MM
+        )
         if picture.scan and box[2] > MOST_DETAIL_SHARE * part.page_mm[0]:
             return None
         others = [arrow for arrow in _arrows_of(picture.scene, figure) if arrow not in part.arrows]
         named = [cut for arrow in part.arrows if (cut := _within(arrow, box)) is not None]
         layers = _marks(part, box, DETAIL_SIZE_PER_MM, named, names, others)
-        return Look("detail", index, box, layers, tuple(arrow.name for arrow in named))
+        return PageView("detail", index, box, layers, tuple(arrow.name for arrow in named))
     return None
 
 
-def _tips_of(part: Scene) -> Box | None:
+def _box_of_tips(part: Scene) -> Box | None:
     """A box around the end of the first vector and where it should be, None where all of it tells more."""
     first = part.arrows[0]
     ends = [arrow for arrow in part.arrows if math.dist(arrow.tip, first.tip) < SAME_PLACE_MM]
     aims = [ghost for ghost in part.ghosts if ghost.name in {arrow.name for arrow in ends}]
     longest = max(arrow.length for arrow in ends)
-    off = max((math.dist(ghost.tip, first.tip) for ghost in aims), default=0.0)
-    if not aims or longest < LONG_MM or off > OFF_BY_LITTLE * longest:
+    residual = max((math.dist(ghost.tip, first.tip) for ghost in aims), default=0.0)
+    if not aims or longest < LONG_MM or residual > LITTLE_SHARE * longest:
         return None
     points = [Ghost("", "", first.tip, ghost.tip) for ghost in aims]
     return _box(points, part, 2 * DETAIL_MARGIN_MM, LEAST_DETAIL_MM)
@@ -193,7 +195,7 @@ def _marks(
 
 
 def scan_element(picture: Picture, index: int) -> Markup:
-    """The scan itself, to be shown by its name in every look at the page; empty where there is none."""
+    """The scan itself, which every view of the page shows by its name; empty where there is none."""
     if not picture.scan:
         return Markup("")
     width, height = picture.scene.page_mm
@@ -204,17 +206,17 @@ def scan_element(picture: Picture, index: int) -> Markup:
     ).format(index, width, height, kind, base64.b64encode(picture.scan).decode("ascii"))
 
 
-def svg(look: Look, picture: Picture, description: str) -> Markup:
-    """A look; `description` says in words what is seen. The scan is taken from the page's `scan_element`."""
-    image = Markup('<use href="#scan-{}"/>').format(look.picture) if picture.scan else Markup("")
+def svg(view: PageView, picture: Picture, description: str) -> Markup:
+    """A view as SVG; `description` is its text. The scan is taken from the page's `scan_element`."""
+    image = Markup('<use href="#scan-{}"/>').format(view.picture) if picture.scan else Markup("")
     return Markup(
         '<svg class="sheet" viewBox="{:.1f} {:.1f} {:.1f} {:.1f}" role="img" aria-label="{}"'
         ' font-family="{}">{}<g class="marks">{}</g></svg>'
-    ).format(*look.box, description, FONTS, image, Markup("").join(_elements(look)))
+    ).format(*view.box, description, FONTS, image, Markup("").join(_elements(view)))
 
 
-def _elements(look: Look) -> Iterator[Markup]:
-    for layer in look.layers:
+def _elements(view: PageView) -> Iterator[Markup]:
+    for layer in view.layers:
         shapes = Markup("".join(elements(layer.shapes)))  # noqa: S704 - written by the canvas
         opaque = layer.opacity == 1.0
         yield shapes if opaque else Markup('<g opacity="{:g}">{}</g>').format(layer.opacity, shapes)

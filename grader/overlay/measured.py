@@ -1,6 +1,6 @@
 """Plans as a student measured them: drawn from the entered lengths and directions, without a scan.
 
-Each vector starts where the others lead to, from the pole on; so what does not close is seen. A length
+Each vector starts at the end of the one before it, from the pole on, so that gaps are visible. A length
 without a direction can only be drawn along the expected direction, where that may be shown.
 """
 
@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from grader.outcomes import Outcome
 from grader.overlay.scene import (
+    HAS_GHOST,
     LEAST_ARROW_MM,
-    OFF,
     XY,
     Arrow,
     Dot,
@@ -87,7 +87,7 @@ def _plan(
     ghosts = tuple(
         ghost_of(arrow, vector)
         for arrow in arrows
-        if arrow.verdict in OFF and (vector := expected.get(arrow.name)) is not None
+        if arrow.verdict in HAS_GHOST and (vector := expected.get(arrow.name)) is not None
     )
     dots = tuple(
         Dot(name, on_paper(place), doubtful=False, lettered=True, figure=figure)

@@ -73,7 +73,7 @@ GHOST_DASH_MM = (0.35, 1.0)
 GHOST_WIDTH_MM = 0.5
 """Expected vectors are dotted."""
 NODE_COLOUR = "#24303c"
-OFF = frozenset({"none", "partial", "review"})
+HAS_GHOST = frozenset({"none", "partial", "review"})
 """Verdicts of vectors that have a ghost."""
 
 
@@ -230,10 +230,10 @@ def _links(
 
 
 def _ghosts(arrows: list[Arrow], outcomes: Mapping[str, Outcome]) -> Iterator[Ghost]:
-    """What was expected of the vectors that are off, or wait for a person."""
+    """The expected vectors beside those that are wrong or wait for a person."""
     for arrow in arrows:
         expected = expected_vector(outcomes.get(arrow.name))
-        if arrow.verdict in OFF and expected is not None:
+        if arrow.verdict in HAS_GHOST and expected is not None:
             yield ghost_of(arrow, expected)
 
 
@@ -304,9 +304,9 @@ class ArrowLabel:
 def labels_of(
     arrows: Sequence[Arrow], within: Box, size: float = 1.0, names: Mapping[str, str] = _NO_NAMES
 ) -> list[ArrowLabel]:
-    """A place for each arrow's mark and name; `size` 1 suits a whole sheet, less a close-up.
+    """The position of each arrow's mark and name; `size` 1 suits a whole sheet, less a close-up.
 
-    Greedy, long arrows first: each label takes the cheapest of its places.
+    Greedy, long arrows first: each label takes the cheapest of its candidates.
     """
     taken = np.zeros((0, 4))
     labels = []
@@ -314,7 +314,7 @@ def labels_of(
         others = np.array([(*one.tail, *one.tip, 0.0) for one in arrows if one is not arrow]).reshape(-1, 5)
         text = pieces_of(names.get(arrow.name, arrow.name))
         wide = BADGE_MM + 1.0 + BOLD_SHARE * width_of(text, NAME_MM)
-        far, boxes = _places(arrow, within, size, wide)
+        far, boxes = _candidates(arrow, within, size, wide)
         corners = np.hstack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
         crossed = lengths_inside(corners, others, clear=0.0).sum(axis=1)
         crowded = OVERLAP_COST * _overlaps(boxes, taken) + CROSSING_COST * crossed
@@ -325,8 +325,8 @@ def labels_of(
     return labels
 
 
-def _places(arrow: Arrow, within: Box, size: float, wide_mm: float) -> tuple[FloatArray, FloatArray]:
-    """What each place costs by its distance, (p,), and the places, (p, 4): x, y, width, height."""
+def _candidates(arrow: Arrow, within: Box, size: float, wide_mm: float) -> tuple[FloatArray, FloatArray]:
+    """Costs of a label's candidates by their distance, (p,), and the boxes, (p, 4): x, y, width, height."""
     box = size * np.array([wide_mm, LABEL_HEIGHT_MM + 0.6])
     tail, along = np.array(arrow.tail), np.array([1.0, 0.0])
     step = np.array(arrow.tip) - tail

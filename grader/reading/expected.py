@@ -1,4 +1,4 @@
-"""What can be expected on a sheet: figures, hypotheses of mistakes, and poses of a figure on the strokes."""
+"""Expected figures with their errors, hypotheses of mistakes, and poses of a figure among the strokes."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -285,13 +285,13 @@ def resized(drawing: Drawing, figure: str, size: float) -> dict[str, FloatArray]
 # Poses of a figure among the strokes ---------------------------------------------------------------
 
 RESIDUAL_MM = 1.6
-"""How far strokes may lie off a figure that is placed roughly: a few drafting errors."""
+"""Standard residual of strokes at a roughly placed figure: a few drafting errors."""
 RESIDUAL_PER_MM = 0.03
-"""The same for each mm from where it was laid on: a degree of turn, and scale."""
+"""The same for each mm from where the figure was aligned: a degree of turn, and scale."""
 HIGHEST_WEIGHT_MM = 40.0
 """Longer edges count no more than this: one long stroke must not decide alone."""
 LEAST_EDGE_MM = 8.0
-"""Shorter edges are laid on letters and arrowheads as well."""
+"""Shorter edges fit letters and arrowheads as well."""
 OVERRUN_MM = 25.0
 """How much longer a stroke may be than its edge: lines run on past nodes."""
 PROPOSING_EDGES = 4
@@ -299,7 +299,7 @@ PROPOSING_EDGES = 4
 SHORT_LIST = 60
 """Poses judged by all edges, by the rough score: the right one is far up."""
 SAME_POSE_MM = 4.0
-"""Poses that move no node by more are one."""
+"""Poses that differ at no node by more than this are the same."""
 PAIRS = 1 << 13
 """Of segments and strokes compared at a time: their arrays stay in a processor's own cache."""
 FARTHEST_SQUARED = 1500.0
@@ -426,7 +426,7 @@ def _support(lines: Lines, tail: ComplexArray, head: ComplexArray, sigma: FloatA
 
 
 def _apart(proposed: FloatArray, scores: FloatArray, radius: float, count: int) -> list[Pose]:
-    """The best proposals that are not the same pose again."""
+    """The best proposals with different poses."""
     chosen: list[int] = []
     origin = proposed[:, 0] + 1j * proposed[:, 1]
     spin = proposed[:, 2] * np.exp(1j * proposed[:, 3])

@@ -1,10 +1,10 @@
-"""What the letters beside a figure's nodes say of the names that the construction gave to them.
+"""Letters beside a figure's nodes as evidence for the nodes' names.
 
-A letter is written a few millimetres off its node, mostly nearer to it than to any other: each piece of
-writing is, with some probability, the label of each node about it, or of none. The likelihoods of the
-writing under the names as read, under two of them swapped, and under names at random show whether the
-letters confirm a name. They are evidence beside the strokes: students swap letters, and pieces of
-strokes look like letters.
+A letter is written a few millimetres from its node, mostly nearer to it than to any other: each piece of
+writing is, with some probability, the label of each node near it, or of none. The likelihoods of the
+writing under the names as read, with two of them swapped, and under random names show whether the
+letters confirm a name. Letters do not replace the strokes: students swap letters, and pieces of strokes
+look like letters.
 """
 
 import math
@@ -33,7 +33,7 @@ RARE_NATS = 5.0
 PRIOR_OF_SWAP = 1.0 / (1.0 + math.exp(RARE_NATS))
 """Probability of a swap before letters are considered: the confidences hold with it."""
 REPORTED = 0.5
-"""Probability from which a swap is reported; what it is used for is another stage's choice."""
+"""Probability from which a swap is reported."""
 COMPONENTS = ("n_", "k_")
 """How names of ends of normal and Coriolis components begin: few write them, and they share a letter."""
 POLE_SIGNS = ("o", "p", "π")

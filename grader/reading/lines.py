@@ -16,7 +16,7 @@ from reference.geometry import ComplexArray
 LEAST_MM = 1.2
 """Shorter strokes are left out: dots, serifs, sides of arrowheads."""
 SE_OFFSET_MM = 0.04
-"""No line of ink is known better: paper and pen are not ideal."""
+"""Least standard error of a line: paper and pen are not ideal."""
 CLEAR_END_MM, HIDDEN_END_MM = 0.2, 1.0
 """Standard error of a stroke's end, clear or hidden in other ink. The error that the ink stage states is
 mostly the part for strokes that run on past nodes, which is modelled separately."""
@@ -25,15 +25,15 @@ HIDDEN = 1.8
 LONG_MM = 12.0
 """Longer strokes show how much ink the pen leaves: they are no letters."""
 ENOUGH = 6
-"""With fewer long strokes nothing is said of thin ones."""
+"""With fewer long strokes no stroke is called thin."""
 THIN = 0.62
 """Share of the usual ink per length below which a stroke is a construction line."""
 MOST_PIECES = 5
 """A chain of more pieces is a dashed line, which is no vector."""
 JOINABLE_MM = 4.0
 """Shorter pieces have no direction that is good enough to extend them."""
-JOIN_OFF_MM = 0.45
-"""How far a piece's ends may lie off the line that it continues: a pencil line's width."""
+JOIN_OFFSET_MM = 0.45
+"""Largest distance of a piece's ends from the line that it continues: a pencil line's width."""
 JOIN_GAP_MM = 14.0
 """The widest gap: a label or another figure's strokes over the line."""
 JOIN_TURN_RAD = 0.03
@@ -274,7 +274,7 @@ def _continues(single: Lines, rows: IntArray, others: IntArray) -> BoolArray:
     """(r, n) whether each of the `others` lies on the line of each of the `rows` and goes on from it."""
     start, along, length = single.start[rows, None], single.along[rows, None], single.length[rows, None]
     turn = np.abs((along * np.conj(single.along[others])).imag)
-    near = turn < JOIN_TURN_RAD + np.minimum(JOIN_OFF_MM / single.length[others], 0.05)
+    near = turn < JOIN_TURN_RAD + np.minimum(JOIN_OFFSET_MM / single.length[others], 0.05)
     relative_start = (single.start[others] - start) * np.conj(along)
     relative_end = (single.end[others] - start) * np.conj(along)
     residual = np.maximum(np.abs(relative_start.imag), np.abs(relative_end.imag))
@@ -284,4 +284,4 @@ def _continues(single: Lines, rows: IntArray, others: IntArray) -> BoolArray:
     # The longer stroke's line decides, the shorter must lie on it.
     shorter = single.length[others] <= length
     beyond = np.maximum(high - length, -low) > JOIN_BEYOND_MM
-    return np.asarray(near & shorter & (residual < JOIN_OFF_MM) & (gap < JOIN_GAP_MM) & beyond)
+    return np.asarray(near & shorter & (residual < JOIN_OFFSET_MM) & (gap < JOIN_GAP_MM) & beyond)

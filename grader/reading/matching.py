@@ -11,9 +11,9 @@ from grader.records import FloatArray, IntArray
 from reference.geometry import ComplexArray
 
 REDRAW_MM = 0.3
-"""How far a stroke misses the nodes that it joins, one standard error."""
+"""Standard error of a stroke's distance from the nodes that it joins."""
 SHARED_MM = 0.4
-"""The same in addition where it serves two edges, that lie this near to each other."""
+"""Added to it where one stroke serves two edges."""
 END_MM, END_SHARE = 0.3, 0.4
 """Of the ink's end as the mark of a node: standard error along, and share of vectors that end with it."""
 RUN_ON_FAR = 4e-4
@@ -24,7 +24,7 @@ UNKNOWN_MM = 1e5
 
 @dataclass(frozen=True, slots=True)
 class EndPrior:
-    """How strokes end at nodes: shares of ends at, beyond and short of the node, and how far off they are."""
+    """How strokes end at nodes: shares of ends at, beyond and short of the node, and their distances."""
 
     at_mm: float = 0.3
     at_share: float = 0.57
@@ -265,7 +265,7 @@ LITTLE_COMMON = 0.4
 BAND_MM = 0.3
 """How far from the middle of a band of ink either of two lines in it may lie."""
 SHARED_RADIUS2_MM2 = 1.0
-"""Two edges share one stroke where their lines lie within about half a millimetre of each other."""
+"""Two edges share one stroke where their lines are within about half a millimetre of each other."""
 CHANCE_RADIUS_MM = 8.0
 """Strokes are counted at least this far about an edge: letters and arrowheads crowd about nodes."""
 

@@ -14,25 +14,25 @@ from reference.geometry import ComplexArray
 ROUNDS = 6
 """Of the fit, each with half a step of the ends' moments."""
 LEAST_REDRAW_MM, MOST_REDRAW_MM = 0.12, 0.6
-"""Bounds of how far strokes miss nodes on a sheet: a sharp pencil, and a careless student."""
+"""Bounds of the redraw error, a stroke's distance from its nodes: a sharp pencil, a careless student."""
 USUAL_REDRAW_MM = 0.25
-"""How far strokes miss nodes as long as nothing is known of the sheet."""
+"""The redraw error as long as nothing is known of the sheet."""
 REDRAW_WEIGHT = 4.0
 """The usual redraw error counts as much as this many spare observations."""
 SHARED_MM = 0.5
-"""How far a stroke that serves two edges may miss their nodes."""
+"""Standard error of a stroke that serves two edges, as a distance from their nodes."""
 WIDE_MM = 0.7
-"""An end's density that is wider than this has several humps, whose mean lies where no end is likely."""
+"""An end's density that is wider than this has several maxima, and its mean lies between them."""
 AT_MM = 0.2
-"""How far a stroke that ends at its node ends from it, beside the error of its end in the ink."""
+"""Standard error of an end at its node, beside the error of the end in the ink."""
 HIDDEN_MM = 0.5
 """Standard errors above this say that other ink goes on beyond the end."""
 END_REACH_MM = 5.0
 """An end that is farther from a node is not about it."""
 CENTRE_MM = 0.2
-"""How far the centre of a circle drawn around a node is off it."""
+"""Standard error of a node by the centre of the circle drawn around it."""
 SUREST = 0.97
-"""The most that tips near a node may say together: any of them may be a letter's stroke."""
+"""Largest probability of all tips near a node together: any of them may be a letter's stroke."""
 TIP_REACH_MM = 3.5
 """A tip that is farther from a node is not about it."""
 THROUGH = 0.02
@@ -42,10 +42,10 @@ TIED_MM = 0.02
 BUNDLE_COSINE = 0.87
 """Of 30 degrees: strokes at less lie on one another for 1 mm and more from their node."""
 SPREAD = 0.7
-"""Standard errors beside those of the model: with it, errors of lengths read rightly have a root mean
-square of 0.8 to 0.95 of their standard errors on sheets drawn by two simulations."""
+"""Factor of the model's standard errors: with it, errors of rightly read lengths have a root mean square of
+0.8 to 0.95 of their standard errors on sheets drawn by two simulations."""
 LOOSE_MM = 6.0
-"""Standard error of the prior that keeps nodes without strokes from running away: it decides nothing else."""
+"""Standard error of the prior, which is needed only for nodes without strokes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class EndDensity:
 
     Attributes
     ----------
-    at_mm : how far a stroke that ends at its node ends from it
+    at_mm : standard error of an end at its node
     shares : of ends at the node, run on a little, run on far, and short of it
     reach_mm : mean lengths of the last three
     merged_shares, merged_reach_mm : the same two where other ink hides the end
@@ -100,7 +100,7 @@ class NodeFit:
     Attributes
     ----------
     at, cov : (n,) complex mm and (2n, 2n) covariance
-    redraw_mm : how far strokes miss their nodes on this figure
+    redraw_mm : standard error of strokes as a distance from their nodes, on this figure
     residual_mm : (edges, 2) distance of the tail and the head from the edge's stroke, nan without one
     """
 
@@ -129,7 +129,7 @@ class _Taken:
 class _LineRows:
     """Observations (r,): a node lies on a stroke's line: `design` @ nodes should equal `goal`, to `sigma` mm.
 
-    `own` where the stroke is this edge's alone: then it also misses its nodes by the redraw error.
+    `own` where the stroke is this edge's alone: then the redraw error is added.
     """
 
     design: FloatArray
@@ -155,7 +155,7 @@ class _EndRows:
 
 @dataclass(frozen=True, slots=True)
 class _Sites:
-    """The Gaussian that stands for each end's density: its precision, and precision times place."""
+    """The Gaussian that replaces each end's density: its precision, and precision times mean."""
 
     precision: FloatArray
     pull: FloatArray
@@ -211,7 +211,7 @@ def _repeated(ends: _EndRows) -> FloatArray:
 
 
 def _redraw(residual_mm: FloatArray, unknowns: int) -> float:
-    """How far strokes miss nodes here, mm, from the residuals beyond the unknowns."""
+    """The redraw error of this figure, mm, from the residuals beyond the unknowns."""
     spare = len(residual_mm) - unknowns
     if spare <= 0:
         return USUAL_REDRAW_MM
@@ -300,7 +300,7 @@ def _line_rows(assignment: StrokeAssignment, taken: _Taken, centres: Mapping[int
 
 
 def _both_axes(nodes: IntArray, count: int) -> FloatArray:
-    """As `_design`, along x and along y of each node in turn."""
+    """(2r, 2n) rows that give the coordinates of nodes, along x and along y of each node in turn."""
     return _design(np.repeat(nodes, 2), np.tile([1.0 + 0j, 1j], len(nodes)), count)
 
 

@@ -51,7 +51,7 @@ POOR = 0.7
 CLEARLY = 0.08
 """Share of the length by which a mistaken plan must be supported better to be laid elsewhere."""
 BEAM_OF_MISTAKES = 4
-"""Enough where all that the mistake does not touch is fixed."""
+"""Beam of the search where all vectors that the mistake does not affect are fixed."""
 SMALLEST_MM, LARGEST_MM = 20.0, 280.0
 LEAST_FIRST_MM = 15.0
 """Of a plan's longest vector, and of its first one: what fits on a sheet and can be measured."""
@@ -60,13 +60,13 @@ LEAST_LAID_MM = 4.0
 SPECK_MM = 1e-6
 """A plan no larger is a point: there is nothing to lay."""
 FARTHEST_MM = 2000.0
-"""Nodes farther off are on no sheet, at any scale: with a mistake made, lines may be nearly parallel."""
+"""Nodes farther away are on no sheet: with a mistake, lines may be nearly parallel."""
 VAGUE_MM = 500.0
-"""Nodes that drafting errors move this far cannot be found: lines meet there at next to no angle."""
+"""Nodes with a larger standard error cannot be found: their lines are nearly parallel."""
 WORSE = 0.3
 """Poses supported by this much less of the plan's length are not examined."""
 LEAST_VISIBLE_MM = 2.5
-"""A shorter vector has no stroke that could be missed."""
+"""A shorter vector may have no stroke of its own."""
 LONG_MM = 8.0
 """A vector that is too long to be overlooked."""
 RIVALS = 25
@@ -87,7 +87,7 @@ MARGIN_MM = 12.0
 
 @dataclass(frozen=True, slots=True)
 class PlanProblem:
-    """What a plan is read from.
+    """The data from which a plan is read.
 
     Attributes
     ----------
@@ -206,7 +206,7 @@ def _poses(expected: Expected, lines: Lines, count: int = 2) -> list[Pose]:
 
 
 def _better_poses(expected: Expected, lines: Lines, than: Pose) -> list[Pose]:
-    """Where a mistaken plan finds clearly more of its length drawn than the regular one did."""
+    """Poses at which a mistaken plan has clearly more support by strokes than the regular one."""
     search = Search(turns_rad=tuple({0.0, than.turn_rad}), sizes=tuple({1.0, than.size}))
     laid = poses(expected, lines.take(lines.length > LEAST_LAID_MM), search, count=2)
     return [pose for pose in laid if pose.score > than.score + CLEARLY]
@@ -249,7 +249,7 @@ def _with_mistakes(
 
 
 def _suspects(plan: PlanReading) -> frozenset[str]:
-    """The nodes at which a mistake could explain what the plan's hypothesis does not."""
+    """The nodes at which a mistake could explain edges without a stroke, and large residuals."""
     fit, expected = plan.fit(), plan.assignment.expected
     odd: set[str] = set()
     for index, edge in enumerate(expected.edges):

@@ -1,4 +1,4 @@
-"""Figures of a sheet read: strokes in millimetres to named vectors with standard errors."""
+"""The reading of a student's sheets: from strokes in millimetres to named vectors with standard errors."""
 
 import cmath
 import math
@@ -33,9 +33,9 @@ from reference.geometry import ComplexArray
 
 LEAST_SKETCH = 15.0
 LEAST_PLAN = 12.0
-"""Nats: what less is explained by may be chance."""
+"""Nats: a figure with a smaller score may be chance."""
 SURE_PLAN = 40.0
-"""Nats from which a plan's strokes are no other plan's."""
+"""Nats from which a plan's strokes belong to no other plan."""
 CLEAR = 0.85
 """A regular plan supported over more of its length is on that sheet, and on no other."""
 LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
@@ -50,7 +50,7 @@ Nodes = dict[str, ComplexArray]
 
 @dataclass(slots=True)
 class _PageReading:
-    """What is read on one sheet so far."""
+    """The figures read on one sheet so far."""
 
     lines: Lines
     ink: Ink
@@ -157,7 +157,7 @@ def _at_velocity_scales(drawing: Drawing, at: Nodes) -> list[Drawing]:
 def _find_plan(
     pages: Sequence[_PageReading], at_scales: Sequence[Drawing], figure: str, known: Nodes
 ) -> PlanReading | None:
-    """The plan on the sheet that explains it best; it is kept with its page.
+    """The plan on the sheet that explains it best; it is added to that page.
 
     Arguments: `at_scales`, the drawing at likely scales; `known`, nodes of the plan before.
     """
@@ -199,7 +199,7 @@ def _sketched(page: _PageReading, pages: Sequence[_PageReading]) -> tuple[Nodes,
 
 
 def _set_apart(pages: Sequence[_PageReading], plan: PlanReading | None) -> None:
-    """One stroke of ink cannot be in two figures: what surely is this plan's is no other's."""
+    """Remove the strokes of a certain plan from its page: they belong to no other figure."""
     page = next((page for page in pages if plan is not None and plan in page.plans.values()), None)
     if plan is None or page is None or plan.score < SURE_PLAN:
         return
@@ -250,7 +250,7 @@ def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
 # Named nodes and vectors with their errors ---------------------------------------------------------
 
 LEAST_VECTOR_MM = 2.0
-"""A shorter vector is known by its nodes, whether or not it has a stroke."""
+"""A shorter vector is read from its nodes, with or without a stroke."""
 
 
 def figure_of_sketch(sketch: SketchReading) -> Figure:
@@ -287,7 +287,7 @@ def figure_of_plan(plan: PlanReading, scale_se: float) -> tuple[Figure, list[Unr
 def _no_surer(
     nodes: Mapping[str, ReadNode], vectors: Mapping[str, ReadVector], plan: PlanReading
 ) -> dict[str, ReadNode]:
-    """A node is no surer than the surest vector that starts or ends there: else its plan may be another."""
+    """Nodes with a confidence no higher than that of the surest vector that starts or ends there."""
     best = dict.fromkeys(nodes, 0.0)
     for name, read in vectors.items():
         vector = plan.hypothesis.drawing.construction.vectors[name]
@@ -361,13 +361,13 @@ def _vector(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
 MARKED_MM = 0.5
 """A tip within this of a node marks it."""
 ELSEWHERE_MM = (0.8, 15.0)
-"""A tip as far off as this may be the one that was meant."""
+"""Distances of other tips that may be the vector's real end."""
 NEAR_MM = 0.5
 """A node is right within this of what was drawn: a pencil stroke's width."""
 RIVAL_NATS = 12.0
-"""Rivals worse by more weigh nothing."""
+"""Rivals with a score lower by more are left out."""
 TEMPERATURE = 3.0
-"""Scores are this much too certain: strokes of one student err in the same way."""
+"""Scores are divided by this: errors of one student's strokes are not independent."""
 WEIGHTS = {
     "placed": 0.34,
     "named": 0.34,

@@ -1,4 +1,4 @@
-"""The mechanism sketch: which strokes are its links, where its joints are, how it is turned."""
+"""The reading of the mechanism sketch: the strokes of its links, its joints, and its turn."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -162,7 +162,7 @@ class _Assigned:
 
 @dataclass(frozen=True, slots=True)
 class _SketchSearch:
-    """What a sketch is looked for in: all lines, the long ones, circles (k, 3)."""
+    """The lines and circles in which a sketch is sought: all lines, the long ones, circles (k, 3)."""
 
     lines: Lines
     long: Lines

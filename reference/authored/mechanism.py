@@ -1,7 +1,6 @@
-"""A mechanism as its author writes it, and the checks that its form alone cannot make.
+"""A mechanism as its author writes it: the tables of the file, and the checks between them.
 
-The tables of a mechanism file are models; joints, links and guides that do not fit together are told
-all at once, each with its path in the file.
+Joints, links and guides that do not fit together are reported all at once, each with its path in the file.
 """
 
 import difflib

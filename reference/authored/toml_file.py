@@ -131,7 +131,7 @@ def is_file(path: Path) -> bool:
 
 
 def _check_tree(data: dict[str, Any]) -> Iterator[Finding]:
-    """Numbers that nothing can be computed with, and tables nested deeper than any that is authored."""
+    """Findings about numbers that are too large or not finite, and about tables nested too deep."""
     waiting: list[tuple[str, Any, int]] = [("$", data, 0)]
     while waiting:
         path, value, depth = waiting.pop()

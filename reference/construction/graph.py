@@ -2,7 +2,7 @@
 
 Mechanism sketch, velocity plan and acceleration plan are one construction in drawn millimetres,
 y up, each figure about its own origin (the mechanism about the assignment's origin, a plan about
-its pole). It is data, a directed acyclic graph, and one evaluator answers every question:
+its pole). It is data, a directed acyclic graph, and one evaluator has all uses:
 
 - the exact plan: `evaluate(construction, parameters)`, every node an array over variants;
 - follow-through: the same with the student's nodes in `given` instead of the computed ones;

@@ -1,7 +1,7 @@
-"""Where letters stand: beside their point, clear of every stroke, arrowhead and other letter.
+"""The positions of letters: beside their point, clear of every stroke, arrowhead and other letter.
 
-Each letter is tried in many places around its point; the nearest one that touches nothing is taken,
-outside the figure first. One that finds no room near its point stands farther off, with a thin line.
+Each letter has many candidates around its point; the nearest one that touches nothing is taken, outside
+the figure first. A letter without room near its point stands farther away, with a thin line to it.
 """
 
 import itertools
@@ -79,7 +79,7 @@ class PlacedLabel:
 
 
 def place_labels(wanted: Sequence[Wanted], obstacles: Iterable[Shape], rounds: int = 3) -> list[PlacedLabel]:
-    """A place for each letter; those with the least room are placed first, then all once more in turn."""
+    """The position of each letter; those with the least room are placed first, then all again in turn."""
     segments = segments_of(obstacles)
     points = np.array([one.at for one in wanted]).reshape(-1, 2)
     tries = [_candidates_at(one, GAPS_MM, segments, points) for one in wanted]

@@ -60,7 +60,7 @@ def reference_drawing(
     """The drawing of one variant of a plan on A3, true to scale.
 
     All on one sheet where it fits, else on the sheets that the assignment asks for, else on as many as
-    are needed. A figure that is too large even so at its scales is told in red on the drawing.
+    are needed. The drawing says in red where a figure is too large at its scales even so.
 
     Arguments: `altitude` draws the right triangles of the normal components on the sketch; raises
     CallError where the scales do not allow that.
@@ -126,7 +126,7 @@ Mask = NDArray[np.bool_]
 
 
 def lay_out(figures: Sequence[DrawnFigure], room: Bounds, column: Bounds) -> tuple[list[Point], bool]:
-    """How far each figure is moved from its own origin, and whether all have their place.
+    """The shift of each figure from its own origin, and whether all have room.
 
     Arguments: `room` is the sheet inside its frame, `column` the part of it that the table takes, at
     its right.
@@ -141,10 +141,7 @@ def _sizes(figures: Sequence[DrawnFigure]) -> list[tuple[float, float]]:
 
 
 def _in_rows(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point] | None:
-    """In rows, the spare room shared out evenly: as many to a row as leaves the widest spaces.
-
-    None where every way leaves too little.
-    """
+    """The shifts in rows with equal spaces, in the layout with the widest spaces; None without room."""
     layouts = [_rows(figures, breaks, room) for breaks in product((False, True), repeat=len(figures) - 1)]
     gap, moves = max(layouts, key=lambda layout: layout[0])
     return moves if gap >= LEAST_GAP_MM else None
@@ -173,9 +170,9 @@ def _rows(figures: Sequence[DrawnFigure], breaks: Sequence[bool], room: Bounds) 
 
 
 def _packed_by_size(figures: Sequence[DrawnFigure], room: Bounds, reserved: Bounds) -> list[Point] | None:
-    """The largest figure in the middle or in a corner, each other where it keeps farthest from all there.
+    """The shifts with the largest figure in the middle or in a corner, each other farthest from those there.
 
-    Of these ways the one whose figures keep farthest apart; None where none has room for all.
+    Of these layouts the one whose figures are farthest apart; None where none has room for all.
     """
     sizes = _sizes(figures)
     if any(width > room[2] - room[0] or height > room[3] - room[1] for width, height in sizes):
@@ -255,7 +252,7 @@ def _roomiest(taken: Mask, mask: Mask, corner: tuple[float, float] | None) -> tu
 
 
 def _stacked(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point]:
-    """All from the room's top left corner: what does not fit is at least seen."""
+    """The shifts that put all figures into the top left corner, so that what does not fit is visible."""
     return [(room[0] - box[0], room[1] - box[1]) for box in (figure.bounds for figure in figures)]
 
 

@@ -209,22 +209,22 @@ Closures = Callable[[FloatArray], list[Closure]]
 
 @dataclass(slots=True)
 class _Walk:
-    """Events on the way along a closure: flat positions that are passed, and the stop."""
+    """Events along a closure: flat positions that are passed, and the stop."""
 
     touched: list[float]
     stop: float | None = None
 
 
-def _walk(closures: Closures, index: int, way: tuple[float, float], *, may_pass: bool) -> _Walk:
-    """From the start to a limit, or to where the closure ends the motion.
+def _walk(closures: Closures, index: int, span: tuple[float, float], *, may_pass: bool) -> _Walk:
+    """The events from the start to a limit (`span`), or to where the closure ends the motion.
 
-    Samples crowd at both ends, as near to a stop all others of the mechanism's motions do.
+    Samples are denser at both ends, where the mechanism moves fastest near a stop.
     """
 
     def curve(driven: FloatArray) -> Closure:
         return closures(driven)[index]
 
-    start, limit = way
+    start, limit = span
     steps = start + (limit - start) * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, SCANNED)))
     scan = curve(steps)
     sign, ahead = np.sign(scan.value[0]), np.sign(limit - start)

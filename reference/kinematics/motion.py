@@ -1,11 +1,11 @@
 """Exact motion in closed form, one Assur group after another.
 
 Positions by Heron's formula and the half chord; velocities and accelerations by eliminating one
-unknown of the rigid-body equations of the group (`reference.kinematics.assur`). This road knows
-nothing of drawings: the construction of `reference.construction.graph` is held against it.
+unknown of the rigid-body equations of the group (`reference.kinematics.assur`). This method does not use
+drawings: tests compare the construction of `reference.construction.graph` with it.
 
-Many variants are solved on arrays, a few on Python's numbers (faster there). A predicted error goes
-with every result. Variants near a singular position are solved again with more digits, their data
+Many variants are solved on arrays, a few on Python's numbers (faster there). Every result has a
+predicted error. Variants near a singular position are solved again with more digits, their data
 (doubles) taken as exact: first in the processor's extended floating point, on arrays, where it has
 one; where that is not enough, in eighty digits one by one. Where a mechanism has no motion, the
 error says which group fails to close, by how much, and what to do.
@@ -47,11 +47,11 @@ from reference.numbers import cross, larger
 
 EPSILON = float(np.finfo(np.float64).eps)
 SAFETY = 32.0
-"""Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""
+"""Rounding errors of the formulas in units of those of the data; compared with 50 digits in tests."""
 FEW = 3
-"""So many variants are faster one by one, on Python's numbers."""
+"""Up to so many variants are faster one by one, on Python's numbers."""
 CLASSES = 200
-"""From so many variants on it pays to calculate once what they share."""
+"""From so many variants on, calculating shared quantities once saves time."""
 BoolArray = NDArray[np.bool_]
 
 
@@ -93,7 +93,7 @@ def move(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
 
 
 def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
-    """As `move`, but nan (and an infinite predicted error) for variants without a motion."""
+    """The motion of every variant; nan, with an infinite predicted error, for variants without one."""
     count, origin = _count(mechanism.driver), _origin(mechanism)
     if origin.any():
         # Far from the coordinates' origin, differences of places lose digits: solved about the driven link.
@@ -154,7 +154,7 @@ def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
 
 
 def _in_python_numbers(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
-    """The same on Python's numbers, a variant after another; where they divide by zero, on arrays."""
+    """The motion of a few variants on Python's numbers; where these divide by zero, on arrays."""
     try:
         solutions = [
             solve(mechanism, one_variant(index, among=count), accelerations=accelerations)
@@ -193,12 +193,12 @@ def _rates(solution: Solution, accelerations: bool) -> list[float]:
 
 
 def _amplification(solution: Solution) -> Any:  # noqa: ANN401 - an array, or one number
-    """By how much a rounding error may have grown anywhere."""
+    """The largest amplification of a rounding error at any joint."""
     return reduce(larger, [joint.amplification for joint in solution.joints.values()])
 
 
 def _predicted_error(amplification: FloatArray) -> FloatArray:
-    """(N,) what the growth of rounding errors says of the results' error; infinite where it is nan."""
+    """(N,) predicted error from the amplification of rounding errors; infinite where that is nan."""
     predicted = SAFETY * EPSILON * amplification
     return np.where(np.isnan(predicted), np.inf, predicted)
 
@@ -220,7 +220,7 @@ DIGITS = 80
 
 
 def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
-    """Solve again what has lost digits; nan where a variant has no motion."""
+    """Solve the variants that have lost digits again, in place; nan where a variant has no motion."""
     predicted = motion.predicted_error
     sine = reduce(np.minimum, motion.transmission.values(), np.ones(predicted.shape))
     motion.recomputed[:], solutions = refined(mechanism, predicted, sine, accelerations=accelerations)
@@ -278,7 +278,7 @@ def _in_digits(mechanism: Mechanism, index: int, accelerations: bool) -> Solutio
 
 
 def _replace_rows(motion: Motion, solution: Solution, rows: NDArray[np.intp]) -> None:
-    """Take the solution of some variants over into the motion."""
+    """Replace the motion of some variants by their solution."""
     for name, joint in solution.joints.items():
         motion.position[name][rows] = _rounded(joint.position)
         motion.velocity[name][rows] = _rounded(joint.velocity)
@@ -340,7 +340,7 @@ def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismErr
 
 
 def _quiet(number: complex) -> np.generic:
-    """NumPy's own scalar: it divides by zero without an error."""
+    """A number as a NumPy scalar, which divides by zero without an error."""
     scalar: np.generic = np.asarray(number)[()]  # type: ignore[assignment]
     return scalar
 
@@ -363,7 +363,7 @@ def _singular(group: Group, where: str, driven: str) -> MechanismError:
 
 
 def _gap(group: Group, before: Solution) -> float:
-    """By how much a group fails to close, metres; the group's pins are where `before` has them."""
+    """The gap by which a group fails to close, metres, with the pins at their positions in `before`."""
     at = {name: joint.position for name, joint in before.joints.items()}
     take = before.take
     match group:

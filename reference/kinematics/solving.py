@@ -166,7 +166,7 @@ def _add(solution: Solution, group: Group) -> None:
 
 
 def _between(p: Joint, q: Joint) -> Complex:
-    """From p to q, with what rounding took from either."""
+    """The vector from p to q, with the rounding rests of both."""
     d = q.position - p.position
     if q.rest is not None:
         d = d + q.rest
@@ -174,12 +174,12 @@ def _between(p: Joint, q: Joint) -> Complex:
 
 
 def _nearness(size2: Number, p: Joint, q: Joint) -> Number:
-    """A length (its square) over its distance from the origin: so much of a place's rounding it has."""
+    """The ratio of a length (given by its square) to its distance from the origin."""
     return root(size2 / (size2 + dot(p.position, p.position) + dot(q.position, q.position)))
 
 
 def _amplification(size2: Number, p: Joint, q: Joint) -> Number:
-    """By how much rounding errors have grown in the vector between two joints, of a length (its square)."""
+    """The amplification of rounding errors in the vector between two joints (length given by its square)."""
     return larger(p.amplification, q.amplification) / _nearness(size2, p, q)
 
 
@@ -260,7 +260,7 @@ def _add_slot_point(solution: Solution, group: SlotPoint, local: Complex) -> Non
 
 
 def _add_point(solution: Solution, group: Plate | PointOnLine) -> None:
-    """A rigid link's point is the same combination of its base at every order."""
+    """Add a rigid link's point: the same combination of its base for position, velocity, acceleration."""
     p, q = (solution.joints[joint] for joint in group.base)
     shape = solution.take(group.shape if isinstance(group, Plate) else group.ratio)
     d, growth = _between(p, q), 1.0 + abs(shape)
@@ -335,14 +335,14 @@ def _add_crossing(solution: Solution, node: str, rails: tuple[Rail, Rail]) -> No
 
 
 def each_number_once(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
-    """Takes all variants at once; what they share and an array only repeats, one time."""
+    """All variants at once; a number that they share (an array of stride 0) only once."""
     return values[:1] if type(values) is not int and values.strides == (0,) else values
 
 
 def one_variant(index: int, number: Callable[[Any], Any] | None = None, *, among: int | None = None) -> Take:
-    """Takes the numbers of one variant out of arrays over variants (those of one entry hold for all).
+    """A function that takes one variant's number from an array over variants (one entry holds for all).
 
-    Arguments: `number` makes another kind of number of a float or complex; `among`, where given, is the
+    Arguments: `number` converts a float or complex to another kind of number; `among`, where given, is the
     number of variants, and an array of another size raises ValueError.
     """
 
@@ -361,7 +361,7 @@ def one_variant(index: int, number: Callable[[Any], Any] | None = None, *, among
 
 
 def some_variants(rows: NDArray[np.intp]) -> Take:
-    """Takes some variants out of arrays over variants, in the widest floats there are."""
+    """A function that takes some variants from arrays over variants, in the widest floats there are."""
 
     def take(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
         if type(values) is int:

@@ -40,8 +40,8 @@ def test_a_right_drawing_has_nothing_to_put_right():
 def test_a_mistake_is_shown_close_up_with_what_was_expected():
     one = report(criteria=[criterion("v_B", "none", 0.0)], mistakes=[mistake("wrong_link", "b", ["v_B"])])
     (action,) = page_of(one, [picture()]).actions
-    assert action.look.names == ("v_B",)
-    x, y, wide, high = action.look.box
+    assert action.view.names == ("v_B",)
+    x, y, wide, high = action.view.box
     tip_and_aim = ((160.0, 130.0), (160.0, 150.0))
     assert all(x < at[0] < x + wide and y < at[1] < y + high for at in tip_and_aim)
 
@@ -65,15 +65,15 @@ def test_a_review_for_a_reason_without_words_is_told_as_open():
 def test_a_picture_is_told_in_words_for_those_who_do_not_see_it():
     one = report(criteria=[criterion("v_A"), criterion("v_B", "none", 0.0)], mistakes=[])
     page = page_of(one, [picture()])
-    _source, looks = page.sheets[0]
-    plan = next(look for look in looks if look.kind == "velocity_plan")
+    _source, views = page.sheets[0]
+    plan = next(view for view in views if view.kind == "velocity_plan")
     assert page.description(plan) == "the velocity plan. v_A: right; v_B: wrong"
 
 
 def test_plans_as_measured_have_no_sheet_beneath_them():
     page = page_of(report(), [picture(scanned=False)])
-    source, looks = page.sheets[0]
-    assert [look.kind for look in looks] == ["velocity_plan"]
+    source, views = page.sheets[0]
+    assert [view.kind for view in views] == ["velocity_plan"]
     assert "entered measurements" in source
 
 
@@ -110,7 +110,7 @@ def test_a_link_that_is_off_is_shown_on_the_sketch():
     arrow = Arrow("O1A", "mechanism", (200.0, 200.0), (250.0, 220.0), "none", doubtful=False, is_link=True)
     sketched = replace(sketched, scene=replace(sketched.scene, arrows=(*sketched.scene.arrows, arrow)))
     (action,) = page_of(report(criteria=[link], mistakes=[]), [sketched]).actions
-    assert action.look.names == ("O1A",)
+    assert action.view.names == ("O1A",)
 
 
 def test_what_hangs_on_something_open_says_so_unless_there_is_a_better_reason():
