@@ -33,7 +33,7 @@ from reference.geometry import FloatArray
 # lint ---------------------------------------------------------------------------------------------
 
 SHOWN_ROWS = 40
-"""More variants than that are told in ranges."""
+"""More variants than that stand in ranges."""
 REASON_MM, REASON_COLOUR = 4.0, "#a03014"
 """Of the line under the drawing's frame that says why this variant."""
 COLOURS = {"fault": "bold red", "warning": "yellow", "hint": "cyan"}
@@ -195,7 +195,7 @@ def check_measured(
     level: str,
     page: Path | None = None,
 ) -> bool:
-    """Tell right and off for every value of a measurement file; whether anything is off.
+    """Print right or off for every value of a measurement file; whether anything is off.
 
     With a `page`, one student's values are drawn and told in that file, too.
     """
@@ -283,15 +283,15 @@ def _tell(
         return
     table = Table(box=None, show_header=False)
     names = assignment.file.names
-    for one in checked:
-        mark, style = MARKS[one.result]
+    for value in checked:
+        mark, style = MARKS[value.result]
         # What is right needs one reason: the others say what would be off, had it not been accepted.
-        shown = one.reasons[:1] if one.result == "right" else one.reasons
+        shown = value.reasons[:1] if value.result == "right" else value.reasons
         sentence = " ".join(reason_sentence(reason, words, level, names) for reason in shown)
         numbers = ""
-        if level == "full" and one.measured and one.expected:
-            numbers = f"{_number(one.measured)} / {_number(one.expected)}"
-        table.add_row(f"[{style}]{mark}[/{style}]", names.get(one.name, one.name), numbers, sentence)
+        if level == "full" and value.measured and value.expected:
+            numbers = f"{_number(value.measured)} / {_number(value.expected)}"
+        table.add_row(f"[{style}]{mark}[/{style}]", names.get(value.name, value.name), numbers, sentence)
     console.print(table, highlight=False)
 
 

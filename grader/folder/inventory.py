@@ -102,7 +102,7 @@ class FileContent:
 
     Attributes
     ----------
-    pages : also those that cannot be decoded, so that their owner is told
+    pages : also those that cannot be decoded: they belong to somebody
     measurements : of a measurement file
     refused : a measurement file that cannot be used at all
     students : whom such a file names in itself
@@ -171,7 +171,7 @@ def code_of(page: PageRef) -> PageRef:
 
 
 def _with_problem(page: PageRef, problem: Problem, workers: Pool) -> PageRef:
-    """A page that could not be scanned; its owner is told, where strokes alone ended the worker."""
+    """A page that could not be scanned, with its problem, and its code where that can still be read."""
     if problem.code in ENDED:
         ((_, known),) = workers.run(code_of, [(page,)])
         page = page if isinstance(known, Problem) else known

@@ -347,7 +347,7 @@ def _did_you_mean(near: Sequence[str]) -> str:
 
 
 def _line(header: list[str], cells: list[str], delimiter: str, entries: _Entries) -> Measurements:
-    """What one line says; what it says wrongly is left out and told."""
+    """What one line says; what is wrong in it is left out and reported."""
     known = {name: cell.strip() for name, cell in zip(header, cells, strict=False) if name and cell.strip()}
     surplus = surplus_of(header, cells, delimiter)
     if surplus is not None:

@@ -45,7 +45,7 @@ _UNIT: Matrix = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 
 
 logging.getLogger("pikepdf").setLevel(logging.CRITICAL)
-"""What is wrong with a file is told by an error; the library's own words on it would be in the way."""
+"""A damaged file raises an error of ours; the library's own messages would only repeat it."""
 if hasattr(pikepdf.settings, "set_qpdf_limits"):
     pikepdf.settings.set_qpdf_limits(
         flate_max_memory=MAX_UNPACKED, run_length_max_memory=MAX_UNPACKED, png_max_memory=MAX_UNPACKED,

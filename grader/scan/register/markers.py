@@ -119,7 +119,7 @@ stated resolution, and there together with what the scanner does."""
 _USUAL_LENGTH_MM = 60.0
 """Of a vector: what the map leaves unexplained is an error of lengths over this distance."""
 _FLAT_MM = 0.12
-"""Misfit from which paper that is not flat is told; printers and flatbeds stay under 0.1."""
+"""Misfit from which paper is reported as not flat; printers and flatbeds stay under 0.1."""
 _SCALE_REPORTED = 0.004
 """Printers and scanners together stay below this."""
 _SCALE_NEAR = 0.1
