@@ -33,6 +33,7 @@ _ROUNDS = 3
 _KILLED = -9
 """Exit code of a process that somebody else killed: the system for want of memory, or a person."""
 _MEGABYTE = 1_000_000
+_ADVICE = "scan or export it again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,9 +184,6 @@ class Workers:
                     if psutil.Process(worker.pid).memory_info().rss > limit:
                         self._over_memory.add(worker.pid or 0)
                         worker.kill()
-
-
-_ADVICE = "scan or export it again"
 
 
 def _workers() -> list[BaseProcess]:

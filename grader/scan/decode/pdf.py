@@ -14,7 +14,7 @@ import pypdfium2
 
 from grader.records import FloatArray, GreyImage, Page
 from grader.scan.decode import pictures
-from grader.scan.decode.content import drawn_by, filters_of, plain_pixels
+from grader.scan.decode.content import SHOWS_TEXT, drawn_by, filters_of, plain_pixels
 from grader.scan.decode.limits import MAX_PAGES, Door, InputFile, check_memory, check_pages, check_size
 from grader.scan.decode.pictures import from_pillow, plausible, to_grey
 from grader.scan.pixels import MM_PER_INCH
@@ -36,7 +36,6 @@ _SHOWN = 0.94
 _SQUARE = 1e-3
 """Of the image's size: by more than rounding askew, it is resampled by what renders the page."""
 _PAINTS = frozenset(("S", "s", "f", "F", "f*", "B", "B*", "b", "b*", "sh", "BI", "INLINE IMAGE"))
-_SHOWS_TEXT = frozenset(("Tj", "TJ", "'", '"'))
 _INVISIBLE_TEXT = 3
 """Text mode of what optical character recognition lays over a scan."""
 
@@ -220,7 +219,7 @@ def _only_image(page: pikepdf.Page) -> Placement | None:
                 text_mode = int(operands[0])
             elif name == "Do":
                 images.append((cast("pikepdf.Stream", page.resources.XObject[str(operands[0])]), matrix))
-            elif name in _PAINTS or (name in _SHOWS_TEXT and text_mode != _INVISIBLE_TEXT):
+            elif name in _PAINTS or (name in SHOWS_TEXT and text_mode != _INVISIBLE_TEXT):
                 return None
     except (pikepdf.PdfError, AttributeError, KeyError, TypeError, ValueError):
         return None
