@@ -3,9 +3,10 @@
 import io
 import logging
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import cast
 
 import numpy as np
@@ -96,19 +97,14 @@ def _leaves(document: pikepdf.Pdf) -> list[pikepdf.Object | None]:
         if isinstance(node, pikepdf.Dictionary) and isinstance(node.get("/Kids"), pikepdf.Array):
             if node.objgen not in known:  # a list that holds itself has no end
                 kids = list(node.Kids)
-                _hand_down(node, kids)
+                for kid, name in product(kids, _INHERITED):
+                    if isinstance(kid, pikepdf.Dictionary) and name in node and name not in kid:
+                        kid[name] = node[name]
                 nodes += reversed(kids)
             known.add(node.objgen)
         else:
             leaves.append(node if isinstance(node, pikepdf.Dictionary) else None)
     return leaves
-
-
-def _hand_down(node: pikepdf.Object, kids: Iterable[pikepdf.Object]) -> None:
-    for kid in kids:
-        for name in _INHERITED:
-            if isinstance(kid, pikepdf.Dictionary) and name in node and name not in kid:
-                kid[name] = node[name]
 
 
 def _unreadable(file: InputFile, number: int, why: str) -> InputFileError:
