@@ -44,7 +44,6 @@ from grader.documents import (
     LintScales,
     LintVariant,
     LintWorst,
-    VariantDocument,
 )
 from grader.printed.layout import SCALE_OF
 from grader.rubric import RubricFile, check_rubric
@@ -340,17 +339,7 @@ def lint_document(result: Lint) -> LintDocument:
     return LintDocument(
         assignment=result.assignment.id,
         needs_a_person=result.needs_a_person,
-        findings=[
-            LintFindingDocument(
-                severity=finding.severity,
-                code=finding.code,
-                file=finding.file,
-                path=finding.path,
-                message=finding.message,
-                variants=[VariantDocument(**_numbers(variant)) for variant in finding.variants],
-            )
-            for finding in result.findings
-        ],
+        findings=[LintFindingDocument.model_validate(finding) for finding in result.findings],
         variants=list(result.rows),
         scales=[
             LintScales(

@@ -22,7 +22,7 @@ from reference.drawing.sheets import FRAME, reference_drawing
 from reference.geometry import FloatArray
 
 SHOWN_ROWS = 40
-"""More variants than that are told in ranges."""
+"""More variants than that stand in ranges."""
 REASON_MM, REASON_COLOUR = 4.0, "#a03014"
 """Of the line under the drawing's frame that says why this variant."""
 COLOURS = {"fault": "bold red", "warning": "yellow", "hint": "cyan"}

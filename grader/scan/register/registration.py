@@ -92,7 +92,7 @@ _MOST_SIDES, _SOME_SIDES = 3, 2
 """A frame is known by three of its sides, if two sides of the paper are found too."""
 _ALL_SIDES = 4
 _COPY_SE = 0.012
-"""Copiers enlarge or reduce by a per cent or two unless told not to."""
+"""Copiers enlarge or reduce by a per cent or two by default."""
 _SAMPLED, _WHITE = 7, 255
 """Every seventh pixel is tested; the value of white ones."""
 _FAR_OFF_MM = 1.5

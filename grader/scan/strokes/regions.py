@@ -165,7 +165,7 @@ def _fitted(ends: FloatArray, length: FloatArray) -> FloatArray:
     return np.stack([centre + t.min() * u, centre + t.max() * u])
 
 
-# Where drawings are looked for --------------------------------------------------------------------
+# The field of drawings --------------------------------------------------------------------
 
 _FRAME_MM = 1.5
 """Inside of the frame's middle line: its pen and the registration's error."""
@@ -193,7 +193,7 @@ _SAMPLES = 64
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """Where on the sheet drawings are looked for.
+    """The part of the sheet in which strokes are searched.
 
     Attributes
     ----------
