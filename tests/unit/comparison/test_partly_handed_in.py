@@ -69,7 +69,9 @@ def test_a_coriolis_component_follows_the_own_angular_velocity_where_no_velocity
     length = share * abs(SHAPER.real[name]) / rule_scales(SHAPER)["ka"]
     reading = changed(without(exact, *velocities), name, length_mm=length)
     alone = outcome_of(SHAPER, Submission(measured=reading), name)
-    follows = outcome_of(SHAPER, Submission(measured=reading, values={rate: share * SHAPER.rates[rate]}), name)
+    follows = outcome_of(
+        SHAPER, Submission(measured=reading, values={rate: share * SHAPER.rates[rate]}), name
+    )
     assert alone.verdict in {"none", "partial"}
     assert follows.verdict == "follow_through"
 
