@@ -1,11 +1,13 @@
-"""Files written whole or not at all, and the folder of bundled samples."""
+"""Files written whole or not at all, folders of results, and the folder of bundled samples."""
 
 import contextlib
 import os
 import secrets
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
+from typing import Protocol
 
 from reference.errors import CallError, PlanmarkError
 
@@ -16,29 +18,34 @@ class OutputError(PlanmarkError):
     exit_status = 5
 
 
-def write_whole(path: Path, data: bytes | str) -> None:
-    """Write a file so that readers see the old one or the new one, never a part.
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary file's path; what is written there takes the place of `path` at the end, if nothing failed.
 
-    Text is stored as UTF-8 with its line ends as they are. Missing folders are made. The temporary
-    file lies beside the target, because a rename is atomic only within one file system.
-
-    Raises OutputError with the system's reason; the target is then as it was.
+    Missing folders are made. The temporary file lies beside the target, because a rename is atomic only
+    within one file system. Raises OutputError with the system's reason; the target is then as it was.
     """
-    content = data.encode("utf-8") if isinstance(data, str) else data
     temporary = path.with_name(f".{path.name[:40]}.{secrets.token_hex(6)}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _write_new(temporary, content)
+        yield temporary
         temporary.replace(path)
     except OSError as error:
-        _forget(temporary)
         raise OutputError(
             "cannot_write",
             f"{path}: cannot be written ({error.strerror or error}); choose another place or make room",
         ) from error
-    except BaseException:
-        _forget(temporary)
-        raise
+    finally:
+        _remove(temporary)
+
+
+def write_whole(path: Path, data: bytes | str) -> None:
+    """Write a file so that readers see the old one or the new one, never a part.
+
+    Text is stored as UTF-8 with its line ends as they are. Raises OutputError as `replacing` does.
+    """
+    with replacing(path) as temporary:
+        _write_new(temporary, data)
 
 
 def make_folder(path: Path) -> None:
@@ -55,16 +62,17 @@ def make_folder(path: Path) -> None:
         ) from error
 
 
-def _write_new(path: Path, content: bytes) -> None:
+def _write_new(path: Path, data: bytes | str) -> None:
+    """Write a file that is not there yet; raises FileExistsError for one that is."""
     with path.open("xb") as file:
-        file.write(content)
+        file.write(data.encode("utf-8") if isinstance(data, str) else data)
         file.flush()
         os.fsync(file.fileno())
 
 
-def _forget(temporary: Path) -> None:
+def _remove(path: Path) -> None:
     with contextlib.suppress(OSError):
-        temporary.unlink()
+        path.unlink()
 
 
 def create_whole(files: Mapping[Path, str]) -> None:
@@ -87,7 +95,7 @@ def create_whole(files: Mapping[Path, str]) -> None:
                 os.fsync(file.fileno())
     except BaseException as error:
         for path in created:
-            _forget(path)
+            _remove(path)
         if isinstance(error, FileExistsError):
             raise _taken(Path(str(error.filename))) from error
         if isinstance(error, OSError):
@@ -99,8 +107,32 @@ def create_whole(files: Mapping[Path, str]) -> None:
 
 
 def _taken(path: Path) -> CallError:
-    told = "is there already and is left as it is; choose another name, or remove it first"
-    return CallError("file_exists", f"{path}: {told}")
+    message = "is there already and is left as it is; choose another name, or remove it first"
+    return CallError("file_exists", f"{path}: {message}")
+
+
+class OfStudent(Protocol):
+    """A report or a submission."""
+
+    @property
+    def student_id(self) -> str:
+        """The student's id."""
+
+    @property
+    def position(self) -> int | None:
+        """The position; None where there is none or it is not known."""
+
+
+def result_folders(results: Iterable[OfStudent]) -> list[str]:
+    """Each result's folder below the output folder: the student's, with several positions one for each."""
+    results = list(results)
+    count = Counter(result.student_id for result in results)
+    return [
+        result.student_id
+        if count[result.student_id] == 1
+        else f"{result.student_id}/{'unknown' if result.position is None else result.position}"
+        for result in results
+    ]
 
 
 def samples_folder() -> Path:

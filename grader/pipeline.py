@@ -18,7 +18,7 @@ from grader.comparison.evidence import Submission
 from grader.comparison.scales import Declarations, Source, declarations
 from grader.comparison.task import Task, task_of
 from grader.documents import ReportDocument
-from grader.feedback.redo_steps import with_mistakes_told
+from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import Level, criterion_feedback
 from grader.inputs.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
 from grader.inputs.scale_text import declared_scales, sure_texts
@@ -186,7 +186,7 @@ def mark(
         sheets=sheets,
         sources=declared.sources,
     )  # fmt: skip
-    report = with_mistakes_told(report, judgement, assignment, task.variant, lang, level)
+    report = with_mistakes_explained(report, judgement, assignment, task.variant, lang, level)
     return report, _pictures(pages, measured, task.construction, judgement, show_expected=ghosts)
 
 

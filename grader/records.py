@@ -135,7 +135,7 @@ class Sheet:
     identity : from the QR code, or None
     problems : evidence that disagrees or is missing
     lens : where the camera's bend was found; `mm_to_px` holds for the stored picture until
-        `grader.scan.register.registration.straighten`, then for the straightened one
+        `grader.scan.register.distortion.straighten`, then for the straightened one
     """
 
     mm_to_px: FloatArray

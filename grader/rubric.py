@@ -238,6 +238,9 @@ class RubricFile(Authored):
         return found
 
 
+# What a rubric asks to be read ---------------------------------------------------------------------
+
+
 @dataclass(frozen=True, slots=True)
 class Asked:
     """What is looked for on pages; everything where no figure is named.
@@ -282,6 +285,9 @@ def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding
         for key, names in known.items()
         if (name := getattr(criterion, key)) is not None and name not in names
     ]
+
+
+# Files ---------------------------------------------------------------------------------------------
 
 
 def rubric_of(assignment: Assignment) -> RubricFile:

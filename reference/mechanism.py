@@ -222,8 +222,8 @@ class Mechanism:
         return joint in self.ground_m
 
 
-def moved(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
-    """The whole mechanism moved on the ground, metres."""
+def translated(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
+    """The whole mechanism translated by a vector, complex metres."""
 
     def onward(guide: Guide) -> Any:  # noqa: ANN401 - of the kind that it is given
         return replace(guide, through_m=guide.through_m + by) if isinstance(guide, FixedGuide) else guide

@@ -12,7 +12,6 @@ from pydantic import BaseModel
 
 from grader.authoring.findings import SEVERITIES, LintFinding, mechanism_place
 from grader.authoring.round_scales import (
-    SCALE_OF,
     WELL_READ_MM,
     AskedVectors,
     PageRoom,
@@ -47,6 +46,7 @@ from grader.documents import (
     LintWorst,
     VariantDocument,
 )
+from grader.printed.layout import SCALE_OF
 from grader.rubric import RubricFile, check_rubric
 from reference.authored.assignment import TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from grader.authoring.findings import NAMED, BoolArray, LintFinding, chosen
 from grader.documents import LintLeast
-from grader.printed.layout import FRAME_MM, MARGIN_MM, TEMPLATES, Template, template_for
-from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box
+from grader.printed.layout import FRAME_MM, MARGIN_MM, SCALE_OF, TEMPLATES, Template, template_for
+from grader.records import MECHANISM, Box
 from grader.rubric import RubricFile
 from reference.authored.assignment import Assignment, Scales, Variant
 from reference.geometry import FloatArray
@@ -33,7 +33,6 @@ RATE_STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 10.0)
 """Of 10^k (m/s)/mm and (m/s^2)/mm: factors by which a ruler's millimetres are easily multiplied."""
 LEAST_LINK_MM = 20.0
 """The plans' directions are read off the sketch: a shorter link tells them less well than a hand draws."""
-SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
 _SLACK = 1e-9
 """Relative rounding error of a scale that is a round step: 0.005 computed as 0.0050000000001 is 0.005."""
 

@@ -31,14 +31,12 @@ from reference.drawing.canvas import (
     width_of,
 )
 from reference.drawing.sheets import ENGLISH, reference_drawing
-from reference.drawing.subject import Wording
+from reference.drawing.subject import SCALE_UNITS, VECTOR_UNITS, Wording
 from reference.geometry import FloatArray
 from reference.plan import Plan
 
-UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}
 Title = Literal["Scales", "Mechanism", "Velocities", "Accelerations"]
 PLANS: dict[Title, str] = {"Velocities": "velocity_plan", "Accelerations": "acceleration_plan"}
-VALUE_UNITS = {"kv": "m/s", "ka": "m/s²"}
 MARGIN_MM = 15.0
 """Inside the drawing frame, 10 mm, on all sides."""
 BOTTOM_MM = A3_MM[1] - MARGIN_MM
@@ -101,7 +99,7 @@ def sections_of(plan: Plan) -> tuple[Section, ...]:
     count = len(plan.variants)
     scales = [
         Column(name, name, unit, np.broadcast_to(getattr(plan.scales, name), (count,)), 5, "g")
-        for name, unit in UNITS.items()
+        for name, unit in SCALE_UNITS.items()
     ]
     rates = [
         Column(
@@ -141,7 +139,7 @@ def _rate(plan: Plan, name: str) -> FloatArray:
 
 def _vector(plan: Plan, name: str) -> tuple[Column, ...]:
     drawn, value, zero = np.abs(plan.drawn_mm(name)), np.abs(plan.vectors_si[name]), is_zero(plan, name)
-    unit = VALUE_UNITS[plan.construction.vectors[name].scale]
+    unit = VECTOR_UNITS[plan.construction.vectors[name].scale]
     return (
         Column(name, name, "mm", np.where(zero, 0.0, drawn), 2),
         Column(f"{name}_value", name, unit, np.where(zero, 0.0, value), 4, "g"),
@@ -196,7 +194,7 @@ class _Cells:
 
 
 @dataclass(frozen=True, slots=True)
-class _Table:
+class _VariantTable:
     """A table as wide as a page: the variants' numbers, then blocks of columns under one name each."""
 
     title: str
@@ -252,7 +250,7 @@ def table_pages(assignment: Assignment, plan: Plan, words: Tongue) -> list[Page]
     return [tuple(page) for page in pages]
 
 
-def _tables(assignment: Assignment, plan: Plan, words: Tongue) -> Iterator[_Table]:
+def _tables(assignment: Assignment, plan: Plan, words: Tongue) -> Iterator[_VariantTable]:
     """Each section's columns, as many at a time as a page is wide."""
     named = tuple(
         _Cells("", words.gettext(name), tuple(str(number) for number in numbers))
@@ -263,7 +261,7 @@ def _tables(assignment: Assignment, plan: Plan, words: Tongue) -> Iterator[_Tabl
     for section in sections_of(plan):
         heading = f"{title} ({assignment.id}). {words.gettext(section.title)}"
         for blocks in _spread(section, assignment, free, words):
-            yield _Table(heading, named, tuple(blocks), len(plan.variants))
+            yield _VariantTable(heading, named, tuple(blocks), len(plan.variants))
 
 
 def _spread(
@@ -296,7 +294,7 @@ def _column(column: Column, assignment: Assignment, words: Tongue) -> _Cells:
     return _Cells(over, under, tuple(texts))
 
 
-def _drawn(table: _Table, rows: range, y: float) -> Iterator[Shape]:
+def _drawn(table: _VariantTable, rows: range, y: float) -> Iterator[Shape]:
     """So many rows of a table, from a height down."""
     top = y + HEAD_MM
     wide = sum(cells.wide_mm for block in (table.named, *table.blocks) for cells in block)

@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from grader.cli.commands import check_language
+from grader.cli.app import check_language
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
 from grader.feedback.sentences import mistake_feedback, reason_sentence
@@ -14,7 +14,7 @@ from grader.inputs.measurements import Measurements, names_of, read_measurements
 from grader.language import Tongue, tongue
 from grader.marking.mark import judge
 from grader.marking.self_check import LEVELS, Checked, Level, checked_values, is_all_right, likely_mistakes
-from grader.outcomes import NamedMistake, Quantity
+from grader.outcomes import Quantity
 from grader.rubric import RubricFile, rubric_of
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError
@@ -36,7 +36,8 @@ def check_measured(
     With a `page`, one student's values are drawn and told in that file, too.
     """
     check_language(lang)
-    _check_page(page)
+    if page is not None and page.suffix.lower() != ".html":
+        raise CallError("page_file", f"--page {page}: the name must end in .html; print the page for paper")
     wanted = checked_level(level)
     assignment = load_assignment(name)
     rubric = rubric_of(assignment)
@@ -55,7 +56,9 @@ def check_measured(
         judgement = judge(task_of(assignment, rubric, variant), submission)
         checked = checked_values(judgement, wanted)
         _tell(console, checked, wanted, words, assignment)
-        _tell_mistakes(console, likely_mistakes(judgement, wanted), lang, assignment)
+        for mistake in likely_mistakes(judgement, wanted):
+            sentences = mistake_feedback(mistake, lang, "full", assignment.file.names)
+            console.print(f"  {mistake.code}: {sentences}", highlight=False, markup=False)
         all_right = all_right and is_all_right(checked) and bool(checked) and not entered.problems
     return not all_right
 
@@ -66,11 +69,6 @@ def checked_level(level: str) -> Level:
     if wanted is None:
         raise CallError("unknown_level", f"--level {level}: known are {', '.join(LEVELS)}")
     return wanted
-
-
-def _check_page(page: Path | None) -> None:
-    if page is not None and page.suffix.lower() != ".html":
-        raise CallError("page_file", f"--page {page}: the name must end in .html; print the page for paper")
 
 
 def _write_page(
@@ -131,14 +129,6 @@ def _tell(
             numbers = f"{_number(one.measured)} / {_number(one.expected)}"
         table.add_row(f"[{style}]{mark}[/{style}]", names.get(one.name, one.name), numbers, sentence)
     console.print(table, highlight=False)
-
-
-def _tell_mistakes(
-    console: Console, mistakes: tuple[NamedMistake, ...], lang: str, assignment: Assignment
-) -> None:
-    for mistake in mistakes:
-        sentences = mistake_feedback(mistake, lang, "full", assignment.file.names)
-        console.print(f"  {mistake.code}: {sentences}", highlight=False, markup=False)
 
 
 def _number(quantity: Quantity) -> str:

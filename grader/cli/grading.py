@@ -8,8 +8,8 @@ from pathlib import Path
 
 import typer
 
+from grader.cli.app import check_language, new_table, progress
 from grader.cli.checking import checked_level
-from grader.cli.commands import check_language, new_table, progress
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
 from grader.feedback.class_page import CAUSES, SIGNS, waiting
 from grader.files import samples_folder
@@ -38,7 +38,7 @@ def grade_folder(
     level: str = "full",
     with_ghosts: bool = True,
 ) -> bool:
-    """Grade a folder and tell what came of it; whether anything is left for a person."""
+    """Grade a folder and print the outcome; whether anything is left for a person."""
     check_language(lang)
     wanted = checked_level(level)
     if pages_per_student is not None and pages_per_student < 1:
@@ -138,7 +138,7 @@ def _print_reading(document: ReadingDocument) -> None:
         console.print(f"  {gap.name}: unread, {gap.reason}", highlight=False, markup=False)
 
 
-# What the terminal says of a graded class ----------------------------------------------------------
+# A graded class on the terminal ----------------------------------------------------------
 
 SHOWN = 12
 CRITERIA = 4
@@ -146,7 +146,7 @@ CRITERIA = 4
 
 
 def tell_class(results: ResultsDocument, out: Path) -> None:
-    """States, what moved, what looks alike, what waits for a person, and where everything is."""
+    """Print states, changes, similar sheets, what waits for a person, and the paths of the results."""
     states = Counter(report.status for report in results.reports)
     told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
     typer.echo(f"{len(results.reports)} submissions: {told or 'none'}")
@@ -173,9 +173,9 @@ def _list(title: str, lines: Sequence[str], page: Path) -> None:
 
 
 def _waiting(results: ResultsDocument) -> Iterator[str]:
-    """What matches nobody, then that first which one look decides most of, then what is missing."""
-    for one in results.unmatched:
-        yield f"{one.file}{'' if one.page is None else f'#{one.page}'}: {one.message}"
+    """Lines on unmatched files, on what waits (most points at stake first), and on missing students."""
+    for page in results.unmatched:
+        yield f"{page.file}{'' if page.page is None else f'#{page.page}'}: {page.message}"
     for wait in waiting(results):
         report = wait.report
         count = f"{len(wait.criteria)} {'criterion' if len(wait.criteria) == 1 else 'criteria'}"

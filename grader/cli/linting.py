@@ -11,7 +11,7 @@ from rich.table import Table
 from grader.authoring.findings import named
 from grader.authoring.lint import Lint, lint, lint_document
 from grader.authoring.round_scales import WELL_READ_MM, Proposal, ends_of, ratio_text
-from grader.cli.commands import new_table
+from grader.cli.app import new_table
 from grader.documents import LintLeast, LintVariant, LintWorst
 from grader.files import write_whole
 from grader.rubric import load_rubric
@@ -31,27 +31,30 @@ COLOURS = {"fault": "bold red", "warning": "yellow", "hint": "cyan"}
 def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
     """Print every finding on an assignment and its rubric; whether any needs a person."""
     assignment = load_assignment(name)
-    found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
-    if svg is not None and found.plan is not None and found.worst is not None:
-        worst = _row_variant(found.worst)
-        told = f"{worst}: {found.worst.why}"
-        reason = Label((FRAME[0], FRAME[3] + 1.5 * REASON_MM), told, REASON_MM, colour=REASON_COLOUR)
-        drawing = reference_drawing(assignment, found.plan, found.plan.variants.index(worst))
+    result = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
+    if svg is not None and result.plan is not None and result.worst is not None:
+        worst = _variant_of(result.worst)
+        why = f"{worst}: {result.worst.why}"
+        reason = Label((FRAME[0], FRAME[3] + 1.5 * REASON_MM), why, REASON_MM, colour=REASON_COLOUR)
+        drawing = reference_drawing(assignment, result.plan, result.plan.variants.index(worst))
         sheets = [(*sheet.shapes, reason) for sheet in drawing]
         write_whole(svg, as_svg(sheets))
     if as_json:
-        typer.echo(lint_document(found).model_dump_json(indent=2))
-        return found.needs_a_person
+        typer.echo(lint_document(result).model_dump_json(indent=2))
+        return result.needs_a_person
     console = Console()
     console.print(f"[bold]{assignment.file.title.en}[/bold]", highlight=False)
-    console.print(_variants_table(found.rows))
-    if found.scales and found.plan is not None:
+    console.print(_variants_table(result.rows))
+    if result.scales and result.plan is not None:
         console.print()
-        console.print(_scales_table(found.scales))
+        console.print(_scales_table(result.scales))
     console.print()
-    _tell_findings(console, found)
-    _tell_end(found, svg)
-    return found.needs_a_person
+    # A line each, which terminals break and programs can search.
+    for finding in result.findings:
+        console.print(f"[{COLOURS[finding.severity]}]{finding.severity:<8}[/] ", end="")
+        console.print(str(finding), markup=False, highlight=False, soft_wrap=True)
+    _tell_end(result, svg)
+    return result.needs_a_person
 
 
 def _variants_table(rows: Sequence[LintVariant]) -> Table:
@@ -68,7 +71,7 @@ def _variants_table(rows: Sequence[LintVariant]) -> Table:
         broken = [row for row in group if row.problem]
         assembles = "yes" if not broken else "no" if len(broken) == len(group) else f"{len(broken)} do not"
         table.add_row(
-            _named_range(group),
+            str(_variant_of(group[0])) if len(group) == 1 else named(map(_variant_of, group)),
             f"[red]{assembles}[/red]" if broken else assembles,
             _worst_of([row.transmission for row in group], "{:.2f}"),
             _worst_of([row.crossing_deg for row in group], "{:.1f}"),
@@ -95,11 +98,7 @@ def _ranges(rows: Sequence[LintVariant]) -> list[list[LintVariant]]:
     ]
 
 
-def _named_range(group: Sequence[LintVariant]) -> str:
-    return str(_row_variant(group[0])) if len(group) == 1 else named(map(_row_variant, group))
-
-
-def _row_variant(row: LintVariant | LintWorst) -> Variant:
+def _variant_of(row: LintVariant | LintWorst) -> Variant:
     return Variant(row.n, row.position)
 
 
@@ -123,30 +122,29 @@ def _room_of(figures: Sequence[LintLeast | None]) -> str:
 
 def _scales_table(scales: Sequence[Proposal]) -> Table:
     """Quantities in rows: three columns stay readable in a narrow terminal."""
-    told = {"proposed": "as proposed", "round": "round", "round_each": "round, each its own"}
+    titles = {"proposed": "as proposed", "round": "round", "round_each": "round, each its own"}
     table = Table("scales", box=None, header_style="bold")
-    for one in scales:
-        table.add_column(told[one.name], justify="right", no_wrap=True)
+    for proposal in scales:
+        table.add_column(titles[proposal.name], justify="right", no_wrap=True)
     rows: dict[str, list[str]] = {
-        "kL": ["..".join(_ratios(one.scales.kL)) for one in scales],
-        "kv, (m/s)/mm": [_span(one.scales.kv) for one in scales],
-        "ka, (m/s^2)/mm": [_span(one.scales.ka) for one in scales],
-        "fits, times": [f"{one.room:.2f}" for one in scales],
+        "kL": ["..".join(dict.fromkeys(map(ratio_text, ends_of(proposal.scales.kL)))) for proposal in scales],
+        "kv, (m/s)/mm": [_span(proposal.scales.kv) for proposal in scales],
+        "ka, (m/s^2)/mm": [_span(proposal.scales.ka) for proposal in scales],
+        "fits, times": [f"{proposal.room:.2f}" for proposal in scales],
         "shortest asked, mm": [
-            "-" if one.shortest_mm is None else f"{one.shortest_mm.value:.2f} {one.shortest_mm.at}"
-            for one in scales
+            "-"
+            if proposal.shortest_mm is None
+            else f"{proposal.shortest_mm.value:.2f} {proposal.shortest_mm.at}"
+            for proposal in scales
         ],
-        f"asked under {WELL_READ_MM:g} mm": [f"{one.under_8_mm} of {one.asked}" for one in scales],
-        "shortest link, mm": [f"{one.link_mm:.1f}" for one in scales],
+        f"asked under {WELL_READ_MM:g} mm": [
+            f"{proposal.under_8_mm} of {proposal.asked}" for proposal in scales
+        ],
+        "shortest link, mm": [f"{proposal.link_mm:.1f}" for proposal in scales],
     }
     for name, cells in rows.items():
         table.add_row(name, *cells)
     return table
-
-
-def _ratios(values: FloatArray) -> list[str]:
-    """The finest and the coarsest scale of lengths, once where they are one."""
-    return list(dict.fromkeys(ratio_text(end) for end in ends_of(values)))
 
 
 def _span(values: FloatArray) -> str:
@@ -154,17 +152,9 @@ def _span(values: FloatArray) -> str:
     return low if low == high else f"{low}..{high}"
 
 
-def _tell_findings(console: Console, result: Lint) -> None:
-    """A line each, which terminals break and programs can search."""
-    for finding in result.findings:
-        word = f"[{COLOURS[finding.severity]}]{finding.severity:<8}[/]"
-        console.print(f"{word} ", end="")
-        console.print(str(finding), markup=False, highlight=False, soft_wrap=True)
-
-
 def _tell_end(result: Lint, svg: Path | None) -> None:
     if result.worst is not None and result.plan is not None:
-        typer.echo(f"hardest to draw: {_row_variant(result.worst)}: {result.worst.why}")
+        typer.echo(f"hardest to draw: {_variant_of(result.worst)}: {result.worst.why}")
         if svg is not None:
             typer.echo(f"drawn in {svg}")
     elif svg is not None:

@@ -10,12 +10,12 @@ import typer
 
 from grader.authoring.lint import lint
 from grader.authoring.round_scales import suggestions
-from grader.cli.commands import check_language, progress
+from grader.cli.app import check_language, progress
 from grader.documents import CalibrationDocument
 from grader.files import write_whole
 from grader.folder.cache import PageCache
 from grader.folder.draft_roster import SURE, contact_sheet, draft_csv, suggest, thumbnail
-from grader.folder.inventory import submissions, survey_folder
+from grader.folder.inventory import submissions, take_inventory
 from grader.folder.workers import Limits, Workers, result_of
 from grader.inputs.measurements import names_of
 from grader.inputs.roster import read_roster
@@ -23,11 +23,11 @@ from grader.printed.answer_sheet import make_calibration, make_sheets
 from grader.records import FloatArray, PageRef, Problem, Unread
 from grader.rubric import rubric_of
 from grader.scan.decode.pages import count_pages
-from grader.scan.register.calibration import calibrate, residual_map
+from grader.scan.register.calibration import ALL_IS_WELL, calibrate, residual_map
 from reference.authored.assignment import Variant, load_assignment
 from reference.errors import CallError, InputFileError
 
-_FIT = "printer and scanner are fit for grading"
+# calibrate ----------------------------------------------------------------------------------------
 
 
 def calibrate_scans(scans: Sequence[Path], svg: Path | None, *, as_json: bool) -> bool:
@@ -50,7 +50,7 @@ def calibrate_scans(scans: Sequence[Path], svg: Path | None, *, as_json: bool) -
     if svg is not None and found:
         write_whole(svg, residual_map(found[0]))
         typer.echo(f"{svg}: where the page is off, magnified", err=True)
-    return unread or any(one.advice != [_FIT] for one in found)
+    return unread or any(one.advice != [ALL_IS_WELL] for one in found)
 
 
 def _print_page(page: CalibrationDocument) -> None:
@@ -76,6 +76,8 @@ def _print_page(page: CalibrationDocument) -> None:
     for line in page.advice:
         typer.echo(f"  {line}")
 
+
+# sheet --------------------------------------------------------------------------------------------
 
 SHOWN_VARIANTS = 12
 
@@ -132,6 +134,9 @@ def _suggest_scales(name: str, roster: Path) -> None:
     )
 
 
+# match --------------------------------------------------------------------------------------------
+
+
 def draft_matches(
     folder: Path, name: str, roster_file: Path, out: Path, pages_per_student: int | None, lang: str
 ) -> bool:
@@ -147,7 +152,7 @@ def draft_matches(
         Workers(os.cpu_count() or 1, Limits(), __name__) as workers,
     ):
         cache = PageCache(Path(notes))
-        contents = survey_folder(paths, folder, names_of(assignment), workers, tell, cache)
+        contents = take_inventory(paths, folder, names_of(assignment), workers, tell, cache)
         sources = [page for content in contents for page in content.pages]
         draft = suggest(sources, roster, assignment, pages_per_student=pages_per_student)
         loose = [one.source for one in draft.suggestions if not one.sure]
@@ -158,7 +163,9 @@ def draft_matches(
             if not isinstance(ends, Problem | None):
                 strokes[loose[index]] = ends
             tell("reading", done, len(loose))
-        draft = suggest(sources, roster, assignment, look=strokes.get, pages_per_student=pages_per_student)
+        draft = suggest(
+            sources, roster, assignment, strokes_of=strokes.get, pages_per_student=pages_per_student
+        )
         shown = [one.source for one in draft.suggestions]
         thumbnails = dict(workers.run(_thumbnail, [(cache, page) for page in shown]))
     entries = []

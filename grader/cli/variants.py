@@ -12,7 +12,7 @@ import typer
 
 from grader.authoring.variant_checks import broken_findings, broken_variants
 from grader.authoring.variant_table import class_csv
-from grader.cli.commands import check_language, new_table, progress
+from grader.cli.app import check_language, new_table, progress
 from grader.cli.plans import check_crank
 from grader.cycle.quantities import CycleSubject, Extreme, Selection, cycle_csv, extremes, strokes_of
 from grader.files import write_whole
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
     from grader.authoring.variant_table import Tell
 
+
+# All variants -------------------------------------------------------------------------------------
 
 LONG = 20
 """So many drawings take seconds: their progress is shown."""
@@ -131,6 +133,8 @@ def _show_table(assignment: Assignment, plan: Plan) -> None:
     console.print(table)
     console.print("all vectors, values and directions: --csv FILE, --pdf FILE or --json", style="dim")
 
+
+# A cycle ------------------------------------------------------------------------------------------
 
 CONSTANT = 1e-9
 """What changes by less over a cycle, against the largest of its kind, is constant but for rounding."""

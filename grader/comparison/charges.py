@@ -1,4 +1,4 @@
-"""What earlier mistakes have cost, and what may follow through from them."""
+"""The charges: what earlier mistakes have cost, and which later values may follow from them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -20,18 +20,18 @@ class Against(Protocol):
     """Marks a criterion against one expectation."""
 
     def __call__(
-        self, expected: complex, reach: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
+        self, expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
     ) -> MarkRange:
-        """The mark; `reach` is how far a careful hand may miss it, `se` its standard errors."""
+        """The mark; `uncertainty` is the propagated drafting error, `se` are standard errors of reading."""
 
 
 @dataclass(frozen=True, slots=True)
-class Marked:
-    """A mark with what it was held against."""
+class ComparedMark:
+    """A mark with the expectation that gave it."""
 
     mark: MarkRange
     expected: complex
-    reach: EndSpread = NO_SPREAD
+    uncertainty: EndSpread = NO_SPREAD
     is_followed: bool = False
 
 
@@ -47,13 +47,21 @@ def new_charges(task: Task, evidence: Evidence, settled: Mapping[str, Scale], ex
 
 @dataclass(slots=True)
 class Charges:
-    """What has been charged while criteria are marked in the order of construction.
+    """The charges while criteria are marked in the order of construction.
 
-    What relies on a wrong node or scale may follow through only when that mistake has cost something:
-    `charged` holds those. `cleared` holds the nodes that were judged and are within their tolerance,
-    `by_length` those of them of which later lengths may show that they were laid off the wrong way,
-    `inherited` those that are right only as they follow from something charged, `doubtful` the nodes
-    and scales whose verdict is open.
+    A value that depends on a wrong node or scale may follow through only when that mistake has cost
+    something.
+
+    Attributes
+    ----------
+    charged : nodes and scales that have cost something
+    cleared : nodes that were judged and are within their tolerance
+    by_length : those of them whose direction is not known: they may be laid off the wrong way
+    inherited : nodes that are right only as they follow from something charged
+    doubtful : nodes and scales whose verdict is open
+    shown : what the current criterion is the first to show; it is charged there, and followed after it
+    known_wrong : by node, whether it is wrong (cache)
+    factors : by scale, the common factor by which all values are wrong, or None (cache)
     """
 
     task: Task
@@ -68,19 +76,17 @@ class Charges:
     inherited: set[str] = field(default_factory=set)
     doubtful: set[str] = field(default_factory=set)
     shown: set[str] = field(default_factory=set)
-    """What the criterion being marked is the first to show: it is charged there, and followed after it."""
-    known_off: dict[str, bool] = field(default_factory=dict)
+    known_wrong: dict[str, bool] = field(default_factory=dict)
     factors: dict[str, float | None] = field(default_factory=dict)
-    """By scale, the factor by which all values are off, where that was looked for."""
 
-    def best(self, segment: TaskSegment, against: Against, *, follows_through: bool) -> Marked:
+    def best(self, segment: TaskSegment, against: Against, *, follows_through: bool) -> ComparedMark:
         """The mark on the original data, or a better one on what follows from own earlier values."""
         self.charge_shown()
         exact = segment.drawn(self.used)
-        marked = Marked(against(exact), exact)
+        marked = ComparedMark(against(exact), exact)
         if not marked.mark.is_full:
-            reach = self.following.whole_reach(segment, exact)
-            marked = Marked(against(exact, reach), exact, reach)
+            uncertainty = self.following.uncertainty_of(segment, exact)
+            marked = ComparedMark(against(exact, uncertainty), exact, uncertainty)
         if not marked.mark.is_full and follows_through:
             marked = self.followed_through(segment, against, marked)
         self.charge_shown()
@@ -92,11 +98,13 @@ class Charges:
         return marked
 
     def charge_shown(self) -> None:
-        """What the last criterion was the first to show has cost something from now on."""
+        """Charge what the last criterion was the first to show."""
         self.charged.update(self.shown)
         self.shown.clear()
 
-    def followed_through(self, segment: TaskSegment, against: Against, original: Marked) -> Marked:
+    def followed_through(
+        self, segment: TaskSegment, against: Against, original: ComparedMark
+    ) -> ComparedMark:
         """The best of what follows: from the scale drawn at, from own nodes, from anything else."""
         marked, following = original, self.following
         at_scale = following.at_followed_scale(segment)
@@ -111,33 +119,33 @@ class Charges:
         return marked
 
     def from_own_nodes(
-        self, segment: TaskSegment, against: Against, marked: Marked, original: Marked
-    ) -> Marked:
-        """The mark by the nodes that this step started from, where they are known."""
+        self, segment: TaskSegment, against: Against, marked: ComparedMark, original: ComparedMark
+    ) -> ComparedMark:
+        """The mark by the own nodes from which this step started, where they are known."""
         expectation = self.following.from_nodes(segment, self.used)
         if not expectation.relies_on:
             return marked
         if self.wrong(expectation.relies_on):
             is_trivial = self.following.is_trivial(segment, expectation.vector)
             return marked if is_trivial else self.the_better(marked, expectation, against)
-        # Every earlier step is within what a hand may miss: this step alone counts.
-        mark = against(expectation.vector, expectation.reach, expectation.se)
+        # Every earlier step is within its propagated uncertainty: this step alone counts.
+        mark = against(expectation.vector, expectation.uncertainty, expectation.se)
         if not mark.is_better(marked.mark):
             return marked
         reasons = () if mark.is_full else original.mark.reasons
         return replace(original, mark=MarkRange(mark.share, mark.worst, mark.best, reasons))
 
-    def the_better(self, marked: Marked, expectation: Expectation, against: Against) -> Marked:
-        """What was found so far, or what follows where that leaves more."""
+    def the_better(self, marked: ComparedMark, expectation: Expectation, against: Against) -> ComparedMark:
+        """The mark so far, or the one against an expectation where that is better."""
         candidate = self.allowed(
-            expectation.relies_on, against(expectation.vector, expectation.reach, expectation.se)
+            expectation.relies_on, against(expectation.vector, expectation.uncertainty, expectation.se)
         )
         if not candidate.is_better(marked.mark):
             return marked
-        return Marked(
+        return ComparedMark(
             the_better(candidate, marked.mark, *self.why(expectation)),
             expectation.vector,
-            expectation.reach,
+            expectation.uncertainty,
             is_followed=True,
         )
 
@@ -148,8 +156,8 @@ class Charges:
             return mark
         self.charged.discard(segment.head)
         self.doubtful.add(segment.head)
-        told = f"{', '.join(unknown)}, on which it hangs, was not read for certain"
-        return MarkRange(mark.share, mark.worst, FULL, (*mark.reasons, Reason("unread", {"reason": told})))
+        why = f"{', '.join(unknown)}, on which it hangs, was not read for certain"
+        return MarkRange(mark.share, mark.worst, FULL, (*mark.reasons, Reason("unread", {"reason": why})))
 
     def unknown_upstream(self, segment: TaskSegment) -> tuple[str, ...]:
         """The nodes that a vector's head is made from and that were not read, of figures that were."""
@@ -162,26 +170,27 @@ class Charges:
 
     # What is wrong --------------------------------------------------------------------------------
 
-    def is_off(self, node: str) -> bool:
-        """Whether an own node is further from its right place than a hand may miss it."""
-        if node not in self.known_off:
-            self.known_off[node] = self._is_off(node)
-        return self.known_off[node]
+    def is_wrong(self, node: str) -> bool:
+        """Whether an own node's residual exceeds both its tolerance and its propagated uncertainty."""
+        if node not in self.known_wrong:
+            self.known_wrong[node] = self._is_wrong(node)
+        return self.known_wrong[node]
 
-    def _is_off(self, node: str) -> bool:
-        """Where it is beyond the plain tolerance, what a careful hand makes of it counts."""
+    def _is_wrong(self, node: str) -> bool:
         task = self.task
-        own = self.own_place(node)
+        own = self.own_position(node)
         if own is None:
             return False
         exact = task.nodes(self.used)[node]
         if task.construction.figure_of(node) == MECHANISM:
             exact *= self.used["kL"] / self.followed["kL"]
-        off = own - exact
-        if abs(off) <= task.tolerance_at(node).length_at(abs(exact)):
+        residual = own - exact
+        if abs(residual) <= task.tolerance_at(node).length_at(abs(exact)):
             return False
-        reach = scaled(spread(task.traced(self.used).nodes[node].moved, off), task.rubric.hand.sigmas)
-        return abs(off) > reach.along
+        uncertainty = scaled(
+            spread(task.traced(self.used).nodes[node].shifts, residual), task.rubric.hand.sigmas
+        )
+        return abs(residual) > uncertainty.along
 
     def is_by_length(self, segment: TaskSegment) -> bool:
         """Whether only the length is known of a vector that is laid off: its sense may be wrong."""
@@ -189,7 +198,7 @@ class Charges:
         is_laid_off = isinstance(self.task.construction.step(segment.head), Given)
         return is_laid_off and drawn is not None and drawn.direction_rad is None
 
-    def own_place(self, node: str) -> complex | None:
+    def own_position(self, node: str) -> complex | None:
         """An own node as read or measured, or as lengths lead to it."""
         if node in self.evidence.nodes:
             return self.evidence.nodes[node]
@@ -199,14 +208,14 @@ class Charges:
         return None
 
     def wrong(self, relies_on: frozenset[str]) -> frozenset[str]:
-        """What is wrong of the nodes and scales relied on: off, and not judged to be within tolerance."""
+        """The wrong ones among nodes and scales: charged, or off and not judged within tolerance."""
         blamed = relies_on & (self.charged | self.inherited)
         open_ones = relies_on - blamed - (self.cleared - self.by_length)
         nodes = known(self.following.own(self.used)) | self.evidence.nodes.keys()
-        return blamed | {name for name in open_ones if name not in nodes or self.is_off(name)}
+        return blamed | {name for name in open_ones if name not in nodes or self.is_wrong(name)}
 
     def allowed(self, relies_on: frozenset[str], mark: MarkRange) -> MarkRange:
-        """Credit for following only where the earlier mistake has been charged; else it is charged here."""
+        """The mark for what follows, where the earlier mistake has been charged; else it is charged here."""
         wrong = self.wrong(relies_on)
         has_doubtful_scale = bool(wrong & self.doubtful & self.settled.keys())
         if not wrong or (wrong & (self.charged | self.inherited) and not has_doubtful_scale):
@@ -218,7 +227,7 @@ class Charges:
         return MarkRange(NONE, NONE, NONE, mark.reasons)
 
     def remember(self, name: str, mark: MarkRange) -> None:
-        """Whether a node or scale has cost something, or may have, or is right."""
+        """Record whether a node or scale has cost something, is in doubt, or is right."""
         if not mark.is_certain:
             self.doubtful.add(name)
         elif mark.share != FULL:
@@ -227,7 +236,7 @@ class Charges:
             self.cleared.add(name)
 
     def leave_open(self, name: str) -> None:
-        """The verdict on a vector, angular quantity or scale is open after all."""
+        """Record that the verdict on a vector, angular quantity or scale is open after all."""
         segment = self.task.segments.get(name)
         node = name if segment is None else segment.head
         self.shown.clear()
@@ -238,7 +247,7 @@ class Charges:
     # Why ------------------------------------------------------------------------------------------
 
     def why(self, expectation: Expectation) -> tuple[Reason, ...]:
-        """What an expectation follows from, and that its scale is not known where it is not."""
+        """The reasons for an expectation: what it follows from, and whether its scale was assumed."""
         follows = Reason(
             "follows", {"what": expectation.what, "of": expectation.of or self.named(expectation)}
         )

@@ -1,11 +1,10 @@
 """All criteria of a rubric, in the order of construction, so that earlier mistakes are known.
 
-`compare(task, submission)` is the whole of it. Each criterion is marked against the original data
-at the student's scales first, then against what follows from the student's own earlier values; the
-better counts. The mistake that later ones follow from costs once: where it was made, or, where no
-criterion asks for that, at the first criterion that shows it. Small errors that are each within
-their tolerance and add up in a later node are no mistake. Verdicts are `Outcome`s with structured
-reasons (`grader.outcomes`); nothing here speaks a human language.
+`compare(task, submission)` marks each criterion against the original data at the student's scales
+first, then against what follows from the student's own earlier values; the better counts. A mistake
+from which later values follow costs once: where it was made, or, where no criterion asks for that, at
+the first criterion that shows it. Small errors that are each within their tolerance and add up in a
+later node are no mistake. Verdicts are `Outcome`s with reasons as data (`grader.outcomes`).
 """
 
 import cmath
@@ -15,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from grader.comparison import verdicts
-from grader.comparison.charges import Against, Charges, Marked, new_charges
+from grader.comparison.charges import Against, Charges, ComparedMark, new_charges
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
 from grader.comparison.follow_through import NO_SPREAD, Explain, ReplayResult, nothing_explained
 from grader.comparison.scales import Scale, settle
@@ -41,172 +40,17 @@ from reference.construction.graph import AngularRate
 from reference.construction.steps import Given
 from reference.construction.uncertainty import EndSpread
 
-SO_MANY = 3
-"""Values that are off by one factor were made with a wrong scale; fewer may be so by chance."""
-ALIKE = 0.02
-"""Relative: how near to each other their factors are, with rounding on the way."""
-HALF = 0.5
-"""The share of a criterion that a right drawing keeps where the rubric has no band of partial points."""
-
-
-def mark_of_value(
-    charges: Charges, criterion: CriterionTable, value: float, marked: Marked, drawn: DrawnVector
-) -> MarkRange | None:
-    """The mark on a computed value beside its drawing; None where it is right, or right by the drawing.
-
-    A wrong value costs only the value: what the rubric's nearest band takes. A wrong factor in all
-    values of a scale costs once.
-    """
-    one, table = charges.task.segments[criterion.name], charges.task.rubric.tolerance_of(criterion)
-    scale = charges.used[one.scale]
-    rights = [abs(one.real), abs(marked.expected) * scale, drawn.length_mm * scale]
-    factor = common_factor(charges, one.scale)
-    if factor is not None and _is_charged(charges, one.scale):
-        rights += [right * factor for right in rights]
-    limits = [table.length_at(right / scale) * scale for right in rights]
-    marks = [
-        mark_value(value, right, limit, limit, table, unit_of(one.name))
-        for right, limit in zip(rights, limits, strict=True)
-    ]
-    best = max(marks, key=lambda mark: mark.share)
-    if best.is_full:
-        return None
-    if factor is not None:
-        charges.charged.add(_name(one.scale))
-    keeps = max(best.share, table.all_bands[0][1] if table.all_bands else HALF)
-    return MarkRange(keeps, keeps, keeps, best.reasons)
-
-
-def common_factor(charges: Charges, scale: str) -> float | None:
-    """The factor by which all values of a scale are off, where they are off by one."""
-    if scale not in charges.factors:
-        charges.factors[scale] = _common_factor(charges, scale)
-    return charges.factors[scale]
-
-
-def _common_factor(charges: Charges, scale: str) -> float | None:
-    task, evidence = charges.task, charges.evidence
-    factors = []
-    for name, vector in task.construction.vectors.items():
-        if vector.scale != scale or name not in evidence.values:
-            continue
-        drawn = evidence.vector(name)
-        length = abs(task.drawn(name, charges.used)) if drawn is None else drawn.length_mm
-        if length > task.rubric.tolerance_of(name).least_mm:
-            factors.append(abs(evidence.values[name]) / (length * charges.used[scale]))
-    if len(factors) < SO_MANY:
-        return None
-    factor = statistics.median(factors)
-    near = [each for each in factors if abs(each - factor) <= ALIKE * factor]
-    is_off = abs(factor - 1.0) > 2.0 * task.rubric.tolerance_of(scale).scale_relative
-    return factor if is_off and len(near) >= max(SO_MANY, len(factors) - 1) else None
-
-
-def _name(scale: str) -> str:
-    return f"values by {scale}"
-
-
-def _is_charged(charges: Charges, scale: str) -> bool:
-    return _name(scale) in charges.charged
-
-
-def value_alone(charges: Charges, criterion: CriterionTable) -> Outcome:
-    """A vector of which only the computed value was handed in, or nothing."""
-    one, values = charges.task.segments[criterion.name], charges.evidence.values
-    scale = charges.used[one.scale]
-    if one.name not in values:
-        exact = one.drawn(charges.used)
-        return absent(charges, criterion, verdicts.expected_quantity(one.name, exact, scale, 0.0))
-    value, unit = abs(values[one.name]), unit_of(one.name)
-
-    def allowed(expected: complex, reach: EndSpread) -> Tolerance:
-        plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(expected), with_direction=False)
-        if reach is NO_SPREAD:
-            return Tolerance(value=(plain.length_mm or 0.0) * scale)
-        wider = widened(plain, abs(expected), reach, charges.task.rubric.hand.at_most)
-        return Tolerance(value=(wider.length_mm or 0.0) * scale, widened=wider.widened)
-
-    def against(expected: complex, reach: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD) -> MarkRange:
-        del se
-        limit, table = allowed(expected, reach).value or 0.0, charges.task.rubric.tolerance_of(criterion)
-        plain = table.length_at(abs(expected)) * scale
-        return mark_value(value, abs(expected) * scale, limit, plain, table, unit)
-
-    follows = charges.task.rubric.follows_through(criterion)
-    marked = charges.best(one, against, follows_through=follows)
-    if not marked.mark.is_full and follows:
-        marked = _by_factor(charges, one.scale, marked, against)
-    measured, right = Quantity(value=values[one.name], unit=unit), abs(marked.expected) * scale
-    return verdicts.outcome(
-        criterion,
-        marked.mark,
-        measured,
-        Quantity(value=right, unit=unit),
-        allowed(marked.expected, marked.reach),
-        followed=marked.is_followed,
-    )
-
-
-def _by_factor(charges: Charges, scale: str, marked: Marked, against: Against) -> Marked:
-    """A value that is off by the factor of all, after the first of them."""
-    factor, exact = common_factor(charges, scale), marked.expected
-    if factor is None:
-        return marked
-    mark = against(exact * factor)
-    if not _is_charged(charges, scale):
-        charges.charged.add(_name(scale))
-        return marked
-    if not mark.is_better(marked.mark):
-        return marked
-    told = Reason("follows", {"what": "scale", "of": scale})
-    return Marked(the_better(mark, marked.mark, told), exact * factor, is_followed=True)
-
-
-# What was not handed in, or not read -------------------------------------------------------------
-
-
-def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> Outcome:
-    """The outcome of a criterion that there is nothing to hold against."""
-    unread = _why_unread(charges, criterion)
-    reason = Reason("not_measured") if unread is None else Reason("unread", {"reason": unread})
-    if criterion.optional:
-        return verdicts.unjudged(criterion, "not_judged", (Reason("optional"), reason), expected=expected)
-    if criterion.link is not None and not charges.evidence.has_sketch:
-        # Links are drawn, not measured: without a sketch that was read nothing is asked of them.
-        return verdicts.unjudged(criterion, "not_judged", (reason,), expected=expected)
-    least, length = charges.task.rubric.tolerance_of(criterion).least_mm, expected.length_mm
-    if length is not None and length < least:
-        short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
-        return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
-    segment = charges.task.segments.get(criterion.name)
-    if segment is not None:
-        # Later criteria may hang on what nobody has seen.
-        charges.doubtful.add(segment.head)
-    verdict = charges.task.rubric.missing if unread is None else "review"
-    return verdicts.unjudged(criterion, verdict, (reason,), expected=expected)
-
-
-def _why_unread(charges: Charges, criterion: CriterionTable) -> str | None:
-    """Why a vector or link was not read, None where no sheet could show it."""
-    segment, evidence = charges.task.segments.get(criterion.name), charges.evidence
-    if segment is None or not evidence.has_sheets:
-        return None
-    for name in (segment.name, segment.head, segment.tail):
-        if name in evidence.unread:
-            return evidence.unread[name]
-    return f"{segment.name} was not found on the sheets"
-
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All outcomes in the rubric's order, the scales used, and the evidence they rest on."""
+    """All outcomes in the rubric's order, the scales used, and the evidence."""
 
     outcomes: tuple[Outcome, ...]
     scales: Mapping[str, UsedScale]
     evidence: Evidence
     settled: Mapping[str, Scale]
     explanation: ReplayResult | None
-    """What the drawing was explained by, where that was asked for."""
+    """The result of the search for what was done, where it was needed."""
 
 
 def compare(task: Task, submission: Submission, explain: Explain = nothing_explained) -> Comparison:
@@ -228,7 +72,7 @@ def compare(task: Task, submission: Submission, explain: Explain = nothing_expla
 
 
 def _in_order(task: Task, scales: tuple[str, ...]) -> list[CriterionTable]:
-    """As things are drawn and found: scales, the sketch, velocities, angular ones, accelerations."""
+    """The criteria as they are drawn: scales, sketch, velocities, omega, accelerations, epsilon."""
     construction = task.construction
     steps = {step.node: place for place, step in enumerate(construction.steps)}
     kinds = ("v", "omega", "a", "epsilon")
@@ -244,7 +88,7 @@ def _in_order(task: Task, scales: tuple[str, ...]) -> list[CriterionTable]:
 
 
 def _outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
-    """The verdict on one criterion, open where it rests on something entered that cannot be used."""
+    """The verdict on one criterion, open where it depends on an entry that cannot be used."""
     outcome = _judged(charges, criterion)
     entry = charges.evidence.refused.get(criterion.name)
     if entry is None and outcome.verdict in {"none", "partial"}:
@@ -256,7 +100,7 @@ def _outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
 
 
 def _refused_below(charges: Charges, name: str) -> str | None:
-    """What was entered for the scale, or for a node that a vector is made from, and cannot be used."""
+    """The entry for the scale, or for a node from which a vector is made, that cannot be used."""
     task, evidence = charges.task, charges.evidence
     turned = task.construction.rates.get(name)
     segment = task.segments.get(name if turned is None else turned.vector)
@@ -269,7 +113,7 @@ def _refused_below(charges: Charges, name: str) -> str | None:
 
 
 def _judged(charges: Charges, criterion: CriterionTable) -> Outcome:
-    """The verdict on what can be used; what it costs is remembered for the later ones."""
+    """The verdict on what can be used; its cost is recorded in the charges."""
     if criterion.scale is not None:
         return _scale(charges, criterion)
     if criterion.angular is not None:
@@ -278,11 +122,11 @@ def _judged(charges: Charges, criterion: CriterionTable) -> Outcome:
     outcomes = [segment(charges, criterion, drawn) for drawn in sources if drawn is not None]
     if len(outcomes) == 2:
         return verdicts.both(outcomes[0], outcomes[1], charges.task.rubric.tolerance_of(criterion).length_mm)
-    return outcomes[0] if outcomes else value_alone(charges, criterion)
+    return outcomes[0] if outcomes else value_outcome(charges, criterion)
 
 
 def _scale(charges: Charges, criterion: CriterionTable) -> Outcome:
-    """A declared scale, as it was settled."""
+    """The outcome of a declared scale."""
     name, unit = criterion.name, unit_of(criterion.name)
     scale, right = charges.settled[name], charges.followed[name]
     expected = Quantity(value=right, unit=unit)
@@ -296,11 +140,11 @@ def _scale(charges: Charges, criterion: CriterionTable) -> Outcome:
     return verdicts.outcome(criterion, scale.mark, measured, expected, allowed)
 
 
-# Vectors and links -------------------------------------------------------------------------------
+# Vectors and links ---------------------------------------------------------------------------------
 
 
 def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> Outcome:
-    """A vector that was drawn (or measured), or a link of the sketch."""
+    """The outcome of a vector that was drawn (or measured), or of a link of the sketch."""
     one, rubric = charges.task.segments[criterion.name], charges.task.rubric
     follows = rubric.follows_through(criterion)
     with_direction = criterion.direction and drawn.direction_rad is not None
@@ -324,7 +168,7 @@ def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> 
         mark,
         verdicts.quantity(one.name, drawn.length_mm, on_sheet, value),
         verdicts.expected_quantity(one.name, marked.expected, scale, drawn.turn_rad),
-        _allowed(criterion, charges, marked, with_direction=with_direction),
+        _full_tolerance(criterion, charges, marked, with_direction=with_direction),
         confidence=drawn.confidence,
         followed=marked.is_followed,
         mistake="arithmetic" if is_arithmetic else None,
@@ -332,51 +176,243 @@ def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> 
 
 
 def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> Against:
-    """How a drawn vector is marked against an expectation, as the rubric and the sheet's cells have it."""
+    """A function that marks a drawn vector against an expectation, by the rubric and the sheet's cells."""
     rubric = charges.task.rubric
     table, least = rubric.tolerance_of(criterion), rubric.least_confidence
     with_direction = criterion.direction and drawn.direction_rad is not None
     is_read = drawn is charges.evidence.drawn.get(criterion.name)
     written = charges.evidence.written.get(criterion.name) if is_read else None
 
-    def against(expected: complex, reach: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD) -> MarkRange:
+    def against(
+        expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
+    ) -> MarkRange:
         size = abs(expected)
         plain = tolerances(table, size, with_direction=with_direction)
-        if reach is NO_SPREAD:
+        if uncertainty is NO_SPREAD:
             mark = mark_vector(drawn, expected, plain, table, se)
         else:
-            mark = mark_vector(drawn, expected, widened(plain, size, reach, rubric.hand.at_most), table, se)
+            mark = mark_vector(
+                drawn, expected, widened(plain, size, uncertainty, rubric.hand.at_most), table, se
+            )
             if not mark.is_full:
-                by_hand = mark_vector(drawn, expected, widened(plain, size, reach), table, se)
-                mark = left_open(mark, ALL_RIGHT if _is_boundless(reach, size) else by_hand)
-        mark = held_against_written(mark, drawn, written, table, least)
+                by_hand = mark_vector(drawn, expected, widened(plain, size, uncertainty), table, se)
+                mark = left_open(mark, ALL_RIGHT if _is_boundless(uncertainty, size) else by_hand)
+        mark = compared_with_cells(mark, drawn, written, table, least)
         return verdicts.with_confidence(mark, drawn.confidence, least)
 
     return against
 
 
 BOUNDLESS_MM, BOUNDLESS_SHARE = 20.0, 0.5
-"""A reach of so much, and of such a share of the vector: there errors no longer grow in proportion, and a
-hand may miss by anything."""
+"""Propagated uncertainty larger than this, and than this share of the vector: the linear propagation no
+longer holds, and the error may be anything."""
 
 
-def _is_boundless(reach: EndSpread, size_mm: float) -> bool:
-    """Whether lines cross so badly that nothing tells how far a careful hand may miss."""
-    return max(reach.along, reach.across) > max(BOUNDLESS_MM, BOUNDLESS_SHARE * size_mm)
+def _is_boundless(uncertainty: EndSpread, size_mm: float) -> bool:
+    """Whether lines cross so badly that the propagated uncertainty has no bound."""
+    return max(uncertainty.along, uncertainty.across) > max(BOUNDLESS_MM, BOUNDLESS_SHARE * size_mm)
 
 
-def _allowed(
-    criterion: CriterionTable, charges: Charges, marked: Marked, *, with_direction: bool
+def _full_tolerance(
+    criterion: CriterionTable, charges: Charges, marked: ComparedMark, *, with_direction: bool
 ) -> Tolerance:
     """What full marks allow, for the report."""
     size = abs(marked.expected)
     plain = tolerances(charges.task.rubric.tolerance_of(criterion), size, with_direction=with_direction)
-    if marked.reach is NO_SPREAD:
+    if marked.uncertainty is NO_SPREAD:
         return plain
-    return widened(plain, size, marked.reach, charges.task.rubric.hand.at_most)
+    return widened(plain, size, marked.uncertainty, charges.task.rubric.hand.at_most)
 
 
-# Angular quantities ------------------------------------------------------------------------------
+def compared_with_cells(
+    mark: MarkRange,
+    drawn: DrawnVector,
+    written: tuple[float, float] | None,
+    tolerance: ToleranceTable,
+    least: float,
+) -> MarkRange:
+    """The mark, open where the drawn length and the one written into the sheet's cells contradict.
+
+    Either of them may be misread, or the student has measured something else. A ruler's error is no
+    more than the tolerance of a length.
+
+    Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
+    `least` the probability from which it counts.
+    """
+    if written is None or written[1] < least:
+        return mark
+    length_mm = written[0]
+    allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
+    if abs(drawn.length_mm - length_mm) <= allowed:
+        return mark
+    params: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
+    return open_between(NONE, FULL, mark, Reason("written_disagrees", params))
+
+
+# Computed values -----------------------------------------------------------------------------------
+
+LEAST_VALUES = 3
+"""So many values with one common factor were computed with a wrong scale; fewer may agree by chance."""
+SAME_FACTOR = 0.02
+"""Relative difference up to which two factors are the same, with rounding on the way."""
+HALF = 0.5
+"""The share of a criterion that a right drawing keeps where the rubric has no band of partial points."""
+
+
+def mark_of_value(
+    charges: Charges, criterion: CriterionTable, value: float, marked: ComparedMark, drawn: DrawnVector
+) -> MarkRange | None:
+    """The mark on a computed value beside its drawing; None where it is right, or right by the drawing.
+
+    A wrong value costs only the value: what the rubric's nearest band takes. A wrong factor in all
+    values of a scale costs once.
+    """
+    one, table = charges.task.segments[criterion.name], charges.task.rubric.tolerance_of(criterion)
+    scale = charges.used[one.scale]
+    rights = [abs(one.real), abs(marked.expected) * scale, drawn.length_mm * scale]
+    factor = common_factor(charges, one.scale)
+    if factor is not None and _is_charged(charges, one.scale):
+        rights += [right * factor for right in rights]
+    limits = [table.length_at(right / scale) * scale for right in rights]
+    marks = [
+        mark_value(value, right, limit, limit, table, unit_of(one.name))
+        for right, limit in zip(rights, limits, strict=True)
+    ]
+    best = max(marks, key=lambda mark: mark.share)
+    if best.is_full:
+        return None
+    if factor is not None:
+        charges.charged.add(_charge_of(one.scale))
+    keeps = max(best.share, table.all_bands[0][1] if table.all_bands else HALF)
+    return MarkRange(keeps, keeps, keeps, best.reasons)
+
+
+def value_outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
+    """A vector of which only the computed value was handed in, or nothing."""
+    one, values = charges.task.segments[criterion.name], charges.evidence.values
+    scale = charges.used[one.scale]
+    if one.name not in values:
+        exact = one.drawn(charges.used)
+        return absent(charges, criterion, verdicts.expected_quantity(one.name, exact, scale, 0.0))
+    value, unit = abs(values[one.name]), unit_of(one.name)
+
+    def allowed(expected: complex, uncertainty: EndSpread) -> Tolerance:
+        plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(expected), with_direction=False)
+        if uncertainty is NO_SPREAD:
+            return Tolerance(value=(plain.length_mm or 0.0) * scale)
+        wider = widened(plain, abs(expected), uncertainty, charges.task.rubric.hand.at_most)
+        return Tolerance(value=(wider.length_mm or 0.0) * scale, widened=wider.widened)
+
+    def against(
+        expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
+    ) -> MarkRange:
+        del se
+        limit, table = (
+            allowed(expected, uncertainty).value or 0.0,
+            charges.task.rubric.tolerance_of(criterion),
+        )
+        plain = table.length_at(abs(expected)) * scale
+        return mark_value(value, abs(expected) * scale, limit, plain, table, unit)
+
+    follows = charges.task.rubric.follows_through(criterion)
+    marked = charges.best(one, against, follows_through=follows)
+    if not marked.mark.is_full and follows:
+        marked = _by_factor(charges, one.scale, marked, against)
+    measured, right = Quantity(value=values[one.name], unit=unit), abs(marked.expected) * scale
+    return verdicts.outcome(
+        criterion,
+        marked.mark,
+        measured,
+        Quantity(value=right, unit=unit),
+        allowed(marked.expected, marked.uncertainty),
+        followed=marked.is_followed,
+    )
+
+
+def _by_factor(charges: Charges, scale: str, marked: ComparedMark, against: Against) -> ComparedMark:
+    """The mark of a value that has the common factor: full marks from the second such value on."""
+    factor, exact = common_factor(charges, scale), marked.expected
+    if factor is None:
+        return marked
+    mark = against(exact * factor)
+    if not _is_charged(charges, scale):
+        charges.charged.add(_charge_of(scale))
+        return marked
+    if not mark.is_better(marked.mark):
+        return marked
+    follows = Reason("follows", {"what": "scale", "of": scale})
+    return ComparedMark(the_better(mark, marked.mark, follows), exact * factor, is_followed=True)
+
+
+def common_factor(charges: Charges, scale: str) -> float | None:
+    """The common factor by which all values of a scale are wrong; None where there is none."""
+    if scale not in charges.factors:
+        charges.factors[scale] = _common_factor(charges, scale)
+    return charges.factors[scale]
+
+
+def _common_factor(charges: Charges, scale: str) -> float | None:
+    task, evidence = charges.task, charges.evidence
+    factors = []
+    for name, vector in task.construction.vectors.items():
+        if vector.scale != scale or name not in evidence.values:
+            continue
+        drawn = evidence.vector(name)
+        length = abs(task.drawn(name, charges.used)) if drawn is None else drawn.length_mm
+        if length > task.rubric.tolerance_of(name).least_mm:
+            factors.append(abs(evidence.values[name]) / (length * charges.used[scale]))
+    if len(factors) < LEAST_VALUES:
+        return None
+    factor = statistics.median(factors)
+    near = [each for each in factors if abs(each - factor) <= SAME_FACTOR * factor]
+    is_wrong = abs(factor - 1.0) > 2.0 * task.rubric.tolerance_of(scale).scale_relative
+    return factor if is_wrong and len(near) >= max(LEAST_VALUES, len(factors) - 1) else None
+
+
+def _charge_of(scale: str) -> str:
+    return f"values by {scale}"
+
+
+def _is_charged(charges: Charges, scale: str) -> bool:
+    return _charge_of(scale) in charges.charged
+
+
+# What was not handed in, or not read ---------------------------------------------------------------
+
+
+def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> Outcome:
+    """The outcome of a criterion for which nothing was handed in or read."""
+    unread = _why_unread(charges, criterion)
+    reason = Reason("not_measured") if unread is None else Reason("unread", {"reason": unread})
+    if criterion.optional:
+        return verdicts.unjudged(criterion, "not_judged", (Reason("optional"), reason), expected=expected)
+    if criterion.link is not None and not charges.evidence.has_sketch:
+        # Links are drawn, not measured: without a sketch that was read nothing is asked of them.
+        return verdicts.unjudged(criterion, "not_judged", (reason,), expected=expected)
+    least, length = charges.task.rubric.tolerance_of(criterion).least_mm, expected.length_mm
+    if length is not None and length < least:
+        short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
+        return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
+    segment = charges.task.segments.get(criterion.name)
+    if segment is not None:
+        # Later criteria may depend on what was not read.
+        charges.doubtful.add(segment.head)
+    verdict = charges.task.rubric.missing if unread is None else "review"
+    return verdicts.unjudged(criterion, verdict, (reason,), expected=expected)
+
+
+def _why_unread(charges: Charges, criterion: CriterionTable) -> str | None:
+    """Why a vector or link was not read, None where no sheet could show it."""
+    segment, evidence = charges.task.segments.get(criterion.name), charges.evidence
+    if segment is None or not evidence.has_sheets:
+        return None
+    for name in (segment.name, segment.head, segment.tail):
+        if name in evidence.unread:
+            return evidence.unread[name]
+    return f"{segment.name} was not found on the sheets"
+
+
+# Angular quantities --------------------------------------------------------------------------------
 
 
 def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
@@ -394,38 +430,49 @@ def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     allowed = Tolerance(value=plain)
     mark, followed = mark_value(value, right, plain, plain, table, unit), False
     if not mark.is_full:
-        allowed = _widened(charges, criterion, segment, per_mm)
+        allowed = _widened_rate(charges, criterion, segment, per_mm)
         mark = mark_value(value, right, allowed.value or 0.0, plain, table, unit)
     charges.remember(name, mark)
     follows = task.rubric.follows_through(criterion)
-    own = from_rate(task, charges.evidence, turned, scale) if follows and not mark.is_full else None
+    own = rate_from_vector(task, charges.evidence, turned, scale) if follows and not mark.is_full else None
     factor = common_factor(charges, segment.scale)
     if own is None and factor is not None and follows and not mark.is_full:
         own = right
     if own is not None:
-        # Values that are all off by one factor give an angular one off by it, too.
+        # A common factor of all values is also that of the angular one.
         own = own if factor is None else min(own, own * factor, key=lambda one: abs(one - value))
         limit = table.length_at(abs(own) / per_mm) * per_mm
         candidate = charges.allowed(
             frozenset({segment.head}), mark_value(value, own, limit, limit, table, unit)
         )
         if candidate.is_better(mark):
-            told = Reason("follows", {"what": "vector", "of": turned.vector})
-            mark, right, followed = the_better(candidate, mark, told), own, True
+            follows_from = Reason("follows", {"what": "vector", "of": turned.vector})
+            mark, right, followed = the_better(candidate, mark, follows_from), own, True
     measured, expected = Quantity(value=value, unit=unit), Quantity(value=right, unit=unit)
     return verdicts.outcome(criterion, mark, measured, expected, allowed, followed=followed)
 
 
-def _widened(charges: Charges, criterion: CriterionTable, segment: TaskSegment, per_mm: float) -> Tolerance:
-    """The tolerance with what a careful hand may miss of the vector that turns the link."""
+def _widened_rate(
+    charges: Charges, criterion: CriterionTable, segment: TaskSegment, per_mm: float
+) -> Tolerance:
+    """The tolerance of an angular quantity, widened by the uncertainty of the vector that turns the link."""
     exact = segment.drawn(charges.used)
     plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(exact), with_direction=False)
-    reach = charges.following.whole_reach(segment, exact)
-    wider = widened(plain, abs(exact), reach, charges.task.rubric.hand.at_most)
+    uncertainty = charges.following.uncertainty_of(segment, exact)
+    wider = widened(plain, abs(exact), uncertainty, charges.task.rubric.hand.at_most)
     return Tolerance(value=(wider.length_mm or 0.0) * per_mm, widened=wider.widened)
 
 
-# From the own vector ----------------------------------------------------------------------------
+def rate_from_vector(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -> float | None:
+    """The angular rate that the student's own vector gives; None without one, or a trivial one.
+
+    Arguments: `scale` is the vector's, real units per drawn millimetre. Where the own vector's direction
+    is not known, the sense is the right one's.
+    """
+    own = evidence.vector(rate.vector)
+    if own is None or own.length_mm < task.rubric.tolerance_of(rate.vector).least_mm:
+        return None
+    return _own_sense(task, evidence, rate) * own.length_mm * scale / own_length(task, evidence, rate)
 
 
 def own_length(task: Task, evidence: Evidence, rate: AngularRate) -> float:
@@ -443,19 +490,7 @@ def _is_given(task: Task, rate: AngularRate) -> bool:
     return not any(isinstance(one, Normal) and one.measured == rate.link for one in lengths)
 
 
-def from_rate(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -> float | None:
-    """The angular rate that the student's own vector gives; None without one, or a trivial one.
-
-    Arguments: `scale` is the vector's, real units per drawn millimetre. Where the own vector's direction
-    is not known, the sense is the right one's.
-    """
-    own = evidence.vector(rate.vector)
-    if own is None or own.length_mm < task.rubric.tolerance_of(rate.vector).least_mm:
-        return None
-    return _sense(task, evidence, rate) * own.length_mm * scale / own_length(task, evidence, rate)
-
-
-def _sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
+def _own_sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
     """+1 where the own vector turns its link counter-clockwise: the link as drawn where it was read."""
     own, along = evidence.vector(rate.vector), task.real[rate.vector]
     sense = math.copysign(1.0, task.rates[rate.name])
@@ -467,31 +502,3 @@ def _sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
     if tail is not None and head is not None:
         return math.copysign(1.0, math.sin(own.direction_rad - cmath.phase(head - tail)))
     return sense * math.copysign(1.0, math.cos(own.direction_rad - cmath.phase(along)))
-
-
-# The length that the student wrote into the sheet's cells ----------------------------------------
-
-
-def held_against_written(
-    mark: MarkRange,
-    drawn: DrawnVector,
-    written: tuple[float, float] | None,
-    tolerance: ToleranceTable,
-    least: float,
-) -> MarkRange:
-    """The mark, open where the two lengths contradict each other: a person must look.
-
-    Either the drawing is misread, or the cells, or the student has measured something else; nothing
-    here says which. A ruler errs by no more than the tolerance of a length.
-
-    Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
-    `least` the probability from which it counts.
-    """
-    if written is None or written[1] < least:
-        return mark
-    length_mm = written[0]
-    allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
-    if abs(drawn.length_mm - length_mm) <= allowed:
-        return mark
-    told: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
-    return open_between(NONE, FULL, mark, Reason("written_disagrees", told))

@@ -49,7 +49,7 @@ class DrawnVector:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What there is to judge by.
+    """Everything that was read and measured, for one submission.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ def gather(task: Task, submission: Submission) -> Evidence:
 
 @dataclass(slots=True)
 class _Sheets:
-    """What was read on the sheets so far; of a figure on two sheets the first one's nodes count."""
+    """The readings of the sheets so far; of a figure on two sheets the nodes of the first one count."""
 
     task: Task
     drawn: dict[str, DrawnVector] = field(default_factory=dict)
@@ -120,31 +120,31 @@ class _Sheets:
     lengths: list[tuple[float, float]] = field(default_factory=list)
 
     def take(self, reading: Reading) -> None:
-        """One sheet."""
+        """Add one sheet."""
         sketch = reading.figures.get(MECHANISM)
         turn, se_turn = turn_of(self.task, sketch) if sketch else (0.0, 0.0)
         joints: dict[str, complex] = {}
         if sketch:
             self.lengths.extend(_yardstick(self.task, sketch))
-            self.see(_links(self.task, sketch, turn, se_turn))
+            self.add_vectors(_links(self.task, sketch, turn, se_turn))
             joints = _mechanism_nodes(self.task, sketch, turn)
-            self.keep(joints, sketch)
+            self.add_nodes(joints, sketch)
         for figure, read in reading.figures.items():
             if figure != MECHANISM:
-                self.see(_vectors(self.task, figure, read, turn, se_turn))
-                self.keep(_plan_nodes(self.task, figure, read, turn), read)
+                self.add_vectors(_vectors(self.task, figure, read, turn, se_turn))
+                self.add_nodes(_plan_nodes(self.task, figure, read, turn), read)
                 if joints:
                     self.sketches.setdefault(figure, joints)
 
-    def see(self, vectors: Mapping[str, DrawnVector]) -> None:
-        """Of a vector on two sheets the surer reading counts."""
+    def add_vectors(self, vectors: Mapping[str, DrawnVector]) -> None:
+        """Add vectors; of one on two sheets the more certain reading counts."""
         for name, vector in vectors.items():
             if name not in self.drawn or vector.confidence > self.drawn[name].confidence:
                 self.drawn[name] = vector
 
-    def keep(self, places: Mapping[str, complex], read: Figure) -> None:
-        """Nodes that are not known yet."""
-        for name, place in places.items():
+    def add_nodes(self, positions: Mapping[str, complex], read: Figure) -> None:
+        """Add the nodes that are not known yet."""
+        for name, place in positions.items():
             if name not in self.nodes:
                 self.nodes[name] = place
                 self.se_mm[name] = read.nodes[name].se_mm
@@ -189,7 +189,7 @@ def _plan_nodes(task: Task, figure: str, read: Figure, turn: float) -> dict[str,
 
 
 def _mechanism_nodes(task: Task, sketch: Figure, turn: float) -> dict[str, complex]:
-    """The sketch about the assignment's origin, for which its scale and one of its pivots must be known."""
+    """The sketch's nodes about the assignment's origin; none where its scale or its pivots are not known."""
     sure, drawn = _sure(task, sketch), _yardstick(task, sketch)
     pivot = next((name for name in task.ground if name in sure), None)
     if task.yardstick is None or not drawn or pivot is None:
@@ -233,7 +233,7 @@ def _refused(reading: Reading | None) -> dict[str, str]:
 
 
 def _nodes_from(task: Task, measured: Mapping[str, DrawnVector]) -> dict[str, complex]:
-    """The nodes that measured vectors with directions lead to, from the poles on by the shortest way."""
+    """The nodes that measured vectors with directions give, from the poles on along the fewest vectors."""
     nodes = dict.fromkeys(task.construction.poles.values(), 0j)
     steps = {name: step for name, one in measured.items() if (step := one.as_complex) is not None}
     vectors = [task.construction.vectors[name] for name in steps if name in task.construction.vectors]
@@ -255,19 +255,18 @@ def _nodes_from(task: Task, measured: Mapping[str, DrawnVector]) -> dict[str, co
 FIT_MM = 1.0
 """Root mean square misfit up to which the drawn mechanism is the right one, turned and scaled."""
 LEAST_GROUND_MM = 20.0
-"""Two pivots nearer than this do not tell the sketch's turn."""
+"""Pivots nearer to each other than this do not determine the sketch's turn."""
 CERTAINLY_UPRIGHT_RAD = 1e-3
-"""A turn that no tolerance notices."""
+"""A smaller turn is far below every tolerance of a direction."""
 LEAST_JOINTS = 3
-"""That agree with each other tell the turn of a sketch whose other joints are wrong."""
+"""So many joints that fit together determine the turn of a sketch whose other joints are wrong."""
 
 
 def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
     """How far the mechanism is turned on its sheet, radians counter-clockwise, and its standard error.
 
-    The whole mechanism tells it where it is the right one; where it is not, what is right without one
-    of its joints and those drawn from it; else its pivots alone, that no mistake moves; where there are
-    none, zero.
+    It is fitted to the whole mechanism where that is right, else to what is right without one joint and
+    those drawn from it, else to the pivots alone, which no mistake moves; zero where there are none.
     """
     exact = task.nodes({"kL": 1.0, "kv": 1.0, "ka": 1.0})
     sure = {
@@ -275,29 +274,29 @@ def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
         for name, node in sketch.nodes.items()
         if name in exact and node.confidence >= task.rubric.least_confidence
     }
-    for nodes in _without_one(task, sure):
+    for nodes in _subsets(task, sure):
         fit = _fit(nodes, exact)
         if fit is not None and fit[2] <= FIT_MM:
-            return (0.0, fit[1]) if _is_hands(task, nodes, fit[0]) else (fit[0], fit[1])
+            return (0.0, fit[1]) if _is_drafting_error(task, nodes, fit[0]) else (fit[0], fit[1])
     ground = _fit({name: node for name, node in sure.items() if name in task.ground}, exact)
     return (ground[0], ground[1]) if ground is not None else (0.0, 0.0)
 
 
-def _is_hands(task: Task, nodes: Iterable[str], turn: float) -> bool:
-    """Whether a turn is no more than a careful hand's errors make of an upright sketch."""
+def _is_drafting_error(task: Task, nodes: Iterable[str], turn: float) -> bool:
+    """Whether a turn is no more than careful drafting errors make of an upright sketch."""
     if abs(turn) <= CERTAINLY_UPRIGHT_RAD:
         return True
     drawn = task.traced(task.rule_scales).nodes
-    places = {name: drawn[name] for name in nodes}
-    centre = sum(one.at for one in places.values()) / len(places)
-    arms = np.array([one.at - centre for one in places.values()])
-    moved = np.array([one.moved for one in places.values()])
-    turned = np.imag(np.conj(arms) @ (moved - moved.mean(axis=0))) / np.sum(np.abs(arms) ** 2)
+    positions = {name: drawn[name] for name in nodes}
+    centre = sum(one.at for one in positions.values()) / len(positions)
+    arms = np.array([one.at - centre for one in positions.values()])
+    shifts = np.array([one.shifts for one in positions.values()])
+    turned = np.imag(np.conj(arms) @ (shifts - shifts.mean(axis=0))) / np.sum(np.abs(arms) ** 2)
     return bool(abs(turn) <= task.rubric.hand.sigmas * np.sqrt(np.sum(turned**2)))
 
 
-def _without_one(task: Task, sure: Mapping[str, ReadNode]) -> Iterator[Mapping[str, ReadNode]]:
-    """All nodes, then what is left without one of them and all that are drawn from it, most first."""
+def _subsets(task: Task, sure: Mapping[str, ReadNode]) -> Iterator[Mapping[str, ReadNode]]:
+    """All nodes, then those left without one of them and all drawn from it, the largest subset first."""
     yield sure
     upstream = {name: task.construction.upstream(name) for name in sure}
     kept = [
@@ -309,7 +308,7 @@ def _without_one(task: Task, sure: Mapping[str, ReadNode]) -> Iterator[Mapping[s
 
 
 def _fit(nodes: Mapping[str, ReadNode], exact: Mapping[str, complex]) -> tuple[float, float, float] | None:
-    """Turn, its standard error, and misfit in mm of the similarity from exact to drawn nodes."""
+    """Turn (rad), its standard error, and RMS residual (mm) of the similarity from exact to drawn nodes."""
     if len(nodes) < 2:
         return None
     drawn = [node.at for node in nodes.values()]

@@ -1,9 +1,9 @@
-"""What a student's own earlier values make of a later one.
+"""What follows from a student's own earlier values.
 
-The same construction, evaluated with the student's nodes in place of the computed ones; from
-lengths alone where that is well defined: normal and Coriolis components from the student's own
-velocities (or computed angular velocity), images of a link's points that start from a common node, and
-the scale that the drawing follows.
+The construction is evaluated with the student's nodes in place of the computed ones. Lengths alone are
+enough for normal and Coriolis components (from the student's own velocities or computed angular
+velocity), for images of a link's points that start from a common node, and for the scale that the
+drawing follows.
 """
 
 import cmath
@@ -31,52 +31,58 @@ NO_SPREAD = EndSpread(0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
-    """What follows rightly from the student's own values.
+    """A vector that follows rightly from the student's own values.
 
     Attributes
     ----------
     vector : complex millimetres
     what, of : ``nodes``, ``scale``, ``vector`` or ``value``, and its name, for the reason `follows`
-    relies_on : the nodes, scales and computed angular velocities of the student's that it follows from
-    reach : how far a careful hand may miss it, the rubric's number of standard deviations, millimetres
-    se : its standard errors, from the reading of what it follows from
+    relies_on : the student's nodes, scales and computed angular velocities from which it follows
+    uncertainty : its propagated drafting error, the rubric's number of standard deviations, millimetres
+    se : its standard errors, from the reading of its sources
     """
 
     vector: complex
     what: str
     of: str
     relies_on: frozenset[str]
-    reach: EndSpread = NO_SPREAD
+    uncertainty: EndSpread = NO_SPREAD
     se: EndSpread = NO_SPREAD
 
 
 @dataclass(frozen=True, slots=True)
 class ReplayResult:
-    """What the search for what was done came to.
+    """The result of the search for what was done.
 
     Attributes
     ----------
-    accounts : the ways in which the drawing may have been made, the likeliest first; none where it may
-        have been made rightly
-    basis : what the plans were drawn by instead, where that is certain
+    explanations : of the drawing, the likeliest first; none where it may be right
+    basis : the other construction by which the plans were drawn, where that is certain
     """
 
-    accounts: tuple[Replay, ...] = ()
+    explanations: tuple[Replay, ...] = ()
     basis: PlanBasis | None = None
 
 
 Explain = Callable[[Task, Evidence, Mapping[str, Scale]], ReplayResult]
-"""Searches for what was done, from the evidence and the scales settled."""
+"""Searches for what was done, from the evidence and the settled scales."""
 
 
 def nothing_explained(_task: Task, _evidence: Evidence, _settled: Mapping[str, Scale]) -> ReplayResult:
-    """No search: everything is held against the right drawing and the own nodes alone."""
+    """No explanation: the drawing is compared with the right one and with the own nodes alone."""
     return ReplayResult()
 
 
 @dataclass(slots=True)
 class FollowThrough:
-    """What follows from one submission's own values, at the scales used and at those that it follows."""
+    """What follows from one submission's own values, at the scales used and at those it follows.
+
+    Attributes
+    ----------
+    explanation : the result of the search for what was done, once it was needed
+    instead : the other construction by which the plans were drawn
+    own_cache, trace_cache : by scales and basis
+    """
 
     task: Task
     evidence: Evidence
@@ -84,11 +90,9 @@ class FollowThrough:
     followed: Mapping[str, float]
     explain: Callable[[], ReplayResult]
     explanation: ReplayResult | None = None
-    """What the search for what was done came to, once it was asked for, and"""
     instead: PlanBasis | None = None
-    """what the plans were drawn by instead of the right mechanism."""
-    places: dict[tuple[object, ...], Nodes] = field(default_factory=dict)
-    traces: dict[tuple[object, ...], TracedDrawing] = field(default_factory=dict)
+    own_cache: dict[tuple[object, ...], Nodes] = field(default_factory=dict)
+    trace_cache: dict[tuple[object, ...], TracedDrawing] = field(default_factory=dict)
 
     @property
     def wrong_scales(self) -> frozenset[str]:
@@ -100,28 +104,28 @@ class FollowThrough:
     def own(self, scales: Mapping[str, float], basis: PlanBasis | None = None) -> Nodes:
         """The student's own nodes, by figure; measured ones as they lie in plans drawn by the basis."""
         key = (*(scales[name] for name in SCALE_NAMES), "" if basis is None else basis.name)
-        if key not in self.places:
-            self.places[key] = own_nodes(self.task, self.evidence, basis or self.right(scales))
-        return self.places[key]
+        if key not in self.own_cache:
+            self.own_cache[key] = own_nodes(self.task, self.evidence, basis or self.right(scales))
+        return self.own_cache[key]
 
     def right(self, scales: Mapping[str, float]) -> PlanBasis:
-        """The right construction, the mechanism at the scale that it follows."""
+        """The right construction, with the mechanism at the scale that the sketch follows."""
         drawn = {**scales, "kL": self.followed["kL"]}
         return PlanBasis("right", self.task.construction, self.task.at(drawn))
 
     def traced(
         self, scales: Mapping[str, float], basis: PlanBasis | None = None, *, by_similarity: bool = False
     ) -> TracedDrawing:
-        """The drawing traced from the student's own nodes; plates' images by similarity if that is asked."""
+        """The drawing traced from the student's own nodes; with plates' images by similarity if asked."""
         key = (*(scales[name] for name in SCALE_NAMES), "" if basis is None else basis.name, by_similarity)
-        if key not in self.traces:
+        if key not in self.trace_cache:
             own, drawn = self.own(scales, basis), basis or self.right(scales)
             construction = self.task.by_similarity if by_similarity else drawn.construction
             if own or basis is not None:
-                self.traces[key] = trace(construction, drawn.parameters, self.task.skill, own)
+                self.trace_cache[key] = trace(construction, drawn.parameters, self.task.skill, own)
             else:
-                self.traces[key] = self.task.traced(scales)
-        return self.traces[key]
+                self.trace_cache[key] = self.task.traced(scales)
+        return self.trace_cache[key]
 
     def from_nodes(
         self,
@@ -131,7 +135,7 @@ class FollowThrough:
         *,
         by_similarity: bool = False,
     ) -> Expectation:
-        """The head constructed from the student's own nodes upstream; from none, as it should be."""
+        """The vector constructed from the student's own nodes upstream; the exact one without any."""
         found, own = self.traced(scales, basis, by_similarity=by_similarity), self.own(scales, basis)
         upstream = self.task.construction.upstream(segment.head) | self.task.construction.upstream(
             segment.tail
@@ -139,46 +143,50 @@ class FollowThrough:
         relies_on = (known(own) & upstream) - {segment.head}
         if not relies_on and basis is None:
             exact = segment.drawn(scales)
-            return Expectation(exact, "nodes", "", relies_on, self.whole_reach(segment, exact))
+            return Expectation(exact, "nodes", "", relies_on, self.uncertainty_of(segment, exact))
         vector = found.vector(segment.tail, segment.head)
-        reach, se = self.spreads(found.moved(segment.tail, segment.head), found.hand, vector)
-        return Expectation(vector, "nodes", "", relies_on, reach, se)
+        uncertainty, se = self.spreads(found.shifts(segment.tail, segment.head), found.drafting_count, vector)
+        return Expectation(vector, "nodes", "", relies_on, uncertainty, se)
 
-    def spreads(self, moved: ComplexArray, hand: int, along: complex) -> tuple[EndSpread, EndSpread]:
-        """How far a hand may miss, and the standard errors of reading.
+    def spreads(
+        self, shifts: ComplexArray, drafting_count: int, along: complex
+    ) -> tuple[EndSpread, EndSpread]:
+        """The propagated drafting error, and the standard errors of reading.
 
-        Measuring by hand is the student's, and part of what a hand may miss; reading is the program's.
+        Errors of measuring by hand are the student's own and count with the drafting errors.
         """
         if not cmath.isfinite(along):
             return NO_SPREAD, NO_SPREAD
         sigmas = self.task.rubric.hand.sigmas
         if self.evidence.has_sheets:
-            return scaled(spread(moved[:hand], along), sigmas), spread(moved[hand:], along)
-        return scaled(self.with_ruler(spread(moved, along), along), sigmas), NO_SPREAD
+            return scaled(spread(shifts[:drafting_count], along), sigmas), spread(
+                shifts[drafting_count:], along
+            )
+        return scaled(self.with_ruler(spread(shifts, along), along), sigmas), NO_SPREAD
 
-    def with_ruler(self, found: EndSpread, along: complex) -> EndSpread:
-        """With the errors of measuring the vector itself, where it was measured by hand."""
+    def with_ruler(self, end: EndSpread, along: complex) -> EndSpread:
+        """A spread with the errors of measuring the vector itself by hand."""
         hand = self.task.rubric.hand
         turned = abs(along) * math.radians(hand.protractor_deg)
-        return EndSpread(math.hypot(found.along, hand.ruler_mm), math.hypot(found.across, turned))
+        return EndSpread(math.hypot(end.along, hand.ruler_mm), math.hypot(end.across, turned))
 
     # From lengths and values ----------------------------------------------------------------------
 
     def at_followed_scale(self, segment: TaskSegment) -> Expectation | None:
-        """The exact one at the scale that the drawing follows; None where that is the one used."""
+        """The exact vector at the scale that the drawing follows; None where that is the one used."""
         wrong = self.wrong_scales
         if segment.scale not in wrong:
             return None
         exact = segment.drawn(self.followed)
-        return Expectation(exact, "scale", segment.scale, wrong, self.whole_reach(segment, exact))
+        return Expectation(exact, "scale", segment.scale, wrong, self.uncertainty_of(segment, exact))
 
     def expectations(self, segment: TaskSegment) -> Iterator[Expectation]:
-        """What follows from a turned plan, other scales, a wrong mechanism, and own lengths and values."""
+        """The expectations from a turned plan, other scales, a wrong mechanism, own lengths and values."""
         wrong = self.wrong_scales
         if segment.scale != "kL":
             yield from self.turned_plan(segment)
             if segment.head in self.task.construction.images:
-                # A plate's image comes by lines or by similarity: of a wrong base they make different ones.
+                # Of a wrong base, lines and similarity give different images of a plate's point.
                 yield self.from_nodes(segment, self.followed, by_similarity=True)
             yield from self.from_vectors(segment, self.used)
             basis = self.drawn_instead()
@@ -193,7 +201,7 @@ class FollowThrough:
                     yield replace(one, relies_on=one.relies_on | wrong)
 
     def drawn_instead(self) -> PlanBasis | None:
-        """What the plans were drawn by instead: by the search for what was done, else by counting vectors."""
+        """The basis of the plans: by the search for what was done, else by counting vectors; or None."""
         if self.explanation is None:
             self.explanation = self.explain()
             scales = (self.used, self.followed)
@@ -201,7 +209,7 @@ class FollowThrough:
         return self.instead
 
     def is_trivial(self, segment: TaskSegment, expected: complex) -> bool:
-        """Near zero, without a solution, or far shorter than the right one: nothing is left to show."""
+        """Whether an expectation is near zero, has no solution, or is far shorter than the right vector."""
         if not cmath.isfinite(expected):
             return True
         rubric = self.task.rubric
@@ -210,21 +218,21 @@ class FollowThrough:
         return abs(expected) < max(least, rubric.least_followed_share * right)
 
     def turned_plan(self, segment: TaskSegment) -> Iterator[Expectation]:
-        """The vector in a plan that is turned as a whole by quarter turns, as the crank's vector tells."""
+        """The vector in a plan that is turned as a whole by quarter turns, as the crank's vector is."""
         task = self.task
         crank = f"{segment.name[0]}_{task.pin}"
         own = self.evidence.vector(crank)
         if segment.name == crank or own is None or own.direction_rad is None or not task.real[crank]:
             return
-        off = math.remainder(own.direction_rad - cmath.phase(task.real[crank]), math.tau)
-        quarters = round(off / (math.pi / 2.0))
+        turn = math.remainder(own.direction_rad - cmath.phase(task.real[crank]), math.tau)
+        quarters = round(turn / (math.pi / 2.0))
         tolerance = task.rubric.tolerance_of(crank)
         slack = math.radians(tolerance.direction_deg * tolerance.farthest)
-        if quarters and abs(off - quarters * math.pi / 2.0) <= slack:
+        if quarters and abs(turn - quarters * math.pi / 2.0) <= slack:
             head = task.construction.vectors[crank].head
             turned = segment.drawn(self.followed) * 1j**quarters
-            reach = self.whole_reach(segment, turned)
-            yield Expectation(turned, "vector", crank, frozenset({head}), reach)
+            uncertainty = self.uncertainty_of(segment, turned)
+            yield Expectation(turned, "vector", crank, frozenset({head}), uncertainty)
             figure = task.construction.figure_of(head)
             right = self.right(self.followed)
             mistake = Mistake("figure_rotated", figure, quarters=quarters % 4)
@@ -233,23 +241,23 @@ class FollowThrough:
             one = self.from_nodes(segment, self.followed, basis)
             yield replace(one, what="vector", of=crank, relies_on=one.relies_on | {head})
 
-    def whole_reach(self, segment: TaskSegment, along: complex) -> EndSpread:
-        """How far a hand may miss a vector from the start of the drawing."""
+    def uncertainty_of(self, segment: TaskSegment, along: complex) -> EndSpread:
+        """The propagated drafting error of a vector since the start of the drawing."""
         task, scales = self.task, (self.used["kv"], self.used["ka"])
         key = ("reach", segment.name, abs(along), cmath.phase(along), *scales, self.evidence.has_sheets)
-        if key not in task.memory:
-            task.keep(key, self._whole_reach(segment, along))
-        return task.memory[key]  # type: ignore[return-value]
+        if key not in task.cache:
+            task.remember(key, self._uncertainty_of(segment, along))
+        return task.cache[key]  # type: ignore[return-value]
 
-    def _whole_reach(self, segment: TaskSegment, along: complex) -> EndSpread:
-        moved = self.task.traced(self.used).moved(segment.tail, segment.head)
-        found = spread(moved * np.exp(1j * (cmath.phase(along) - cmath.phase(segment.real))), along)
+    def _uncertainty_of(self, segment: TaskSegment, along: complex) -> EndSpread:
+        shifts = self.task.traced(self.used).shifts(segment.tail, segment.head)
+        found = spread(shifts * np.exp(1j * (cmath.phase(along) - cmath.phase(segment.real))), along)
         if not self.evidence.has_sheets:
             found = self.with_ruler(found, along)
         return scaled(found, self.task.rubric.hand.sigmas)
 
     def from_vectors(self, segment: TaskSegment, scales: Mapping[str, float]) -> Iterator[Expectation]:
-        """A vector that hangs on one or two others alone, whose lengths are enough."""
+        """A vector that depends on one or two others alone, whose lengths are enough."""
         task = self.task
         match task.construction.step(segment.head):
             case Given(length=Normal(tail=tail, head=head)):
@@ -286,9 +294,9 @@ class FollowThrough:
     def coriolis(
         self, segment: TaskSegment, length: Coriolis, scales: Mapping[str, float]
     ) -> Iterator[Expectation]:
-        """2 omega v from the own sliding velocity and what turns the guide: velocity, or computed omega.
+        """2 omega v from the own sliding velocity and the guide's own velocity or computed omega.
 
-        Each counts as the share that it has of the right one, with its sense.
+        Each counts as its ratio to the right one, with its sense.
         """
         vectors, right = self.task.construction.vectors, segment.drawn(scales)
         slide = self.named(*length.slide)
@@ -326,6 +334,6 @@ class FollowThrough:
         return next((v.name for v in vectors if {v.tail, v.head} == ends), None)
 
 
-def scaled(found: EndSpread, by: float) -> EndSpread:
-    """So many standard deviations."""
-    return EndSpread(by * found.along, by * found.across)
+def scaled(end: EndSpread, by: float) -> EndSpread:
+    """A spread times a factor."""
+    return EndSpread(by * end.along, by * end.across)

@@ -1,4 +1,4 @@
-"""The student's own nodes: from the sheet, or from entered lengths without directions."""
+"""The student's own nodes, from the sheet or from measured lengths, and the mechanism they belong to."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -21,9 +21,9 @@ from reference.geometry import ComplexArray, FloatArray
 
 @dataclass(frozen=True, slots=True)
 class PlanBasis:
-    """What plans may have been drawn by: a construction with its parameters, under a name of its own.
+    """A construction with its parameters from which plans may have been drawn, under a name of its own.
 
-    `wrong` are the nodes at which its steps are wrong ones, or the mechanism.
+    `wrong` are the nodes whose steps are wrong ones, or the mechanism.
     """
 
     name: str
@@ -37,7 +37,7 @@ Nodes = Mapping[str, Mapping[str, OwnNode]]
 
 
 def own_nodes(task: Task, evidence: Evidence, sketch: PlanBasis) -> Nodes:
-    """The student's own nodes by figure, poles apart; measured ones as plans drawn for a sketch have them."""
+    """The student's own nodes by figure, without poles; `sketch` places nodes measured by lengths."""
     if evidence.has_sheets:
         return _from_sheets(task, evidence)
     if evidence.measured:
@@ -46,22 +46,22 @@ def own_nodes(task: Task, evidence: Evidence, sketch: PlanBasis) -> Nodes:
 
 
 def _from_sheets(task: Task, evidence: Evidence) -> Nodes:
-    """As read; a plan with the sketch that is beside it."""
+    """The nodes as read; a plan has the sketch that is beside it."""
     names = [name for name in evidence.nodes if name not in task.construction.poles.values()]
-    moved = {name: np.zeros(2 * len(names), np.complex128) for name in names}
+    shifts = {name: np.zeros(2 * len(names), np.complex128) for name in names}
     for column, name in enumerate(names):
-        moved[name][2 * column : 2 * column + 2] = evidence.se_mm.get(name, 0.0) * np.array([1.0, 1j])
-    places = {name: OwnNode(evidence.nodes[name], moved[name]) for name in names}
-    found = dict(_by_figure(task, places))
+        shifts[name][2 * column : 2 * column + 2] = evidence.se_mm.get(name, 0.0) * np.array([1.0, 1j])
+    positions = {name: OwnNode(evidence.nodes[name], shifts[name]) for name in names}
+    found = dict(_by_figure(task, positions))
     for plan, joints in evidence.sketches.items():
-        sketch = {name: OwnNode(place, moved.get(name)) for name, place in joints.items()}
+        sketch = {name: OwnNode(place, shifts.get(name)) for name, place in joints.items()}
         found[plan] = {**found.get(plan, {}), **sketch}
     return found
 
 
-def _by_figure(task: Task, places: Mapping[str, OwnNode]) -> dict[str, dict[str, OwnNode]]:
+def _by_figure(task: Task, positions: Mapping[str, OwnNode]) -> dict[str, dict[str, OwnNode]]:
     found: dict[str, dict[str, OwnNode]] = {}
-    for name, place in places.items():
+    for name, place in positions.items():
         found.setdefault(task.construction.figure_of(name), {})[name] = place
     return found
 
@@ -69,26 +69,26 @@ def _by_figure(task: Task, places: Mapping[str, OwnNode]) -> dict[str, dict[str,
 def known(nodes: Nodes) -> frozenset[str]:
     """The names of all own nodes."""
     return frozenset(
-        name for figure, places in nodes.items() for name in places if figure != MECHANISM
+        name for figure, positions in nodes.items() for name in positions if figure != MECHANISM
     ) | frozenset(nodes.get(MECHANISM, ()))
 
 
-# From measured vectors ---------------------------------------------------------------------------
-
+# From measured lengths -----------------------------------------------------------------------------
 
 LEAST_SINE = 0.2
-"""Of the angle at which two lengths meet: of a flatter triangle only its line tells where the corner is."""
-MISS_MM = 3.0
-"""By so much two lengths may fail to reach each other, by the hand's and the ruler's errors."""
+"""Of the angle at which two lengths meet: in a flatter triangle the corner is taken to lie on the base."""
+GAP_MM = 3.0
+"""So much two lengths may be too short to meet, by errors of drawing and of measuring."""
 BRANCHES = 32
-WITHIN = 26.0
-"""Accounts dearer than the cheapest by more than two surprises are dropped."""
+"""Explanations that are continued."""
+COST_WINDOW = 26.0
+"""Explanations that cost more than the cheapest by two unexpected nodes and a little are dropped."""
 UNKNOWN = 1.0
-"""What it costs to take a node as not known."""
+"""Cost of a node that is taken as not known."""
 AS_EXPECTED = 3.0
-"""Standard deviations within which a node is taken to lie where its step puts it."""
-OFF = 12.0
-"""What a node costs that lies elsewhere, and one that lies the other way round from its start."""
+"""Standard deviations within which a node lies where its step puts it."""
+UNEXPECTED = 12.0
+"""Cost of a node that lies elsewhere; the most that one length adds."""
 BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
@@ -107,10 +107,10 @@ def nodes_from_lengths(task: Task, evidence: Evidence, sketch: PlanBasis) -> dic
     poles = task.construction.poles.values()
     with np.errstate(all="ignore"):
         for step in sketch.construction.steps:
-            seen = tracking.seen.get(step.node, [])
+            ends = tracking.ends.get(step.node, [])
             made = np.asarray(step.place(view)) + np.zeros(len(tracking.cost))
-            if seen:
-                tracking.settle(step, made, seen)
+            if ends:
+                tracking.settle(step, made, ends)
             elif _is_component(step) and step.node not in poles:
                 tracking.part(step.node, [tracking.nodes[step.start]], made, [], [])
             else:
@@ -120,11 +120,19 @@ def nodes_from_lengths(task: Task, evidence: Evidence, sketch: PlanBasis) -> dic
 
 @dataclass(slots=True)
 class _LengthBranches:
-    """All accounts so far: arrays of shape (branches,)."""
+    """All explanations so far, arrays of shape (branches,).
+
+    Attributes
+    ----------
+    ends : the measured vectors by the node where they end
+    cost : as in `reference.replay.explanations`
+    sources : by node, the vectors from which its position was taken
+    is_known : by node, whether its position was taken from vectors
+    """
 
     task: Task
     measured: Mapping[str, DrawnVector]
-    seen: dict[str, list[_Measured]] = field(default_factory=dict)
+    ends: dict[str, list[_Measured]] = field(default_factory=dict)
     nodes: dict[str, ComplexArray] = field(default_factory=dict)
     cost: FloatArray = field(default_factory=lambda: np.zeros(1))
     sources: dict[str, Sequence[_Measured]] = field(default_factory=dict)
@@ -134,37 +142,37 @@ class _LengthBranches:
         vectors = self.task.construction.vectors
         for name, drawn in self.measured.items():
             if name in vectors:
-                self.seen.setdefault(vectors[name].head, []).append(_Measured(vectors[name], drawn))
+                self.ends.setdefault(vectors[name].head, []).append(_Measured(vectors[name], drawn))
 
     @property
     def sigma_mm(self) -> float:
-        """How far a node may be off by the hand and the ruler, roughly: half the tolerance."""
+        """A rough standard error of a node by drawing and measuring: half the tolerance."""
         return self.task.rubric.tolerance.length_mm / 2.0
 
-    def settle(self, step: Step, made: ComplexArray, seen: Sequence[_Measured]) -> None:
-        """Where a node lies in each account; accounts part where its lengths admit two places."""
-        directed = next((one for one in seen if one.drawn.direction_rad is not None), None)
+    def settle(self, step: Step, made: ComplexArray, ends: Sequence[_Measured]) -> None:
+        """Place a node in each branch; branches divide where its lengths admit two positions."""
+        directed = next((one for one in ends if one.drawn.direction_rad is not None), None)
         if directed is not None:
             self.nodes[step.node] = self.nodes[directed.vector.tail] + (directed.drawn.as_complex or 0j)
             self.is_known[step.node] = np.ones(len(self.cost), np.bool_)
             self.sources[step.node] = [directed]
-        elif len(seen) == 1:
-            self.part(step.node, self._along(step, made, seen[0]), made, seen, seen)
+        elif len(ends) == 1:
+            self.part(step.node, self._along(step, made, ends[0]), made, ends, ends)
         else:
-            pair, places = self._meeting(seen)
-            self.part(step.node, places, made, pair, seen)
+            pair, positions = self._meeting(ends)
+            self.part(step.node, positions, made, pair, ends)
 
     def _along(self, step: Step, made: ComplexArray, one: _Measured) -> list[ComplexArray]:
-        """By one length along the direction of the step; normal components the other way round too."""
+        """Positions at one length along the step's direction; for components laid off, also reversed."""
         start = self.nodes[one.vector.tail]
-        reach = made - start
-        along = np.where(np.abs(reach) > 1e-9, reach / np.abs(reach), np.nan)
+        step_vector = made - start
+        along = np.where(np.abs(step_vector) > 1e-9, step_vector / np.abs(step_vector), np.nan)
         senses = (1.0, -1.0) if isinstance(step, Given) else (1.0,)
         return [start + sense * one.drawn.length_mm * along for sense in senses]
 
-    def _meeting(self, seen: Sequence[_Measured]) -> tuple[Sequence[_Measured], list[ComplexArray]]:
-        """The two points where the two lengths meet that cross at the best angle."""
-        pairs = [(one, other) for index, one in enumerate(seen) for other in seen[:index]]
+    def _meeting(self, ends: Sequence[_Measured]) -> tuple[Sequence[_Measured], list[ComplexArray]]:
+        """The pair of lengths that cross at the best angle, and the two points where they meet."""
+        pairs = [(one, other) for index, one in enumerate(ends) for other in ends[:index]]
         crossings = [_crossing(self.nodes, pair) for pair in pairs]
         best = max(range(len(pairs)), key=lambda index: float(np.nan_to_num(crossings[index][2]).min()))
         first, second, _ = crossings[best]
@@ -173,74 +181,78 @@ class _LengthBranches:
     def part(
         self,
         node: str,
-        places: Sequence[ComplexArray],
+        positions: Sequence[ComplexArray],
         made: ComplexArray,
         sources: Sequence[_Measured],
-        seen: Sequence[_Measured],
+        ends: Sequence[_Measured],
     ) -> None:
-        """Go on with each place, and where none is as expected, with the node where its step puts it."""
-        count, ways = len(self.cost), len(places) + 1
-        every, index = np.concatenate([*places, made]), np.tile(np.arange(count), ways)
-        is_known = np.arange(len(index)) < count * len(places)
-        off = np.abs(every - made[index]) / self.sigma_mm
-        is_expected = off <= AS_EXPECTED
-        total = self.cost[index] + np.where(is_expected, off**2, OFF) + np.where(is_known, 0.0, UNKNOWN)
-        for one in seen:
+        """Continue with each position and, where none is as expected, with the one that the step gives."""
+        count, ways = len(self.cost), len(positions) + 1
+        every, index = np.concatenate([*positions, made]), np.tile(np.arange(count), ways)
+        is_known = np.arange(len(index)) < count * len(positions)
+        residual = np.abs(every - made[index]) / self.sigma_mm
+        is_expected = residual <= AS_EXPECTED
+        total = (
+            self.cost[index]
+            + np.where(is_expected, residual**2, UNEXPECTED)
+            + np.where(is_known, 0.0, UNKNOWN)
+        )
+        for one in ends:
             length = np.abs(every - self.nodes[one.vector.tail][index])
-            total += np.minimum(((length - one.drawn.length_mm) / self.sigma_mm) ** 2, OFF)
+            total += np.minimum(((length - one.drawn.length_mm) / self.sigma_mm) ** 2, UNEXPECTED)
         found = np.asarray((is_expected & is_known).reshape(ways, count).any(axis=0))
         total = np.where(np.isfinite(total) & (is_known | ~found[index]), total, np.inf)
         order = np.argsort(total, kind="stable")[:BRANCHES]
-        order = order[(total[order] < total[order[0]] + WITHIN) | (np.arange(len(order)) == 0)]
+        order = order[(total[order] < total[order[0]] + COST_WINDOW) | (np.arange(len(order)) == 0)]
         self.take(index[order])
         self.cost, self.nodes[node] = total[order], every[order]
         self.is_known[node], self.sources[node] = is_known[order], sources
 
     def take(self, index: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> None:
-        """Only these accounts, in this order."""
-        for name, places in self.nodes.items():
-            self.nodes[name] = places[index]
+        """Keep these branches, in this order."""
+        for name, positions in self.nodes.items():
+            self.nodes[name] = positions[index]
         for name, flags in self.is_known.items():
             self.is_known[name] = flags[index]
 
     def best(self) -> dict[str, OwnNode]:
-        """The nodes of the cheapest account that are known in it."""
+        """The nodes that are known in the cheapest explanation."""
         columns = {name: 2 * index for index, name in enumerate(self.measured)}
         found: dict[str, OwnNode] = {}
-        moved: dict[str, ComplexArray] = {
+        shifts: dict[str, ComplexArray] = {
             pole: np.zeros(2 * len(columns), np.complex128) for pole in self.task.construction.poles.values()
         }
         for name, sources in self.sources.items():
             place = complex(self.nodes[name][0])
-            if self.is_known[name][0] and all(one.vector.tail in moved for one in sources):
-                moved[name] = self._moved(place, sources, columns, moved)
-                found[name] = OwnNode(place, moved[name])
+            if self.is_known[name][0] and all(one.vector.tail in shifts for one in sources):
+                shifts[name] = self._shifts(place, sources, columns, shifts)
+                found[name] = OwnNode(place, shifts[name])
         return found
 
-    def _moved(
+    def _shifts(
         self,
         place: complex,
         sources: Sequence[_Measured],
         columns: Mapping[str, int],
-        moved: Mapping[str, ComplexArray],
+        shifts: Mapping[str, ComplexArray],
     ) -> ComplexArray:
-        """What one standard deviation of each measurement makes of a node."""
+        """How one standard deviation of each measurement moves a node, complex mm."""
         hand = self.task.rubric.hand
         rows = []
         for one in sources:
-            reach = place - complex(self.nodes[one.vector.tail][0])
-            along = reach / abs(reach) if abs(reach) > 0.0 else 1.0 + 0j
-            row = np.array(moved[one.vector.tail])
+            step_vector = place - complex(self.nodes[one.vector.tail][0])
+            along = step_vector / abs(step_vector) if abs(step_vector) > 0.0 else 1.0 + 0j
+            row = np.array(shifts[one.vector.tail])
             column = columns[one.vector.name]
             row[column] += hand.ruler_mm * along
-            rows.append((along, row, column, reach))
+            rows.append((along, row, column, step_vector))
         if not rows:
             return np.zeros(2 * len(columns), np.complex128)
         if len(rows) == 1:
-            along, row, column, reach = rows[0]
-            # Across, its direction's error: measured, or the hand's in drawing it.
+            along, row, column, step_vector = rows[0]
+            # Across: the error of the direction, measured or drawn.
             deg = hand.protractor_deg if sources[0].drawn.direction_rad is not None else hand.angle_deg
-            row[column + 1] += 1j * reach * math.radians(deg)
+            row[column + 1] += 1j * step_vector * math.radians(deg)
             return row
         (u, first, _, p), (v, second, column, q) = rows
         # |x - p| and |x - q| are given: u.dx = u.dp + dr, v.dx = v.dq + ds.
@@ -265,7 +277,7 @@ def _crossing(
 ) -> tuple[ComplexArray, ComplexArray, FloatArray]:
     """Both points at two distances from two nodes, and the sine of the angle between them there.
 
-    A flat triangle's are one, on the line; two lengths that do not reach each other have none.
+    Of a flat triangle both are the same, on the line; two lengths that do not meet have none (nan).
     """
     (p, r), (q, s) = ((nodes[one.vector.tail], one.drawn.length_mm) for one in pair)
     base = q - p
@@ -275,11 +287,13 @@ def _crossing(
     across = np.sqrt(np.maximum(across2, 0.0))
     sine = across * distance**2 / (r * s) if r and s else 0.0 * across
     is_flat = sine < LEAST_SINE
-    misses_mm = np.maximum(np.maximum(distance - r - s, np.abs(r - s) - distance), 0.0)
+    gap_mm = np.maximum(np.maximum(distance - r - s, np.abs(r - s) - distance), 0.0)
     across = np.where(is_flat, 0.0, across)
-    base = np.where(misses_mm > MISS_MM, np.nan, base)
+    base = np.where(gap_mm > GAP_MM, np.nan, base)
     return p + base * (along + 1j * across), p + base * (along - 1j * across), sine
 
+
+# Another mechanism that the vectors fit ------------------------------------------------------------
 
 BETTER_BY = 3
 """So many more vectors a wrong mechanism must explain."""
@@ -318,7 +332,7 @@ class _Plans:
     vectors: ComplexArray
 
     def sketch(self, index: int) -> PlanBasis:
-        """One of them, as plans may have been drawn for it."""
+        """The basis of the variant at an index."""
         one = {
             name: np.asarray(np.ravel(value)[index if np.size(value) > 1 else 0])
             for name, value in self.parameters.items()
@@ -329,13 +343,13 @@ class _Plans:
 def _tried(task: Task, scales: Mapping[str, float]) -> list[tuple[str, _Plans]]:
     """The plans for the right mechanism and for every wrong one."""
     key = ("plans", *(scales[name] for name in SCALE_NAMES))
-    if key not in task.memory:
+    if key not in task.cache:
         right = task.at(scales)
         found = [("right", _plans(task.construction, right))]
         found += [("assembly", _plans(one, right)) for one in _other_assemblies(task.construction)]
         found += [("variant", _plans(task.construction, one)) for one in _other_variants(task, scales)]
-        task.keep(key, found)
-    return task.memory[key]  # type: ignore[return-value]
+        task.remember(key, found)
+    return task.cache[key]  # type: ignore[return-value]
 
 
 def _plans(construction: Construction, parameters: Parameters) -> _Plans:
@@ -355,9 +369,9 @@ def _other_assemblies(construction: Construction) -> list[Construction]:
 def _other_variants(task: Task, scales: Mapping[str, float]) -> list[Parameters]:
     """All other variants' data, at the scales given and at their own: arrays over variants."""
     key = ("variants",)
-    if key not in task.memory:
-        task.keep(key, _variants(task))
-    together: Parameters = task.memory[key]  # type: ignore[assignment]
+    if key not in task.cache:
+        task.remember(key, _variants(task))
+    together: Parameters = task.cache[key]  # type: ignore[assignment]
     if not together:
         return []
     fixed = {name: np.asarray(scales[name]) for name in SCALE_NAMES}

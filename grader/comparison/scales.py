@@ -1,4 +1,4 @@
-"""Scales: as declared, as the rule wants them, as the drawing shows them."""
+"""The scales: as declared, as the assignment's rule gives them, as the drawing shows them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ from grader.rubric import ToleranceTable
 from reference.construction.uncertainty import spread
 
 TELLING = 2
-"""So many vectors of the right length tell a scale as well as the crank's does."""
+"""So many vectors of the right length confirm a scale as well as the crank's vector does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ def settle(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> dict[
     """The three scales, in the order in which each may follow from those before."""
     settled: dict[str, Scale] = {}
     for name in SCALE_NAMES:
-        settled[name] = _settle_one(task, evidence, name, declared.get(name), settled)
+        settled[name] = _settled_scale(task, evidence, name, declared.get(name), settled)
     return settled
 
 
@@ -64,7 +64,7 @@ def followed_scales(settled: Mapping[str, Scale]) -> dict[str, float]:
     return {name: scale.other or scale.used.used for name, scale in settled.items()}
 
 
-def _settle_one(
+def _settled_scale(
     task: Task, evidence: Evidence, name: str, text: str | None, before: Mapping[str, Scale]
 ) -> Scale:
     parsed = _parsed(task, name, text)
@@ -87,9 +87,7 @@ def _settle_one(
 def _parsed(task: Task, name: str, text: str | None) -> ParsedScale | None:
     if text is None or not text.strip():
         return None
-    units = task.assignment.file.scales.bare_units
-    bare = next((unit for scale, unit in units.items() if scale == name), None)
-    parsed = _understood(name, text, bare)
+    parsed = _parsed_text(task, name, text)
     if isinstance(parsed, ByRule) and "omega" in parsed.powers and task.omega is None:
         with_unit, _, _ = EXAMPLES[name].partition(" or ")
         return Refused(f"a slider drives this mechanism, there is no crank's omega; write {with_unit}")
@@ -98,7 +96,7 @@ def _parsed(task: Task, name: str, text: str | None) -> ParsedScale | None:
 
 @lru_cache(maxsize=4096)
 def _understood(name: str, text: str, bare_unit: str | None) -> ParsedScale:
-    """A class declares the same few scales again and again."""
+    """The scale that a text declares; cached, since a class declares the same few scales."""
     return parse_scale(name, text, bare_unit=bare_unit)
 
 
@@ -107,26 +105,26 @@ def _assumed(name: str, rule: float) -> Reason:
 
 
 def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Scale]) -> float:
-    """The assignment's rule; a length scale from the drawn yardstick where that was read."""
+    """The scale by the assignment's rule; a length scale by the drawn yardstick where that was read."""
     known = followed_scales(before)
     if name == "kL":
-        witness = _witness(task, evidence, name)
-        if witness is not None:
+        shown = _evidence_of(task, evidence, name)
+        if shown is not None:
             # A crank that agrees with the scale proposed was drawn at that one, a little off.
             proposed = task.rule_scales["kL"]
-            return proposed if _is_witnessed(task, evidence, name, proposed) else witness[0] / witness[1]
+            return proposed if _is_confirmed(task, evidence, name, proposed) else shown[0] / shown[1]
     key = ("rule", *known.items())
-    if key not in task.memory:
+    if key not in task.cache:
         found = task.assignment.scales([task.variant], **known)
-        task.keep(key, float(getattr(found, name)[0]))
-    return task.memory[key]  # type: ignore[return-value]
+        task.remember(key, float(getattr(found, name)[0]))
+    return task.cache[key]  # type: ignore[return-value]
 
 
-# What the drawing says ----------------------------------------------------------------------------
+# What the drawing shows ----------------------------------------------------------------------------
 
 
-def _witness(task: Task, evidence: Evidence, name: str) -> tuple[float, float, float] | None:
-    """What is known of a scale: real value, drawn millimetres, standard error."""
+def _evidence_of(task: Task, evidence: Evidence, name: str) -> tuple[float, float, float] | None:
+    """What shows a scale on the drawing: real value, drawn millimetres, standard error; None without it."""
     if name == "kL":
         if task.yardstick is None or evidence.yardstick_mm is None:
             return None
@@ -141,13 +139,13 @@ def _witness(task: Task, evidence: Evidence, name: str) -> tuple[float, float, f
 
 
 def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> float | None:
-    """The scale that the drawing follows, where more of it fits that one than the one used."""
-    witness = _witness(task, evidence, name)
-    if witness is None or name == "kL":
+    """The scale that the drawing follows, where more vectors fit that one than the one used; else None."""
+    shown = _evidence_of(task, evidence, name)
+    if shown is None or name == "kL":
         return None
-    if _is_witnessed(task, evidence, name, used):
+    if _is_confirmed(task, evidence, name, used):
         return None
-    other = witness[0] / witness[1]
+    other = shown[0] / shown[1]
     return other if _fitting(task, evidence, name, other) > _fitting(task, evidence, name, used) else None
 
 
@@ -177,18 +175,18 @@ def _fits(drawn: DrawnVector, expected_mm: float, tolerance: ToleranceTable) -> 
     return is_telling and abs(drawn.length_mm - expected_mm) <= tolerance.length_at(expected_mm)
 
 
-# Declared scales ----------------------------------------------------------------------------------
+# A declared scale compared with the drawing --------------------------------------------------------
 
 
 def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, rule: float) -> Scale:
-    """A declared scale against what was drawn, or against the rule where nothing was.
+    """A declared scale compared with the drawing, or with the rule where nothing was drawn.
 
-    Another scale than the rule's cannot be judged where nothing was drawn: it may be the own choice.
+    Another scale than the rule's cannot be judged where nothing was drawn: it may be the student's choice.
     """
     tolerance = task.rubric.tolerance_of(name)
     is_rule = abs(scale.used - rule) <= tolerance.scale_relative * rule
-    witness = _witness(task, evidence, name)
-    if witness is None:
+    shown = _evidence_of(task, evidence, name)
+    if shown is None:
         if _is_unseen(task, evidence, name, scale.used):
             why = f"{name[1]}_{task.pin}, which tells it, was not read for certain"
             return Scale(scale, None, MarkRange(NONE, NONE, FULL, (Reason("unread", {"reason": why}),)))
@@ -196,22 +194,22 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
     other = _followed_instead(task, evidence, name, scale.used, None if is_rule else rule)
     if other is None:
         return Scale(scale, None, mark([]))
-    real, drawn_mm, se_mm = witness
-    told: dict[str, float | str] = {"declared": scale.used, "expected": other, "unit": unit_of(name)}
+    real, drawn_mm, se_mm = shown
+    params: dict[str, float | str] = {"declared": scale.used, "expected": other, "unit": unit_of(name)}
     limit = Limit(
         what="scale",
-        off=abs(real / scale.used - drawn_mm),
+        residual=abs(real / scale.used - drawn_mm),
         tolerance=_allowed_mm(task, evidence, name, drawn_mm),
         plain=tolerance.length_at(drawn_mm),
         se=se_mm,
         table=tolerance,
-        reason=Reason("scale_off", told),
+        reason=Reason("scale_off", params),
     )
     return Scale(scale, other, mark([limit]))
 
 
 def _is_unseen(task: Task, evidence: Evidence, name: str, scale: float) -> bool:
-    """Whether a plan is on a sheet whose crank's vector was not read, and nothing else tells its scale."""
+    """Whether a plan was read without its crank's vector, and nothing else confirms its scale."""
     plan = [v.name for v in task.construction.vectors.values() if v.scale == name]
     return any(one in evidence.drawn for one in plan) and _fitting(task, evidence, name, scale) < TELLING
 
@@ -223,49 +221,51 @@ def _followed_instead(
 
     Arguments: `rule` is the assignment's, None where the declared one is that.
     """
-    witness = _witness(task, evidence, name)
-    if witness is None or _is_witnessed(task, evidence, name, declared):
+    shown = _evidence_of(task, evidence, name)
+    if shown is None or _is_confirmed(task, evidence, name, declared):
         return None
-    other = witness[0] / witness[1]
+    other = shown[0] / shown[1]
     if name == "kL":
         # A crank drawn too long beside links that are right is a wrong crank, no wrong scale.
         return None if _links_at(task, evidence, declared) > _links_at(task, evidence, other) else other
-    # Where nothing else tells, a drawing that follows the rule tells that the declaration does not.
-    follows_rule = rule is not None and _is_witnessed(task, evidence, name, rule)
+    # A drawing that follows the rule contradicts another declaration.
+    follows_rule = rule is not None and _is_confirmed(task, evidence, name, rule)
     return other if follows_rule else _contradiction(task, evidence, name, declared)
 
 
-def _is_witnessed(task: Task, evidence: Evidence, name: str, scale: float) -> bool:
-    """Whether a scale makes the real value of what was drawn."""
-    witness = _witness(task, evidence, name)
-    if witness is None:
+def _is_confirmed(task: Task, evidence: Evidence, name: str, scale: float) -> bool:
+    """Whether a scale agrees with the drawn length within its tolerance and uncertainty."""
+    shown = _evidence_of(task, evidence, name)
+    if shown is None:
         return False
-    expected_mm = witness[0] / scale
-    off = abs(expected_mm - witness[1])
+    expected_mm = shown[0] / scale
+    residual = abs(expected_mm - shown[1])
     plain = task.rubric.tolerance_of(name).length_at(expected_mm)
-    return off <= plain or off <= _allowed_mm(task, evidence, name, expected_mm)
+    return residual <= plain or residual <= _allowed_mm(task, evidence, name, expected_mm)
 
 
 def _allowed_mm(task: Task, evidence: Evidence, name: str, expected_mm: float) -> float:
-    """How far what a scale is told by may be off, with what a careful hand makes of it."""
+    """The tolerance (mm) of the length that shows a scale, widened by its propagated drafting error."""
     table, hand = task.rubric.tolerance_of(name), task.rubric.hand
     plain, ends = table.length_at(expected_mm), _ends(task, name)
     if ends is None:
         return plain
     drawn = task.traced(task.rule_scales)
-    reach = hand.sigmas * spread(drawn.moved(*ends), drawn.vector(*ends)).along
+    uncertainty = hand.sigmas * spread(drawn.shifts(*ends), drawn.vector(*ends)).along
     if not evidence.has_sheets:
-        reach = math.hypot(reach, hand.sigmas * hand.ruler_mm)
-    return max(plain, min(reach, hand.at_most * plain))
+        uncertainty = math.hypot(uncertainty, hand.sigmas * hand.ruler_mm)
+    return max(plain, min(uncertainty, hand.at_most * plain))
 
 
 def _ends(task: Task, name: str) -> tuple[str, str] | None:
-    """Tail and head of what a scale is told by."""
+    """Tail and head of the link or vector that shows a scale."""
     if name == "kL":
         return None if task.yardstick is None else (task.yardstick.tail, task.yardstick.head)
     vector = task.construction.vectors.get(f"{name[1]}_{task.pin}")
     return None if vector is None else (vector.tail, vector.head)
 
+
+# Which of the declarations count -------------------------------------------------------------------
 
 LIKELY, BEYOND_DOUBT = 0.2, 0.985
 """Confidence at which a box is believed where the drawing or the rule has the very scale (a misreading
@@ -275,6 +275,12 @@ SAME = 0.005
 BORNE_OUT = 0.02
 """Relative: as near as that the drawing or the rule bears a scale out."""
 Source = Literal["roster", "measurements", "box"]
+SOURCES: Mapping[Source, str] = {
+    "roster": "the roster",
+    "measurements": "the measurements",
+    "box": "the box",
+}
+"""What messages call them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,7 +307,7 @@ def declarations(
     readings: Sequence[Reading],
     further: Sequence[Mapping[str, str]] = (),
 ) -> Declarations:
-    """What counts, from what was entered (later sources before earlier ones) and from the boxes.
+    """The declarations that count, from entries (later sources before earlier ones) and from the boxes.
 
     Arguments: `further` are the scales of further files of measurements.
     """
@@ -322,9 +328,9 @@ def declarations(
         if given:
             texts[name], sources[name] = given[-1]
         boxes = [reading.written[name] for reading in readings if name in reading.written]
-        box, told = _believed(task, evidence, name, boxes, known)
+        box, box_problems = _believed(task, evidence, name, boxes, known)
         if name not in texts:
-            problems.extend(told)
+            problems.extend(box_problems)
             if box is not None:
                 texts[name], sources[name] = box.text, "box"
         elif box is not None and not _is_same(task, name, box.text, texts[name], known):
@@ -342,12 +348,13 @@ def _believed(
         return None, []
     best = max(boxes, key=lambda box: box.confidence)
     if not best.text:
-        told = f"{name}'s box could not be read; enter {name} in the roster or with the measurements"
-        return None, [Problem("scale_box_unread", told)]
-    told = f"{name}'s box seems to read '{best.text}' ({100 * best.confidence:.0f} %)"
+        message = f"{name}'s box could not be read; enter {name} in the roster or with the measurements"
+        return None, [Problem("scale_box_unread", message)]
+    message = f"{name}'s box seems to read '{best.text}' ({100 * best.confidence:.0f} %)"
     very = best.confidence >= LIKELY and _is_borne_out(task, evidence, name, best.text, known, SAME)
     if best.confidence < SURE and not very:
-        return None, [Problem("scale_box_doubtful", f"{told}, too unsure to be used; look, and enter {name}")]
+        why = "too unsure to be used"
+        return None, [Problem("scale_box_doubtful", f"{message}, {why}; look, and enter {name}")]
     sure = [box for box in boxes if box.confidence >= SURE]
     if any(not _is_same(task, name, box.text, best.text, known) for box in sure):
         each = " and ".join(f"'{box.text}'" for box in sure)
@@ -356,7 +363,7 @@ def _believed(
         return best, []
     if best.confidence < BEYOND_DOUBT:
         why = "which neither the drawing nor the assignment's rule bears out"
-        return None, [Problem("scale_box_doubtful", f"{told}, {why}; look, and enter {name}")]
+        return None, [Problem("scale_box_doubtful", f"{message}, {why}; look, and enter {name}")]
     return best, []
 
 
@@ -370,24 +377,13 @@ def _differ(name: str, given: Sequence[tuple[str, Source]]) -> Problem:
     return Problem("scale_disagrees", f"{name} is {texts}: none is used; correct one of them")
 
 
-SOURCES: Mapping[Source, str] = {
-    "roster": "the roster",
-    "measurements": "the measurements",
-    "box": "the box",
-}
-"""What messages call them."""
-
-
-# Values -------------------------------------------------------------------------------------------
-
-
 def _parsed_text(task: Task, name: str, text: str) -> ParsedScale:
     units = task.assignment.file.scales.bare_units
-    return parse_scale(name, text, bare_unit=next((unit for one, unit in units.items() if one == name), None))
+    return _understood(name, text, next((unit for scale, unit in units.items() if scale == name), None))
 
 
 def _value(task: Task, name: str, text: str, known: Mapping[str, float]) -> dict[str, float]:
-    """The scale in real units per millimetre, by its name; empty where it cannot be told."""
+    """The scale in real units per millimetre, by its name; empty where it is not determined."""
     match _parsed_text(task, name, text):
         case Declared(per_mm=value):
             return {name: value}
@@ -399,7 +395,7 @@ def _value(task: Task, name: str, text: str, known: Mapping[str, float]) -> dict
 
 
 def _is_same(task: Task, name: str, one: str, other: str, known: Mapping[str, float]) -> bool:
-    """Whether two texts mean one scale; what cannot be understood contradicts nothing."""
+    """Whether two texts mean the same scale, as far as both can be understood."""
     first, second = (_value(task, name, text, known).get(name) for text in (one, other))
     return first is None or second is None or abs(first / second - 1.0) <= SAME
 
@@ -434,7 +430,7 @@ def _is_borne_out(
 
 
 def _drawn(task: Task, evidence: Evidence, name: str) -> list[float]:
-    """The scale that the drawing shows, where it can be told."""
+    """The scale that the drawing shows, whatever its confidence; empty where it shows none."""
     if name == "kL":
         if task.yardstick is None or evidence.yardstick_mm is None or evidence.yardstick_mm[0] <= 0.0:
             return []

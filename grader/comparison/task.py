@@ -1,4 +1,4 @@
-"""What is asked: one variant's exact plan, its construction, and the rubric."""
+"""The task of one variant: its exact plan, its construction, and the rubric."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -25,10 +25,10 @@ UNITS: Mapping[str, str] = {
     "epsilon": "rad/s^2",
 }
 """By scale, or by the part of a name before its first underscore."""
-KEPT = 64
-"""Drawings at scales of students' own that a task keeps."""
-TASKS = 256
-"""That are kept: students of the same variant have the same task."""
+CACHE_SIZE = 64
+"""Results in the cache of one task, at students' own scales."""
+TASK_CACHE_SIZE = 256
+"""Tasks in the cache: students of the same variant have the same one."""
 
 
 def unit_of(name: str) -> str:
@@ -38,7 +38,7 @@ def unit_of(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Yardstick:
-    """A link of given length, whose drawing tells the scale of lengths, from joint `tail` to `head`."""
+    """A link of given length whose drawn length shows the scale kL, from joint `tail` to `head`."""
 
     tail: str
     head: str
@@ -80,7 +80,7 @@ class Task:
     pin : of the driven link
     yardstick : the crank; where a slider drives, the first link of given length; None without any
     omega : of the crank, None where a slider drives
-    memory : what has been drawn already, by what it depends on
+    cache : results, by everything on which they depend
     """
 
     assignment: Assignment
@@ -96,14 +96,14 @@ class Task:
     yardstick: Yardstick | None
     omega: float | None
     ground: Mapping[str, complex]
-    memory: dict[tuple[object, ...], object] = field(
+    cache: dict[tuple[object, ...], object] = field(
         init=False, repr=False, compare=False, default_factory=dict
     )
 
     def tolerance_at(self, node: str) -> ToleranceTable:
-        """The tolerance of the place of a node: that of the vector or link asked for that ends there.
+        """The tolerance of a node's position: that of the vector or link asked for that ends there.
 
-        The vector from the pole comes first; where nothing asked for ends there, it is the rubric's.
+        The vector from the pole comes first; where none ends there, it is the rubric's.
         """
         asked = {criterion.name for criterion in self.rubric.criterion}
         ends = [one for one in self.segments.values() if one.head == node and one.name in asked]
@@ -112,7 +112,7 @@ class Task:
 
     @property
     def skill(self) -> Skill:
-        """The hand that tolerances are widened for."""
+        """The drafting errors for which tolerances are widened."""
         hand = self.rubric.hand
         return Skill(hand.angle_deg, hand.place_mm, hand.mark_mm)
 
@@ -136,45 +136,45 @@ class Task:
     def nodes(self, scales: Mapping[str, float]) -> Mapping[str, complex]:
         """All nodes at these scales."""
         key = ("nodes", *(scales[name] for name in SCALE_NAMES))
-        found = self.memory.get(key)
+        found = self.cache.get(key)
         if found is None:
             places = evaluate(self.construction, self.at(scales))
             found = {name: complex(np.ravel(node)[0]) for name, node in places.items()}
-            self.keep(key, found)
+            self.remember(key, found)
         return found  # type: ignore[return-value]
 
     def traced(self, scales: Mapping[str, float]) -> TracedDrawing:
-        """The whole drawing with what a hand's errors make of it, at these scales.
+        """The whole drawing with its propagated drafting errors, at these scales.
 
-        The sketch at the rule's: its size changes next to nothing in how far a hand may miss.
+        The sketch is at the rule's scale: its size hardly changes the errors of the plans.
         """
         key = ("traced", scales["kv"], scales["ka"], self.skill)
-        found = self.memory.get(key)
+        found = self.cache.get(key)
         if found is None:
             rule = {**scales, "kL": float(self.parameters["kL"])}
             found = trace(self.construction, self.at(rule), self.skill)
-            self.keep(key, found)
+            self.remember(key, found)
         return found  # type: ignore[return-value]
 
     @property
     def by_similarity(self) -> Construction:
         """The construction with every image of a plate's point found by similarity."""
-        found = self.memory.get(("by similarity",))
+        found = self.cache.get(("by similarity",))
         if found is None:
             found = self.construction
             for image in self.construction.images.values():
                 found = found.with_step(image)
-            self.keep(("by similarity",), found)
+            self.remember(("by similarity",), found)
         return found  # type: ignore[return-value]
 
-    def keep(self, key: tuple[object, ...], found: object) -> None:
-        """Remember what was drawn, by what it depends on."""
-        if len(self.memory) >= KEPT:
-            self.memory.clear()
-        self.memory[key] = found
+    def remember(self, key: tuple[object, ...], found: object) -> None:
+        """Put a result into the cache, under everything on which it depends."""
+        if len(self.cache) >= CACHE_SIZE:
+            self.cache.clear()
+        self.cache[key] = found
 
 
-_tasks: deque[Task] = deque(maxlen=TASKS)
+_tasks: deque[Task] = deque(maxlen=TASK_CACHE_SIZE)
 
 
 def task_of(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:

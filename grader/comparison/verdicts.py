@@ -1,4 +1,4 @@
-"""One value against one expectation: residual, tolerance, verdict, and what the reading leaves open."""
+"""One value compared with one expectation: residual, tolerance, mark, verdict."""
 
 import cmath
 import math
@@ -14,26 +14,29 @@ from reference.construction.uncertainty import EndSpread
 
 FULL, NONE = 1.0, 0.0
 ROUNDING = 1e-9
-"""Relative: a deviation this little above its tolerance is on it."""
+"""Relative excess over a tolerance that still counts as within it."""
+
+
+# Limits and marks ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """A deviation held against its tolerance.
+    """A residual and its tolerance.
 
     Attributes
     ----------
     what : ``length``, ``direction``, ``value`` or ``scale``
-    off : deviation without its sign, in the unit of `tolerance`
-    plain : the tolerance without what it was widened by
-    se : standard error of the deviation
+    residual : without its sign, in the unit of `tolerance`
+    plain : the tolerance before it was widened
+    se : standard error of the residual
     table : the rubric's: bands of partial marks, and how many standard errors a verdict must be away
         from changing
     reason : said where the mark is not full
     """
 
     what: str
-    off: float
+    residual: float
     tolerance: float
     plain: float
     se: float
@@ -42,33 +45,33 @@ class Limit:
 
     @property
     def share(self) -> float:
-        """The mark on the deviation as it is."""
-        return self.share_at(self.off)
+        """The share of the points at the residual."""
+        return self.share_at(self.residual)
 
     @property
     def worst(self) -> float:
-        """The mark at the far end of its error."""
-        return self.share_at(self.off + self.table.certain_errors * self.se)
+        """The share at the upper end of the residual's error."""
+        return self.share_at(self.residual + self.table.certain_errors * self.se)
 
     @property
     def best(self) -> float:
-        """The mark at the near end of its error."""
-        return self.share_at(max(self.off - self.table.certain_errors * self.se, 0.0))
+        """The share at the lower end of the residual's error."""
+        return self.share_at(max(self.residual - self.table.certain_errors * self.se, 0.0))
 
-    def share_at(self, off: float) -> float:
-        """The share of the points at a deviation; bands are as wide as the plain tolerance says."""
+    def share_at(self, residual: float) -> float:
+        """The share of the points at a residual; bands are multiples of the plain tolerance."""
         slack = 1.0 + ROUNDING
-        if off <= self.tolerance * slack:
+        if residual <= self.tolerance * slack:
             return FULL
         for factor, share in self.table.all_bands:
-            if off <= (self.tolerance + (factor - 1.0) * self.plain) * slack:
+            if residual <= (self.tolerance + (factor - 1.0) * self.plain) * slack:
                 return share
         return NONE
 
 
 @dataclass(frozen=True, slots=True)
 class MarkRange:
-    """Several limits together: the worst of them counts.
+    """The mark of one or several limits together, of which the worst counts.
 
     Attributes
     ----------
@@ -109,7 +112,7 @@ def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> MarkRange
     near = tuple(
         Reason(
             "near_limit",
-            {"what": limit.what, "off": limit.off, "tolerance": limit.tolerance, "se": limit.se},
+            {"what": limit.what, "off": limit.residual, "tolerance": limit.tolerance, "se": limit.se},
         )
         for limit in by_loss
         if limit.worst != limit.best
@@ -128,14 +131,14 @@ def open_between(low: float, high: float, first: MarkRange, *reasons: Reason) ->
 
 
 def left_open(first: MarkRange, by_hand: MarkRange) -> MarkRange:
-    """A mark that a careful hand's errors alone leave open; `by_hand` is it with all that they allow."""
+    """A mark, open where drafting errors beyond `at_most` explain the loss; `by_hand` allows all of them."""
     if by_hand.best <= first.best:
         return first
     return open_between(first.worst, by_hand.best, first, Reason("hand_may_miss"))
 
 
 def the_better(first: MarkRange, other: MarkRange, *reasons: Reason) -> MarkRange:
-    """Two marks of which the better counts; the reasons are those of `other`, after `reasons`."""
+    """The better of two marks; its reasons are `reasons`, then those of `other`."""
     return MarkRange(
         max(first.share, other.share),
         max(first.worst, other.worst),
@@ -145,7 +148,7 @@ def the_better(first: MarkRange, other: MarkRange, *reasons: Reason) -> MarkRang
 
 
 def the_worse(first: MarkRange, other: MarkRange) -> MarkRange:
-    """Two marks of which the worse counts."""
+    """The worse of two marks, with the reasons of both."""
     return MarkRange(
         min(first.share, other.share),
         min(first.worst, other.worst),
@@ -154,8 +157,17 @@ def the_worse(first: MarkRange, other: MarkRange) -> MarkRange:
     )
 
 
+def with_confidence(mark: MarkRange, confidence: float, least: float) -> MarkRange:
+    """A mark, wholly open where the reading is less certain than the rubric asks."""
+    if confidence >= least:
+        return mark
+    return open_between(NONE, FULL, mark, Reason("doubtful", {"confidence": confidence}))
+
+
+# Vectors and values --------------------------------------------------------------------------------
+
 REVERSED_WITHIN_DEG = 20.0
-"""A direction this near the opposite one is told as reversed, not as turned by so much."""
+"""A direction this near the opposite one is called reversed, not turned by so much."""
 
 
 def tolerances(tolerance: ToleranceTable, expected_mm: float, *, with_direction: bool) -> Tolerance:
@@ -164,19 +176,21 @@ def tolerances(tolerance: ToleranceTable, expected_mm: float, *, with_direction:
     return Tolerance(tolerance.length_at(expected_mm), turn)
 
 
-def widened(plain: Tolerance, expected_mm: float, reach: EndSpread, at_most: float = math.inf) -> Tolerance:
-    """The tolerance of a vector that a careful hand may miss by `reach`, millimetres, where that is more.
+def widened(
+    plain: Tolerance, expected_mm: float, uncertainty: EndSpread, at_most: float = math.inf
+) -> Tolerance:
+    """The tolerance of a vector, widened to its propagated drafting error (mm) where that is more.
 
-    What the end is off across a vector makes it longer too, and a zero vector as long as it is off.
+    An error across a vector makes it longer too; a zero vector becomes as long as its error.
 
-    Arguments: `at_most` bounds it to so many times the plain one.
+    Arguments: `at_most` bounds it to a multiple of the plain one.
     """
     plain_mm, plain_deg = plain.length_mm or 0.0, plain.direction_deg
-    length_mm = math.hypot(expected_mm + reach.along, reach.across) - expected_mm
+    length_mm = math.hypot(expected_mm + uncertainty.along, uncertainty.across) - expected_mm
     length_mm = max(plain_mm, min(length_mm, at_most * plain_mm))
     direction = plain_deg
     if plain_deg is not None:
-        turned = math.degrees(math.atan2(reach.across, expected_mm))
+        turned = math.degrees(math.atan2(uncertainty.across, expected_mm))
         direction = max(plain_deg, min(turned, at_most * plain_deg))
     is_wider = length_mm > plain_mm or direction != plain_deg
     return Tolerance(length_mm, direction, widened=is_wider)
@@ -185,37 +199,37 @@ def widened(plain: Tolerance, expected_mm: float, reach: EndSpread, at_most: flo
 def mark_vector(
     drawn: DrawnVector, expected: complex, allowed: Tolerance, table: ToleranceTable, se: EndSpread
 ) -> MarkRange:
-    """A vector as drawn against the expected one, both in millimetres.
+    """The mark of a drawn vector against the expected one, both in millimetres.
 
     Arguments: `allowed` has a direction where one is judged; `se` are standard errors of what is expected.
     """
     expected_mm = abs(expected)
-    off_mm = drawn.length_mm - expected_mm
+    residual_mm = drawn.length_mm - expected_mm
     se_mm = math.hypot(drawn.se_mm, se.along)
     is_asked = allowed.direction_deg is not None and drawn.direction_rad is not None
     is_judged = is_asked and drawn.length_mm >= table.least_mm
-    off_deg = se_deg = 0.0
+    residual_deg = se_deg = 0.0
     if is_judged and drawn.direction_rad is not None:
-        off_deg = math.degrees(math.remainder(drawn.direction_rad - cmath.phase(expected), math.tau))
+        residual_deg = math.degrees(math.remainder(drawn.direction_rad - cmath.phase(expected), math.tau))
         se_deg = (
             math.hypot(drawn.se_deg, math.degrees(se.across / expected_mm)) if se.across else drawn.se_deg
         )
     length_mm, direction_deg = allowed.length_mm or 0.0, allowed.direction_deg or math.inf
     margin = table.certain_errors
     if (
-        abs(off_mm) + margin * se_mm <= length_mm
+        abs(residual_mm) + margin * se_mm <= length_mm
         and is_judged
-        and abs(off_deg) + margin * se_deg <= direction_deg
+        and abs(residual_deg) + margin * se_deg <= direction_deg
     ):
         return ALL_RIGHT
     plain = tolerances(table, expected_mm, with_direction=True)
     reason = _length_reason(drawn, expected_mm, length_mm)
-    limits = [Limit("length", abs(off_mm), length_mm, plain.length_mm or 0.0, se_mm, table, reason)]
+    limits = [Limit("length", abs(residual_mm), length_mm, plain.length_mm or 0.0, se_mm, table, reason)]
     remarks: tuple[Reason, ...] = ()
     if is_judged:
-        reason = _direction_reason(drawn, expected, off_deg, direction_deg)
+        reason = _direction_reason(drawn, expected, residual_deg, direction_deg)
         plain_deg = plain.direction_deg or direction_deg
-        limits.append(Limit("direction", abs(off_deg), direction_deg, plain_deg, se_deg, table, reason))
+        limits.append(Limit("direction", abs(residual_deg), direction_deg, plain_deg, se_deg, table, reason))
     elif drawn.direction_rad is not None and min(expected_mm, drawn.length_mm) < table.least_mm:
         shorter = min(expected_mm, drawn.length_mm)
         remarks = (Reason("too_short_to_judge", {"length_mm": shorter, "least_mm": table.least_mm}),)
@@ -223,24 +237,26 @@ def mark_vector(
 
 
 def _length_reason(drawn: DrawnVector, expected_mm: float, allowed_mm: float) -> Reason:
-    off = drawn.length_mm - expected_mm
-    told: dict[str, float | str] = {"measured_mm": drawn.length_mm, "tolerance_mm": allowed_mm}
+    residual = drawn.length_mm - expected_mm
+    params: dict[str, float | str] = {"measured_mm": drawn.length_mm, "tolerance_mm": allowed_mm}
     if expected_mm <= 1e-9 * allowed_mm:
-        return Reason("should_be_zero", told)
-    told |= {"expected_mm": expected_mm, "off_mm": abs(off)}
-    return Reason("too_long" if off > 0.0 else "too_short", told)
+        return Reason("should_be_zero", params)
+    params |= {"expected_mm": expected_mm, "off_mm": abs(residual)}
+    return Reason("too_long" if residual > 0.0 else "too_short", params)
 
 
-def _direction_reason(drawn: DrawnVector, expected: complex, off_deg: float, allowed_deg: float) -> Reason:
-    told: dict[str, float | str] = {
+def _direction_reason(
+    drawn: DrawnVector, expected: complex, residual_deg: float, allowed_deg: float
+) -> Reason:
+    params: dict[str, float | str] = {
         "measured_deg": degrees((drawn.direction_rad or 0.0) + drawn.turn_rad),
         "expected_deg": degrees(cmath.phase(expected) + drawn.turn_rad),
-        "off_deg": abs(off_deg),
+        "off_deg": abs(residual_deg),
         "tolerance_deg": allowed_deg,
     }
-    if abs(off_deg) >= 180.0 - REVERSED_WITHIN_DEG:
-        return Reason("reversed", told)
-    return Reason("turned_left" if off_deg > 0.0 else "turned_right", told)
+    if abs(residual_deg) >= 180.0 - REVERSED_WITHIN_DEG:
+        return Reason("reversed", params)
+    return Reason("turned_left" if residual_deg > 0.0 else "turned_right", params)
 
 
 def degrees(angle_rad: float) -> float:
@@ -251,47 +267,42 @@ def degrees(angle_rad: float) -> float:
 def mark_value(
     value: float, expected: float, allowed: float, plain: float, table: ToleranceTable, unit: str
 ) -> MarkRange:
-    """A computed value against the expected one, SI; its sign counts where the expected one has any.
+    """The mark of a computed value against the expected one, SI, with its sign.
 
-    Arguments: `plain` is the tolerance without what it was widened by.
+    Arguments: `plain` is the tolerance before it was widened.
     """
-    off = abs(value - expected)
-    if off <= allowed:
+    residual = abs(value - expected)
+    if residual <= allowed:
         return ALL_RIGHT
-    told: dict[str, float | str] = {"measured": value, "expected": expected, "unit": unit}
+    params: dict[str, float | str] = {"measured": value, "expected": expected, "unit": unit}
     if value * expected < 0.0:
-        reason = Reason("value_reversed", told)
+        reason = Reason("value_reversed", params)
     else:
-        told |= {"off": off, "tolerance": allowed}
+        params |= {"off": residual, "tolerance": allowed}
         large = abs(value) > abs(expected)
-        reason = Reason("value_too_large" if large else "value_too_small", told)
-    return mark([Limit("value", off, allowed, plain, 0.0, table, reason)])
+        reason = Reason("value_too_large" if large else "value_too_small", params)
+    return mark([Limit("value", residual, allowed, plain, 0.0, table, reason)])
 
+
+# Outcomes ------------------------------------------------------------------------------------------
 
 RANKS: dict[Verdict, int] = {"none": 0, "partial": 1, "follow_through": 2, "full": 2}
 
 
-def with_confidence(mark: MarkRange, confidence: float, least: float) -> MarkRange:
-    """Anything is possible where the reading is less certain than the rubric asks."""
-    if confidence >= least:
-        return mark
-    return open_between(NONE, FULL, mark, Reason("doubtful", {"confidence": confidence}))
-
-
 def quantity(name: str, length_mm: float, direction_rad: float | None, value: float) -> Quantity:
-    """A vector's record; `direction_rad` on the sheet."""
+    """The quantity of a vector; `direction_rad` on the sheet."""
     direction = None if direction_rad is None else degrees(direction_rad)
     return Quantity(length_mm, direction, value, unit_of(name))
 
 
 def expected_quantity(name: str, expected: complex, scale: float, turn_rad: float) -> Quantity:
-    """The record of an expected vector (millimetres); a zero vector has no direction."""
+    """The quantity of an expected vector (complex mm); a zero vector has no direction."""
     direction = cmath.phase(expected) + turn_rad if abs(expected) > 1e-9 else None
     return quantity(name, abs(expected), direction, abs(expected) * scale)
 
 
 def verdict_of(share: float, *, followed: bool) -> Verdict:
-    """The verdict that a share of the points is told as."""
+    """The verdict for a share of the points."""
     if share == FULL:
         return "follow_through" if followed else "full"
     return "none" if share == NONE else "partial"
@@ -328,7 +339,7 @@ def outcome(  # noqa: PLR0913 - one argument per field of the record
 def unjudged(
     criterion: CriterionTable, verdict: Verdict, reasons: tuple[Reason, ...], *, expected: Quantity
 ) -> Outcome:
-    """The outcome of a criterion that nothing was handed in for, or nothing that could be read."""
+    """The outcome of a criterion for which nothing was handed in, or nothing could be read."""
     is_open = verdict == "review"
     return Outcome(
         criterion=criterion.id,
@@ -345,13 +356,10 @@ def unjudged(
 
 
 def entry_refused(judged: Outcome, entry: str) -> Outcome:
-    """The outcome left to a person, because something that was entered for it cannot be used.
-
-    Arguments: `entry` is what was entered.
-    """
+    """The outcome left to a person, because the `entry` for it cannot be used."""
     reasons = [reason for reason in judged.reasons if reason.code != "right"]
     if judged.measured == Quantity():
-        # Why nothing was judged is that nothing of it can be used.
+        # The refused entry is the reason why nothing was judged.
         reasons = []
     return replace(
         judged,
@@ -365,10 +373,10 @@ def entry_refused(judged: Outcome, entry: str) -> Outcome:
 
 
 def both(first: Outcome, second: Outcome, allowed_mm: float) -> Outcome:
-    """Scan and measurement of one vector: told where they differ, reviewed where it matters."""
+    """The outcome of a vector with scan and measurement: for review where they differ in the verdict."""
     lengths = first.measured.length_mm or 0.0, second.measured.length_mm or 0.0
-    told: dict[str, float | str] = {"first": lengths[0], "second": lengths[1], "unit": "mm"}
-    differ = Reason("readings_disagree", told)
+    params: dict[str, float | str] = {"first": lengths[0], "second": lengths[1], "unit": "mm"}
+    differ = Reason("readings_disagree", params)
     if (first.verdict, first.possible, first.shares) == (second.verdict, second.possible, second.shares):
         if abs(lengths[0] - lengths[1]) <= allowed_mm:
             return first

@@ -20,6 +20,8 @@ from reference.kinematics.motion import Motion, move_where_possible
 from reference.mechanism import CrossSlider, Dyad, FixedGuide, Group, Mechanism, Slider, SlottedLink, Yoke
 from reference.plan import vectors_of
 
+# Quantities ---------------------------------------------------------------------------------------
+
 Kind = Literal["velocity", "acceleration", "omega", "epsilon"]
 UNITS: dict[Kind, str] = {"velocity": "m/s", "acceleration": "m/s²", "omega": "rad/s", "epsilon": "rad/s²"}
 AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
@@ -215,6 +217,8 @@ def _written(value: float, decimal_comma: bool) -> str:
     text = repr(value + 0.0)
     return text.replace(".", ",") if decimal_comma else text
 
+
+# Strokes and extremes -----------------------------------------------------------------------------
 
 POINTS = 17
 ROUNDS = 11

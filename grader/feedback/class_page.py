@@ -29,7 +29,7 @@ from grader.feedback.words import (
     score_text,
     unmatched_sentence,
 )
-from grader.files import write_whole
+from grader.files import result_folders, write_whole
 from grader.language import N_, Tongue, tongue
 from grader.overlay.scene import COLOURS, MARKS
 
@@ -132,7 +132,7 @@ class Followed:
     criteria: list[tuple[str, int]]
 
 
-def share_followed(results: ResultsDocument) -> Followed:
+def follow_through(results: ResultsDocument) -> Followed:
     """Follow-through granted, with the reports."""
     points, reports, times = 0.0, [], Counter[str]()
     for report in results.reports:
@@ -159,9 +159,10 @@ def wrong_scales(results: ResultsDocument) -> list[tuple[ReportDocument, list[Cr
     """Reports whose scales were not right: the criteria lost, and the scales not understood."""
     wrong = []
     for report in results.reports:
-        lost = [
-            criterion for criterion in report.criteria if _is_scale(criterion) and criterion.verdict in _LOST
-        ]
+        # A criterion asks for a scale where it expects something per millimetre on paper.
+        asked = [each for each in report.criteria if each.vector is None]
+        asked = [each for each in asked if (each.expected.unit or "").endswith("/mm")]
+        lost = [criterion for criterion in asked if criterion.verdict in _LOST]
         refused = [
             f"{name} = {scale.text}" for name, scale in report.scales.items() if scale.refused and scale.text
         ]
@@ -170,17 +171,12 @@ def wrong_scales(results: ResultsDocument) -> list[tuple[ReportDocument, list[Cr
     return wrong
 
 
-def _is_scale(criterion: CriterionDocument) -> bool:
-    """Whether a criterion asks for a scale: something per millimetre on paper."""
-    return criterion.vector is None and (criterion.expected.unit or "").endswith("/mm")
-
-
 # What waits ---------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A report that a person must look at, the points at stake, and the criteria that wait."""
+    """A report that a person must review, the points at stake, and the criteria that wait."""
 
     report: ReportDocument
     points: float
@@ -205,6 +201,8 @@ def _stake(report: ReportDocument) -> float:
         return report.max_score
     return report.score_range[1] - report.score_range[0]
 
+
+# The page -----------------------------------------------------------------------------------------
 
 _NO_NAMES: Mapping[str, str] = {}
 SHOWN = 12
@@ -246,7 +244,7 @@ def index_page(
     """The class's page."""
     speaker = tongue(lang)
     links = _links(results.reports)
-    followed = share_followed(results)
+    followed = follow_through(results)
 
     def link(student: ReportDocument | MovedDocument) -> Link:
         return links.get((student.student_id, student.position), Link(student.student_id))
@@ -284,17 +282,6 @@ def index_page(
     )  # fmt: skip
 
 
-def folders_of(reports: Sequence[ReportDocument]) -> list[str]:
-    """Each report's folder below the output folder: the student, with several positions also that."""
-    counts = Counter(report.student_id for report in reports)
-    return [
-        report.student_id
-        if counts[report.student_id] == 1
-        else f"{report.student_id}/{'unknown' if report.position is None else report.position}"
-        for report in reports
-    ]
-
-
 # Students -----------------------------------------------------------------------------------------
 
 
@@ -314,7 +301,7 @@ Links = Mapping[tuple[str, int | None], Link]
 def _links(reports: Sequence[ReportDocument]) -> Links:
     count = Counter(report.student_id for report in reports)
     links = {}
-    for report, folder in zip(reports, folders_of(reports), strict=True):
+    for report, folder in zip(reports, result_folders(reports), strict=True):
         student, position = report.student_id, report.position
         text = f"{student}, {position}" if count[student] > 1 else student
         picture = f"{quote(folder)}/overlay.png" if report.reading.sheets else ""
@@ -336,21 +323,20 @@ def _row(report: ReportDocument, names: Mapping[str, str], link: Link, speaker: 
 
 def _scale(criterion: CriterionDocument, speaker: Tongue) -> str:
     """A scale that was not right: what was declared, and what it is."""
-    told = [
-        speaker.value(one.value, one.unit or "")
-        for one in (criterion.measured, criterion.expected)
-        if one.value is not None
-    ]
-    return f"{criterion.title}: {' ≠ '.join(told)}"
+    quantities = (criterion.measured, criterion.expected)
+    values = [speaker.value(each.value, each.unit or "") for each in quantities if each.value is not None]
+    return f"{criterion.title}: {' ≠ '.join(values)}"
 
 
-# Sheets that look alike, and what moved -----------------------------------------------------------
+# Similar sheets, and changes since the last run -----------------------------------------------------------
 
 
 def _similar_row(pair: AlikeDocument, links: Links, speaker: Tongue) -> dict[str, object]:
     chance, share = "", None
     if pair.measure is not None:
-        chance = speaker.gettext(CHANCE) % {"chance": _small(pair.measure, speaker)}
+        small = pair.measure < 1e-6
+        number = f"< {speaker.number(1e-6, 6)}" if small else speaker.significant(pair.measure, 1)
+        chance = speaker.gettext(CHANCE) % {"chance": number}
     if pair.share is not None:
         share = f"{speaker.number(100.0 * pair.share, 0)}\N{NO-BREAK SPACE}%"
     return {
@@ -360,11 +346,6 @@ def _similar_row(pair: AlikeDocument, links: Links, speaker: Tongue) -> dict[str
         "compared": pair.compared,
         "chance": chance,
     }
-
-
-def _small(value: float, speaker: Tongue) -> str:
-    """A small number in words of tens: 0,0004, or under the least that means anything."""
-    return speaker.significant(value, 1) if value >= 1e-6 else f"< {speaker.number(1e-6, 6)}"
 
 
 def _change_row(change: MovedDocument, link: Link, speaker: Tongue) -> dict[str, object]:
@@ -403,7 +384,7 @@ def _verdict(verdict: str | None, points: float | None, speaker: Tongue) -> str:
 
 def _causes(changes: Sequence[MovedDocument]) -> list[tuple[str, int]]:
     """Why marks changed, and how often."""
-    times = Counter(cause for one in changes for cause in one.why)
+    times = Counter(cause for change in changes for cause in change.why)
     return [(CAUSES[cause], count) for cause, count in times.most_common()]
 
 

@@ -12,10 +12,8 @@ from grader.language import N_
 
 ALONG_GUIDE = "guide"
 """The detail `line` of a mistake in a line that runs along a moving guide."""
-CORIOLIS_END = "k_"
-"""How the nodes begin in which Coriolis components end,"""
-NORMAL_END = "n_"
-"""and normal ones."""
+CORIOLIS_END, NORMAL_END = "k_", "n_"
+"""First letters of the nodes in which Coriolis and normal components end."""
 _NAMED = re.compile(r"%\((\w+)\)s")
 
 
@@ -193,7 +191,7 @@ PRECISE_ALONG_GUIDE: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 GIVING_AWAY = frozenset({"factor", "degrees", "n", "position"})
-"""What is told of a mistake only to those who may see the answers."""
+"""Details of a mistake that only those who may see the answers are given."""
 
 
 def precise(code: str, at: str, line: str, known: Collection[str]) -> str | None:

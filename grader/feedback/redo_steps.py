@@ -23,12 +23,12 @@ from reference.construction.steps import Coincide, Divide, Given, Similar, Step,
 from reference.drawing.subject import Subject
 from reference.plan import exact_plan
 
-LAY_OFF_UNTOLD = N_("From %(start)s lay off %(segment)s, %(direction)s; it ends in %(node)s.")
-SIMILAR_UNTOLD = N_(
+LAY_OFF_UNMEASURED = N_("From %(start)s lay off %(segment)s, %(direction)s; it ends in %(node)s.")
+SIMILAR_UNMEASURED = N_(
     "On %(base)s draw the triangle similar to %(model)s, its letters following in the same sense. "
     "Its third corner is %(node)s."
 )
-DIVIDE_UNTOLD = N_("Take %(node)s on the line through %(p)s and %(q)s as the link's points divide it.")
+DIVIDE_UNMEASURED = N_("Take %(node)s on the line through %(p)s and %(q)s as the link's points divide it.")
 MOST_STEPS = 8
 """Of one figure that are told in full: what follows is told by its names."""
 THEN = N_("Then draw again what follows from it: %(nodes)s.")
@@ -100,12 +100,12 @@ def _text_without_numbers(speaker: Speaker, step: Step) -> Iterator[Markup]:
             yield from _formula(speaker, step)
             segment, direction = (step.start, step.node), sentences.direction_of(speaker, step)
             yield speaker.say(
-                LAY_OFF_UNTOLD, start=step.start, node=step.node, segment=segment, direction=direction
+                LAY_OFF_UNMEASURED, start=step.start, node=step.node, segment=segment, direction=direction
             )
         case Similar(base=base, model=model):
-            yield speaker.say(SIMILAR_UNTOLD, base=base, model=model, node=step.node)
+            yield speaker.say(SIMILAR_UNMEASURED, base=base, model=model, node=step.node)
         case Divide(base=(p, q)):
-            yield speaker.say(DIVIDE_UNTOLD, node=step.node, p=p, q=q)
+            yield speaker.say(DIVIDE_UNMEASURED, node=step.node, p=p, q=q)
 
 
 def _formula(speaker: Speaker, step: Given) -> Iterator[Markup]:
@@ -119,7 +119,7 @@ def _formula(speaker: Speaker, step: Given) -> Iterator[Markup]:
         yield Markup("{} = 2 · {} · {}").format(name, rate, speaker.vector(*step.length.slide))
 
 
-def with_mistakes_told(
+def with_mistakes_explained(
     report: ReportDocument,
     judgement: Judgement,
     assignment: Assignment,

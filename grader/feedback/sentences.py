@@ -1,6 +1,6 @@
 """Reasons and mistakes as sentences.
 
-Three levels of telling: ``full`` for instructors, with every number; ``hint``, which says in which way
+Three levels of feedback: ``full`` for instructors, with every number; ``hint``, which says in which way
 something is off without giving the answer away; ``symbol``, which says nothing beside the mark.
 Names of vectors stand in sentences as `v_BA`, `a_BA_n`; pages set them with indices.
 """
@@ -17,8 +17,10 @@ Level = Literal["symbol", "hint", "full"]
 
 _NO_NAMES: Mapping[str, str] = {}
 
+# Criteria -----------------------------------------------------------------------------------------
+
 UNDECIDED = "scale_undecided"
-"""Said for `scale_assumed` and `follows` together, under review: neither alone says what is in doubt."""
+"""Stands for `scale_assumed` and `follows` together, under review: neither alone says what is in doubt."""
 
 HINTS: dict[str, str] = {
     "right": N_("Right."),
@@ -113,8 +115,9 @@ def criterion_feedback(
     if level == "symbol":
         return ""
     speaker = tongue(lang)
+    in_part = NEARLY if outcome.verdict == "partial" else MAY_FOLLOW
     told = (
-        speaker.gettext(_followed_in_part(outcome))
+        speaker.gettext(in_part)
         if reason.code == "follows" and outcome.verdict != "follow_through"
         else reason_sentence(reason, speaker, level, names)
         for reason in _worth_telling(outcome, level)
@@ -126,10 +129,6 @@ def criterion_feedback(
         title = speaker.gettext(words.title)
         parts.append(speaker.gettext("Likely cause: %(cause)s.") % {"cause": title})
     return " ".join(part for part in parts if part)
-
-
-def _followed_in_part(outcome: Outcome) -> str:
-    return NEARLY if outcome.verdict == "partial" else MAY_FOLLOW
 
 
 def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
@@ -155,10 +154,12 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     ]
 
 
+# Mistakes -----------------------------------------------------------------------------------------
+
 RIVALS = N_("What was handed in does not tell this from something else:")
-"""Said between a mistake and those that explain the same nearly as well,"""
-OR_RIVAL = N_("or:")
-"""each after this."""
+"""Stands between a mistake and those that explain the same nearly as well."""
+BETWEEN_RIVALS = N_("or:")
+"""Stands before each of those."""
 
 
 def mistake_feedback(
@@ -177,7 +178,7 @@ def mistake_feedback(
     if not others:
         return told
     return " ".join(
-        (told, speaker.gettext(RIVALS), *(f"{speaker.gettext(OR_RIVAL)} {one}" for one in others))
+        (told, speaker.gettext(RIVALS), *(f"{speaker.gettext(BETWEEN_RIVALS)} {one}" for one in others))
     )
 
 
@@ -229,6 +230,9 @@ def place(at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str
     return speaker.gettext(PLACES[at]) if at in PLACES else names.get(at, at)
 
 
+# Reasons ------------------------------------------------------------------------------------------
+
+
 def reason_sentence(
     reason: Reason, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
 ) -> str:
@@ -253,7 +257,9 @@ def _fill(text: str, said: Mapping[str, str], otherwise: str) -> str:
 
 def _speak(params: Mapping[str, Param], speaker: Tongue, names: Mapping[str, str]) -> dict[str, str]:
     """Parameters in words: `off_mm` becomes `off`, with its unit."""
-    unit = str(params.get("unit", _unit_of_limit(params)))
+    # `near_limit` says what it speaks of instead of a unit.
+    unit_of_limit = {"length": "mm", "scale": "mm", "direction": "°"}.get(str(params.get("what", "")), "")
+    unit = str(params.get("unit", unit_of_limit))
     said: dict[str, str] = {}
     for key, value in params.items():
         stem, _, suffix = key.rpartition("_")
@@ -268,11 +274,6 @@ def _speak(params: Mapping[str, Param], speaker: Tongue, names: Mapping[str, str
         else:
             said[key] = _real(speaker, value, unit)
     return said
-
-
-def _unit_of_limit(params: Mapping[str, Param]) -> str:
-    """`near_limit` says what it speaks of instead of a unit."""
-    return {"length": "mm", "scale": "mm", "direction": "°"}.get(str(params.get("what", "")), "")
 
 
 def _real(speaker: Tongue, value: float, unit: str) -> str:
@@ -316,7 +317,7 @@ REASONS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
 def reader_reason(reason: str, speaker: Tongue) -> str:
     """A reason of the reader, in a language."""
     for pattern, text in REASONS:
-        found = pattern.fullmatch(reason)
-        if found is not None:
-            return speaker.gettext(text) % found.groupdict()
+        match = pattern.fullmatch(reason)
+        if match is not None:
+            return speaker.gettext(text) % match.groupdict()
     return reason

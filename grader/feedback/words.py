@@ -8,7 +8,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from grader.documents import ProblemDocument, ReportDocument, UnmatchedDocument
-from grader.feedback.sentences import OR_RIVAL, RIVALS
+from grader.feedback.sentences import BETWEEN_RIVALS, RIVALS
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.overlay.scene import MARKS
 
@@ -89,7 +89,7 @@ def environment(lang: str) -> Environment:
     made.filters["points"] = lambda value: speaker.trimmed(value, 2)
     made.globals.update(
         speaker=speaker, verdicts=VERDICTS, states_words=STATES, state_marks=STATE_MARKS,
-        marks=MARKS, rivals=speaker.gettext(RIVALS), either=speaker.gettext(OR_RIVAL),
+        marks=MARKS, rivals=speaker.gettext(RIVALS), either=speaker.gettext(BETWEEN_RIVALS),
     )  # fmt: skip
     return made
 
@@ -103,6 +103,8 @@ def score_text(report: ReportDocument, speaker: Tongue) -> str:
     low, high = (speaker.trimmed(value, 2) for value in report.score_range)
     return low if low == high else f"{low}–{high}"
 
+
+# Problems -----------------------------------------------------------------------------------------
 
 PROBLEMS: dict[str, str] = {
     "file_missing": N_("The file could not be opened."),

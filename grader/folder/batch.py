@@ -1,7 +1,6 @@
 """A folder of submissions: inventory, owners, marking in parallel, results. One bad file stops nothing."""
 
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from grader.documents import AlikeDocument, ReportDocument, ResultsDocument, Unm
 from grader.feedback.class_page import write_index
 from grader.feedback.sentences import Level
 from grader.feedback.student_page import About, write_feedback
-from grader.files import make_folder, write_whole
+from grader.files import make_folder, result_folders, write_whole
 from grader.folder.cache import (
     CELL_STAGE,
     CELLS_OF,
@@ -26,7 +25,7 @@ from grader.folder.cache import (
     store_reading,
 )
 from grader.folder.changes import Inputs, changes_since, earlier, inputs_of, note_inputs, noted_inputs
-from grader.folder.inventory import FileContent, Progress, submissions, survey_folder
+from grader.folder.inventory import FileContent, Progress, submissions, take_inventory
 from grader.folder.owners import Unmatched, assign_pages
 from grader.folder.submissions import Unusable, submissions_of
 from grader.folder.workers import ENDED, Limits, Pool, Workers
@@ -41,73 +40,6 @@ from grader.similarity.groups import find_similar
 from grader.similarity.submission import compared_submission
 from reference.authored.assignment import Assignment, Variant
 from reference.errors import CallError, PlanmarkError
-
-
-@dataclass(frozen=True, slots=True)
-class Job:
-    """One submission to mark.
-
-    Attributes
-    ----------
-    folder : below the results: the student's, with several positions one for each
-    reading_key : a digest of everything that the reading of its pages depends on
-    key : a digest of everything that its report depends on
-    """
-
-    submission: StudentSubmission
-    folder: str
-    reading_key: str
-    key: str
-
-    @property
-    def name(self) -> str:
-        """Of what is kept of it."""
-        return self.folder.replace("/", "#")
-
-
-def folders_of(submissions: Iterable[StudentSubmission]) -> list[str]:
-    """Each submission's folder below the results: the student's, with several positions one for each."""
-    submissions = list(submissions)
-    count = Counter(submission.student_id for submission in submissions)
-    return [
-        submission.student_id
-        if count[submission.student_id] == 1
-        else f"{submission.student_id}/{_position(submission)}"
-        for submission in submissions
-    ]
-
-
-def _position(submission: StudentSubmission) -> str:
-    position = None if submission.variant is None else submission.variant.position
-    return "unknown" if position is None else str(position)
-
-
-def inputs_of_run(
-    assignment: Assignment, rubric: RubricFile, jobs: Sequence[Job], contents: Sequence[FileContent]
-) -> Inputs:
-    """What this run's marks come from, for the next run to tell what has changed."""
-    files = (assignment.file.model_dump_json(), assignment.mechanism_file.model_dump_json())
-    authored = {
-        "assignment": repr(files),
-        "rubric": rubric.model_dump_json(),
-        "program": stage_digest(MARK_STAGE),
-    }
-    digests = {page.file: page.digest for content in contents for page in content.pages}
-    return inputs_of(authored, [job.submission for job in jobs], [job.folder for job in jobs], digests)
-
-
-def similar_of_run(
-    assignment: Assignment, jobs: Sequence[Job], reports: Sequence[ReportDocument], readings: Path
-) -> list[AlikeDocument]:
-    """The similar sheets among those that were marked."""
-    marked = [
-        (job, compared_submission(report, job.submission.variant, job.submission.measured))
-        for job, report in zip(jobs, reports, strict=True)
-        if job.submission.variant is not None and report.criteria
-    ]
-    maps = [cached_maps(readings, job.name) for job, _ in marked]
-    return find_similar(assignment, [one for _, one in marked], maps)
-
 
 CACHE_FOLDER = ".planmark"
 _PASSING = "file_changed"
@@ -171,7 +103,7 @@ def _graded(
 ) -> ResultsDocument:
     notes = batch.out / CACHE_FOLDER
     names, cache = names_of(batch.assignment), _page_cache(batch)
-    contents = survey_folder(files, batch.folder, names, workers, progress, cache)
+    contents = take_inventory(files, batch.folder, names, workers, progress, cache)
     students, unmatched = _submissions(batch, roster, contents)
     if not students and not unmatched:
         raise _nothing(batch)
@@ -219,7 +151,7 @@ def _submissions(
 ) -> tuple[list[StudentSubmission], list[UnmatchedDocument]]:
     """Every student's submission, and what is nobody's."""
     measured = [row for content in contents for row in content.measurements]
-    ownership = assign_pages(
+    owners = assign_pages(
         [page for content in contents for page in content.pages],
         roster,
         batch.assignment.id,
@@ -229,12 +161,12 @@ def _submissions(
     refused = [(content.refused, content.students) for content in contents if content.refused is not None]
     unusable = [Unusable((Problem(file.code, file.message, file.file),), who) for file, who in refused]
     students, strangers = submissions_of(
-        batch.assignment, roster, ownership, measured, batch.lang, refused=unusable
+        batch.assignment, roster, owners, measured, batch.lang, refused=unusable
     )
-    unmatched = [_unmatched(page) for page in ownership.unmatched]
+    unmatched = [_unmatched(page) for page in owners.unmatched]
     missing = [
         UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
-        for problem in ownership.problems
+        for problem in owners.problems
     ]
     return students, [*(file for file, _ in refused), *unmatched, *strangers, *missing]
 
@@ -245,6 +177,58 @@ def _unmatched(page: Unmatched) -> UnmatchedDocument:
     return UnmatchedDocument(
         file=page.source.file, page=page.source.page, code=page.problem.code, message=message
     )
+
+
+# Jobs ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One submission to mark.
+
+    Attributes
+    ----------
+    folder : below the results: the student's, with several positions one for each
+    reading_key : a digest of everything that the reading of its pages depends on
+    key : a digest of everything that its report depends on
+    """
+
+    submission: StudentSubmission
+    folder: str
+    reading_key: str
+    key: str
+
+    @property
+    def name(self) -> str:
+        """Of its files in the cache."""
+        return self.folder.replace("/", "#")
+
+
+def inputs_of_run(
+    assignment: Assignment, rubric: RubricFile, jobs: Sequence[Job], contents: Sequence[FileContent]
+) -> Inputs:
+    """What this run's marks come from, for the next run to tell what has changed."""
+    files = (assignment.file.model_dump_json(), assignment.mechanism_file.model_dump_json())
+    authored = {
+        "assignment": repr(files),
+        "rubric": rubric.model_dump_json(),
+        "program": stage_digest(MARK_STAGE),
+    }
+    digests = {page.file: page.digest for content in contents for page in content.pages}
+    return inputs_of(authored, [job.submission for job in jobs], [job.folder for job in jobs], digests)
+
+
+def similar_of_run(
+    assignment: Assignment, jobs: Sequence[Job], reports: Sequence[ReportDocument], readings: Path
+) -> list[AlikeDocument]:
+    """The similar sheets among those that were marked."""
+    marked = [
+        (job, compared_submission(report, job.submission.variant, job.submission.measured))
+        for job, report in zip(jobs, reports, strict=True)
+        if job.submission.variant is not None and report.criteria
+    ]
+    maps = [cached_maps(readings, job.name) for job, _ in marked]
+    return find_similar(assignment, [submission for _, submission in marked], maps)
 
 
 # Marking ------------------------------------------------------------------------------------------
@@ -267,7 +251,7 @@ def _jobs(batch: Batch, cache: PageCache, students: Sequence[StudentSubmission])
     marked = digest_of((stage_digest(MARK_STAGE), *assignment, *settings))
     return [
         _job(submission, folder, (read, marked))
-        for submission, folder in zip(students, folders_of(students), strict=True)
+        for submission, folder in zip(students, result_folders(students), strict=True)
     ]
 
 

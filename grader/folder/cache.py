@@ -1,9 +1,9 @@
-"""The cache: what an earlier run read and a later one need not read again.
+"""The cache of scans and readings, from which a later run takes what has not changed.
 
 Everything lies beside the results in small files that are written whole. A file's name or first line
 is a digest of all that its content depends on: what was handed in, what is asked for, and the code of
 the stage with its data (networks, templates, translations). What does not match, or cannot be
-understood, is found out again.
+understood, is computed again.
 """
 
 import hashlib
@@ -163,7 +163,7 @@ def _ordered(value: object) -> object:
 def packed(value: Any, arrays: list[NDArray[Any]]) -> Any:  # noqa: ANN401 - any record, down to its numbers
     """A record as JSON-like data, numbers to the last digit; its arrays are added to `arrays`."""
     if is_dataclass(value) and not isinstance(value, type):
-        items = {one.name: packed(getattr(value, one.name), arrays) for one in fields(value)}
+        items = {column.name: packed(getattr(value, column.name), arrays) for column in fields(value)}
         return {"record": type(value).__name__, **items}
     if isinstance(value, complex):
         return {"record": "complex", "parts": [value.real, value.imag]}
@@ -263,7 +263,7 @@ class PageCache:
         return replace(page, ref=ref)
 
     def _scanned(self, ref: PageRef) -> ScannedPage:
-        """The page scanned now, and kept unless it could not be."""
+        """The page scanned now, and stored unless it has a problem."""
         page = scan(ref, self.asked)
         if page.ref.problem is None:
             path = self.path_of(ref)
@@ -272,7 +272,7 @@ class PageCache:
         return page
 
     def drop_others(self, refs: Iterable[PageRef]) -> None:
-        """Forget what is not among these pages."""
+        """Delete the files of all other pages."""
         names = {self.path_of(ref).stem for ref in refs}
         for path in self.folder.glob("*"):
             if path.stem not in names:
@@ -298,10 +298,9 @@ def _pages_in(path: Path, key: str, printed_key: str) -> list[ScannedPage]:
 
 
 def store_reading(folder: Path, name: str, key: str, pages: Sequence[ScannedPage], cache: PageCache) -> None:
-    """Keep a submission's pages as read, in place of what was kept of it before.
+    """Store a submission's pages as read, without what their scans hold already.
 
-    What a page's scan has already is left out. With it goes where the ink lies on registered pages, for
-    comparing the sheets of a class.
+    The ink maps of registered pages are stored too, for comparing the sheets of a class.
     """
     bare = [replace(page, ink=None, backdrop=None) for page in pages]
     write_whole(folder / f"{name}.reading", dumped((key, cache.printed_key, bare)))

@@ -112,7 +112,7 @@ def _digest(*parts: object) -> str:
 
 
 def earlier(results: Path, assignment: str) -> Mapping[Key, EarlierReport] | None:
-    """Where everybody stood at the end of the last run; None where there was none of this assignment."""
+    """The last run's reports by student and position; None where there was no run of this assignment."""
     try:
         before = EarlierResults.model_validate_json(results.read_bytes())
     except (OSError, KeyError, TypeError, ValidationError):
@@ -135,7 +135,7 @@ def note_inputs(folder: Path, inputs: Inputs) -> None:
     write_whole(folder / NOTE, inputs.model_dump_json())
 
 
-# What moved ---------------------------------------------------------------------------------------
+# Changes ---------------------------------------------------------------------------------------
 
 
 def changes_since(
@@ -144,7 +144,7 @@ def changes_since(
     folders: Sequence[str] = (),
     inputs: tuple[Inputs, Inputs] | None = None,
 ) -> list[MovedDocument]:
-    """Who stands elsewhere than before, who is new and who is gone; nobody after a first run.
+    """The submissions whose status or points changed, new ones and dropped ones; none after a first run.
 
     Arguments: `folders` are the reports', `inputs` what the last run's and this one's marks came from.
     """

@@ -11,6 +11,7 @@ Students who made mistakes match their own variant less well.
 """
 
 import base64
+import contextlib
 import csv
 import io
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +22,8 @@ import numpy as np
 import simplejpeg
 
 from grader.folder.owners import How, Owned, assign_pages
-from grader.inputs.roster import COLUMNS, DRAFT_COLUMNS, SCALES, Roster, RosterRow
+from grader.inputs.roster import COLUMNS, DRAFT_COLUMNS, Roster, RosterRow
+from grader.inputs.scale_text import SCALE_NAMES
 from grader.language import N_, Tongue, tongue
 from grader.records import FloatArray, GreyImage, PageRef, Problem
 from grader.scan.pixels import shrink
@@ -38,22 +40,7 @@ _CLEAR = 0.75
 """The next best variant must match this share of it, or less, to be told apart."""
 _NAMED = 6
 
-_ANCHOR_OFF_RAD = np.radians(2.5)
-_SCALES = (0.4, 1.6)
-"""Drawn size over the one that the assignment proposes."""
-_LEAST_ANCHOR_MM = 15.0
-_LEAST_LINE_MM = 8.0
-"""Shorter lines are found anywhere."""
-_OFF_MM = 0.6
-"""Of a line's ends, across: a usual hand."""
-_COVERED = 0.6
-_AMISS = 0.5
-"""What a line without a stroke takes off, as a share of what one with a stroke adds."""
-_ANCHORS = 4
-_TRIED = 24
-"""Strokes tried as the anchor, those nearest in direction."""
-
-Look = Callable[[PageRef], FloatArray | None]
+StrokesOf = Callable[[PageRef], FloatArray | None]
 """The strokes (n, 2, 2) of a page in sheet millimetres, y down; None where there are none to be had."""
 
 
@@ -89,14 +76,14 @@ def suggest(
     roster: Roster,
     assignment: Assignment,
     *,
-    look: Look | None = None,
+    strokes_of: StrokesOf | None = None,
     pages_per_student: int | None = None,
 ) -> RosterDraft:
     """Who each page may belong to.
 
     Arguments
     ---------
-    look : gives the strokes of a page whose owner is not certain, to see whose variant they look like
+    strokes_of : gives the strokes of a page whose owner is not certain, to see whose variant they look like
     pages_per_student : how many pages each student has, if the file is in the roster's order
     """
     known = assign_pages(pages, roster, assignment.id, pages_per_student=pages_per_student)
@@ -105,16 +92,19 @@ def suggest(
     if pages_per_student is None:
         settled |= _by_likely_order(pages, roster, assignment, settled)
     variants = _variants(roster, assignment)
-    found: list[Suggestion] = []
+    suggestions: list[Suggestion] = []
     for page in pages:
         first = settled.get(page)
         if first is None and page not in reasons:
             continue
         contested = page in reasons and reasons[page].code in {"owner_disagree", "owner_other_assignment"}
-        if (first is None or not first.sure) and not contested and look is not None and variants:
-            first = _by_similarity(page, look(page), assignment, variants, first) or first
-        found.append(first or Suggestion(page, None, _reason(reasons[page], page), sure=False))
-    return RosterDraft(tuple(_in_order(found, roster)), known.problems)
+        if (first is None or not first.sure) and not contested and strokes_of is not None and variants:
+            first = _by_similarity(page, strokes_of(page), assignment, variants, first) or first
+        if first is None:
+            why = reasons[page].message.removeprefix(f"{page}: ")
+            first = Suggestion(page, None, why, sure=False)
+        suggestions.append(first)
+    return RosterDraft(tuple(_in_order(suggestions, roster)), known.problems)
 
 
 def _certain(owned: Owned, roster: Roster) -> Suggestion:
@@ -127,13 +117,11 @@ def _certain(owned: Owned, roster: Roster) -> Suggestion:
 
 def _variants(roster: Roster, assignment: Assignment) -> dict[Variant, list[RosterRow]]:
     """The rows of each variant; rows whose variant is unknown have none."""
-    found: dict[Variant, list[RosterRow]] = {}
+    variants: dict[Variant, list[RosterRow]] = {}
     for row in roster.rows:
-        try:
-            found.setdefault(assignment.variant(row.n, row.position), []).append(row)
-        except CallError:
-            continue
-    return found
+        with contextlib.suppress(CallError):
+            variants.setdefault(assignment.variant(row.n, row.position), []).append(row)
+    return variants
 
 
 def _by_similarity(
@@ -201,10 +189,6 @@ def _in_order(suggestions: list[Suggestion], roster: Roster) -> list[Suggestion]
     return settled
 
 
-def _reason(problem: Problem, page: PageRef) -> str:
-    return problem.message.removeprefix(f"{page}: ")
-
-
 def _who(row: RosterRow) -> str:
     return row.student_id if row.position is None else f"{row.student_id} (position {row.position})"
 
@@ -232,7 +216,7 @@ def _cells(row: RosterRow) -> list[str]:
         row.name,
         *whole,
         row.email or "",
-        *(row.scales.get(name, "") for name in SCALES),
+        *(row.scales.get(name, "") for name in SCALE_NAMES),
         row.lang or "",
     ]
 
@@ -248,6 +232,22 @@ def _judged(row: RosterRow, mine: list[Suggestion]) -> list[str]:
 
 
 # Similarity of strokes and figures ------------------------------------------------------------------
+
+
+_ANCHOR_OFF_RAD = np.radians(2.5)
+_SCALES = (0.4, 1.6)
+"""Drawn size over the one that the assignment proposes."""
+_LEAST_ANCHOR_MM = 15.0
+_LEAST_LINE_MM = 8.0
+"""Shorter lines are found anywhere."""
+_OFF_MM = 0.6
+"""Of a line's ends, across: a usual hand."""
+_COVERED = 0.6
+_AMISS = 0.5
+"""What a line without a stroke takes off, as a share of what one with a stroke adds."""
+_ANCHORS = 4
+_TRIED = 24
+"""Strokes tried as the anchor, those nearest in direction."""
 
 
 def figure_similarity(ends_mm: FloatArray, assignment: Assignment, variants: Sequence[Variant]) -> FloatArray:
@@ -347,6 +347,8 @@ def _on_strokes(tail: FloatArray, head: FloatArray, strokes: FloatArray) -> Floa
     good = np.exp(-0.5 * (across / (2.0 * _OFF_MM)) ** 2)
     return np.asarray(np.where(covered >= _COVERED * (high - low), good, 0.0).max(axis=-1))
 
+
+# The contact sheet --------------------------------------------------------------------------------
 
 _THUMBNAIL_PX = 640
 _QUALITY = 60

@@ -21,6 +21,8 @@ from grader.scan.decode.pages import count_pages, decode
 from grader.scan.register.registration import register
 from reference.errors import InputFileError
 
+# The files handed in ------------------------------------------------------------------------------
+
 _TOOL_NAMES = frozenset(
     {"thumbs.db", "desktop.ini", "layout.json", "results.json", "summary.csv", "index.html", "truth.jsonl"}
 )
@@ -45,8 +47,8 @@ def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[
         folder's top is none either
     passed_over : files and folders that are none, such as the folder of results
 
-    A folder that cannot be opened is one, and an empty folder named as a file: somebody must be told.
-    Links that lead out of the folder are passed over: a submission is a file, not a way to others.
+    A folder that cannot be opened counts as a file, and so does an empty folder named as one: both are
+    reported. Links that lead out of the folder are left out.
     """
     top = folder.resolve()
     none = {path.resolve() for path in (*passed_over, *([roster] if roster else []), folder / "roster.csv")}
@@ -66,7 +68,7 @@ def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[
 
 
 def shown_name(path: Path, folder: Path) -> str:
-    """A file's path in the folder as people are told it; bytes that are no text are told by number.
+    """A file's path in the folder, as messages name it; bytes that are no text stand as numbers.
 
     Archives from systems with other alphabets unpack to such names.
     """
@@ -86,6 +88,8 @@ def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
     parts = (part for part in _DIGITS.split(name.lower()) if part)
     return tuple((0, int(part)) if part.isascii() and part.isdigit() else (1, part) for part in parts)
 
+
+# What is in them ----------------------------------------------------------------------------------
 
 MEASUREMENT_TYPES = {".csv", ".json"}
 Progress = Callable[[str, int, int], None]
@@ -110,7 +114,7 @@ class FileContent:
     students: tuple[str, ...] = ()
 
 
-def survey_folder(
+def take_inventory(
     files: Sequence[Path], folder: Path, names: Names, workers: Pool, progress: Progress, cache: PageCache
 ) -> list[FileContent]:
     """What each of a folder's files holds; never raises for a bad file.

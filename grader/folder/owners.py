@@ -25,55 +25,6 @@ from typing import TypeVar
 from grader.inputs.roster import Roster, RosterRow, ScanRef, why_no_id
 from grader.records import Identity, PageRef, Problem
 
-Row = TypeVar("Row")
-
-
-@dataclass(frozen=True, slots=True)
-class OrderRefused:
-    """Why the order says nothing. False in a condition."""
-
-    reason: str
-
-    def __bool__(self) -> bool:
-        return False
-
-
-def deal(
-    blank: Sequence[bool], rows: Sequence[Row], waiting: Sequence[Row], each: int
-) -> dict[int, Row] | OrderRefused:
-    """The row of each page, by the page's place in the file from 0; blank pages are dealt to nobody.
-
-    Arguments
-    ---------
-    blank : for each page of the file
-    rows : the roster's rows in order
-    waiting : those of them that have no pages elsewhere; dealt to where all `rows` do not come out even
-    each : pages per row
-    """
-    if each < 1:
-        raise ValueError(f"pages per student must be 1 or more, not {each}")
-    ways = (_drawn(blank), list(range(len(blank))), _fronts(blank))
-    for candidates in (rows, waiting):
-        for places in ways:
-            if candidates and len(places) == each * len(candidates):
-                dealt = zip(places, (row for row in candidates for _ in range(each)), strict=True)
-                return {place: row for place, row in dealt if not blank[place]}
-    drawn = len(_drawn(blank))
-    return OrderRefused(
-        f"{drawn} pages that are not blank cannot be {each} for each of {len(rows)} lines of the roster;"
-        " name the pages in the roster's scans, `planmark match` makes a draft"
-    )
-
-
-def _drawn(blank: Sequence[bool]) -> list[int]:
-    """Places of the pages that are not blank."""
-    return [place for place, empty in enumerate(blank) if not empty]
-
-
-def _fronts(blank: Sequence[bool]) -> list[int]:
-    """Places of the fronts of a duplex scan whose backs are all blank; none for anything else."""
-    return list(range(0, len(blank), 2)) if len(blank) % 2 == 0 and all(blank[1::2]) else []
-
 
 class How(Enum):
     """What says whose a page is, in the order in which they decide."""
@@ -105,7 +56,7 @@ class Unmatched:
 
 
 @dataclass(frozen=True, slots=True)
-class Ownership:
+class PageOwners:
     """What becomes of every page.
 
     Attributes
@@ -136,7 +87,7 @@ def assign_pages(
     *,
     pages_per_student: int | None = None,
     student_ids: Iterable[str] = (),
-) -> Ownership:
+) -> PageOwners:
     """Give every page its owner.
 
     Arguments
@@ -162,7 +113,7 @@ def assign_pages(
         else:
             students = dict.fromkeys(row.student_id for claim in claims for row in claim.rows)
             unmatched.append(Unmatched(page, settled, tuple(students)))
-    return Ownership(tuple(owned), tuple(unmatched), tuple(blank), tuple(_missing_scans(pages, listed)))
+    return PageOwners(tuple(owned), tuple(unmatched), tuple(blank), tuple(_missing_scans(pages, listed)))
 
 
 def student_of_name(file: str, student_ids: Iterable[str]) -> str | None:
@@ -253,7 +204,13 @@ def _order_claims(
         if page.file == file and not any(claim.how is How.SCANS for claim in certain[index])
     ]
     rows = [row for row in roster.rows if all(ref.file != file for ref in row.scans)]
-    elsewhere = _rows_elsewhere(pages, certain, file)
+    elsewhere = {
+        row.line
+        for page, claims in zip(pages, certain, strict=True)
+        if page.file != file and not page.blank
+        for claim in claims
+        for row in claim.rows
+    }
     dealt = deal(
         [pages[index].blank for index in indices],
         rows,
@@ -271,20 +228,9 @@ def _order_claims(
             if not pages[index].blank and not _common([claim, other]):
                 reason = f"it is disproved on page {pages[index].page}: {other.text}; {claim.text}"
                 # Pages with no other source may be shifted just as well; those that agree may stay.
-                kept = {i: c for i, c in claims_by_index.items() if certain[i]}
-                return kept, {file: reason}
+                agreeing = {i: c for i, c in claims_by_index.items() if certain[i]}
+                return agreeing, {file: reason}
     return claims_by_index, {}
-
-
-def _rows_elsewhere(pages: Sequence[PageRef], certain: Sequence[Sequence[_Claim]], file: str) -> set[int]:
-    """Lines of the rows that have pages in other files."""
-    return {
-        row.line
-        for page, claims in zip(pages, certain, strict=True)
-        if page.file != file and not page.blank
-        for claim in claims
-        for row in claim.rows
-    }
 
 
 def _common(claims: Sequence[_Claim]) -> tuple[RosterRow, ...]:
@@ -349,8 +295,8 @@ def _near(file: str, roster: Roster) -> str:
     """A hint for a name that is almost an id; never more than a hint."""
     stem = PurePath(file).stem
     by_lower = {student.lower(): student for student in roster.student_ids}
-    found = student_of_name(f"{stem.lower()}.x", by_lower)
-    near = [found] if found else difflib.get_close_matches(stem.lower(), by_lower, n=1, cutoff=0.8)
+    student = student_of_name(f"{stem.lower()}.x", by_lower)
+    near = [student] if student else difflib.get_close_matches(stem.lower(), by_lower, n=1, cutoff=0.8)
     return f" (is {by_lower[near[0]]} meant?)" if near else ""
 
 
@@ -360,8 +306,8 @@ def _missing_scans(pages: Sequence[PageRef], roster: Roster) -> Iterable[Problem
         for ref in row.scans:
             reason = _why_missing(ref, there)
             if reason:
-                told = f"line {row.line}: {_who(row)} has {ref} among the scans, {reason}"
-                yield Problem("scan_missing", told, roster.file)
+                message = f"line {row.line}: {_who(row)} has {ref} among the scans, {reason}"
+                yield Problem("scan_missing", message, roster.file)
 
 
 def _why_missing(ref: ScanRef, there: Mapping[str, int]) -> str | None:
@@ -372,3 +318,46 @@ def _why_missing(ref: ScanRef, there: Mapping[str, int]) -> str | None:
     if ref.page is not None and ref.page > there[ref.file]:
         return f"which has {there[ref.file]} page(s)"
     return None
+
+
+# The roster's order over one class file -----------------------------------------------------------
+
+Row = TypeVar("Row")
+
+
+@dataclass(frozen=True, slots=True)
+class OrderRefused:
+    """Why the order says nothing. False in a condition."""
+
+    reason: str
+
+    def __bool__(self) -> bool:
+        return False
+
+
+def deal(
+    blank: Sequence[bool], rows: Sequence[Row], waiting: Sequence[Row], each: int
+) -> dict[int, Row] | OrderRefused:
+    """The row of each page, by the page's place in the file from 0; blank pages are dealt to nobody.
+
+    Arguments
+    ---------
+    blank : for each page of the file
+    rows : the roster's rows in order
+    waiting : those of them that have no pages elsewhere; dealt to where all `rows` do not come out even
+    each : pages per row
+    """
+    if each < 1:
+        raise ValueError(f"pages per student must be 1 or more, not {each}")
+    drawn = [place for place, empty in enumerate(blank) if not empty]
+    # The fronts of a duplex scan whose backs are all blank.
+    fronts = list(range(0, len(blank), 2)) if len(blank) % 2 == 0 and all(blank[1::2]) else []
+    for candidates in (rows, waiting):
+        for places in (drawn, list(range(len(blank))), fronts):
+            if candidates and len(places) == each * len(candidates):
+                dealt = zip(places, (row for row in candidates for _ in range(each)), strict=True)
+                return {place: row for place, row in dealt if not blank[place]}
+    return OrderRefused(
+        f"{len(drawn)} pages that are not blank cannot be {each} for each of {len(rows)} lines of the roster;"
+        " name the pages in the roster's scans, `planmark match` makes a draft"
+    )

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 
 from grader.documents import UnmatchedDocument
-from grader.folder.owners import How, Owned, Ownership, student_of_name
+from grader.folder.owners import How, Owned, PageOwners, student_of_name
 from grader.inputs.measurements import Measurements, StudentSubmission, combined
 from grader.inputs.roster import Roster, RosterRow, why_no_id
 from grader.records import Problem
@@ -151,7 +151,7 @@ class _Submissions:
 def submissions_of(
     assignment: Assignment,
     roster: Roster | None,
-    ownership: Ownership,
+    owners: PageOwners,
     measured: Sequence[Measurements],
     lang: str,
     *,
@@ -167,13 +167,13 @@ def submissions_of(
     submissions = _Submissions(roster)
     for row in () if roster is None else roster.rows:
         submissions.at((row.student_id, row.position)).row = row
-    for owned in (*ownership.owned, *_blank_only(ownership, roster)):
+    for owned in (*owners.owned, *_blank_only(owners, roster)):
         submissions.at((owned.student_id, owned.position)).owned.append(owned)
     for entered in measured:
         said = submissions.said.setdefault(entered.source, set())
         said.update([] if entered.student_id is None else [entered.student_id])
     unusable = [refusal for refusal in map(submissions.take, measured) if refusal is not None]
-    pages = [Unusable((page.problem,), page.students) for page in ownership.unmatched]
+    pages = [Unusable((page.problem,), page.students) for page in owners.unmatched]
     for refusal in (*unusable, *(_by_name(submissions, file) for file in refused), *pages):
         submissions.report(refusal)
     students = [_submission(assignment, key, gathered, lang) for key, gathered in submissions.by_key.items()]
@@ -202,11 +202,11 @@ def _unmatched(entered: Measurements, why: str) -> Problem:
     return Problem("measurements_unmatched", f"{entered.source}: {why}", entered.source)
 
 
-def _blank_only(ownership: Ownership, roster: Roster | None) -> list[Owned]:
+def _blank_only(owners: PageOwners, roster: Roster | None) -> list[Owned]:
     """Blank pages whose file's name tells a student who has no other page: to be told, not passed over."""
-    having = {owned.student_id for owned in ownership.owned}
+    having = {owned.student_id for owned in owners.owned}
     found: dict[str, Owned] = {}
-    for source in ownership.blank:
+    for source in owners.blank:
         stem = PurePath(source.file).stem
         improvised = [stem] if why_no_id(stem) is None else []
         student = student_of_name(source.file, improvised if roster is None else roster.student_ids)

@@ -25,7 +25,7 @@ Result = TypeVar("Result")
 ENDED = frozenset({"crashed", "too_slow", "too_much_memory"})
 """Problems for which a call is tried once more, alone: another sheet may have taken time or memory."""
 _WATCH_S = 0.05
-"""Between two looks at the workers' memory: a worker fills at most some 100 MB in this time."""
+"""The workers' memory is measured at this interval: a worker fills at most some 100 MB in this time."""
 _STALLED_S = 30.0
 """Past every time limit without any result: a worker was killed while it took its task, which is lost."""
 _ROUNDS = 3
@@ -91,9 +91,7 @@ class Workers:
     ) -> Iterator[tuple[int, Result | Problem]]:
         """As `Pool.run`; calls that end their worker are tried once more at the end, one at a time.
 
-        Arguments
-        ---------
-        sheets : of each call, which multiply the time limit; 1 where not given
+        Arguments: `sheets` of each call multiply its time limit; 1 where not given.
         """
         seconds = [self._limits.seconds] * len(calls)
         for index, count in enumerate(sheets):

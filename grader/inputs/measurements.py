@@ -17,12 +17,14 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeGuard
 
 from pydantic import ValidationError
 
 from grader.documents import MeasurementsDocument
 from grader.inputs.roster import MAX_LINES, delimiter_of, surplus_of, table_lines, whole_number, why_no_id
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
+from grader.inputs.scale_text import SCALE_NAMES
 from grader.records import (
     ACCELERATION_PLAN,
     VELOCITY_PLAN,
@@ -40,7 +42,6 @@ from reference.construction.graph import Construction, coincident
 from reference.errors import MOST_FINDINGS, Finding, InputFileError, lines_of, near_names
 
 KEYS = ("student_id", "n", "position")
-SCALES = ("kL", "kv", "ka")
 TABLES = {"segments_mm": "", "directions_deg": "_deg", "values": "_value"}
 """The tables of a JSON file, and what a CSV file's columns add to the names in them."""
 MAX_BYTES = 1_000_000
@@ -120,6 +121,11 @@ class StudentSubmission:
     name: str = ""
     problems: tuple[Problem, ...] = ()
     has_unusable: bool = False
+
+    @property
+    def position(self) -> int | None:
+        """The variant's position; None where there is none or it is not known."""
+        return None if self.variant is None else self.variant.position
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,7 +331,7 @@ def _parse_csv(text: str, file: str, names: Names) -> Iterator[Measurements]:
 
 
 def _check_header(header: list[str], names: Names) -> Iterator[Finding]:
-    known = frozenset((*KEYS, *SCALES, *_columns(names)))
+    known = frozenset((*KEYS, *SCALE_NAMES, *_columns(names)))
     if "student_id" not in header:
         yield Finding("line 1", "column student_id is missing")
     for index, (name, count) in enumerate(Counter(filter(None, header)).items()):
@@ -360,7 +366,7 @@ def _line(header: list[str], cells: list[str], delimiter: str, entries: _Entries
     for column, text in known.items():
         if column in entries.columns:
             entries.number(column, column, text[:40], _number(text, delimiter))
-    for scale in SCALES:
+    for scale in SCALE_NAMES:
         if scale in known:
             entries.scale(scale, scale, known[scale])
     owner = None if why else student
@@ -497,10 +503,13 @@ def _parse_json(text: str, file: str, names: Names) -> Measurements:
         raise _refuse(file, [Finding("$", "is no table: a file of measurements begins with a brace")])
     entries = _Entries(names, _columns(names), file)
     for name, value in _take(data, "scales"):
-        if name not in SCALES:
-            entries.fault(f"$.scales.{name[:40]}", f"is not known here; there are {', '.join(SCALES)}")
+        if name not in SCALE_NAMES:
+            entries.fault(f"$.scales.{name[:40]}", f"is not known here; there are {', '.join(SCALE_NAMES)}")
         else:
-            entries.scale(f"$.scales.{name}", name, str(value) if _is_number(value) else _text(value))
+            declared = str(value) if _is_number(value) else value
+            if not isinstance(declared, str | _NoValue):
+                declared = _NoValue(_shown(value), "is no number")
+            entries.scale(f"$.scales.{name}", name, declared)
     for table, end in TABLES.items():
         _enter(dict(_take(data, table)), table, end, entries)
     about = _about(data, file)
@@ -516,12 +525,8 @@ def _take(data: dict[str, object], key: str) -> list[tuple[str, object]]:
     return list(table.items())
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _text(value: object) -> "str | _NoValue":
-    return value if isinstance(value, str | _NoValue) else _NoValue(_shown(value), "is no number")
 
 
 def _enter(given: Mapping[str, object], table: str, end: str, entries: _Entries) -> None:
@@ -533,7 +538,7 @@ def _enter(given: Mapping[str, object], table: str, end: str, entries: _Entries)
             near = near_names(name, known) if len(entries.faults) < MOST_FINDINGS else []
             entries.fault(path, f"is not known here{_did_you_mean(near)}")
             entries.unread += [Unread(meant, f"{name}: '{shown}'") for meant in near if meant not in given]
-        elif isinstance(value, int | float) and not isinstance(value, bool):
+        elif _is_number(value):
             entries.number(path, f"{name}{end}", shown, float(value))
         else:
             refused = value if isinstance(value, _NoValue) else _NoValue(shown, "is no number")

@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
+from grader.inputs.scale_text import SCALE_NAMES
+from grader.language import LANGUAGES
 from grader.records import Problem
 from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
 
@@ -22,9 +24,7 @@ _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECA
 """Windows opens a device in place of a file or folder of such a name, whatever its extension."""
 _RESULT_FILES = frozenset({"results.json", "summary.csv", "index.html", "decisions.csv"})
 """What lies beside the students' folders of results."""
-LANGUAGES = ("en", "ro", "ru")
-SCALES = ("kL", "kv", "ka")
-COLUMNS = ("student_id", "name", "n", "position", "email", *SCALES, "lang", "scans")
+COLUMNS = ("student_id", "name", "n", "position", "email", *SCALE_NAMES, "lang", "scans")
 DRAFT_COLUMNS = ("why", "sure")
 """What `planmark match` adds for the person who checks its draft; without meaning here."""
 _REQUIRED = ("student_id", "name")
@@ -250,7 +250,7 @@ def _row(
         n=whole_number(text["n"], delimiter),
         position=whole_number(text["position"], delimiter),
         email=text["email"] or None,
-        scales={name: text[name] for name in SCALES if text[name]},
+        scales={name: text[name] for name in SCALE_NAMES if text[name]},
         lang=text["lang"].lower() or None,
         scans=tuple(ref for ref in scans if isinstance(ref, ScanRef)),
         line=number,
@@ -263,7 +263,7 @@ def _row(
 
 def _faults_of(row: RosterRow, text: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """The columns of a row whose text cannot be used, and why."""
-    for name in SCALES:
+    for name in SCALE_NAMES:
         if len(text[name]) > LONGEST_SCALE:
             yield name, f"has more than {LONGEST_SCALE} characters"
     why = why_no_id(row.student_id)

@@ -1,9 +1,7 @@
 """Exports: read the results, choose what a platform takes, validate it, write it whole or not at all."""
 
-import contextlib
 import json
 import math
-import secrets
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -13,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from grader.documents import SCHEMA_VERSION, ResultsDocument
-from grader.files import OutputError, create_whole, write_whole
+from grader.files import create_whole, replacing, write_whole
 from grader.lms import canvas, moodle, moodle_guide, scores
 from grader.lms.grades import Content, Delivery, Grade, Options, grades_of, in_a_row, ready
 from grader.lms.marks import faults_of
@@ -214,9 +212,7 @@ def _bytes(data: bytes | Path) -> bytes:
 
 def _write_archive(path: Path, content: Content) -> None:
     """A class's pages may be a gigabyte: one at a time goes through the memory, twice to be compared."""
-    temporary = path.with_name(f".{path.name[:40]}.{secrets.token_hex(6)}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary:
         with zipfile.ZipFile(temporary, "x", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
             for name, data in content.items():
                 # Of a fixed date: the same files make the same archive. Unpacked, all may read it.
@@ -227,12 +223,3 @@ def _write_archive(path: Path, content: Content) -> None:
             is_same = archive.namelist() == list(content)
             if not is_same or any(archive.read(name) != _bytes(data) for name, data in content.items()):
                 raise not_as_meant("the archive")
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(
-            "cannot_write",
-            f"{path}: cannot be written ({error.strerror or error}); choose another place or make room",
-        ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink()

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from grader.documents import ReportDocument, ResultsDocument
+from grader.files import result_folders
 from grader.inputs.roster import why_no_id
 from reference.errors import CallError, InputFileError, lines_of
 
@@ -184,7 +185,8 @@ def grades_of(results: ResultsDocument, options: Options) -> list[Grade]:
         students.setdefault(report.student_id, []).append(report)
     grades = []
     for student_id, reports in students.items():
-        chosen = tuple(report for report in reports if position in (None, report.position))
+        folder_of = zip(reports, result_folders(reports), strict=True)
+        chosen = [(report, folder) for report, folder in folder_of if position in (None, report.position)]
         if len(chosen) > 1 and combine is None:
             raise CallError(
                 "several_positions",
@@ -192,8 +194,7 @@ def grades_of(results: ResultsDocument, options: Options) -> list[Grade]:
                 " choose a position, or combine them by sum or mean",
             )
         if chosen:
-            folders = tuple(_folder(report, len(reports)) for report in chosen)
-            grades.append(_grade(student_id, chosen, options, folders))
+            grades.append(_grade(student_id, chosen, options))
     if not grades:
         raise CallError("nothing_to_export", "the results hold no report that could be exported")
     return grades
@@ -219,12 +220,6 @@ def _check(reports: Sequence[ReportDocument]) -> None:
         raise InputFileError("results_wrong", message)
 
 
-def _folder(report: ReportDocument, positions: int) -> str:
-    if positions == 1:
-        return report.student_id
-    return f"{report.student_id}/{'unknown' if report.position is None else report.position}"
-
-
 _WHY = {
     "needs_review": "needs review",
     "unreadable": "unreadable",
@@ -234,9 +229,9 @@ _WHY = {
 """Why a report of each status has no grade yet, for the terminal."""
 
 
-def _grade(
-    student_id: str, reports: tuple[ReportDocument, ...], options: Options, folders: tuple[str, ...]
-) -> Grade:
+def _grade(student_id: str, chosen: Sequence[tuple[ReportDocument, str]], options: Options) -> Grade:
+    """The grade of a student's reports, each with its folder."""
+    reports, folders = tuple(report for report, _ in chosen), tuple(folder for _, folder in chosen)
     person = options.people.get(student_id, Person())
     person = replace(person, lang=person.lang or options.lang)
     maximum = sum(report.max_score for report in reports)

@@ -68,15 +68,11 @@ def json_document(model: type[BaseModel], content: Mapping[str, object], name: s
 
 def faults_of(error: ValidationError) -> str:
     """What a model refuses, a line each with the path in the document."""
-    return lines_of([f"{_path(each['loc'])}: {_plain(each['msg'])}" for each in error.errors()])
-
-
-def _path(parts: Sequence[int | str]) -> str:
-    return "$" + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts)
-
-
-def _plain(message: str) -> str:
-    return message.removeprefix("Value error, ")
+    lines = []
+    for each in error.errors():
+        path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in each["loc"])
+        lines.append(f"${path}: {each['msg'].removeprefix('Value error, ')}")
+    return lines_of(lines)
 
 
 def check_unique(names: Iterable[object], what: str) -> None:

@@ -123,7 +123,7 @@ def _results(grade: Grade, visibility: str, options: Options) -> str:
         "score": float(number(grade.score or 0.0)),
         "output": "\n".join([plain_comment(grade), *others]),
         "visibility": visibility,
-        "tests": [_test(str(place), mark, parts, visibility) for place, mark in enumerate(judged, start=1)],
+        "tests": [_test(index, mark, parts, visibility) for index, mark in enumerate(judged, start=1)],
         "extra_data": {
             "assignment": grade.assignment,
             "student_id": grade.student_id,
@@ -133,10 +133,10 @@ def _results(grade: Grade, visibility: str, options: Options) -> str:
     return json_document(GradescopeDocument, content, f"results.json of {grade.student_id}")
 
 
-def _test(place: str, mark: Mark, parts: int, visibility: str) -> dict[str, object]:
+def _test(index: int, mark: Mark, parts: int, visibility: str) -> dict[str, object]:
     return {
         "name": _name(mark),
-        "number": place,
+        "number": str(index),
         "score": mark.points / parts,
         "max_score": mark.max_points / parts,
         "status": "passed" if mark.is_full else "failed",

@@ -297,12 +297,7 @@ NAMES = frozenset({"name", "name turned"})
 
 @dataclass(slots=True)
 class Matches:
-    """The row of each student, and why others have none. No row serves two students.
-
-    Attributes
-    ----------
-    by_name : students for whom nothing but their name speaks
-    """
+    """The row of each student, and why others have none; `by_name` are students known by their name alone."""
 
     rows: dict[str, int] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)

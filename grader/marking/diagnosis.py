@@ -1,11 +1,11 @@
-"""Which mistakes explain what is off: the drawing replayed with and without them.
+"""Diagnosis: which mistakes explain the residuals of a drawing.
 
-`reference.replay.replay` gives explanations of the drawing, each with the mistakes that it supposes; the
-simplest one that fits is told. First the drawing is replayed step by step. Only where that leaves
-something off are mistakes of the whole drawing tried as well (another variant's data, a plan turned as
-a whole, letters swapped) and mistakes at steps of which nothing was seen. How sure a mistake is, is its
-share among all explanations; what cannot be told apart from it is named as its rival. Drafting errors
-are measured on the drawing itself: a drawing that is right is never accused.
+`reference.replay.replay` gives explanations of the drawing, each with its mistakes. First the drawing is
+replayed step by step. Only where that leaves residuals, mistakes of the whole drawing are tried as well
+(another variant's data, a plan turned as a whole, letters swapped) and mistakes at steps without an
+observation. The confidence in a mistake is its share of the probability of all explanations; a mistake
+that the evidence does not distinguish from it is its rival. The size of drafting errors is estimated on
+the drawing itself, so that a right drawing has no mistake named.
 """
 
 import math
@@ -26,190 +26,21 @@ from reference.construction.uncertainty import Skill
 from reference.replay.explanations import RARITY, Observations
 from reference.replay.replay import Replay, Root, replay
 
-LEAST_CONFIDENCE = 0.6
-"""An explanation less certain than this is not named."""
-SURE_TOGETHER = 0.8
-"""A mistake and its rivals are told together when one of them it is, this surely."""
-LEAST_RIVAL = 0.1
-"""A rival less likely than this is not named."""
-MOST_RIVALS = 3
-SUSPICIOUS, GROSS = 2.0, 5.0
-"""Standard deviations of this hand: what is off by less than the latter at a step is no mistake to be
-named. (Where it is not off at all, the mistake showed elsewhere.)"""
 OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
-RPM_WITHIN = 0.03
-"""Relative: a scale off by 30/pi (squared for accelerations) this nearly was made from rev/min."""
 SCALES = frozenset({"kL", "kv", "ka"})
 
-Key = tuple[str, str]
 
-
-def sure_of(accounts: Sequence[Replay], least: float) -> list[Mistake]:
-    """The mistakes of the likeliest account that are this sure, unless they are slight."""
-    if not accounts:
-        return []
-    shares = _Shares(accounts)
-    return [
-        one for one in accounts[0].made if shares.of(_key(one)) >= least and not _is_slight(one, accounts[0])
-    ]
-
-
-@dataclass(frozen=True, slots=True)
-class Lost:
-    """The criteria that lost points, or may lose some, by the vectors and by the scales that they ask for."""
-
-    vectors: Mapping[str, str]
-    scales: Mapping[str, str]
-
-
-def named(accounts: Sequence[Replay], construction: Construction, lost: Lost) -> tuple[NamedMistake, ...]:
-    """The mistakes of the likeliest account that are sure enough, in the order of construction."""
-    if not accounts:
-        return ()
-    best, shares = accounts[0], _Shares(accounts)
-    explains, mistakes = _explained(best, construction, lost), []
-    for mistake in _in_order(best.made, construction):
-        key, share = _key(mistake), shares.of(_key(mistake))
-        rivals = shares.rivals(key, {_key(one) for one in best.made})
-        together = share + sum(shares.instead(key, _key(one)) for one in rivals)
-        is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
-        if explains[mistake] and is_sure and not _is_slight(mistake, best):
-            others = tuple(_record(one, construction, (), shares.instead(key, _key(one))) for one in rivals)
-            mistakes.append(_record(mistake, construction, tuple(explains[mistake]), share, others))
-    return tuple(mistakes)
-
-
-def _key(mistake: Mistake) -> Key:
-    return mistake.code, mistake.at
-
-
-def _is_slight(mistake: Mistake, account: Replay) -> bool:
-    """Whether the step that it was made at is not far off: nothing that a hand could not do."""
-    if mistake.code in OF_THE_WHOLE:
-        return False
-    return SUSPICIOUS < account.right.get(mistake.at, 0.0) < GROSS
-
-
-class _Shares:
-    """What share of the probability accounts with a mistake have."""
-
-    def __init__(self, accounts: Sequence[Replay]) -> None:
-        least = accounts[0].cost
-        weights = [math.exp((least - account.cost) / 2.0) for account in accounts]
-        whole = sum(weights)
-        self._accounts = [
-            ({_key(one): one for one in account.made}, weight / whole)
-            for account, weight in zip(accounts, weights, strict=True)
-        ]
-
-    def of(self, key: Key) -> float:
-        """Of a mistake."""
-        return sum(weight for made, weight in self._accounts if key in made)
-
-    def instead(self, key: Key, other: Key) -> float:
-        """Of another mistake without the first."""
-        return sum(weight for made, weight in self._accounts if other in made and key not in made)
-
-    def rivals(self, key: Key, best: set[Key]) -> list[Mistake]:
-        """The mistakes that stand in a mistake's place elsewhere, the likeliest first."""
-        others = {name: one for made, _ in self._accounts if key not in made for name, one in made.items()}
-        likely = [name for name in others if name not in best and self.instead(key, name) >= LEAST_RIVAL]
-        likely.sort(key=lambda name: -self.instead(key, name))
-        return [others[name] for name in likely[:MOST_RIVALS]]
-
-
-def _in_order(made: Sequence[Mistake], construction: Construction) -> list[Mistake]:
-    """Mistakes of the whole first, then step by step."""
-    order = [step.node for step in construction.steps]
-    return sorted(made, key=lambda one: order.index(one.at) if one.at in order else -1)
-
-
-def _explained(account: Replay, construction: Construction, lost: Lost) -> dict[Mistake, list[str]]:
-    """Which of the criteria lost each mistake explains: the nearest one before it in the construction."""
-    made = _in_order(account.made, construction)
-    explains: dict[Mistake, list[str]] = {
-        mistake: [name for scale, name in lost.scales.items() if _is_about(mistake, scale)]
-        for mistake in made
-    }
-    reach = {mistake: affected(mistake, construction) for mistake in made}
-    for name, criterion in lost.vectors.items():
-        vector = construction.vectors[name]
-        if vector.head in account.unexplained:
-            continue
-        touching = [
-            one for one in made if _touches(one, vector.scale, {vector.tail, vector.head}, reach[one])
-        ]
-        own = [one for one in touching if one.at == vector.head]
-        for mistake in (own or touching)[-1:]:
-            explains[mistake].append(criterion)
-    return explains
-
-
-def _touches(mistake: Mistake, scale: str, ends: set[str], reach: frozenset[str]) -> bool:
-    if mistake.at in SCALES:
-        return mistake.at in {scale, "kL"}
-    if mistake.code == "labels_swapped":
-        return bool(ends & set(mistake.other))
-    return bool(ends & reach)
-
-
-def _is_about(mistake: Mistake, scale: str) -> bool:
-    return mistake.at == scale or mistake.code == "other_variant"
-
-
-# The record ---------------------------------------------------------------------------------------
-
-
-def _record(
-    mistake: Mistake,
-    construction: Construction,
-    explains: tuple[str, ...],
-    confidence: float,
-    rivals: tuple[NamedMistake, ...] = (),
-) -> NamedMistake:
-    if mistake.code == "scale_wrong":
-        mistake = replace(mistake, code=_code_of_scale(mistake.at, mistake.factor))
-    is_line = mistake.code in LINE_MISTAKES
-    line = _line_of(construction.step(mistake.at), mistake.slot) if is_line else {}
-    return NamedMistake(mistake, explains, min(confidence, 1.0), line, rivals)
-
-
-LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
-
-
-def _line_of(step: Step, slot: int) -> dict[str, str]:
-    """Which line of a step it is: where it starts, the link that gives its direction, if a guide does."""
-    line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None
-    if not isinstance(line, Line):
-        return {}
-    told = {"from": line.through}
-    if line.along.quarters % 2 == 0:
-        # Perpendiculars are of turning links, all else is along what something slides on.
-        told["line"] = "guide"
-    if isinstance(line.along, Along):
-        told["link"] = line.along.tail + line.along.head
-    return told
-
-
-def _code_of_scale(name: str, factor: float) -> str:
-    powers = {"kv": 1, "ka": 2}
-    rpm = RPM_FACTOR ** powers.get(name, 0)
-    return "rpm_not_converted" if name in powers and abs(factor / rpm - 1.0) <= RPM_WITHIN else "scale_wrong"
-
+# The explanations of a drawing ---------------------------------------------------------------------
 
 FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
-CERTAIN = 0.9
-"""From this confidence on what follows from a mistake that nothing else shows is credited."""
-NO_STEPS = frozenset({"scale_wrong", "labels_swapped"})
-"""Mistakes that change no step: what follows from them is told by the scales and by the letters."""
 BEYOND_DOUBT = 20.0
 """A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
 LEAST_WRONG = 0.06
-"""A scale off by a smaller share than this is nobody's mistake by name: a hand may draw so."""
+"""Of a scale's logarithm: a smaller error is no mistake to be named, drafting errors reach it."""
 USUAL = 1.0
-HANDS = (0.6, USUAL, 1.6, 2.5, 4.0)
-"""The hands supposed, as multiples of a usual one's standard deviations."""
+CARES = (0.6, USUAL, 1.6, 2.5, 4.0)
+"""The sizes of drafting errors that are tried, as multiples of the usual ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,15 +50,15 @@ class Case:
     Attributes
     ----------
     drawing : how it should have been drawn, at the scales declared
-    work : what was drawn
-    assignment, variant : whose plan it should be
-    skill : of a usual hand
+    observations : the drawing as read or measured
+    assignment, variant : the student's
+    skill : usual drafting errors
     followed : scales that the drawing follows although others were declared
     assumed : scales that nobody declared
     """
 
     drawing: Drawing
-    work: Observations
+    observations: Observations
     assignment: Assignment
     variant: Variant
     skill: Skill
@@ -236,92 +67,72 @@ class Case:
 
 
 def explained(case: Case) -> tuple[Replay, ...]:
-    """The ways in which a drawing may have been made, the likeliest first.
-
-    There are none where a right drawing is to be believed.
-    """
+    """The explanations of a drawing, the likeliest first; none where it may well be right."""
     roots = [Root(), *_other_scales(case)]
-    accounts = replay(case.drawing, case.work, roots, case.skill, cares=HANDS)
-    innocent = _innocent(accounts)
-    if accounts and not _is_clear(accounts, case):
-        accounts = _looked_into(case, roots, accounts)
-    if not accounts or innocent - accounts[0].cost < BEYOND_DOUBT:
+    explanations = replay(case.drawing, case.observations, roots, case.skill, cares=CARES)
+    innocent = _cost_if_right(explanations)
+    if explanations and not _is_clear(explanations, case):
+        explanations = _searched_further(case, roots, explanations)
+    if not explanations or innocent - explanations[0].cost < BEYOND_DOUBT:
         return ()
-    return tuple(accounts)
+    return tuple(explanations)
 
 
-def drawn_instead(accounts: Sequence[Replay], case: Case) -> tuple[Drawing, frozenset[str]]:
-    """The drawing with those mistakes in it that are certain, and the nodes at which it is wrong.
+def _searched_further(case: Case, roots: Sequence[Root], explanations: Sequence[Replay]) -> list[Replay]:
+    """The explanations with mistakes of the whole drawing, and at steps without an observation.
 
-    Of a wrong mechanism that is the mechanism as a whole; of the right drawing there are none.
+    Large drafting errors are also tried as usual ones with some mistake. Where one mistake explains all, and
+    directions were observed, mistakes of the whole drawing are not tried.
     """
-    joints = {step.node for step in case.drawing.construction.figures[MECHANISM]}
-    certain = [one for one in sure_of(accounts, CERTAIN) if one.code not in NO_STEPS]
-    wrong = {MECHANISM if one.at in joints or one.code == "other_variant" else one.at for one in certain}
-    return _with(certain, case.drawing), frozenset(wrong)
-
-
-def _with(mistakes: Sequence[Mistake], drawing: Drawing) -> Drawing:
-    """A drawing with mistakes in it, at its own scales."""
-    for one in mistakes:
-        if one.code == "other_variant":
-            drawing = Drawing(drawing.construction, {**drawing.parameters, **one.parameters})
-        else:
-            drawing = commit(one, drawing)
-    return drawing
-
-
-def _looked_into(case: Case, roots: Sequence[Root], accounts: Sequence[Replay]) -> list[Replay]:
-    """The accounts with mistakes of the whole drawing among them, and with guesses at what was not seen.
-
-    A careless hand is also taken for a usual one that has made some mistake. What one mistake explains,
-    places and all, is not sought in the whole drawing.
-    """
-    best = accounts[0]
-    if not _is_explained(best) or not all(one.has_direction for one in case.work.seen):
+    best = explanations[0]
+    if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
         roots = [*roots, *_of_the_whole(case)]
     cares = sorted({best.care, min(best.care, USUAL)})
-    found = replay(case.drawing, case.work, roots, case.skill, cares=cares, blind=True) or [*accounts]
+    found = replay(case.drawing, case.observations, roots, case.skill, cares=cares, blind=True) or [
+        *explanations
+    ]
     for swap in _swaps(case.drawing, found[0]):
-        root, work = Root((swap,), cost=RARITY[swap.code]), _renamed(case.work, swap.other)
-        found += replay(case.drawing, work, [root], case.skill, cares=cares)
-    return sorted(found, key=lambda account: account.cost)
+        root, observations = Root((swap,), cost=RARITY[swap.code]), _renamed(case.observations, swap.other)
+        found += replay(case.drawing, observations, [root], case.skill, cares=cares)
+    return sorted(found, key=lambda explanation: explanation.cost)
 
 
-def _is_explained(account: Replay) -> bool:
-    """Whether a usual hand and one mistake at most explain everything."""
-    return not account.unexplained and len(account.made) <= 1 and account.care <= USUAL
+def _is_explained(explanation: Replay) -> bool:
+    """Whether usual drafting errors and one mistake at most explain everything."""
+    return not explanation.unexplained and len(explanation.made) <= 1 and explanation.care <= USUAL
 
 
-def _innocent(accounts: Sequence[Replay]) -> float:
-    """What the account costs in which everything was made rightly; infinite where it is beyond belief."""
-    return min((account.cost for account in accounts if account.is_innocent), default=math.inf)
+def _cost_if_right(explanations: Sequence[Replay]) -> float:
+    """The least cost of an explanation without mistakes; infinite where there is none."""
+    return min(
+        (explanation.cost for explanation in explanations if explanation.is_innocent), default=math.inf
+    )
 
 
-def _is_clear(accounts: Sequence[Replay], case: Case) -> bool:
-    """Whether a usual hand made everything rightly, or one mistake at a step whose beginnings were seen.
+def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
+    """Whether the best explanation needs no further search.
 
-    What goes wrong in a mechanism that nobody saw shows in more than one step.
+    It has no mistake, or one at a step whose node and sources were observed: a mistake in a mechanism
+    that was not handed in shows in more than one step.
     """
-    best, construction = accounts[0], case.drawing.construction
+    best, construction = explanations[0], case.drawing.construction
     if not _is_explained(best):
         return False
     if not best.made:
         return True
-    places = {one.node for one in case.work.seen if one.has_direction} | {*construction.poles.values()}
+    places = {one.node for one in case.observations.entries if one.has_direction} | {
+        *construction.poles.values()
+    }
     joints = {step.node for step in construction.figures[MECHANISM]}
     step = next((one for one in construction.steps if one.node == best.made[0].at), None)
     return step is not None and places.issuperset({step.node, *step.needs} - joints)
 
 
-# Mistakes of the whole drawing --------------------------------------------------------------------
-
-
 def _other_scales(case: Case) -> Iterator[Root]:
-    """The drawing at the scales that it follows, where others were declared.
+    """Roots with the scales that the drawing follows, where others were declared.
 
-    A plan may be drawn to another scale throughout, or start from a crank's vector that is, while what is
-    computed from it is computed at the scale declared.
+    A plan may be drawn to another scale throughout, or only its crank's vector, while what is computed
+    from that is computed at the declared scale.
     """
     factors = {
         name: float(case.drawing.parameters[name]) / followed for name, followed in case.followed.items()
@@ -345,7 +156,7 @@ def _other_scales(case: Case) -> Iterator[Root]:
 
 
 def _of_the_whole(case: Case) -> Iterator[Root]:
-    """A plan turned as a whole; another variant's data."""
+    """Roots with a plan turned as a whole, or with another variant's data."""
     for plan in case.drawing.construction.poles:
         for quarters in (1, 2, 3):
             turned = Mistake("figure_rotated", plan, quarters=quarters)
@@ -354,7 +165,7 @@ def _of_the_whole(case: Case) -> Iterator[Root]:
 
 
 def _other_variants(case: Case) -> Iterator[Root]:
-    """Another student's data, all else right."""
+    """Roots with another variant's data, all else right."""
     variants = case.assignment.variants()
     scales = case.assignment.scales(variants, kL=float(case.drawing.parameters["kL"]))
     together = parameters_of(case.assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
@@ -372,10 +183,10 @@ def _other_variants(case: Case) -> Iterator[Root]:
             yield Root((other,), parameters, cost=RARITY["other_variant"])
 
 
-def _swaps(drawing: Drawing, account: Replay) -> Iterator[Mistake]:
-    """Two images of a plan with each other's letters, both of which are off by the likeliest account."""
+def _swaps(drawing: Drawing, explanation: Replay) -> Iterator[Mistake]:
+    """Pairs of images in one plan that may have each other's letters: both are wrong in the explanation."""
     construction = drawing.construction
-    off = {*account.unexplained, *(mistake.at for mistake in account.made)}
+    off = {*explanation.unexplained, *(mistake.at for mistake in explanation.made)}
     for figure, pole in construction.poles.items():
         images = sorted(
             v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
@@ -385,11 +196,211 @@ def _swaps(drawing: Drawing, account: Replay) -> Iterator[Mistake]:
                 yield Mistake("labels_swapped", pair[0], other=pair)
 
 
-def _renamed(work: Observations, pair: tuple[str, ...]) -> Observations:
-    """What was drawn, under the right names where two letters were swapped."""
+def _renamed(observations: Observations, pair: tuple[str, ...]) -> Observations:
+    """The observations with the names of two nodes exchanged."""
     other = {pair[0]: pair[1], pair[1]: pair[0]}
-    seen = (
+    entries = (
         replace(one, node=other.get(one.node, one.node), tail=other.get(one.tail or "", one.tail))
-        for one in work.seen
+        for one in observations.entries
     )
-    return replace(work, seen=tuple(seen))
+    return replace(observations, entries=tuple(entries))
+
+
+# What was drawn by mistake, where that is certain --------------------------------------------------
+
+CERTAIN = 0.9
+"""From this confidence on what follows from a mistake that nothing else shows is credited."""
+NO_STEPS = frozenset({"scale_wrong", "labels_swapped"})
+"""Mistakes that change no step: scales and letters already say what follows from them."""
+
+
+def drawn_instead(explanations: Sequence[Replay], case: Case) -> tuple[Drawing, frozenset[str]]:
+    """The drawing with those mistakes in it that are certain, and the nodes at which it is wrong.
+
+    A wrong mechanism counts as a whole (`MECHANISM`); the right drawing has no wrong nodes.
+    """
+    joints = {step.node for step in case.drawing.construction.figures[MECHANISM]}
+    certain = [one for one in sure_of(explanations, CERTAIN) if one.code not in NO_STEPS]
+    wrong = {MECHANISM if one.at in joints or one.code == "other_variant" else one.at for one in certain}
+    return _with(certain, case.drawing), frozenset(wrong)
+
+
+def _with(mistakes: Sequence[Mistake], drawing: Drawing) -> Drawing:
+    """A drawing with mistakes in it, at its own scales."""
+    for one in mistakes:
+        if one.code == "other_variant":
+            drawing = Drawing(drawing.construction, {**drawing.parameters, **one.parameters})
+        else:
+            drawing = commit(one, drawing)
+    return drawing
+
+
+# The mistakes that are named -----------------------------------------------------------------------
+
+LEAST_CONFIDENCE = 0.6
+"""A mistake less certain than this is not named."""
+SURE_TOGETHER = 0.8
+"""A mistake is named with its rivals where their probability together is at least this."""
+LEAST_RIVAL = 0.1
+"""A rival less likely than this is not named."""
+MOST_RIVALS = 3
+SUSPICIOUS, GROSS = 2.0, 5.0
+"""RMS misfits of a step in standard deviations of this drawing's errors: between the two a mistake is too
+slight to be named. (Below the first the mistake shows elsewhere.)"""
+Key = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The criteria that lost points, or may lose some, by the vector and by the scale they ask for."""
+
+    vectors: Mapping[str, str]
+    scales: Mapping[str, str]
+
+
+def named(explanations: Sequence[Replay], construction: Construction, lost: Lost) -> tuple[NamedMistake, ...]:
+    """The mistakes of the likeliest explanation that are sure enough, in the order of construction."""
+    if not explanations:
+        return ()
+    best, shares = explanations[0], _Shares(explanations)
+    explains, mistakes = _losses_explained(best, construction, lost), []
+    for mistake in _in_order(best.made, construction):
+        key, share = _key(mistake), shares.of(_key(mistake))
+        rivals = shares.rivals(key, {_key(one) for one in best.made})
+        together = share + sum(shares.instead(key, _key(one)) for one in rivals)
+        is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
+        if explains[mistake] and is_sure and not _is_slight(mistake, best):
+            others = tuple(_record(one, construction, (), shares.instead(key, _key(one))) for one in rivals)
+            mistakes.append(_record(mistake, construction, tuple(explains[mistake]), share, others))
+    return tuple(mistakes)
+
+
+def sure_of(explanations: Sequence[Replay], least: float) -> list[Mistake]:
+    """The mistakes of the likeliest explanation that are this sure, unless they are slight."""
+    if not explanations:
+        return []
+    shares = _Shares(explanations)
+    return [
+        one
+        for one in explanations[0].made
+        if shares.of(_key(one)) >= least and not _is_slight(one, explanations[0])
+    ]
+
+
+def _key(mistake: Mistake) -> Key:
+    return mistake.code, mistake.at
+
+
+def _is_slight(mistake: Mistake, explanation: Replay) -> bool:
+    """Whether the residual at the mistake's step is small enough for drafting errors."""
+    if mistake.code in OF_THE_WHOLE:
+        return False
+    return SUSPICIOUS < explanation.right.get(mistake.at, 0.0) < GROSS
+
+
+class _Shares:
+    """The share of the probability that explanations with a mistake have."""
+
+    def __init__(self, explanations: Sequence[Replay]) -> None:
+        least = explanations[0].cost
+        weights = [math.exp((least - explanation.cost) / 2.0) for explanation in explanations]
+        whole = sum(weights)
+        self._weights = [
+            ({_key(one): one for one in explanation.made}, weight / whole)
+            for explanation, weight in zip(explanations, weights, strict=True)
+        ]
+
+    def of(self, key: Key) -> float:
+        """The share of the explanations with a mistake."""
+        return sum(weight for made, weight in self._weights if key in made)
+
+    def instead(self, key: Key, other: Key) -> float:
+        """The share of the explanations with another mistake and without the first."""
+        return sum(weight for made, weight in self._weights if other in made and key not in made)
+
+    def rivals(self, key: Key, best: set[Key]) -> list[Mistake]:
+        """The mistakes of explanations without a mistake, the likeliest first."""
+        others = {name: one for made, _ in self._weights if key not in made for name, one in made.items()}
+        likely = [name for name in others if name not in best and self.instead(key, name) >= LEAST_RIVAL]
+        likely.sort(key=lambda name: -self.instead(key, name))
+        return [others[name] for name in likely[:MOST_RIVALS]]
+
+
+def _in_order(made: Sequence[Mistake], construction: Construction) -> list[Mistake]:
+    """Mistakes of the whole first, then step by step."""
+    order = [step.node for step in construction.steps]
+    return sorted(made, key=lambda one: order.index(one.at) if one.at in order else -1)
+
+
+def _losses_explained(
+    explanation: Replay, construction: Construction, lost: Lost
+) -> dict[Mistake, list[str]]:
+    """The lost criteria that each mistake explains: each is given to the last mistake upstream."""
+    made = _in_order(explanation.made, construction)
+    explains: dict[Mistake, list[str]] = {
+        mistake: [name for scale, name in lost.scales.items() if _is_about(mistake, scale)]
+        for mistake in made
+    }
+    reach = {mistake: affected(mistake, construction) for mistake in made}
+    for name, criterion in lost.vectors.items():
+        vector = construction.vectors[name]
+        if vector.head in explanation.unexplained:
+            continue
+        touching = [
+            one for one in made if _touches(one, vector.scale, {vector.tail, vector.head}, reach[one])
+        ]
+        own = [one for one in touching if one.at == vector.head]
+        for mistake in (own or touching)[-1:]:
+            explains[mistake].append(criterion)
+    return explains
+
+
+def _touches(mistake: Mistake, scale: str, ends: set[str], reach: frozenset[str]) -> bool:
+    if mistake.at in SCALES:
+        return mistake.at in {scale, "kL"}
+    if mistake.code == "labels_swapped":
+        return bool(ends & set(mistake.other))
+    return bool(ends & reach)
+
+
+def _is_about(mistake: Mistake, scale: str) -> bool:
+    return mistake.at == scale or mistake.code == "other_variant"
+
+
+RPM_WITHIN = 0.03
+"""Relative: a scale wrong by 30/pi (squared for accelerations) this nearly was computed from rev/min."""
+LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
+
+
+def _record(
+    mistake: Mistake,
+    construction: Construction,
+    explains: tuple[str, ...],
+    confidence: float,
+    rivals: tuple[NamedMistake, ...] = (),
+) -> NamedMistake:
+    if mistake.code == "scale_wrong":
+        mistake = replace(mistake, code=_code_of_scale(mistake.at, mistake.factor))
+    is_line = mistake.code in LINE_MISTAKES
+    line = _line_of(construction.step(mistake.at), mistake.slot) if is_line else {}
+    return NamedMistake(mistake, explains, min(confidence, 1.0), line, rivals)
+
+
+def _line_of(step: Step, slot: int) -> dict[str, str]:
+    """The parameters that describe a step's line: ``from`` a node, its ``link``, ``line`` of a guide."""
+    line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None
+    if not isinstance(line, Line):
+        return {}
+    params = {"from": line.through}
+    if line.along.quarters % 2 == 0:
+        # Perpendiculars belong to turning links, all other lines are along guides.
+        params["line"] = "guide"
+    if isinstance(line.along, Along):
+        params["link"] = line.along.tail + line.along.head
+    return params
+
+
+def _code_of_scale(name: str, factor: float) -> str:
+    powers = {"kv": 1, "ka": 2}
+    rpm = RPM_FACTOR ** powers.get(name, 0)
+    return "rpm_not_converted" if name in powers and abs(factor / rpm - 1.0) <= RPM_WITHIN else "scale_wrong"

@@ -23,20 +23,90 @@ from reference.construction.uncertainty import trace
 from reference.geometry import ComplexArray
 from reference.replay.explanations import Covariance, Observation, Observations
 
+CHARGED = frozenset({"none", "partial"})
+LOST = CHARGED | {"follow_through", "review"}
+"""Verdicts for which the diagnosis seeks a cause, also where a person has still to decide."""
+LEAST_LEFT_OUT_MM = 5.0
+"""A shorter vector may be hidden by the marks of its ends."""
+LEFT_OUT = 0.9
+"""Confidence that it was not drawn: of 368 vectors between two ends read for certain, none was missed."""
+
+
+def judge(task: Task, submission: Submission) -> Judgement:
+    """Verdicts, mistakes and points of one submission for one variant."""
+    comparison = compare(task, submission, explain)
+    mistakes = _named(task, comparison)
+    mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes), *_not_drawn(task, comparison))
+    outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
+    return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
+
+
+def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
+    """The mistakes that explain lost points, or points that may be lost."""
+    scales, vectors = comparison.settled, task.construction.vectors
+    lost = [one for one in comparison.outcomes if one.verdict in LOST]
+    by_vector = {one.name: one.criterion for one in lost if one.name in vectors}
+    by_scale = {one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED}
+    is_other_scale = any(scale.other and not scale.used.assumed for scale in scales.values())
+    if not by_vector and not is_other_scale:
+        return ()
+    explanation = comparison.explanation or explain(task, comparison.evidence, scales)
+    return named(explanation.explanations, task.construction, Lost(by_vector, by_scale))
+
+
+def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:
+    """Letters read at each other's node on a sheet; the diagnosis uses lines alone and cannot find them."""
+    vectors = task.construction.vectors
+    pairs = {one.mistake.other for one in known if one.code == "labels_swapped"}
+    found = []
+    for swap in (swap for reading in submission.readings for swap in reading.swapped):
+        pair = swap.first, swap.second
+        if swap.confidence < LEAST_CONFIDENCE or {pair, pair[::-1]} & pairs:
+            continue
+        pairs.add(pair)
+        explains = tuple(
+            one.id
+            for one in task.rubric.criterion
+            if one.name in vectors and {vectors[one.name].tail, vectors[one.name].head} & set(pair)
+        )
+        mistake = Mistake("labels_swapped", swap.first, other=pair)
+        found.append(NamedMistake(mistake, explains, swap.confidence))
+    return found
+
+
+def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
+    """Vectors that are asked for, long enough, and not on the sheet although both their ends were read.
+
+    Missing measurements are no evidence: nobody need measure everything.
+    """
+    evidence, construction = comparison.evidence, task.construction
+    known = {*evidence.nodes, *construction.poles.values()} if evidence.has_sheets else set()
+    found = []
+    for one in comparison.outcomes:
+        vector = construction.vectors.get(one.name)
+        if vector is None or one.verdict not in {"none", "review"} or evidence.vector(one.name) is not None:
+            continue
+        is_left_out = {vector.tail, vector.head} <= known
+        if is_left_out and (one.expected.length_mm or 0.0) >= LEAST_LEFT_OUT_MM:
+            mistake = Mistake("vector_missing", one.name)
+            found.append(NamedMistake(mistake, (one.criterion,), LEFT_OUT))
+    return found
+
+
+def _with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
+    """The outcome with the mistake that explains its loss."""
+    if outcome.verdict not in {"none", "partial"}:
+        return outcome
+    found = next((one for one in mistakes if outcome.criterion in one.explains), None)
+    if found is None or outcome.mistake is not None:
+        return outcome
+    return replace(outcome, mistake=found.code, cause=found)
+
+
+# Points --------------------------------------------------------------------------------------------
+
 DECIMALS = 6
-"""Points are told to so many decimals; more is the computer's rounding."""
-
-
-def share_of(rubric: RubricFile, criterion: CriterionTable, verdict: Verdict) -> float:
-    """The share of a criterion's points that a verdict gives: of a partial one, that of the nearest band."""
-    bands = rubric.tolerance_of(criterion).all_bands
-    shares: Mapping[str, float] = {
-        "full": 1.0,
-        "follow_through": 1.0,
-        "partial": bands[0][1] if bands else 0.0,
-        "none": 0.0,
-    }
-    return shares[verdict]
+"""Decimals of points; further ones are rounding errors."""
 
 
 def score(rubric: RubricFile, outcomes: Sequence[Outcome]) -> Score:
@@ -72,6 +142,18 @@ def score(rubric: RubricFile, outcomes: Sequence[Outcome]) -> Score:
     return Score(points, None if is_open else low, low, high, maximum)
 
 
+def share_of(rubric: RubricFile, criterion: CriterionTable, verdict: Verdict) -> float:
+    """The share of a criterion's points that a verdict gives: of a partial one, that of the nearest band."""
+    bands = rubric.tolerance_of(criterion).all_bands
+    shares: Mapping[str, float] = {
+        "full": 1.0,
+        "follow_through": 1.0,
+        "partial": bands[0][1] if bands else 0.0,
+        "none": 0.0,
+    }
+    return shares[verdict]
+
+
 def _shares(rubric: RubricFile, criterion: CriterionTable, outcome: Outcome) -> tuple[float, float]:
     """The shares of a criterion's points that its verdict leaves, at worst and at best."""
     if outcome.shares:
@@ -91,45 +173,47 @@ class _Total:
     is_weighted: bool = False
 
     def add(self, worth: float, worst: float, best: float) -> float:
-        """Count one criterion; its points at worst."""
+        """Count one criterion; returns its points at worst."""
         self.low, self.high = self.low + worst * worth, self.high + best * worth
         self.judged += worth
         return round(worst * worth, DECIMALS)
 
     @property
     def scale(self) -> float:
-        """What its points are multiplied by for what was not judged of it."""
+        """The factor that makes up for the criteria that were not judged."""
         return self.whole / self.judged if self.is_weighted and self.judged else 1.0
 
     @property
     def in_full(self) -> float:
-        """What it could give."""
+        """The points it could give."""
         return self.judged * self.scale
 
     @property
     def ends(self) -> tuple[float, float]:
-        """What it gives at worst and at best."""
+        """The points it gives at worst and at best."""
         return self.low * self.scale, self.high * self.scale
 
 
-LEAST_MISS_MM = 0.15
-"""However well a hand draws, and however well its drawing is read."""
-NOTHING: ComplexArray = np.zeros(0, np.complex128)
+# What was drawn, for the diagnosis -----------------------------------------------------------------
+
+LEAST_ERROR_MM = 0.15
+"""Least standard error of a node, however well it is drawn and read."""
+NO_ERRORS: ComplexArray = np.zeros(0, np.complex128)
 
 
 def explain(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> ReplayResult:
-    """What was done, most likely, and what the plans were drawn by where that is certain."""
+    """The explanations of a drawing, and the basis of its plans where that is certain."""
     case = case_of(task, evidence, settled)
-    accounts = explained(case)
-    drawn, wrong = drawn_instead(accounts, case)
-    # Where a sheet shows the mechanism as it was drawn, and no plan is turned, the own nodes tell the rest.
+    explanations = explained(case)
+    drawn, wrong = drawn_instead(explanations, case)
+    # Where a sheet shows the drawn mechanism and no plan is turned, the own nodes are enough.
     is_needed = wrong and (wrong & task.construction.poles.keys() or not evidence.has_sheets)
     basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong) if is_needed else None
-    return ReplayResult(accounts, basis)
+    return ReplayResult(explanations, basis)
 
 
 def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Case:
-    """The drawing to explain, at the scales used, with what contradicts them."""
+    """The drawing to explain at the scales used, with the scales that the drawing follows instead."""
     assumed = frozenset(name for name, scale in settled.items() if scale.used.assumed)
     others = {name: scale.other for name, scale in settled.items() if scale.other}
     used = {
@@ -139,7 +223,7 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Cas
     parameters = {**task.parameters, **used}
     return Case(
         drawing=Drawing(task.construction, parameters),
-        work=Observations(tuple(_seen(task, evidence, parameters)), evidence.sketches),
+        observations=Observations(tuple(_observations(task, evidence, parameters)), evidence.sketches),
         assignment=task.assignment,
         variant=task.variant,
         skill=task.skill,
@@ -152,12 +236,12 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Cas
     )
 
 
-def _seen(task: Task, evidence: Evidence, parameters: Parameters) -> list[Observation]:
+def _observations(task: Task, evidence: Evidence, parameters: Parameters) -> list[Observation]:
     """The student's own nodes, and the vectors that lead to none of them."""
     construction = task.construction
     given = {*construction.poles.values(), *task.ground}
-    seen = [
-        Observation(name, None, place, _missed_by(task, evidence, name))
+    entries = [
+        Observation(name, None, place, _reading_covariance(task, evidence, name))
         for name, place in evidence.nodes.items()
         if name not in given
     ]
@@ -166,23 +250,23 @@ def _seen(task: Task, evidence: Evidence, parameters: Parameters) -> list[Observ
         drawn = evidence.vector(name)
         if drawn is None or drawn.confidence < task.rubric.least_confidence or vector.head in evidence.nodes:
             continue
-        value, read_mm = drawn.as_complex, math.hypot(LEAST_MISS_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
+        value, read_mm = drawn.as_complex, math.hypot(LEAST_ERROR_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
         if value is not None:
-            seen.append(Observation(vector.head, vector.tail, value, _spread(NOTHING, read_mm)))
+            entries.append(Observation(vector.head, vector.tail, value, _covariance(NO_ERRORS, read_mm)))
             continue
-        # What leads to a length is not seen: all earlier errors are in it.
+        # The nodes before a length are not known: it contains all earlier errors.
         traced = traced or trace(construction, parameters, task.skill)
-        spread = _spread(traced.moved(vector.tail, vector.head), read_mm)
-        seen.append(Observation(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
-    return seen
+        spread = _covariance(traced.shifts(vector.tail, vector.head), read_mm)
+        entries.append(Observation(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
+    return entries
 
 
-def _missed_by(task: Task, evidence: Evidence, node: str) -> Covariance:
-    """How far a node may be missed by being read, or by the measurements that lead to it."""
+def _reading_covariance(task: Task, evidence: Evidence, node: str) -> Covariance:
+    """The covariance (mm^2) of a node by reading, or by the measurements that give it."""
     vectors = [one for one in task.construction.vectors.values() if one.head == node]
     hand = task.rubric.hand
-    rows: list[ComplexArray] = [NOTHING]
-    each_mm = LEAST_MISS_MM if evidence.has_sheets else hand.ruler_mm
+    rows: list[ComplexArray] = [NO_ERRORS]
+    each_mm = LEAST_ERROR_MM if evidence.has_sheets else hand.ruler_mm
     for vector in vectors[:1]:
         drawn = evidence.vector(vector.name)
         along = None if drawn is None else drawn.as_complex
@@ -195,11 +279,11 @@ def _missed_by(task: Task, evidence: Evidence, node: str) -> Covariance:
         if along:
             share = _computed_within(task, evidence, node, math.sqrt(2.0) * each_mm)
             rows.append(np.array([along * share], np.complex128))
-    return _spread(np.concatenate(rows), LEAST_MISS_MM)
+    return _covariance(np.concatenate(rows), LEAST_ERROR_MM)
 
 
 def _computed_within(task: Task, evidence: Evidence, node: str, each_mm: float) -> float:
-    """The relative error of a component that is computed from velocities as they were read or measured."""
+    """The relative error of a component that is computed from read or measured velocities."""
     sources: tuple[tuple[str, str, float], ...]
     match task.construction.step(node):
         case Given(length=Normal(tail=tail, head=head)):
@@ -219,89 +303,7 @@ def _computed_within(task: Task, evidence: Evidence, node: str, each_mm: float) 
     return math.hypot(*errors)
 
 
-def _spread(moved: ComplexArray, least_mm: float) -> Covariance:
-    """What independent errors make of an end together: variance along x, covariance, variance along y."""
-    x, y = moved.real, moved.imag
+def _covariance(shifts: ComplexArray, least_mm: float) -> Covariance:
+    """The covariance (mm^2) of an end from independent errors, and a least error along both axes."""
+    x, y = shifts.real, shifts.imag
     return float(x @ x) + least_mm**2, float(x @ y), float(y @ y) + least_mm**2
-
-
-CHARGED = frozenset({"none", "partial"})
-LOST = CHARGED | {"follow_through", "review"}
-"""Verdicts whose cause is looked for: also where a person has still to decide."""
-
-
-def judge(task: Task, submission: Submission) -> Judgement:
-    """Verdicts, mistakes and points of one submission for one variant."""
-    comparison = compare(task, submission, explain)
-    mistakes = _named(task, comparison)
-    mistakes = (*mistakes, *_swaps_seen(task, submission, mistakes), *_not_drawn(task, comparison))
-    outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
-    return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
-
-
-def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
-    """The mistakes that explain what was lost, or may be."""
-    scales, vectors = comparison.settled, task.construction.vectors
-    lost = [one for one in comparison.outcomes if one.verdict in LOST]
-    by_vector = {one.name: one.criterion for one in lost if one.name in vectors}
-    by_scale = {one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED}
-    is_other_scale = any(scale.other and not scale.used.assumed for scale in scales.values())
-    if not by_vector and not is_other_scale:
-        return ()
-    explanation = comparison.explanation or explain(task, comparison.evidence, scales)
-    return named(explanation.accounts, task.construction, Lost(by_vector, by_scale))
-
-
-def _swaps_seen(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:
-    """Letters seen at each other's node on a sheet: lines tell nothing of them, so diagnosis cannot."""
-    vectors = task.construction.vectors
-    told = {one.mistake.other for one in known if one.code == "labels_swapped"}
-    found = []
-    for swap in (swap for reading in submission.readings for swap in reading.swapped):
-        pair = swap.first, swap.second
-        if swap.confidence < LEAST_CONFIDENCE or {pair, pair[::-1]} & told:
-            continue
-        told.add(pair)
-        explains = tuple(
-            one.id
-            for one in task.rubric.criterion
-            if one.name in vectors and {vectors[one.name].tail, vectors[one.name].head} & set(pair)
-        )
-        mistake = Mistake("labels_swapped", swap.first, other=pair)
-        found.append(NamedMistake(mistake, explains, swap.confidence))
-    return found
-
-
-def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
-    """Vectors that are asked for, long enough, and not on the sheet although both their ends were read.
-
-    What was not measured says nothing: nobody need measure everything.
-    """
-    evidence, construction = comparison.evidence, task.construction
-    known = {*evidence.nodes, *construction.poles.values()} if evidence.has_sheets else set()
-    found = []
-    for one in comparison.outcomes:
-        vector = construction.vectors.get(one.name)
-        if vector is None or one.verdict not in {"none", "review"} or evidence.vector(one.name) is not None:
-            continue
-        is_left_out = {vector.tail, vector.head} <= known
-        if is_left_out and (one.expected.length_mm or 0.0) >= LEAST_LEFT_OUT_MM:
-            mistake = Mistake("vector_missing", one.name)
-            found.append(NamedMistake(mistake, (one.criterion,), LEFT_OUT))
-    return found
-
-
-LEAST_LEFT_OUT_MM = 5.0
-"""A shorter one may hide in its ends' marks."""
-LEFT_OUT = 0.9
-"""How sure it is: of 368 vectors drawn between two ends read for certain, none was overlooked."""
-
-
-def _with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
-    """The outcome with the mistake that explains its loss."""
-    if outcome.verdict not in {"none", "partial"}:
-        return outcome
-    found = next((one for one in mistakes if outcome.criterion in one.explains), None)
-    if found is None or outcome.mistake is not None:
-        return outcome
-    return replace(outcome, mistake=found.code, cause=found)

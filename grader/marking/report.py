@@ -1,4 +1,4 @@
-"""The report of a submission: what was judged, as the published schema has it."""
+"""The report of a submission, as the published schema has it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -111,7 +111,7 @@ def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
     )
 
 
-def unjudged_report(  # noqa: PLR0913 - as above
+def unjudged_report(  # noqa: PLR0913 - what a report holds beside the status
     assignment: Assignment,
     rubric: RubricFile,
     variant: Variant,
@@ -145,7 +145,7 @@ def _head(assignment: Assignment, variant: Variant, student_id: str) -> dict[str
 
 
 def _criterion(outcome: Outcome) -> dict[str, object]:
-    """What the outcome itself says."""
+    """The fields of a criterion that come from its outcome."""
     is_scale = outcome.name in SCALE_NAMES
     is_vector = not is_scale and "_" in outcome.name
     return {
@@ -163,7 +163,7 @@ def _criterion(outcome: Outcome) -> dict[str, object]:
 
 
 def _mistake(mistake: NamedMistake) -> dict[str, object]:
-    """What a mistake and a rival have in common."""
+    """The fields that a mistake and a rival have in common."""
     detail = ", ".join(
         f"{key} = {value:.6g}" if isinstance(value, float) else f"{key} = {value}"
         for key, value in mistake.detail.items()

@@ -1,16 +1,13 @@
-"""A student's check of the own measurements: right, or off and in which way, and no answer given away.
+"""A student's check of their own measurements, without the answer.
 
 Three levels: ``symbol`` says right or off; ``hint`` also in which way (too long, turned left); ``full``,
-for instructors, has the numbers and the most likely mistake. What a level must not tell is not in
-the result at all.
+for instructors, has the numbers and the most likely mistake. A result holds nothing that its level must
+not show.
 """
 
 from dataclasses import dataclass
 from typing import Literal
 
-from grader.comparison.evidence import Submission
-from grader.comparison.task import Task
-from grader.marking.mark import judge
 from grader.outcomes import Judgement, NamedMistake, Outcome, Quantity, Reason, Tolerance
 
 Level = Literal["symbol", "hint", "full"]
@@ -18,7 +15,7 @@ LEVELS: tuple[Level, ...] = ("symbol", "hint", "full")
 Result = Literal["right", "off", "open"]
 
 TELLING = frozenset({"what", "of"})
-"""Parameters of reasons that name things and hold no numbers: these a hint may have."""
+"""Parameters of reasons that are names, not numbers: a hint may have them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +25,8 @@ class Checked:
     Attributes
     ----------
     criterion, name : as in the rubric
-    result : right, off, or open where it cannot be told
-    reasons : why, in the order of weight; without numbers at level ``hint``, empty at ``symbol``
+    result : right, off, or open where the verdict is open
+    reasons : the most important first; without numbers at level ``hint``, empty at ``symbol``
     measured, expected, tolerance, mistake : the evidence, at level ``full`` only
     """
 
@@ -43,13 +40,8 @@ class Checked:
     mistake: str | None = None
 
 
-def self_check(task: Task, submission: Submission, level: Level = "hint") -> tuple[Checked, ...]:
-    """Check everything that was handed in, in the rubric's order; what was not is passed over."""
-    return checked_values(judge(task, submission), level)
-
-
 def checked_values(judgement: Judgement, level: Level) -> tuple[Checked, ...]:
-    """What a judgement may tell at a level."""
+    """The part of a judgement that a level may show."""
     return tuple(_checked(one, level) for one in judgement.outcomes if _is_handed_in(one))
 
 
@@ -96,7 +88,7 @@ def _result(outcome: Outcome) -> Result:
 
 
 def _without_numbers(reason: Reason) -> Reason:
-    """A reason without what would give the answer away; a refused scale is told in full."""
+    """A reason without the numbers that give the answer away; a refused scale keeps its text."""
     if reason.code in {"scale_refused", "unread"}:
         return reason
     return Reason(reason.code, {key: value for key, value in reason.params.items() if key in TELLING})

@@ -250,6 +250,8 @@ def ghost_of(arrow: Arrow, expected: complex) -> Ghost:
     return Ghost(arrow.name, arrow.figure, arrow.tail, tip, arrow.verdict)
 
 
+# Labels --------------------------------------------------------------------------------------------
+
 LABEL_HEIGHT_MM = 3.4
 NAME_MM, BOLD_SHARE = 3.1, 1.1
 """Size of names; pages set them bold, which is wider than the font that `width_of` knows by so much."""

@@ -14,11 +14,12 @@ from grader.printed.layout import (
     CODE_MM,
     EASY_FIELDS,
     SCALE_BOXES,
+    SCALE_OF,
     WHOLE_CELLS,
-    Fit,
     Layout,
     PageLayout,
     Template,
+    TemplateFit,
     best_template,
     code_of,
     comb_cells,
@@ -32,8 +33,7 @@ from grader.printed.pdf import (
     BOLD,
     GREY,
     REGULAR,
-    Drawing,
-    decimal_mark,
+    PdfDrawing,
     fitted,
     number,
     pieces_width_mm,
@@ -44,8 +44,10 @@ from grader.printed.pdf import (
 )
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity, Problem
 from reference.authored.assignment import Assignment, PageTable, Variant
-from reference.drawing.canvas import Piece, pieces_of
+from reference.drawing.canvas import Piece, pieces_of, scale_pieces
 from reference.errors import AuthoredFileError, CallError, Finding
+
+# One page -----------------------------------------------------------------------------------------
 
 FIGURES = {
     MECHANISM: N_("Mechanism"),
@@ -121,7 +123,7 @@ class PageForm:
 
 
 def draw_page(
-    drawing: Drawing,
+    drawing: PdfDrawing,
     assignment: Assignment,
     text: PageText,
     form: PageForm,
@@ -144,7 +146,7 @@ def draw_page(
     drawing.next_page()
 
 
-def _code(drawing: Drawing, identity: Identity) -> None:
+def _code(drawing: PdfDrawing, identity: Identity) -> None:
     x, y, side, _ = CODE_MM
     modules = [list(map(bool, row)) for row in segno.make(code_of(identity), error="m", micro=False).matrix]
     quiet = 4
@@ -152,7 +154,7 @@ def _code(drawing: Drawing, identity: Identity) -> None:
     drawing.cells((x + quiet * module, y + quiet * module), module, runs(modules), 0.0)
 
 
-def _student(drawing: Drawing, assignment: Assignment, text: PageText, tongue: Tongue) -> None:
+def _student(drawing: PdfDrawing, assignment: Assignment, text: PageText, tongue: Tongue) -> None:
     x, y, wide, _ = _STUDENT_MM
     identity = text.identity
     title = [assignment.file.title.in_language(tongue.lang)]
@@ -170,7 +172,7 @@ def _student(drawing: Drawing, assignment: Assignment, text: PageText, tongue: T
     drawing.text((x, y + 23.6), f"{tongue.gettext(KINDS[identity.kind])}, {sheet}", 9.0)
 
 
-def _task(drawing: Drawing, assignment: Assignment, identity: Identity, tongue: Tongue) -> None:
+def _task(drawing: PdfDrawing, assignment: Assignment, identity: Identity, tongue: Tongue) -> None:
     """The task in words at the largest size that leaves room for the data below it."""
     x, y, wide, high = _TASK_MM
     task = assignment.file.task.in_language(tongue.lang)
@@ -201,7 +203,7 @@ def _given(assignment: Assignment, variant: Variant, tongue: Tongue) -> list[tup
     values = assignment.values([variant])
     data = []
     for datum in assignment.file.given:
-        value = number(float(np.ravel(datum.value(values))[0]), tongue.lang)
+        value = number(float(np.ravel(datum.value(values))[0]), tongue.decimal_mark)
         unit = tongue.unit(datum.unit)
         gap = "" if unit in {"", "°"} else "\N{NO-BREAK SPACE}"
         data.append((*pieces_of(datum.label), Piece(f" = {value}{gap}{unit}")))
@@ -222,14 +224,14 @@ def _flow(data: list[tuple[Piece, ...]], size_pt: float, wide_mm: float) -> list
     return rows
 
 
-def _advice(drawing: Drawing, tongue: Tongue) -> None:
+def _advice(drawing: PdfDrawing, tongue: Tongue) -> None:
     """What makes a drawing easy to read, and what the registration of the scan needs."""
     for texts, box in ((_ADVICE, _ADVICE_MM), ((_CLEAR,), _CLEAR_MM)):
         words = [tongue.gettext(text) for text in texts]
         drawing.paragraphs(box, words, (7.5, 7.0, 6.5, 6.0, 5.5), lines_down=1)
 
 
-def _zone(drawing: Drawing, zone: Box, title: str) -> None:
+def _zone(drawing: PdfDrawing, zone: Box, title: str) -> None:
     """Ticks just outside the zone's corners: no ink of ours where strokes are looked for."""
     x, y, w, h = zone
     for cx, across in ((x - 0.6, 1.0), (x + w + 0.6, -1.0)):
@@ -239,7 +241,7 @@ def _zone(drawing: Drawing, zone: Box, title: str) -> None:
     drawing.text((x + _TICK_MM + 1.5, y - 0.5), title, 6.5, REGULAR, GREY)
 
 
-def _pole(drawing: Drawing, at: tuple[float, float], name: str) -> None:
+def _pole(drawing: PdfDrawing, at: tuple[float, float], name: str) -> None:
     """A faint cross, open in the middle, with the pole's letter."""
     x, y = at
     near, far = _POLE_MM
@@ -248,12 +250,12 @@ def _pole(drawing: Drawing, at: tuple[float, float], name: str) -> None:
     drawing.text((x - 5.0, y + 5.5), name, 8.0, REGULAR, _FAINT)
 
 
-def _fields(drawing: Drawing, assignment: Assignment, fields: dict[str, Box], tongue: Tongue) -> None:
+def _fields(drawing: PdfDrawing, assignment: Assignment, fields: dict[str, Box], tongue: Tongue) -> None:
     names = assignment.file.names
     for name, box in fields.items():
         x, y, _, h = box
         shown = names.get(name, name)
-        label = _scale_label(shown) if name in SCALE_BOXES else pieces_of(shown)
+        label = (*scale_pieces(shown), Piece(" =")) if name in SCALE_BOXES else pieces_of(shown)
         size = 10.0 if name in SCALE_BOXES else 8.0
         wide = pieces_width_mm(label, REGULAR, size)
         drawing.pieces((x - wide - 0.8, y + 0.68 * h), label, size)
@@ -265,23 +267,18 @@ def _fields(drawing: Drawing, assignment: Assignment, fields: dict[str, Box], to
         drawing.text(_MEASURED_AT_MM, tongue.gettext(_MEASURED), 6.5, REGULAR, GREY)
 
 
-def _comb(drawing: Drawing, box: Box, tongue: Tongue) -> None:
+def _comb(drawing: PdfDrawing, box: Box, tongue: Tongue) -> None:
     """A cell for each digit, light so that digits stand out, and the decimal mark."""
     cells = comb_cells(box)
     for cell in cells:
         drawing.box(cell, 0.18, _CELL_GREY)
     x, y, wide, high = cells[WHOLE_CELLS - 1]
     middle = (x + wide + cells[WHOLE_CELLS][0]) / 2.0
-    mark = decimal_mark(tongue.lang)
+    mark = tongue.decimal_mark
     drawing.text((middle - width_mm(mark, BOLD, 11.0) / 2.0, y + high - 1.0), mark, 11.0, BOLD)
 
 
-def _scale_label(name: str) -> tuple[Piece, ...]:
-    """The letter k with L, v or a below it."""
-    return (Piece(name[:1]), Piece(name[1:], -1), Piece(" =")) if len(name) > 1 else (Piece(f"{name} ="),)
-
-
-def draw_ruler(drawing: Drawing, tongue: Tongue) -> None:
+def draw_ruler(drawing: PdfDrawing, tongue: Tongue) -> None:
     """A line of exactly 100 mm below the frame, to see at a glance whether the printer shrank the page."""
     x, y, long = _RULER_MM
     drawing.line((x, y, x + long, y), 0.2, GREY)
@@ -291,7 +288,7 @@ def draw_ruler(drawing: Drawing, tongue: Tongue) -> None:
     drawing.text((x + long + 3.0, y + 0.8), words, 6.5, REGULAR, GREY)
 
 
-_SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
+# The sheets of a class ----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -339,7 +336,7 @@ def make_sheets(
     variants = _variants(assignment, rows, roster)
     plans, problems = _plans(assignment, asked)
     poles = [poles_mm(assignment, plan.form.template, variants) for plan in plans]
-    drawing = Drawing.begin(assignment.file.title.in_language(lang))
+    drawing = PdfDrawing.begin(assignment.file.title.in_language(lang))
     for index, (row, variant) in enumerate(zip(rows, variants, strict=True)):
         for page, plan in enumerate(plans, start=1):
             identity = Identity(assignment.id, row.student_id, variant.n, variant.position, plan.table.kind)
@@ -391,7 +388,7 @@ def _plans(
             message = f"page {table.kind}: {len(names)} lengths are too many for boxes; none are printed"
             problems.append(Problem("sheet_boxes", message, str(assignment.path)))
         problems.extend(_too_small(assignment, table, fit))
-        scales = {_SCALE_OF[figure]: SCALE_BOXES[_SCALE_OF[figure]] for figure in figures}
+        scales = {SCALE_OF[figure]: SCALE_BOXES[SCALE_OF[figure]] for figure in figures}
         plans.append(_PagePlan(table, PageForm(fit.template, scales | boxes, dict(construction.poles))))
     return plans, tuple(problems)
 
@@ -422,7 +419,7 @@ def _boxes(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box
     return {name: boxes[name] for name in wanted if name in boxes}
 
 
-def _too_small(assignment: Assignment, table: PageTable, fit: Fit) -> list[Problem]:
+def _too_small(assignment: Assignment, table: PageTable, fit: TemplateFit) -> list[Problem]:
     problems: list[Problem] = []
     for figure, share in fit.room.items():
         if share >= 1.0:
@@ -447,8 +444,10 @@ def _layout(plan: _PagePlan) -> PageLayout:
     )
 
 
+# The calibration page -----------------------------------------------------------------------------
+
 _PEN_MM = 0.3
-_CALIBRATION_ADVICE = N_(
+_CALIBRATION_TEXT = N_(
     "Calibration page of planmark. Print it on A3 at 100 %, scan it as the drawings will be scanned, and let"
     " planmark read it: the segments are known, so their errors are the printer's and the scanner's."
 )
@@ -480,11 +479,11 @@ def calibration_segments() -> FloatArray:
 def make_calibration(lang: str = "en") -> Sheets:
     """The page that `planmark sheet --calibration` prints."""
     words = tongue(lang)
-    drawing = Drawing.begin(words.gettext(N_("Calibration page")))
+    drawing = PdfDrawing.begin(words.gettext(N_("Calibration page")))
     drawing.frame()
     drawing.markers(CALIBRATION)
     drawing.paragraphs(
-        (39.0, 16.0, 103.0, 36.0), [words.gettext(_CALIBRATION_ADVICE)], (9.0, 8.0, 7.0), pitch=1.3
+        (39.0, 16.0, 103.0, 36.0), [words.gettext(_CALIBRATION_TEXT)], (9.0, 8.0, 7.0), pitch=1.3
     )
     for (x0, y0), (x1, y1) in calibration_segments().tolist():
         drawing.line((x0, y0, x1, y1), _PEN_MM)

@@ -20,6 +20,8 @@ from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.drawing.canvas import A3_MM
 from reference.geometry import ComplexArray
 
+# The code's text ----------------------------------------------------------------------------------
+
 VERSION = "planmark1"
 KINDS = ("all", "velocity", "acceleration")
 MAX_LENGTH = 200
@@ -50,6 +52,8 @@ def identity_of(code: str) -> Identity | None:
     return Identity(match["assignment"], match["student"], n, position, match["kind"])
 
 
+# The sheet and its zones --------------------------------------------------------------------------
+
 PAGE_MM = A3_MM
 FRAME_MM: Box = (20.0, 10.0, 390.0, 277.0)
 """ISO 5457: 20 mm at the left for filing, 10 mm elsewhere."""
@@ -66,6 +70,8 @@ CODE_MM: Box = (363.0, 13.0, 28.0, 28.0)
 SCALE_BOXES: dict[str, Box] = {
     name: (306.0, 13.0 + 9.5 * row, 53.0, 8.0) for row, name in enumerate(("kL", "kv", "ka"))
 }
+SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
+"""The scale that each figure is drawn at."""
 _ZONE_GAP_MM = 4.0
 """Ink of one zone does not reach the next."""
 _FIELD_COLUMNS = ((39.0, 103.0), (159.0, 113.0), (289.0, 103.0))
@@ -166,6 +172,9 @@ def template_of(marker_id: int) -> Template | None:
     return TEMPLATES[number] if 0 <= number < len(TEMPLATES) else None
 
 
+# Boxes to write in --------------------------------------------------------------------------------
+
+
 def field_boxes(names: tuple[str, ...]) -> dict[str, Box]:
     """Boxes for measured lengths in the sheet's foot, as large as their number allows.
 
@@ -211,6 +220,9 @@ def combs_of(fields: Mapping[str, Box]) -> dict[str, tuple[Box, ...]]:
     return {name: comb_cells(box) for name, box in fields.items() if name not in SCALE_BOXES}
 
 
+# The file layout.json -----------------------------------------------------------------------------
+
+
 class _Document(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -252,12 +264,14 @@ def marker_places(template: Template) -> list[MarkerPlace]:
     ]
 
 
+# Room for an assignment's figures -----------------------------------------------------------------
+
 MARGIN_MM = 12.0
 """Around a figure: letters, arrowheads, hatching of the guides."""
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class TemplateFit:
     """A template for a page and how well it holds the figures.
 
     Attributes
@@ -331,12 +345,12 @@ def poles_mm(
     return poles
 
 
-def best_template(assignment: Assignment, figures: Sequence[str]) -> Fit:
+def best_template(assignment: Assignment, figures: Sequence[str]) -> TemplateFit:
     """The division with the most room for the figure that has the least; a sketch may be drawn smaller."""
     return template_for(extents_mm(assignment, figures, assignment.variants()))
 
 
-def template_for(extents: Mapping[str, tuple[float, float]]) -> Fit:
+def template_for(extents: Mapping[str, tuple[float, float]]) -> TemplateFit:
     """The same for figures whose largest width and height (millimetres) are known already."""
     figures = tuple(extents)
     need = {figure: (wide + 2 * MARGIN_MM, high + 2 * MARGIN_MM) for figure, (wide, high) in extents.items()}
@@ -352,4 +366,4 @@ def template_for(extents: Mapping[str, tuple[float, float]]) -> Fit:
         return (round(least, 6), min(room(template, figure) for figure in figures))
 
     best = max((template for template in TEMPLATES if template.figures == set(figures)), key=worth)
-    return Fit(best, {figure: room(best, figure) for figure in figures}, need)
+    return TemplateFit(best, {figure: room(best, figure) for figure in figures}, need)

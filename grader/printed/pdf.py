@@ -18,6 +18,8 @@ from grader.printed.layout import FRAME_MM, MARKER_CORNERS, MARKER_MM, PAGE_MM, 
 from grader.records import Box
 from reference.drawing.canvas import Piece
 
+# Markers ------------------------------------------------------------------------------------------
+
 CELLS = 6
 """Cells along a marker's side, its black border included."""
 
@@ -34,8 +36,9 @@ def cells(marker_id: int) -> NDArray[np.bool_]:
     return np.asarray(image > 127)
 
 
+# Fonts and texts ----------------------------------------------------------------------------------
+
 REGULAR, BOLD = "DejaVuSansCondensed", "DejaVuSansCondensed-Bold"
-_DECIMAL_COMMA = frozenset({"ro", "ru"})
 
 
 @cache
@@ -61,17 +64,12 @@ def unprintable(text: str) -> str:
     )
 
 
-def number(value: float, lang: str) -> str:
-    """A datum to six significant digits, as it is written in a language."""
+def number(value: float, decimal_mark: str) -> str:
+    """A datum to six significant digits, as it is written in a language with this decimal mark."""
     text = f"{value:.6g}"
     if "e" in text and 1e-6 < abs(value) < 1e9:
         text = f"{value:.6f}".rstrip("0").rstrip(".") if abs(value) < 1.0 else f"{value:.0f}"
-    return text.replace(".", decimal_mark(lang))
-
-
-def decimal_mark(lang: str) -> str:
-    """Comma or point."""
-    return "," if lang in _DECIMAL_COMMA else "."
+    return text.replace(".", decimal_mark)
 
 
 def pieces_width_mm(pieces: Iterable[Piece], font: str, size_pt: float) -> float:
@@ -116,19 +114,21 @@ def fitted(
     return size, [*cut[:-1], f"{cut[-1].rstrip('.,;')} …"] if cut else []
 
 
+# Pages --------------------------------------------------------------------------------------------
+
 BLACK, GREY = 0.0, 0.55
 _FRAME_PEN_MM = 0.7
 
 
 @dataclass(frozen=True, slots=True)
-class Drawing:
+class PdfDrawing:
     """A PDF being drawn."""
 
     canvas: Canvas
     buffer: io.BytesIO
 
     @classmethod
-    def begin(cls, title: str) -> "Drawing":
+    def begin(cls, title: str) -> "PdfDrawing":
         """An empty A3 landscape document. It says the same, byte for byte, for the same input."""
         embed_fonts()
         buffer = io.BytesIO()

@@ -185,6 +185,8 @@ def vectors_of(construction: Construction, figure: str, absent: Iterable[str] = 
     )
 
 
+# Hypotheses of how a plan was drawn ----------------------------------------------------------------
+
 REGULAR = ("as constructed", "plates by similarity")
 """Labels of the hypotheses without a mistake."""
 COST_OF_SIMILARITY = 0.7
@@ -279,6 +281,8 @@ def resized(drawing: Drawing, figure: str, size: float) -> dict[str, FloatArray]
     scale = next(v.scale for v in drawing.construction.vectors_of(figure))
     return {**drawing.parameters, scale: np.asarray(drawing.parameters[scale] / size)}
 
+
+# Poses of a figure among the strokes ---------------------------------------------------------------
 
 RESIDUAL_MM = 1.6
 """How far strokes may lie off a figure that is placed roughly: a few drafting errors."""

@@ -1,4 +1,4 @@
-"""Strokes assigned to the lines of a figure, and how sure each assignment is."""
+"""The assignment of strokes to the edges of a figure, and its likelihood."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -239,6 +239,8 @@ def _corrected(
     cov = beliefs.cov - projected.transpose(0, 2, 1) @ gain
     return Beliefs(beliefs.at + step[:, 0::2] + 1j * step[:, 1::2], (cov + cov.transpose(0, 2, 1)) / 2.0)
 
+
+# The search for an assignment ----------------------------------------------------------------------
 
 BEAM = 10
 """Partial assignments of a figure that are continued."""

@@ -31,8 +31,333 @@ from reference.authored.assignment import Assignment, Scales, Variant
 from reference.construction.mistakes import Drawing
 from reference.geometry import ComplexArray
 
+LEAST_SKETCH = 15.0
+LEAST_PLAN = 12.0
+"""Nats: what less is explained by may be chance."""
+SURE_PLAN = 40.0
+"""Nats from which a plan's strokes are no other plan's."""
+CLEAR = 0.85
+"""A regular plan supported over more of its length is on that sheet, and on no other."""
+LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
+"""Of the vectors given at the start of a plan: what fits on a sheet and can be measured."""
+SAME_SCALE = 0.95
+"""Ratio of the declared scale and the drawn one from which they are the same."""
+WILD = 3.0
+"""Where the drawn scale differs by more than this factor, the declared one was surely not followed."""
+Nodes = dict[str, ComplexArray]
+"""Nodes already read, complex mm on the sheet, by name."""
+
+
+@dataclass(slots=True)
+class _PageReading:
+    """What is read on one sheet so far."""
+
+    lines: Lines
+    ink: Ink
+    sheet: Sheet
+    sketch: SketchReading | None = None
+    plans: dict[str, PlanReading] = field(default_factory=dict)
+
+
+def read_figures(
+    inks: Sequence[Ink],
+    sheets: Sequence[Sheet],
+    assignment: Assignment,
+    variant: Variant | None,
+    scales: Scales | None,
+    wanted: Collection[str],
+) -> list[Reading]:
+    """Name what was drawn on a student's sheets.
+
+    Arguments
+    ---------
+    inks, sheets : one each per sheet, in order
+    variant : the student's own, None where not known; the drawing may follow another one
+    scales : as declared, None where not; the drawing may follow others
+    wanted : names of vectors (and nodes) asked for: each is in a figure or in `unread` of one reading
+
+    Returns one Reading per sheet.
+    """
+    pages = [_PageReading(lines_of(ink), ink, sheet) for ink, sheet in zip(inks, sheets, strict=True)]
+    own, others = _drawings(assignment, variant, scales)
+    for page in pages:
+        letters_nats = partial(support, letters=page.ink.letters, renamed=assignment.file.names)
+        sketch = find_sketch(page.lines, page.ink.circles, own, others, letters_nats)
+        if sketch is not None and sketch.score >= LEAST_SKETCH:
+            page.sketch = sketch
+    followed = [page.sketch.drawing for page in pages if page.sketch is not None] if variant is None else []
+    drawing = _measurable((followed or own)[0], assignment, variant)
+    velocity = _find_plan(pages, [drawing], VELOCITY_PLAN, {})
+    velocities = {} if velocity is None else _nodes(velocity)
+    if _asks_accelerations(wanted, drawing):
+        _set_apart(pages, velocity)
+        at_scales = [drawing] if velocity is None else _at_velocity_scales(drawing, velocities)
+        _find_plan(pages, at_scales, ACCELERATION_PLAN, velocities)
+    return [
+        lettered(reading, page.ink.letters, drawing.construction, assignment.file.names)
+        for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
+    ]
+
+
+# The drawing to look for ---------------------------------------------------------------------------
+
+
+def _drawings(
+    assignment: Assignment, variant: Variant | None, scales: Scales | None
+) -> tuple[list[Drawing], list[Drawing]]:
+    """The student's own drawing (any variant's, when it is not known), and other students'."""
+    everybody = assignment.variants()
+    if variant is None:
+        return drawings(assignment, everybody, scales), []
+    others = [other for other in everybody if other != variant]
+    return drawings(assignment, [variant], scales), drawings(assignment, others, None)
+
+
+def _measurable(drawing: Drawing, assignment: Assignment, variant: Variant | None) -> Drawing:
+    """The drawing at the declared scales, or at the assignment's own where those would not fit the paper."""
+    usual = assignment.scales([variant or assignment.variants()[0]])
+    parameters = dict(drawing.parameters)
+    for vector in drawing.construction.vectors.values():
+        real = parameters.get(vector.name, parameters.get(f"{vector.name}_n"))
+        if real is None:
+            continue
+        drawn_mm = abs(float(np.ravel(real)[0]) / float(np.ravel(parameters[vector.scale])[0]))
+        if drawn_mm and not LEAST_DRAWN_MM < drawn_mm < MOST_DRAWN_MM:
+            parameters[vector.scale] = getattr(usual, vector.scale)
+    return Drawing(drawing.construction, parameters)
+
+
+def _asks_accelerations(wanted: Collection[str], drawing: Drawing) -> bool:
+    vectors = drawing.construction.vectors
+    return not wanted or any(name in vectors and vectors[name].scale == "ka" for name in wanted)
+
+
+def _at_velocity_scales(drawing: Drawing, at: Nodes) -> list[Drawing]:
+    """The drawing at the velocity scale that the drawn plan follows, and at the one declared.
+
+    Normal components are taken from drawn velocities: with a wrong scale they come out wrong.
+    """
+    vectors = [v for v in drawing.construction.vectors_of(VELOCITY_PLAN) if v.name in drawing.parameters]
+    declared = float(np.ravel(drawing.parameters["kv"])[0])
+    for vector in vectors:
+        real = float(np.ravel(drawing.parameters[vector.name])[0])
+        drawn_mm = abs(complex(at[vector.head] - at[vector.tail]))
+        if drawn_mm > 1.0 and real:
+            followed = abs(real) / drawn_mm
+            if SAME_SCALE < followed / declared < 1.0 / SAME_SCALE:
+                return [drawing]
+            own = Drawing(drawing.construction, {**drawing.parameters, "kv": np.array([followed])})
+            return [own, drawing] if followed / declared < WILD and declared / followed < WILD else [own]
+    return [drawing]
+
+
+# Plans ---------------------------------------------------------------------------------------------
+
+
+def _find_plan(
+    pages: Sequence[_PageReading], at_scales: Sequence[Drawing], figure: str, known: Nodes
+) -> PlanReading | None:
+    """The plan on the sheet that explains it best; it is kept with its page.
+
+    Arguments: `at_scales`, the drawing at likely scales; `known`, nodes of the plan before.
+    """
+    laid: list[tuple[_PageReading, PlanProblem, list[PlanReading]]] = []
+    for page in pages:
+        joints, guide_turn = _sketched(page, pages)
+        problem = PlanProblem(page.lines, figure, {**joints, **known})
+        for drawing in at_scales:
+            parameters = {**drawing.parameters, "turn": np.asarray(guide_turn)}
+            plans = regular_plans(problem, Drawing(drawing.construction, parameters))
+            if plans:
+                laid.append((page, problem, plans))
+    laid.sort(key=lambda entry: -entry[2][0].score)
+    # Where no sheet shows the plan as it should be, a mistaken one may be on either.
+    clear = bool(laid) and laid[0][2][0].pose.score > CLEAR
+    best: tuple[_PageReading, PlanReading] | None = None
+    for page, problem, plans in laid[:1] if clear else laid:
+        plan = best_plan(problem, plans)
+        if plan is not None and (best is None or plan.score > best[1].score):
+            best = page, plan
+    if best is None or best[1].score < LEAST_PLAN:
+        return None
+    best[0].plans[figure] = best[1]
+    return best[1]
+
+
+def _sketched(page: _PageReading, pages: Sequence[_PageReading]) -> tuple[Nodes, float]:
+    """The joints as drawn and the turn of the guides: of the same sheet's sketch, else of another sheet's.
+
+    Without a sketch there are no joints, so that the exact ones are taken.
+    """
+    sketch = next((other.sketch for other in (page, *pages) if other.sketch is not None), None)
+    if sketch is None:
+        return {}, 0.0
+    names = sketch.assignment.expected.names
+    return {
+        name: np.asarray(at) for name, at in zip(names, sketch.fit.at, strict=True)
+    }, sketch.guide_turn_rad
+
+
+def _set_apart(pages: Sequence[_PageReading], plan: PlanReading | None) -> None:
+    """One stroke of ink cannot be in two figures: what surely is this plan's is no other's."""
+    page = next((page for page in pages if plan is not None and plan in page.plans.values()), None)
+    if plan is None or page is None or plan.score < SURE_PLAN:
+        return
+    stroke = plan.assignment.stroke
+    used = np.isin(page.lines.members, plan.lines.members[stroke[stroke >= 0]])
+    page.lines = page.lines.take(np.flatnonzero(~used.any(axis=1)))
+
+
+def _nodes(plan: PlanReading) -> Nodes:
+    names = plan.assignment.expected.names
+    return {name: np.asarray(at) for name, at in zip(names, plan.fit().at, strict=True)}
+
+
+# Readings of the sheets ----------------------------------------------------------------------------
+
+
+def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collection[str]) -> list[Reading]:
+    """One Reading per sheet; what is nowhere is unread on the last sheet."""
+    readings = []
+    for page in pages:
+        figures: dict[str, Figure] = {}
+        unread: list[Unread] = []
+        if page.sketch is not None:
+            figures[MECHANISM] = figure_of_sketch(page.sketch)
+        for figure, plan in page.plans.items():
+            figures[figure], missing = figure_of_plan(plan, page.sheet.scale_se)
+            unread.extend(gap for gap in missing if not wanted or gap.name in wanted)
+        readings.append(Reading(figures, tuple(unread)))
+    named = {gap.name for reading in readings for gap in reading.unread}
+    for figure_read in (figure for reading in readings for figure in reading.figures.values()):
+        named.update((*figure_read.nodes, *figure_read.vectors))
+    nowhere = tuple(_nowhere(drawing, [name for name in wanted if name not in named]))
+    if readings:
+        readings[-1] = replace(readings[-1], unread=(*readings[-1].unread, *nowhere))
+    return readings
+
+
+def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
+    for name in names:
+        vector = drawing.construction.vectors.get(name)
+        if vector is None:
+            yield Unread(name, "it is no vector or node of this assignment")
+        else:
+            plan = "velocity plan" if vector.scale == "kv" else "acceleration plan"
+            yield Unread(name, f"no {plan} was found on the sheets")
+
+
+# Named nodes and vectors with their errors ---------------------------------------------------------
+
 LEAST_VECTOR_MM = 2.0
 """A shorter vector is known by its nodes, whether or not it has a stroke."""
+
+
+def figure_of_sketch(sketch: SketchReading) -> Figure:
+    """Joints of the mechanism."""
+    fit = sketch.fit
+    names = sketch.assignment.expected.names
+    nodes = {name: _node(fit, row, within(_node_cov(fit, row))) for row, name in enumerate(names)}
+    return Figure(nodes, {})
+
+
+def figure_of_plan(plan: PlanReading, scale_se: float) -> tuple[Figure, list[Unread]]:
+    """Nodes and vectors of a plan; what is not drawn, with the reason.
+
+    Arguments: `scale_se` is the sheet's relative standard error of lengths.
+    """
+    fit, names = plan.fit(), plan.assignment.expected.names
+    named = _named(plan, fit)
+    absent = dict(plan.hypothesis.absent)
+    nodes = {
+        name: _node(fit, row, Signs(within(_node_cov(fit, row)), float(named[row])).confidence())
+        for row, name in enumerate(names)
+        if name not in absent and np.isfinite(fit.at[row])
+    }
+    vectors, unread = _vectors(plan, fit, named, scale_se)
+    unread.extend(Unread(name, reason) for name, reason in absent.items())
+    construction = plan.hypothesis.drawing.construction
+    for vector in construction.vectors_of(construction.figure_of(names[0])):
+        reason = absent.get(vector.head, absent.get(vector.tail))
+        if reason is not None and vector.name not in vectors:
+            unread.append(Unread(vector.name, reason))
+    return Figure(_no_surer(nodes, vectors, plan), vectors), unread
+
+
+def _no_surer(
+    nodes: Mapping[str, ReadNode], vectors: Mapping[str, ReadVector], plan: PlanReading
+) -> dict[str, ReadNode]:
+    """A node is no surer than the surest vector that starts or ends there: else its plan may be another."""
+    best = dict.fromkeys(nodes, 0.0)
+    for name, read in vectors.items():
+        vector = plan.hypothesis.drawing.construction.vectors[name]
+        for end in (vector.tail, vector.head):
+            best[end] = max(best.get(end, 0.0), read.confidence)
+    return {name: replace(node, confidence=min(node.confidence, best[name])) for name, node in nodes.items()}
+
+
+def _node_cov(fit: NodeFit, index: int) -> FloatArray:
+    """(2, 2) covariance of one node."""
+    rows = slice(2 * index, 2 * index + 2)
+    return fit.cov[rows, rows]
+
+
+def _node(fit: NodeFit, index: int, confidence: float) -> ReadNode:
+    return ReadNode(complex(fit.at[index]), _node_cov(fit, index), confidence)
+
+
+def _vectors(
+    plan: PlanReading, fit: NodeFit, named: FloatArray, scale_se: float
+) -> tuple[dict[str, ReadVector], list[Unread]]:
+    expected = plan.assignment.expected
+    vectors: dict[str, ReadVector] = {}
+    unread: list[Unread] = []
+    for index, edge in enumerate(expected.edges):
+        span = complex(fit.at[edge.head] - fit.at[edge.tail])
+        row = int(plan.assignment.stroke[index])
+        if row < 0 and abs(span) > LEAST_VECTOR_MM:
+            ends = f"{expected.names[edge.tail]} and {expected.names[edge.head]}"
+            unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
+            continue
+        cov = _difference_cov(fit, edge, span, scale_se)
+        signs = Signs(
+            placed=within(cov),
+            named=float(min(named[edge.tail], named[edge.head])),
+            off_mm=0.0,
+            mistaken=plan.hypothesis.label not in REGULAR,
+        )
+        if row >= 0:
+            off_mm = float(np.abs(fit.residual_mm[index]).max())
+            marked, elsewhere = _marks(plan, fit, edge, row)
+            signs = replace(
+                signs, off_mm=off_mm, thin=bool(plan.lines.thin[row]), marked=marked, elsewhere=elsewhere
+            )
+        vectors[edge.name] = _vector(span, cov, signs.confidence())
+    return vectors, unread
+
+
+def _difference_cov(fit: NodeFit, edge: Edge, span: complex, scale_se: float) -> FloatArray:
+    """Covariance (2, 2) of a vector, from both its nodes and the sheet's scale."""
+    difference = np.zeros((2, fit.cov.shape[0]))
+    for axis in (0, 1):
+        difference[axis, 2 * edge.head + axis], difference[axis, 2 * edge.tail + axis] = 1.0, -1.0
+    scaled = scale_se * np.array([span.real, span.imag])
+    return np.asarray(difference @ fit.cov @ difference.T + np.outer(scaled, scaled))
+
+
+def _vector(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
+    """Length and direction with their standard errors."""
+    length = float(abs(span))
+    along = np.array([span.real, span.imag]) / max(length, 1e-9)
+    across = np.array([-along[1], along[0]])
+    se_along, se_across = (math.sqrt(max(float(axis @ cov @ axis), 0.0)) for axis in (along, across))
+    se_deg = math.degrees(math.atan2(se_across, max(length, 1e-9)))
+    direction = math.degrees(cmath.phase(span)) % 360.0 if length > se_across else None
+    return ReadVector(length, se_along, direction, se_deg, confidence)
+
+
+# Confidence ----------------------------------------------------------------------------------------
+
 MARKED_MM = 0.5
 """A tip within this of a node marks it."""
 ELSEWHERE_MM = (0.8, 15.0)
@@ -43,7 +368,6 @@ RIVAL_NATS = 12.0
 """Rivals worse by more weigh nothing."""
 TEMPERATURE = 3.0
 """Scores are this much too certain: strokes of one student err in the same way."""
-
 WEIGHTS = {
     "placed": 0.34,
     "named": 0.34,
@@ -107,59 +431,6 @@ def within(cov: FloatArray, radius_mm: float = NEAR_MM) -> float:
     return float(first * second)
 
 
-def figure_of_sketch(sketch: SketchReading) -> Figure:
-    """Joints of the mechanism."""
-    fit = sketch.fit
-    names = sketch.assignment.expected.names
-    nodes = {name: _node(fit, row, within(_node_cov(fit, row))) for row, name in enumerate(names)}
-    return Figure(nodes, {})
-
-
-def figure_of_plan(plan: PlanReading, scale_se: float) -> tuple[Figure, list[Unread]]:
-    """Nodes and vectors of a plan; what is not drawn, with the reason.
-
-    Arguments: `scale_se` is the sheet's relative standard error of lengths.
-    """
-    fit, names = plan.fit(), plan.assignment.expected.names
-    named = _named(plan, fit)
-    absent = dict(plan.hypothesis.absent)
-    nodes = {
-        name: _node(fit, row, Signs(within(_node_cov(fit, row)), float(named[row])).confidence())
-        for row, name in enumerate(names)
-        if name not in absent and np.isfinite(fit.at[row])
-    }
-    vectors, unread = _vectors(plan, fit, named, scale_se)
-    unread.extend(Unread(name, reason) for name, reason in absent.items())
-    construction = plan.hypothesis.drawing.construction
-    for vector in construction.vectors_of(construction.figure_of(names[0])):
-        reason = absent.get(vector.head, absent.get(vector.tail))
-        if reason is not None and vector.name not in vectors:
-            unread.append(Unread(vector.name, reason))
-    return Figure(_no_surer(nodes, vectors, plan), vectors), unread
-
-
-def _no_surer(
-    nodes: Mapping[str, ReadNode], vectors: Mapping[str, ReadVector], plan: PlanReading
-) -> dict[str, ReadNode]:
-    """A node is no surer than the surest vector that starts or ends there: else its plan may be another."""
-    best = dict.fromkeys(nodes, 0.0)
-    for name, read in vectors.items():
-        vector = plan.hypothesis.drawing.construction.vectors[name]
-        for end in (vector.tail, vector.head):
-            best[end] = max(best.get(end, 0.0), read.confidence)
-    return {name: replace(node, confidence=min(node.confidence, best[name])) for name, node in nodes.items()}
-
-
-def _node_cov(fit: NodeFit, index: int) -> FloatArray:
-    """(2, 2) covariance of one node."""
-    rows = slice(2 * index, 2 * index + 2)
-    return fit.cov[rows, rows]
-
-
-def _node(fit: NodeFit, index: int, confidence: float) -> ReadNode:
-    return ReadNode(complex(fit.at[index]), _node_cov(fit, index), confidence)
-
-
 def _named(plan: PlanReading, fit: NodeFit) -> FloatArray:
     """(n,) share of the explanations, by their scores, that have each node where it is read."""
     names = plan.assignment.expected.names
@@ -179,36 +450,6 @@ def _named(plan: PlanReading, fit: NodeFit) -> FloatArray:
     return np.asarray(agree / total)
 
 
-def _vectors(
-    plan: PlanReading, fit: NodeFit, named: FloatArray, scale_se: float
-) -> tuple[dict[str, ReadVector], list[Unread]]:
-    expected = plan.assignment.expected
-    vectors: dict[str, ReadVector] = {}
-    unread: list[Unread] = []
-    for index, edge in enumerate(expected.edges):
-        span = complex(fit.at[edge.head] - fit.at[edge.tail])
-        row = int(plan.assignment.stroke[index])
-        if row < 0 and abs(span) > LEAST_VECTOR_MM:
-            ends = f"{expected.names[edge.tail]} and {expected.names[edge.head]}"
-            unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
-            continue
-        cov = _difference_cov(fit, edge, span, scale_se)
-        signs = Signs(
-            placed=within(cov),
-            named=float(min(named[edge.tail], named[edge.head])),
-            off_mm=0.0,
-            mistaken=plan.hypothesis.label not in REGULAR,
-        )
-        if row >= 0:
-            off_mm = float(np.abs(fit.residual_mm[index]).max())
-            marked, elsewhere = _marks(plan, fit, edge, row)
-            signs = replace(
-                signs, off_mm=off_mm, thin=bool(plan.lines.thin[row]), marked=marked, elsewhere=elsewhere
-            )
-        vectors[edge.name] = _vector(span, cov, signs.confidence())
-    return vectors, unread
-
-
 def _marks(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> tuple[float, float]:
     """How clearly tips mark a vector's two ends on its stroke, and whether others might be meant."""
     marked, elsewhere = [], []
@@ -221,240 +462,3 @@ def _marks(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> tuple[float
         marked.append(float(sure[0, near].max(initial=0.0)))
         elsewhere.append(float(sure[0, far].max(initial=0.0)))
     return min(marked), max(elsewhere)
-
-
-def _difference_cov(fit: NodeFit, edge: Edge, span: complex, scale_se: float) -> FloatArray:
-    """Covariance (2, 2) of a vector, from both its nodes and the sheet's scale."""
-    difference = np.zeros((2, fit.cov.shape[0]))
-    for axis in (0, 1):
-        difference[axis, 2 * edge.head + axis], difference[axis, 2 * edge.tail + axis] = 1.0, -1.0
-    scaled = scale_se * np.array([span.real, span.imag])
-    return np.asarray(difference @ fit.cov @ difference.T + np.outer(scaled, scaled))
-
-
-def _vector(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
-    """Length and direction with their standard errors."""
-    length = float(abs(span))
-    along = np.array([span.real, span.imag]) / max(length, 1e-9)
-    across = np.array([-along[1], along[0]])
-    se_along, se_across = (math.sqrt(max(float(axis @ cov @ axis), 0.0)) for axis in (along, across))
-    se_deg = math.degrees(math.atan2(se_across, max(length, 1e-9)))
-    direction = math.degrees(cmath.phase(span)) % 360.0 if length > se_across else None
-    return ReadVector(length, se_along, direction, se_deg, confidence)
-
-
-LEAST_SKETCH = 15.0
-LEAST_PLAN = 12.0
-"""Nats: what less is explained by may be chance."""
-SURE_PLAN = 40.0
-"""Nats from which a plan's strokes are no other plan's."""
-CLEAR = 0.85
-"""A regular plan supported over more of its length is on that sheet, and on no other."""
-LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
-"""Of the vectors given at the start of a plan: what fits on a sheet and can be measured."""
-SAME_SCALE = 0.95
-"""Ratio of the declared scale and the drawn one from which they are the same."""
-WILD = 3.0
-"""Where the drawn scale differs by more than this factor, the declared one was surely not followed."""
-
-Nodes = dict[str, ComplexArray]
-"""Nodes already read, complex mm on the sheet, by name."""
-
-
-@dataclass(slots=True)
-class _PageReading:
-    """What is read on one sheet so far."""
-
-    lines: Lines
-    ink: Ink
-    sheet: Sheet
-    sketch: SketchReading | None = None
-    plans: dict[str, PlanReading] = field(default_factory=dict)
-
-
-def read_figures(
-    inks: Sequence[Ink],
-    sheets: Sequence[Sheet],
-    assignment: Assignment,
-    variant: Variant | None,
-    scales: Scales | None,
-    wanted: Collection[str],
-) -> list[Reading]:
-    """Name what was drawn on a student's sheets.
-
-    Arguments
-    ---------
-    inks, sheets : one each per sheet, in order
-    variant : the student's own, None where not known; the drawing may follow another one
-    scales : as declared, None where not; the drawing may follow others
-    wanted : names of vectors (and nodes) asked for: each is in a figure or in `unread` of one reading
-
-    Returns one Reading per sheet.
-    """
-    pages = [_PageReading(lines_of(ink), ink, sheet) for ink, sheet in zip(inks, sheets, strict=True)]
-    own, others = _drawings(assignment, variant, scales)
-    for page in pages:
-        letters_nats = partial(support, letters=page.ink.letters, renamed=assignment.file.names)
-        sketch = find_sketch(page.lines, page.ink.circles, own, others, letters_nats)
-        if sketch is not None and sketch.score >= LEAST_SKETCH:
-            page.sketch = sketch
-    followed = [page.sketch.drawing for page in pages if page.sketch is not None] if variant is None else []
-    drawing = _measurable((followed or own)[0], assignment, variant)
-    velocity = _find_plan(pages, [drawing], VELOCITY_PLAN, {})
-    velocities = {} if velocity is None else _nodes(velocity)
-    if _asks_accelerations(wanted, drawing):
-        _set_apart(pages, velocity)
-        at_scales = [drawing] if velocity is None else _at_velocity_scales(drawing, velocities)
-        _find_plan(pages, at_scales, ACCELERATION_PLAN, velocities)
-    return [
-        lettered(reading, page.ink.letters, drawing.construction, assignment.file.names)
-        for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
-    ]
-
-
-# What is to be drawn ------------------------------------------------------------------------------
-
-
-def _drawings(
-    assignment: Assignment, variant: Variant | None, scales: Scales | None
-) -> tuple[list[Drawing], list[Drawing]]:
-    """The student's own drawing (any variant's, when it is not known), and other students'."""
-    everybody = assignment.variants()
-    if variant is None:
-        return drawings(assignment, everybody, scales), []
-    others = [other for other in everybody if other != variant]
-    return drawings(assignment, [variant], scales), drawings(assignment, others, None)
-
-
-def _measurable(drawing: Drawing, assignment: Assignment, variant: Variant | None) -> Drawing:
-    """The drawing at the declared scales, or at the assignment's own where those would not fit the paper."""
-    usual = assignment.scales([variant or assignment.variants()[0]])
-    parameters = dict(drawing.parameters)
-    for vector in drawing.construction.vectors.values():
-        real = parameters.get(vector.name, parameters.get(f"{vector.name}_n"))
-        if real is None:
-            continue
-        drawn_mm = abs(float(np.ravel(real)[0]) / float(np.ravel(parameters[vector.scale])[0]))
-        if drawn_mm and not LEAST_DRAWN_MM < drawn_mm < MOST_DRAWN_MM:
-            parameters[vector.scale] = getattr(usual, vector.scale)
-    return Drawing(drawing.construction, parameters)
-
-
-def _asks_accelerations(wanted: Collection[str], drawing: Drawing) -> bool:
-    vectors = drawing.construction.vectors
-    return not wanted or any(name in vectors and vectors[name].scale == "ka" for name in wanted)
-
-
-def _at_velocity_scales(drawing: Drawing, at: Nodes) -> list[Drawing]:
-    """The drawing at the velocity scale that the drawn plan follows, and at the one declared.
-
-    Normal components are taken from drawn velocities: with a wrong scale they come out wrong.
-    """
-    vectors = [v for v in drawing.construction.vectors_of(VELOCITY_PLAN) if v.name in drawing.parameters]
-    declared = float(np.ravel(drawing.parameters["kv"])[0])
-    for vector in vectors:
-        real = float(np.ravel(drawing.parameters[vector.name])[0])
-        drawn_mm = abs(complex(at[vector.head] - at[vector.tail]))
-        if drawn_mm > 1.0 and real:
-            followed = abs(real) / drawn_mm
-            if SAME_SCALE < followed / declared < 1.0 / SAME_SCALE:
-                return [drawing]
-            own = Drawing(drawing.construction, {**drawing.parameters, "kv": np.array([followed])})
-            return [own, drawing] if followed / declared < WILD and declared / followed < WILD else [own]
-    return [drawing]
-
-
-# Plans --------------------------------------------------------------------------------------------
-
-
-def _find_plan(
-    pages: Sequence[_PageReading], at_scales: Sequence[Drawing], figure: str, known: Nodes
-) -> PlanReading | None:
-    """The plan on the sheet that explains it best; it is kept with its page.
-
-    Arguments: `at_scales`, the drawing at likely scales; `known`, nodes of the plan before.
-    """
-    laid: list[tuple[_PageReading, PlanProblem, list[PlanReading]]] = []
-    for page in pages:
-        joints, guide_turn = _sketched(page, pages)
-        problem = PlanProblem(page.lines, figure, {**joints, **known})
-        for drawing in at_scales:
-            parameters = {**drawing.parameters, "turn": np.asarray(guide_turn)}
-            plans = regular_plans(problem, Drawing(drawing.construction, parameters))
-            if plans:
-                laid.append((page, problem, plans))
-    laid.sort(key=lambda entry: -entry[2][0].score)
-    # Where no sheet shows the plan as it should be, a mistaken one may be on either.
-    clear = bool(laid) and laid[0][2][0].pose.score > CLEAR
-    best: tuple[_PageReading, PlanReading] | None = None
-    for page, problem, plans in laid[:1] if clear else laid:
-        plan = best_plan(problem, plans)
-        if plan is not None and (best is None or plan.score > best[1].score):
-            best = page, plan
-    if best is None or best[1].score < LEAST_PLAN:
-        return None
-    best[0].plans[figure] = best[1]
-    return best[1]
-
-
-def _sketched(page: _PageReading, pages: Sequence[_PageReading]) -> tuple[Nodes, float]:
-    """The joints as drawn and the turn of the guides: of the same sheet's sketch, else of another sheet's.
-
-    Without a sketch there are no joints, so that the exact ones are taken.
-    """
-    sketch = next((other.sketch for other in (page, *pages) if other.sketch is not None), None)
-    if sketch is None:
-        return {}, 0.0
-    names = sketch.assignment.expected.names
-    return {
-        name: np.asarray(at) for name, at in zip(names, sketch.fit.at, strict=True)
-    }, sketch.guide_turn_rad
-
-
-def _set_apart(pages: Sequence[_PageReading], plan: PlanReading | None) -> None:
-    """One stroke of ink cannot be in two figures: what surely is this plan's is no other's."""
-    page = next((page for page in pages if plan is not None and plan in page.plans.values()), None)
-    if plan is None or page is None or plan.score < SURE_PLAN:
-        return
-    stroke = plan.assignment.stroke
-    used = np.isin(page.lines.members, plan.lines.members[stroke[stroke >= 0]])
-    page.lines = page.lines.take(np.flatnonzero(~used.any(axis=1)))
-
-
-def _nodes(plan: PlanReading) -> Nodes:
-    names = plan.assignment.expected.names
-    return {name: np.asarray(at) for name, at in zip(names, plan.fit().at, strict=True)}
-
-
-# Readings -----------------------------------------------------------------------------------------
-
-
-def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collection[str]) -> list[Reading]:
-    """One Reading per sheet; what is nowhere is unread on the last sheet."""
-    readings = []
-    for page in pages:
-        figures: dict[str, Figure] = {}
-        unread: list[Unread] = []
-        if page.sketch is not None:
-            figures[MECHANISM] = figure_of_sketch(page.sketch)
-        for figure, plan in page.plans.items():
-            figures[figure], missing = figure_of_plan(plan, page.sheet.scale_se)
-            unread.extend(gap for gap in missing if not wanted or gap.name in wanted)
-        readings.append(Reading(figures, tuple(unread)))
-    named = {gap.name for reading in readings for gap in reading.unread}
-    for figure_read in (figure for reading in readings for figure in reading.figures.values()):
-        named.update((*figure_read.nodes, *figure_read.vectors))
-    nowhere = tuple(_nowhere(drawing, [name for name in wanted if name not in named]))
-    if readings:
-        readings[-1] = replace(readings[-1], unread=(*readings[-1].unread, *nowhere))
-    return readings
-
-
-def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
-    for name in names:
-        vector = drawing.construction.vectors.get(name)
-        if vector is None:
-            yield Unread(name, "it is no vector or node of this assignment")
-        else:
-            plan = "velocity plan" if vector.scale == "kv" else "acceleration plan"
-            yield Unread(name, f"no {plan} was found on the sheets")

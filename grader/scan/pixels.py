@@ -1,6 +1,6 @@
 """Homographies, pictures with their light levelled, and strokes measured across at full resolution.
 
-Shared by the stages that look at pixels (`sheet`, `ink`, `letters`). Pixel coordinates are (x right,
+Shared by registration, strokes and handwriting. Pixel coordinates are (x right,
 y down), the centre of the stored image's top left pixel is (0, 0). A homography is a (3, 3) array.
 """
 
@@ -17,6 +17,8 @@ Float32Array = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
 
 MM_PER_INCH = 25.4
+TITLE_BLOCK_MM = (215.0, 80.0)
+"""Width and height of the corner of a sheet in which a title block may lie."""
 _PAPER_LONG_SIDE_PX = 640
 """Resolution of the paper's brightness: about 1.5 px/mm on A3."""
 _CLOSE_PX = 17
@@ -32,6 +34,9 @@ _PART = 1 << 21
 _TUKEY_ROUNDS = 6
 _TUKEY = 4.685
 """Tukey's constant: 95 % efficient for normal errors."""
+
+
+# Homographies -------------------------------------------------------------------------------------
 
 
 def mapped(homography: FloatArray, points: FloatArray) -> FloatArray:
@@ -94,6 +99,9 @@ def cut_out(
     return np.asarray(cut, dtype=np.uint8)
 
 
+# Segments and stretches of lines ------------------------------------------------------------------
+
+
 def reached(spans: FloatArray, start: FloatArray, gap: float) -> BoolArray:
     """Which stretches of a line, (n, 2) low and high, are reached from another (2,) over gaps no wider."""
     low, high = float(start[0]), float(start[1])
@@ -111,6 +119,9 @@ def lengths_and_directions(ends: FloatArray) -> tuple[FloatArray, FloatArray]:
     span = ends[..., 1, :] - ends[..., 0, :]
     length = np.maximum(np.hypot(span[..., 0], span[..., 1]), 1e-9)
     return length, span / length[..., None]
+
+
+# Levelled light -----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +210,9 @@ def shrink(grey: GreyImage, scale: float) -> GreyImage:
     )
 
 
+# Strokes cut across -------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True, slots=True)
 class Cuts:
     """k strokes cut across at n places each along guessed lines; distances in pixels.
@@ -260,15 +274,13 @@ def _cut_part(
 ) -> Cuts:
     """Some of the strokes cut across; `near` holds `capture_px` and `level`."""
     capture_px, level = near
-    span = ends[:, 1] - ends[:, 0]
-    length = np.maximum(np.hypot(span[:, 0], span[:, 1]), 1e-9)
+    length, u = lengths_and_directions(ends)
     share = (np.arange(count) + 0.5) / count
-    u = span / length[:, None]
     normal = np.column_stack([-u[:, 1], u[:, 0]])
     step = float(np.clip(reach_px / _ACROSS_STEPS, *_ACROSS_STEP_PX))
     half = int(np.ceil(reach_px / step))
     across = np.asarray(np.arange(-half, half + 1) * step, dtype=np.float32)
-    middle = ends[:, None, 0] + share[None, :, None] * span[:, None, :]
+    middle = ends[:, None, 0] + share[None, :, None] * (ends[:, 1] - ends[:, 0])[:, None, :]
     contrast = _contrast_across(flat, middle, normal, across)
     k, n, m = contrast.shape
     captured = np.abs(across)[None, :] <= capture_px[:, None]
@@ -341,8 +353,11 @@ def _crossing(
     return np.where(beyond, across[outside], crossed).astype(np.float64)
 
 
+# Robust lines -------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True, slots=True)
-class Lines:
+class FittedLines:
     """Straight lines y = a + b t, robustly fitted, one per row.
 
     Attributes
@@ -364,7 +379,7 @@ class Lines:
         return np.asarray(ends + shift[:, :, None] * np.column_stack([-u[:, 1], u[:, 0]])[:, None, :])
 
 
-def robust_lines(t: FloatArray, y: FloatArray, weight: FloatArray, noise_floor: float) -> Lines:
+def robust_lines(t: FloatArray, y: FloatArray, weight: FloatArray, noise_floor: float) -> FittedLines:
     """Lines by Tukey's biweight through (k, n) points with prior weights (0 leaves a point out).
 
     Starts from the line through the medians of the outer thirds, so that strays at one side cannot
@@ -386,7 +401,7 @@ def robust_lines(t: FloatArray, y: FloatArray, weight: FloatArray, noise_floor: 
         spread = np.maximum((weights * dt**2).sum(axis=1), 1e-12)
         b = (weights * dt * (y - ym[:, None])).sum(axis=1) / spread
         a = ym - b * tm
-    return Lines(a, b, scale, weights)
+    return FittedLines(a, b, scale, weights)
 
 
 def _through_medians(t: FloatArray, y: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:

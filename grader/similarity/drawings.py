@@ -1,16 +1,15 @@
-"""Similarity of drawings: drafting errors and places on the sheet weighed together.
+"""Similarity of drawings, by drafting errors and by positions on the sheet.
 
-Each node is held against the one that a perfect hand would have made of the student's *own* earlier
-nodes, so that an error counts where it was made and nowhere after. What an act may miss by, from the
-construction's derivative with a usual hand's errors, makes the errors of all acts comparable: for hands
-that do not know of each other they are independent and of one spread. A mistake is no error of a hand:
-acts that miss by much more than the student's others are left out.
+Each node is compared with the one that follows exactly from the student's *own* earlier nodes, so that
+an error counts only where it was made. Divided by its propagated standard deviation, the errors of all
+acts are comparable: those of independent students are independent and have one spread. Acts with much
+larger errors than the student's others are mistakes and are left out.
 
-Two lists of d such errors make an angle. Without a common origin all directions in d dimensions are
-equally likely, whatever the two hands' quality, and the cosine's distribution is known exactly.
+Two lists of d such errors are two vectors. For independent drawings all directions in d dimensions are
+equally likely, whatever the size of the errors, and the distribution of the cosine is known exactly.
 
-How near two placements come to each other by chance is told by the class itself: where a teacher or a
-printed sheet says where the pole belongs, everybody's figures lie alike and that says nothing.
+How near two placements come to each other by chance is estimated from the class: where a teacher or a
+printed sheet says where the pole belongs, all figures lie at the same position, which is no evidence.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,27 +35,27 @@ from reference.construction.derive import construction_of
 from reference.construction.elements import View
 from reference.construction.graph import Construction
 from reference.construction.steps import Coincide, Pivot, Pole, Step
-from reference.construction.uncertainty import SMALL, hand_errors
+from reference.construction.uncertainty import SMALL, step_errors
 from reference.geometry import ComplexArray
 from reference.plan import exact_plan
 
 USUAL_SHARE = 0.45
-"""Drafting errors that count as independent, as a share of all; a large class shows its own share,"""
+"""Share of the drafting errors that is independent; a large class gives its own share,"""
 LARGEST_SHARE = 0.7
-"""which is taken up to this."""
+"""up to this."""
 RARE = -9.0
-"""Log of the chance below which two placements make it worth to hold each against the other's variant."""
+"""Log of the chance of two placements below which each drawing is also compared with the other's variant."""
 SCALES = ("kL", "kv", "ka")
 GROSS = 4.0
 """An error so many times as large as the student's usual one is a mistake or a misreading."""
 TAIL = 2.5
-"""Larger errors count as this: one bad slip does not make two drawings similar."""
+"""Larger errors count as this: one large error does not make two drawings similar."""
 LEAST_SPREAD = 0.1
-"""A student's usual error is not taken for less than this share of a usual hand's."""
+"""Least usual error of a student, as a share of the usual drafting errors."""
 LEAST_CLASS = 10
-"""So many of one variant tell what they have in common (a copier's scale, a table's rounding)."""
+"""So many of one variant show what they have in common (a copier's scale, a table's rounding)."""
 NEAR_MM = 0.5
-"""Nearer than this is not told apart."""
+"""Smaller distances count as this."""
 RINGS_MM = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Radii within which the class's own placements are counted."""
 LAYOUT_MM, LAYOUT_SHARE = 16.0, 0.15
@@ -71,7 +70,7 @@ TRUSTED = 3000.0
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A student's drawing (by index) held against a variant."""
+    """A student's drawing (by index) compared with a variant."""
 
     owner: int
     variant: Variant
@@ -83,12 +82,12 @@ class DrawingSimilarity:
 
     Attributes
     ----------
-    log_chance : natural logarithm of the chance that independent hands come so near; 0 where not compared
-    log_errors, log_places : what errors of the hand and places on the sheet give alone
+    log_chance : natural logarithm of the chance of so much similarity without copying; 0 where not compared
+    log_errors, log_places : the same by drafting errors and by positions on the sheet alone
     log_layout : as `log_places`, of those who follow a layout; nan for others
     cosine, count : agreement of the errors, and how many there are
     pairs : of different students
-    fits : the variant of the class that a drawing fits though it is not the own, and how far off it is, mm
+    fits : another variant of the class that a drawing fits, and the residual in mm
     """
 
     log_chance: FloatArray
@@ -114,9 +113,9 @@ def compare_drawings(assignment: Assignment, submissions: Sequence[ComparedSubmi
     variants = list(dict.fromkeys(each.variant for each in submissions))
     variant = np.array([variants.index(each.variant) for each in submissions])
     printed = np.array([each.printed for each in submissions])
-    places, layout = place_chance(drawn, printed, variant)
+    places, layout = position_chance(drawn, printed, variant)
     rows = _rows(submissions, fits, places)
-    together = _together(rows, submissions)
+    together = _compared_rows(rows, submissions)
     cosines, counts, log_agreement = _agreement(
         drafting_errors(assignment, submissions, drawn, rows), together
     )
@@ -126,7 +125,7 @@ def compare_drawings(assignment: Assignment, submissions: Sequence[ComparedSubmi
     (compared,) = _by_student(rows, len(submissions), np.where(together, -1.0, 0.0))
     people = np.array([each.student_id for each in submissions])
     return DrawingSimilarity(
-        log_chance=np.where(compared < 0.0, _both(log_errors, places), 0.0),
+        log_chance=np.where(compared < 0.0, _fisher_combined(log_errors, places), 0.0),
         log_errors=log_errors,
         log_places=np.where(compared < 0.0, places, 0.0),
         log_layout=layout,
@@ -142,7 +141,7 @@ def _rows(
     fits: Sequence[tuple[Variant, float] | None],
     places: FloatArray,
 ) -> list[Row]:
-    """Each drawing against its own variant, against those that it fits, and that of whose places it has."""
+    """Each drawing with its own variant, with those that it fits, and with those of drawings placed alike."""
     known = {each.variant for each in submissions}
     rows = [Row(k, each.variant) for k, each in enumerate(submissions)]
     rows += [Row(k, fit[0]) for k, fit in enumerate(fits) if fit is not None]
@@ -153,7 +152,7 @@ def _rows(
     return list(dict.fromkeys(rows))
 
 
-def _together(rows: Sequence[Row], submissions: Sequence[ComparedSubmission]) -> NDArray[np.bool_]:
+def _compared_rows(rows: Sequence[Row], submissions: Sequence[ComparedSubmission]) -> NDArray[np.bool_]:
     """(rows, rows) which rows are compared: of one variant, and of two people."""
     variants = list(dict.fromkeys(row.variant for row in rows))
     variant = np.array([variants.index(row.variant) for row in rows])
@@ -177,7 +176,7 @@ def _by_student(
     return by_student
 
 
-def _both(first: FloatArray, second: FloatArray) -> FloatArray:
+def _fisher_combined(first: FloatArray, second: FloatArray) -> FloatArray:
     """Fisher's rule: log of the chance that two independent pieces of evidence are so rare together."""
     both = gammaincc(2.0, -(first + second))
     with np.errstate(divide="ignore"):
@@ -193,7 +192,7 @@ def drafting_errors(
     drawn: Mapping[str, Drawn],
     rows: Sequence[Row],
 ) -> FloatArray:
-    """Errors of drawings held against variants, (rows, acts), in units of the student's usual error.
+    """Errors of drawings compared with variants, (rows, acts), in units of the student's usual error.
 
     nan where not known.
     """
@@ -212,9 +211,9 @@ def _raw_errors(
     variants: list[Variant],
     drawn: Mapping[str, ComplexArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """Errors of each node against the student's own earlier nodes, in usual errors; both (rows, 2 nodes).
+    """Errors of each node by the student's own earlier nodes, in usual errors, (rows, 2 nodes).
 
-    The second array is the error that an enlargement by 1 would give, as printers and copiers enlarge.
+    The second array, of the same shape, is their derivative by an enlargement (of printers, copiers).
     """
     plan = exact_plan(assignment, variants, scales_used(assignment, chosen, variants))
     own = _own_nodes(plan.construction, plan.nodes_mm, drawn)
@@ -275,8 +274,8 @@ def _laid_over(drawn: ComplexArray, proper: ComplexArray) -> tuple[ComplexArray,
 
 
 def _covariance(step: Step, view: View, expected: ComplexArray) -> FloatArray:
-    """(rows, 2, 2) covariance of a node under a usual hand's errors in the acts that make it, mm^2."""
-    errors = hand_errors(step, USUAL)
+    """(rows, 2, 2) covariance of a node by usual errors in the acts that make it, mm^2."""
+    errors = step_errors(step, USUAL)
     placed = np.asarray(step.place(View(view.nodes, view.parameters, errors)))
     count = len(next(iter(errors.values())))
     change = (np.broadcast_to(placed, (count, len(expected))) - expected) / SMALL
@@ -291,7 +290,7 @@ def _whitened(error: ComplexArray, covariance: FloatArray) -> FloatArray:
 
 
 def _normed(errors: FloatArray) -> FloatArray:
-    """Errors in units of the student's usual one; mistakes out, bad slips cut to size."""
+    """Errors in units of the student's usual one; mistakes are nan, large errors are limited to `TAIL`."""
     with np.errstate(invalid="ignore"):
         usual = _median(np.abs(errors))[:, None] / 0.6745
         scaled = errors / np.maximum(usual, LEAST_SPREAD)
@@ -311,7 +310,7 @@ def _enlargement(errors: FloatArray, by_scale: FloatArray) -> FloatArray:
 
 
 def _without(errors: FloatArray, by_scale: FloatArray) -> FloatArray:
-    """Errors less what a common enlargement explains of them."""
+    """Errors without the part that a common enlargement explains."""
     known = np.isfinite(errors) & np.isfinite(by_scale)
     along = np.where(known, by_scale, 0.0)
     size = np.maximum((along**2).sum(axis=1, keepdims=True), 1e-12)
@@ -331,7 +330,7 @@ def _median(values: FloatArray) -> FloatArray:
 
 
 def _centred(errors: FloatArray, variants: Sequence[Variant]) -> FloatArray:
-    """Errors less what all of a variant have in common, where they are many enough to tell."""
+    """Errors without the median of those with the same variant, where they are many enough."""
     errors = errors.copy()
     for variant in set(variants):
         same = np.array([each == variant for each in variants])
@@ -345,9 +344,9 @@ def _agreement(errors: FloatArray, together: NDArray[np.bool_]) -> tuple[FloatAr
 
     Arguments: `together` (rows, rows) are the pairs that are compared.
 
-    What pushes every hand the same way (a protractor, a bent scan, the reading of a node) gives all
-    cosines one mean, by which they are reduced: two vectors with a part in common have the cosine
-    rho + (1 - rho) cos, where cos is that of their own parts.
+    A common cause (a protractor, a bent scan, the reading of a node) gives all cosines one mean, by which
+    they are reduced: two vectors with a common part have the cosine rho + (1 - rho) cos, where cos is that
+    of their own parts.
     """
     known = np.isfinite(errors)
     values, mask = np.where(known, errors, 0.0), known.astype(np.float64)
@@ -362,7 +361,7 @@ def _agreement(errors: FloatArray, together: NDArray[np.bool_]) -> tuple[FloatAr
 
 
 def _share(cosines: FloatArray, counts: FloatArray) -> float:
-    """The share of the errors that is independent, from how widely the cosines of this class spread."""
+    """The share of the errors that is independent, from the spread of the cosines of this class."""
     if len(cosines) < LEAST_CLASS * (LEAST_CLASS - 1) // 2:
         return USUAL_SHARE
     low, high = np.percentile(cosines, [15.87, 84.13])
@@ -380,23 +379,22 @@ def log_chance(cosine: FloatArray, dimensions: FloatArray) -> FloatArray:
     return np.where(dimensions >= 2.0, np.log(np.maximum(chance, 1e-300)), 0.0)
 
 
-# Places on the sheet ------------------------------------------------------------------------------
+# Positions on the sheet ---------------------------------------------------------------------------
 
 
-def place_chance(
+def position_chance(
     drawn: Mapping[str, Drawn], printed: NDArray[np.bool_], variant: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Log of the chance that two placements come so near, and of what a layout explains.
+    """Log of the chance that two placements come so near, and the part that a layout explains.
 
-    Two arrays (students, students). The first is 0 where places are not known. The second is nan for pairs
-    of whom few lie in the same places; where the class follows a layout, or those of one variant do,
-    it is the first, 0 where places are not known.
+    Two arrays (students, students). The first is 0 where positions are not known. The second equals the
+    first where the class, or those of one variant, follow a layout; else it is nan.
 
     Arguments: which students drew on a `printed` sheet, whose crosses say for each variant where poles
     are best put: there the sketch alone is placed freely. `variant` is each student's, as a number.
 
-    What one figure is shifted by, from one student's sheet to another's, is held against the shift of
-    the next: it does not matter how the sheets lay in the scanner.
+    The shift of one figure between two sheets is compared with the shift of the next figure, so that the
+    position of the sheets in the scanner does not matter.
     """
     shifts = {figure: _shift(nodes.at) for figure, nodes in drawn.items()}
     count = len(next(iter(drawn.values())).at)
@@ -413,7 +411,7 @@ def place_chance(
     freedom = np.minimum(freedom, most)
     apart = np.maximum(apart, NEAR_MM)
     same = variant[:, None] == variant[None, :]
-    # Those of one variant may have more in common than all.
+    # Drawings of one variant may have more in common than those of the class.
     chance = _chance(apart, freedom)
     chance = np.where(same, np.maximum(chance, _chance(apart, freedom, same)), chance)
     known = (freedom > 0) & ~np.eye(count, dtype=bool)
@@ -426,16 +424,16 @@ def place_chance(
 
 
 def _shift(at: ComplexArray) -> ComplexArray:
-    """(students, students) by how much a figure is shifted, the median over the nodes that both have."""
+    """(students, students) shift of a figure, complex mm: the median over the nodes that both have."""
     between = at[None, :, :] - at[:, None, :]
     shift = _median(between.real) + 1j * _median(between.imag)
     return np.asarray(np.where(np.isfinite(between).any(axis=2), shift, UNKNOWN))
 
 
 def _chance(apart: FloatArray, freedom: IntArray, among: NDArray[np.bool_] | None = None) -> FloatArray:
-    """Log chances, by the densest ring about each placement that the class (or some pairs of it) shows.
+    """Log chances by the densest ring about each placement in the class (or in some pairs of it).
 
-    Too few pairs show nothing: 0 for the whole class, no objection (-inf) for some pairs of it.
+    With too few pairs they are 0 for the whole class, and -inf (no limit) for some pairs of it.
     """
     chance = np.zeros(apart.shape) if among is None else np.full(apart.shape, -np.inf)
     for dimensions in (2, 4):

@@ -1,14 +1,13 @@
-"""Similar sheets: pairs that are nearer to each other than independent hands come by chance.
+"""Similar sheets: pairs that are more similar than independent drawings are by chance.
 
-No accusation: a person should look at both. Well-drawn plans of one variant are similar anyway, and so
-are the values of all who work exactly. The evidence is in the errors, which differ between two hands.
-Each kind of evidence gives the chance that two students who work apart come so near; times the number
-of pairs it is the measure: how many such pairs a class of this size would show by chance.
+This is no accusation: a person should look at both. Well-drawn plans of one variant are similar anyway,
+and so are the values of all who work exactly; the evidence is in the errors. Each kind of evidence gives
+the chance of so much similarity between two independent students; times the number of pairs it is the
+measure: the number of such pairs that a class of this size shows by chance.
 
-The ink of two sheets is compared as well: the same drawing, scanned twice, nearly covers itself. A
-small map of each sheet says where its ink is. What many sheets have in common (frame,
-title block, a printed sheet's lines) is left out, and how much independent drawings of this class
-resemble each other is measured on the class itself.
+The ink of two sheets is compared as well, on a coarse map: the same drawing, scanned twice, nearly
+covers itself. Ink that many sheets have in common (frame, title block, a printed sheet's lines) is left
+out, and the usual similarity of independent drawings is estimated on the class itself.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,41 +25,11 @@ from grader.similarity.submission import ComparedSubmission
 from reference.authored.assignment import Assignment
 
 FALSE_ALARMS = 0.001
-"""Pairs of independent students named by chance in a class, of each kind of evidence, on average."""
+"""Mean number of independent pairs that each kind of evidence names in a class by chance."""
 NOTED = log(0.05)
 """Chance below which a part of the evidence is named."""
 MOST_OWNERS = 3
-"""A number that more students have does not tell whose drawing it is."""
-
-CELL_MM = 2.5
-"""Side of a map's cell."""
-CELLS = (118, 168)
-"""Rows and columns of an A3 sheet's map; what lies outside is left out."""
-COMMON = 0.3
-"""Share of the sheets with ink in a cell from which it belongs to the sheet, not to the drawing."""
-INKED = 3
-"""Of 255: darker cells have ink, of a hard pencil too."""
-DARKEST = 60.0
-"""A darker cell counts as this one: ink and pencil weigh alike."""
-RUN, RUN_INKED = 32, 0.8
-"""Cells of a straight run (80 mm) that is the page's, and the share of them that have ink."""
-PART = 12
-"""Side of a part in cells: 30 mm, a letter or line with its surroundings, less than a figure."""
-FAINT = 20.0
-"""Norm of a part's ink below which it is dust."""
-LEAST_PARTS = 8
-"""A sheet with ink in fewer parts shows too little to be recognised by."""
-LEAST_SHEETS = 7
-"""Of six sheets two are a third: what they share would be taken for the page's."""
-LEAST_OVERLAP = 0.5
-"""Mean correlation of the parts below which two sheets are never the same drawing."""
-LEAST_SPREAD = 0.015
-"""Least scale of the tail, in inverse hyperbolic tangents: where all pairs are equal there is none."""
-QUANTILES = 0.84, 0.95
-"""The upper one leaves a copied pair out in a class of seven."""
-TAIL_DROP = float(np.log((1.0 - QUANTILES[0]) / (1.0 - QUANTILES[1])))
-"""How far the logarithm of an exponential tail falls between the two quantiles."""
-
+"""A number that more students share does not show whose drawing it is."""
 Maps = Sequence[Sequence[NDArray[np.uint8]]]
 
 
@@ -70,7 +39,7 @@ class PictureSimilarity:
 
     Attributes
     ----------
-    log_chance : natural logarithm of the chance that sheets of this class are so alike; 0 where not compared
+    log_chance : natural logarithm of the chance of so much similarity in this class; 0 where not compared
     overlap : correlation of the ink, the largest of any two sheets
     pairs : compared
     """
@@ -99,7 +68,7 @@ class _Pair:
 def find_similar(
     assignment: Assignment, submissions: Sequence[ComparedSubmission], maps: Maps = ()
 ) -> list[AlikeDocument]:
-    """The sheets of a class that a person should hold beside each other, the most similar first.
+    """The groups of similar sheets that a person should compare, the most similar first.
 
     Arguments: `maps` are each submission's ink maps (see `ink_map`), in the order of `submissions`.
     """
@@ -126,7 +95,7 @@ def find_similar(
 
 
 def _rare(log_chance: FloatArray, pairs: int) -> Iterator[tuple[int, int, float]]:
-    """The pairs whose evidence is rarer than chance in the class gives, and how many there would be."""
+    """The pairs whose evidence is rarer than `FALSE_ALARMS`, with their expected number in the class."""
     expected = log_chance + log(max(pairs, 1))
     for i, j in np.argwhere(np.triu(expected < log(FALSE_ALARMS), 1)):
         yield int(i), int(j), exp(max(float(expected[i, j]), -600.0))
@@ -150,7 +119,7 @@ def _add_numbers(pairs: dict[tuple[int, int], _Pair], numbers: NumberSimilarity)
 def _add_pictures(
     pairs: dict[tuple[int, int], _Pair], pictures: PictureSimilarity, drawings: DrawingSimilarity
 ) -> None:
-    # Good drawings whose figures follow one layout have the same ink: that is no rarer than their places.
+    # Good drawings that follow one layout have the same ink: that is no rarer than their positions.
     log_chance = np.fmax(pictures.log_chance, drawings.log_layout)
     for i, j, measure in _rare(log_chance, pictures.pairs):
         share = float(np.clip(pictures.overlap[i, j], 0.0, 1.0))
@@ -162,7 +131,7 @@ def _add_other_numbers(
     submissions: Sequence[ComparedSubmission],
     drawings: DrawingSimilarity,
 ) -> None:
-    """Whose number it is that somebody drew with."""
+    """Add the pairs of a student who drew with another number and the student who has that number."""
     for k, submission in enumerate(submissions):
         owners = [
             other
@@ -209,7 +178,36 @@ def _document(
     )
 
 
-# Ink ----------------------------------------------------------------------------------------------
+# Similarity of the ink -----------------------------------------------------------------------------
+
+CELL_MM = 2.5
+"""Side of a map's cell."""
+CELLS = (118, 168)
+"""Rows and columns of an A3 sheet's map; what lies outside is left out."""
+COMMON = 0.3
+"""Share of the sheets with ink in a cell from which it belongs to the sheet, not to the drawing."""
+INKED = 3
+"""Of 255: darker cells have ink, of a hard pencil too."""
+DARKEST = 60.0
+"""A darker cell counts as this one: ink and pencil weigh alike."""
+RUN, RUN_INKED = 32, 0.8
+"""Cells of a straight run (80 mm) that is the page's, and the share of them that have ink."""
+PART = 12
+"""Side of a part in cells: 30 mm, a letter or line with its surroundings, less than a figure."""
+FAINT = 20.0
+"""Norm of a part's ink below which it is dust."""
+LEAST_PARTS = 8
+"""A sheet with ink in fewer parts shows too little to be recognised by."""
+LEAST_SHEETS = 7
+"""Of six sheets two are a third: what they share would be taken for the page's."""
+LEAST_OVERLAP = 0.5
+"""Mean correlation of the parts below which two sheets are never the same drawing."""
+LEAST_SPREAD = 0.015
+"""Least scale of the tail, in inverse hyperbolic tangents: where all pairs are equal there is none."""
+QUANTILES = 0.84, 0.95
+"""The upper one leaves a copied pair out in a class of seven."""
+TAIL_DROP = float(np.log((1.0 - QUANTILES[0]) / (1.0 - QUANTILES[1])))
+"""How far the logarithm of an exponential tail falls between the two quantiles."""
 
 
 def ink_map(scan: GreyImage, page_mm: tuple[float, float]) -> NDArray[np.uint8]:
@@ -250,7 +248,7 @@ def compare_pictures(
     np.maximum.at(overlap, (owner[:, None], owner[None, :]), _agreement(np.array(maps), printed[owner]))
     rows, columns = having[np.array(np.triu_indices(len(having), 1))]
     scaled = np.arctanh(np.minimum(overlap, 0.999))
-    # A few printed sheets among plain ones (or the reverse) are each other's like by their print.
+    # A few printed sheets among plain ones (or the reverse) are similar by their print.
     many = np.bincount(printed[having], minlength=2)[printed.astype(np.int64)] >= LEAST_SHEETS
     compared = (printed[:, None] != printed[None, :]) | many
     log = np.where((overlap > LEAST_OVERLAP) & compared, _log_tail(scaled, scaled[rows, columns]), 0.0)
@@ -260,8 +258,8 @@ def compare_pictures(
 def _log_tail(values: FloatArray, known: FloatArray) -> FloatArray:
     """Log of the chance of values as large, by an exponential tail through upper quantiles of the known ones.
 
-    The tail is heavier than a normal one, as resemblances are, and no steeper than the class shows: where
-    all follow one layout some pairs are much more like each other than others.
+    The tail is heavier than a normal one, and no steeper than in the class: where all follow one layout,
+    some pairs are much more similar than others.
     """
     middle, high, higher = np.quantile(known, [0.5, *QUANTILES])
     scale = max((high - middle) / 2.0, (higher - high) / TAIL_DROP, LEAST_SPREAD)

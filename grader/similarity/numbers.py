@@ -1,9 +1,9 @@
-"""Entered values that are the same: how likely that is for two who measured their own drawings.
+"""Equal entered values: how likely they are for two students who measured their own drawings.
 
-Lengths and directions spread about the exact ones by the construction's derivative with a usual hand's
-errors, all vectors of a drawing together: one line drawn aslant shifts many values, and that is one
-coincidence, not many. A student whose values are all but exact is no evidence: everybody who works
-exactly has the same ones. What is far off is a mistake, which two may make alike, and is left out.
+Lengths and directions spread about the exact ones by the propagated drafting errors, all vectors of a
+drawing together: one inaccurate line shifts many values, which is one coincidence, not many. Nearly exact
+values are no evidence, since everybody who works exactly has them. Values that are far off are mistakes,
+which two students may make independently, and are left out.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from grader.similarity.drawings import LEAST_CLASS
 from grader.similarity.submission import USUAL, ComparedSubmission, scales_used
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.graph import evaluate
-from reference.construction.uncertainty import SMALL, hand_errors
+from reference.construction.uncertainty import SMALL, step_errors
 from reference.geometry import ComplexArray
 from reference.plan import exact_plan
 
@@ -34,17 +34,17 @@ NEARLY_ALL = 0.75
 LEAST_MM = 8.0
 """Directions of shorter vectors are not compared."""
 GROSS = 4.0
-"""An error of more standard deviations is a mistake, not a hand's error."""
+"""An error of more standard deviations is a mistake, not a drafting error."""
 ROUNDED_MM = 0.05
-"""As good as exact, beside the step of the values."""
+"""Residual that counts as exact, beside the step of the values."""
 OWN_SHARE = 0.6
-"""Of a student's values that must be near the exact ones: others are of another drawing."""
+"""Share of a student's values that must be near the exact ones; else they are of another drawing."""
 LEAST_EQUAL = 5
 """Fewer equal values are not examined,"""
 LEAST_TELLING = 3
 """nor are values of which fewer differ from the exact ones by more than rounding."""
 SKILLS = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0)
-"""Drafting errors tried, as multiples of the usual one's errors."""
+"""Drafting errors that are tried, as multiples of the usual ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,29 +66,29 @@ class NumberSimilarity:
 
 @dataclass(frozen=True, slots=True)
 class _Table:
-    """Entered values beside what is expected of each student; nan where there is none.
+    """Entered values and the values expected of each student; nan where there is none.
 
     Attributes
     ----------
     entered : (students, fields) mm and degrees
-    usable : (students, fields) what is near enough to the exact value to be a hand's error
-    telling : (students, fields) what of it is further off than rounding alone would bring it
-    off_mm : (students, fields) from the exact values, directions as the vector's end across it; less what
-        all of one variant are off
+    usable : (students, fields) whether the residual may be a drafting error
+    telling : (students, fields) whether it is usable and more than rounding
+    residual_mm : (students, fields) from the exact values, directions as the vector's end across it;
+        without the mean of those with the same variant
     grain_mm : (students, fields) step of the values
-    by_act : (students, fields, acts) what a usual error of each act adds, mm
+    by_act : (students, fields, acts) shift by a usual error of each act, mm
     """
 
     entered: FloatArray
     usable: NDArray[np.bool_]
     telling: NDArray[np.bool_]
-    off_mm: FloatArray
+    residual_mm: FloatArray
     grain_mm: FloatArray
     by_act: FloatArray
 
 
 def compare_numbers(assignment: Assignment, submissions: Sequence[ComparedSubmission]) -> NumberSimilarity:
-    """Compare the entered values of a class, each against the variant that was drawn."""
+    """Compare the entered values of a class, each with the variant that was drawn."""
     count = len(submissions)
     chance, equal, compared = np.zeros((count, count)), np.zeros((count, count)), np.zeros((count, count))
     having = [k for k, each in enumerate(submissions) if len(each.numbers) >= LEAST_EQUAL]
@@ -108,7 +108,7 @@ def compare_numbers(assignment: Assignment, submissions: Sequence[ComparedSubmis
         key = int(i), chosen.tobytes()
         if key not in known:
             known[key] = _chance(table, int(i), chosen)
-        # Whoever copied, the values came from one of both drawings.
+        # Whichever student copied, the values belong to one of the two drawings.
         a, b = having[i], having[j]
         chance[a, b] = chance[b, a] = min(chance[a, b], known[key] + choices[i, j])
     where = np.ix_(having, having)
@@ -117,10 +117,10 @@ def compare_numbers(assignment: Assignment, submissions: Sequence[ComparedSubmis
 
 
 def _counted(table: _Table, single: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """What every two students have in common, arrays (students, students).
+    """Counts for every two students, arrays (students, students).
 
-    Usable values of the first that the second has, too; telling ones of them; the log of their chances,
-    each taken by itself; and all values that both have.
+    The usable values of the first that the second has, too; the telling ones of them; the sum of the logs
+    of their single chances; the number of values that both have.
     """
     count = len(table.entered)
     same, telling, alone = (np.zeros((count, count)) for _ in range(3))
@@ -135,7 +135,7 @@ def _counted(table: _Table, single: FloatArray) -> tuple[FloatArray, FloatArray,
 
 
 def _choices(both: FloatArray, equal: FloatArray) -> FloatArray:
-    """Log of the number of ways in which so many of the values can be the equal ones."""
+    """Log of the number of combinations in which so many of the values can be the equal ones."""
     return np.asarray(gammaln(both + 1.0) - gammaln(equal + 1.0) - gammaln(both - equal + 1.0))
 
 
@@ -160,18 +160,18 @@ def _table(assignment: Assignment, submissions: Sequence[ComparedSubmission]) ->
     turns = np.where(size >= LEAST_MM, turns, np.nan)
     known_mm, known_deg = _grain(lengths), _grain(turns)
     grain = np.concatenate([known_mm * np.ones_like(size), np.radians(known_deg) * size], axis=1)
-    off_mm = np.concatenate([lengths - size, np.radians(off) * size], axis=1)
+    residual_mm = np.concatenate([lengths - size, np.radians(off) * size], axis=1)
     by_act = np.concatenate([acts.real, acts.imag], axis=1)
     spread = _spread(by_act, grain)
     excused = np.tile([[name in each.excused for name in names] for each in submissions], 2)
     entered = np.concatenate([lengths, turns], axis=1)
     with np.errstate(invalid="ignore"):
-        usable = np.isfinite(entered) & (np.abs(off_mm) < GROSS * spread) & ~excused
+        usable = np.isfinite(entered) & (np.abs(residual_mm) < GROSS * spread) & ~excused
         count = np.isfinite(entered).sum(axis=1, keepdims=True)
         usable &= usable.sum(axis=1, keepdims=True) >= OWN_SHARE * count
-        off_mm = off_mm - _common(np.where(usable, off_mm, np.nan), variants)
-        telling = usable & (np.abs(off_mm) > 0.5 * grain + ROUNDED_MM)
-    return _Table(entered, usable, telling, off_mm, grain, by_act)
+        residual_mm = residual_mm - _common(np.where(usable, residual_mm, np.nan), variants)
+        telling = usable & (np.abs(residual_mm) > 0.5 * grain + ROUNDED_MM)
+    return _Table(entered, usable, telling, residual_mm, grain, by_act)
 
 
 def _spread(by_act: FloatArray, grain_mm: FloatArray) -> FloatArray:
@@ -182,14 +182,14 @@ def _spread(by_act: FloatArray, grain_mm: FloatArray) -> FloatArray:
 def _exact(
     assignment: Assignment, submissions: Sequence[ComparedSubmission], variants: list[Variant]
 ) -> tuple[dict[str, ComplexArray], dict[str, ComplexArray]]:
-    """Exact vectors (students,) in mm, and what usual errors of all acts add to them (students, acts)."""
+    """Exact vectors (students,) in mm, and their shifts by usual errors of all acts (students, acts)."""
     plan = exact_plan(assignment, variants, scales_used(assignment, submissions, variants))
     vectors = {
         name: np.broadcast_to(plan.drawn_mm(name), len(submissions)) for name in plan.construction.vectors
     }
     changes: dict[str, list[ComplexArray]] = {name: [] for name in vectors}
     for step in plan.construction.steps:
-        errors = hand_errors(step, USUAL)
+        errors = step_errors(step, USUAL)
         if not errors:
             continue
         nodes = evaluate(plan.construction, plan.drawing.parameters, errors=errors)
@@ -204,18 +204,18 @@ def _exact(
     return vectors, {name: np.nan_to_num(np.concatenate(parts, axis=1)) for name, parts in changes.items()}
 
 
-def _common(off_mm: FloatArray, variants: Sequence[Variant]) -> FloatArray:
-    """(students, fields) the mean of what those of the same variant are off, where they are many enough.
+def _common(residual_mm: FloatArray, variants: Sequence[Variant]) -> FloatArray:
+    """(students, fields) mean residual of those with the same variant, where they are many enough.
 
-    A protractor or a rounded table that all have makes all values wrong alike. Not the median: of values
-    in whole millimetres it is one of them.
+    A protractor or a rounded table that all share gives all values the same error. A median of values in
+    whole millimetres would be one of them.
     """
-    common = np.zeros_like(off_mm)
+    common = np.zeros_like(residual_mm)
     for variant in set(variants):
         same = np.array([each == variant for each in variants])
-        known = np.isfinite(off_mm[same])
+        known = np.isfinite(residual_mm[same])
         count = known.sum(axis=0)
-        mean = np.where(known, off_mm[same], 0.0).sum(axis=0) / np.maximum(count, 1)
+        mean = np.where(known, residual_mm[same], 0.0).sum(axis=0) / np.maximum(count, 1)
         common[same] = np.where(count >= LEAST_CLASS, mean, 0.0)
     return common
 
@@ -235,20 +235,19 @@ def _grain(values: FloatArray) -> FloatArray:
 
 
 def _single(table: _Table) -> FloatArray:
-    """Log chance of each value by itself: an upper bound of the evidence, roughly, and quick."""
+    """Log chance of each value by itself: roughly an upper bound of the evidence, quickly computed."""
     spread = _spread(table.by_act, table.grain_mm)
     with np.errstate(divide="ignore", invalid="ignore"):
-        log = np.log(table.grain_mm / spread / np.sqrt(2.0 * np.pi)) - 0.5 * (table.off_mm / spread) ** 2
+        log = np.log(table.grain_mm / spread / np.sqrt(2.0 * np.pi)) - 0.5 * (table.residual_mm / spread) ** 2
     return np.asarray(np.nan_to_num(np.minimum(log, 0.0)))
 
 
 def _chance(table: _Table, student: int, chosen: np.ndarray) -> float:
-    """Log of the chance that an independent student comes to these values of one who drew the same variant.
+    """Log of the chance that an independent student with the same variant has these values.
 
-    The density of all the values together times their steps; of the hands, better or worse than usual,
-    the one that makes it likeliest.
+    The density of all the values together times their steps, at the likeliest size of drafting errors.
     """
-    acts, off = table.by_act[student][chosen], table.off_mm[student][chosen]
+    acts, off = table.by_act[student][chosen], table.residual_mm[student][chosen]
     grain = table.grain_mm[student][chosen]
     best = -np.inf
     for skill in SKILLS:

@@ -1,4 +1,4 @@
-"""What the comparison of students uses of their submissions: nodes, entered values, scales."""
+"""The data of submissions that are compared between students: nodes, entered values, scales."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,9 +17,9 @@ Nodes = Mapping[str, Mapping[str, complex]]
 """By figure and name, x - i y in sheet millimetres."""
 UNKNOWN = complex(np.nan, np.nan)
 FITS_MM = 2.0
-"""Root mean square distance from the exact figures up to which a drawing may be of that variant,"""
+"""RMS distance (mm) from a variant's exact figures up to which a drawing may be of that variant."""
 FITS_BETTER = 0.5
-"""and how many times nearer than to those of the own one it must be."""
+"""Largest ratio of that distance to the one from the student's own variant."""
 LEAST_NODES = 6
 """A drawing of fewer nodes is not compared with other variants."""
 USUAL = Skill(angle_deg=0.3, place_mm=0.3, mark_mm=0.15)
@@ -36,8 +36,8 @@ class ComparedSubmission:
     numbers : entered lengths (mm), ``NAME_deg`` directions and ``NAME_value`` SI values
     used : scales used for marking, real units per millimetre; empty where marking came to none
     fits : the variant that diagnosis says was drawn instead, with its confidence, or None
-    printed : whether it is drawn on printed answer sheets, that say where poles are best put
-    excused : nodes and vectors at which a mistake was named: what is off there is no hand's error
+    printed : whether it is drawn on printed answer sheets, which have a cross for each pole
+    excused : nodes and vectors at which a mistake was named: residuals there are no drafting errors
     """
 
     student_id: str
@@ -58,7 +58,7 @@ class ComparedSubmission:
 def compared_submission(
     report: ReportDocument, variant: Variant, measured: Measurements | None
 ) -> ComparedSubmission:
-    """A submission that was marked."""
+    """The data of a marked submission."""
     return ComparedSubmission(
         student_id=report.student_id,
         variant=variant,
@@ -81,7 +81,7 @@ def compared_submission(
 
 
 def _fits(variant: Variant, report: ReportDocument) -> tuple[Variant, float] | None:
-    """The other variant that diagnosis names."""
+    """The other variant that the diagnosis names, and its confidence; None without one."""
     for mistake in report.mistakes:
         if mistake.code == "other_variant":
             named = dict(part.split(" = ", 1) for part in mistake.detail.split(", ") if " = " in part)
@@ -113,7 +113,7 @@ class Drawn:
 def drawn_of(
     submissions: Sequence[ComparedSubmission], nodes: Mapping[str, Sequence[str]]
 ) -> dict[str, Drawn]:
-    """Each figure's nodes, of the sheet that shows most of them; a student may hand in two sketches."""
+    """Each figure's nodes from the sheet with most of them; a student may hand in two sketches."""
     drawn = {}
     for figure, names in nodes.items():
         chosen = [_fullest(each, figure) for each in submissions]

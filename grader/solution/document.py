@@ -16,6 +16,8 @@ from reference.kinematics.motion import Motion
 from reference.mechanism import Crank, Mechanism
 from reference.plan import Plan, conditioning
 
+# Centres and poles --------------------------------------------------------------------------------
+
 NO_TURN = 1e-12
 """A link that turns so slowly, over the mechanism's reach and relative to its largest speed, does not."""
 
@@ -31,9 +33,9 @@ def instantaneous_centres(
     fields = {link: _spin(motion, joint, motion.omega[link]) for link, joint in joints.items()}
     still = (np.zeros(1, dtype=np.complex128), np.zeros(1))
     least = NO_TURN * _largest(motion.velocity) / _largest(motion.position)
-    centres = {f"I{link}": _alike(field, still, least) for link, field in fields.items()}
+    centres = {f"I{link}": _common_point(field, still, least) for link, field in fields.items()}
     for first, second in combinations(fields, 2):
-        centres[f"I{first}{second}"] = _alike(fields[first], fields[second], least)
+        centres[f"I{first}{second}"] = _common_point(fields[first], fields[second], least)
     return centres
 
 
@@ -67,7 +69,7 @@ def _spin(motion: Motion, joint: str, omega: FloatArray) -> tuple[ComplexArray, 
     return np.asarray(velocity - 1j * omega * at), omega
 
 
-def _alike(
+def _common_point(
     first: tuple[ComplexArray, FloatArray], second: tuple[ComplexArray, FloatArray], least: FloatArray
 ) -> ComplexArray:
     return _divided(second[0] - first[0], np.asarray(1j * (first[1] - second[1])), least)
@@ -77,6 +79,8 @@ def _divided(over: ComplexArray, under: ComplexArray, least: FloatArray) -> Comp
     with np.errstate(all="ignore"):
         return np.where(np.abs(under) > least, over / under, np.nan)
 
+
+# The document -------------------------------------------------------------------------------------
 
 UNITS = {"kv": "m/s", "ka": "m/s^2"}
 
@@ -147,29 +151,24 @@ def _document(assignment: Assignment, plan: Plan, columns: _Columns, index: int)
                 value=value[name],
                 unit=UNITS[vector.scale],
                 drawn_mm=drawn[name],
-                direction_deg=_known(direction[name]),
+                direction_deg=None if math.isnan(direction[name]) else direction[name],
             )
             for name, vector in plan.construction.vectors.items()
         },
         nodes_mm={figure: points(figure) for figure in plan.construction.poles},
         angular=numbers("rate"),
-        centres_m={name: _known_point(place) for name, place in points("centres").items()},
+        centres_m={
+            name: point if all(map(math.isfinite, point)) else None
+            for name, point in points("centres").items()
+        },
         conditioning=_grouped(numbers("conditioning")),
     )
 
 
 def _centres(plan: Plan) -> dict[str, ComplexArray]:
-    found = (plan.mechanism, plan.construction, plan.motion)
-    poles = acceleration_poles(*found) if plan.motion.acceleration else {}
-    return {**instantaneous_centres(*found), **poles}
-
-
-def _known_point(place: tuple[float, float]) -> tuple[float, float] | None:
-    return place if all(map(math.isfinite, place)) else None
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
+    of_plan = (plan.mechanism, plan.construction, plan.motion)
+    poles = acceleration_poles(*of_plan) if plan.motion.acceleration else {}
+    return {**instantaneous_centres(*of_plan), **poles}
 
 
 def _grouped(values: Mapping[str, float]) -> dict[str, float | dict[str, float]]:

@@ -46,6 +46,8 @@ from reference.drawing.canvas import (
 from reference.drawing.sheets import figures_of
 from reference.drawing.subject import DrawnFigure, Subject
 
+# Shapes on a PDF page -----------------------------------------------------------------------------
+
 
 def pdf(sheets: Sequence[Sequence[Shape]], title: str, page_mm: tuple[float, float] = A3_MM) -> bytes:
     """The sheets as the pages of a PDF document; `page_mm` is their width and height."""
@@ -131,6 +133,8 @@ def _pen(canvas: Canvas, width_mm: float, colour: str, dash: tuple[float, ...] =
     canvas.setLineWidth(width_mm)
     canvas.setStrokeColor(ink(colour))
 
+
+# Steps with their pictures ------------------------------------------------------------------------
 
 MARGIN_MM = 2.5
 LEAST_PICTURE_MM = (40.0, 12.0)
@@ -223,6 +227,9 @@ def _box(shapes: Sequence[Shape]) -> Bounds:
     return (left - across, top - down, right + across, bottom + down)
 
 
+# As HTML ------------------------------------------------------------------------------------------
+
+
 @cache
 def _environment() -> Environment:
     return Environment(
@@ -243,6 +250,9 @@ def html_page(subject: Subject, tongue: Tongue) -> str:
             chapters=chapters(subject, tongue),
         )
     )
+
+
+# As PDF -------------------------------------------------------------------------------------------
 
 
 class _Drawn(Flowable):  # type: ignore[misc]  # reportlab has no types

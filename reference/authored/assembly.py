@@ -256,8 +256,8 @@ def _link_point(
             side: int | FloatArray = SIDES[table.side or "left"]
             shape = _shape(np.abs(base), first, second, SIDES[table.side or "left"])
             if table.side is None and np.any(shape.imag != 0.0):
-                told = f"{node} may lie to the left or to the right of {p} -> {q}; say which: side"
-                raise FormulaError(f"side of {node} is missing: {told}")
+                detail = f"{node} may lie to the left or to the right of {p} -> {q}; say which: side"
+                raise FormulaError(f"side of {node} is missing: {detail}")
         case _:
             local = numbers.point(table.at)
             shape = np.asarray(local / np.abs(base))

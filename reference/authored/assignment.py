@@ -132,12 +132,12 @@ class Variant:
     position: int | None = None
 
     def __str__(self) -> str:
-        told = [
+        parts = [
             f"{name} = {value}"
             for name, value in (("n", self.n), ("position", self.position))
             if value is not None
         ]
-        return ", ".join(told) or "the only variant"
+        return ", ".join(parts) or "the only variant"
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,11 +177,13 @@ class Assignment:
             if allowed is None:
                 chosen[name] = None
                 continue
-            told = f"{name} from {allowed.first} to {allowed.last}"
+            allowed_range = f"{name} from {allowed.first} to {allowed.last}"
             if given is None:
-                raise CallError(f"{name}_needed", f"assignment {self.id} needs --{name} ({told})")
+                raise CallError(f"{name}_needed", f"assignment {self.id} needs --{name} ({allowed_range})")
             if given not in allowed.values:
-                raise CallError(f"{name}_range", f"{name} = {given}: assignment {self.id} has {told}")
+                raise CallError(
+                    f"{name}_range", f"{name} = {given}: assignment {self.id} has {allowed_range}"
+                )
             chosen[name] = given
         return Variant(**chosen)
 
@@ -236,6 +238,8 @@ def _speeds(driver: Driver) -> dict[str, Value]:
         return {"omega": np.abs(driver.omega), "crank_m": driver.length_m}
     return {"speed": np.abs(driver.speed)}
 
+
+# Files ---------------------------------------------------------------------------------------------
 
 SUFFIXES = {"assignment": ".assignment.toml", "mechanism": ".mechanism.toml", "rubric": ".rubric.toml"}
 

@@ -224,6 +224,9 @@ class MechanismFile(Authored):
         return cast("CrankTable | DrivenSliderTable", self.crank or self.driven_slider)
 
 
+# Checks of joints and links ------------------------------------------------------------------------
+
+
 Keyed = Iterator[tuple[str, str]]
 """A key of the group's table, and the joint that stands there."""
 
@@ -239,7 +242,7 @@ class _CarriedJoints:
         self.moments: dict[str, str] = {}
         """Points that lie under a slider at this instant only, and their links."""
 
-    def one_with(self, joints: set[str]) -> str | None:
+    def body_of(self, joints: set[str]) -> str | None:
         """The body that carries all these joints, in words; the ground is one."""
         link = next((link for link, held in self.links.items() if joints <= held), None)
         return "the ground" if joints <= self.ground else link and f"link {link}"
@@ -248,15 +251,15 @@ class _CarriedJoints:
         """The moving link that carries all these joints."""
         return next((link for link, held in self.links.items() if set(joints) <= held), None)
 
-    def told_of(self, joints: list[str]) -> str:
+    def carriers_of(self, joints: list[str]) -> str:
         """Which links carry each joint."""
-        told = []
+        detail = []
         for joint in joints:
             links = [link for link, held in self.links.items() if joint in held]
             on = f"link {', '.join(links)}" if links else "no link"
             momentary = f"link {self.moments.get(joint)} for this instant only"
-            told.append(f"{joint} is on {momentary if joint in self.moments else on}")
-        return f" ({'; '.join(told)})"
+            detail.append(f"{joint} is on {momentary if joint in self.moments else on}")
+        return f" ({'; '.join(detail)})"
 
 
 def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
@@ -277,14 +280,14 @@ def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
         where = f"$.group[{index}]"
         for key, joint in _needed(group):
             if joint in later and joint not in placed:
-                told = f"{joint} is placed further down: groups stand in the order in which they assemble"
-                yield Finding(f"{where}.{key}", told)
+                detail = f"{joint} is placed further down: groups stand in the order in which they assemble"
+                yield Finding(f"{where}.{key}", detail)
             elif joint not in placed:
                 yield Finding(f"{where}.{key}", _unknown(joint, placed, "placed above"))
         for key, joint in _added(group):
             if joint in placed:
-                told = f"{joint} has a place already: over-constrained; a group places a new joint"
-                yield Finding(f"{where}.{key}", told)
+                detail = f"{joint} has a place already: over-constrained; a group places a new joint"
+                yield Finding(f"{where}.{key}", detail)
             placed.add(joint)
             later.remove(joint)
         yield from _check_hinges(group, bodies, where)
@@ -297,8 +300,8 @@ def _check_hinges(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> I
     hinges = {joint for key, joint in _needed(group) if key.startswith(("pin", "pivot"))}
     for joint in sorted(hinges & bodies.moments.keys()):
         link = bodies.moments[joint]
-        told = f'hinge it to a fixed point of the link, a group of type = "point" on link {link}'
-        yield Finding(where, f"{joint} is a point of link {link} for this instant only: {told}")
+        detail = f'hinge it to a fixed point of the link, a group of type = "point" on link {link}'
+        yield Finding(where, f"{joint} is a point of link {link} for this instant only: {detail}")
     moving = [set(guide.joints) for _, guide in _guides(group) if guide.joints]
     match group:
         case CrossSliderTable():
@@ -307,28 +310,28 @@ def _check_hinges(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> I
             hinges |= moving[0] if moving else set()
     # A single hinge beside a fixed guide moves unless it is itself on the ground.
     alone = len(hinges) == 1 and not hinges <= bodies.ground
-    body = bodies.one_with(hinges) if hinges and not alone else None
+    body = bodies.body_of(hinges) if hinges and not alone else None
     if body is not None:
-        told = f"what it is hinged to and slides on is all on {body}: nothing moves between"
-        yield Finding(where, f'{told}; a further point of a link is a group of type = "plate" or "point"')
+        detail = f"what it is hinged to and slides on is all on {body}: nothing moves between"
+        yield Finding(where, f'{detail}; a further point of a link is a group of type = "plate" or "point"')
 
 
 def _check_names(joints: set[str]) -> Iterator[Finding]:
-    yield from _read_alike(joints)
+    yield from _ambiguous_names(joints)
     lower = [joint.lower() for joint in joints]
     for joint in sorted(joints):
         if lower.count(joint.lower()) > 1:
             yield Finding("$", f"joint {joint}: another one has the same letters in another case")
 
 
-def _read_alike(joints: set[str]) -> Iterator[Finding]:
+def _ambiguous_names(joints: set[str]) -> Iterator[Finding]:
     """Names that run together: v_BA is B about A, so no third joint may be called BA."""
     read_as: dict[str, tuple[str, ...]] = {joint: (joint,) for joint in sorted(joints)}
     for first, second in permutations(sorted(joints), 2):
         other = read_as.setdefault(first + second, (first, second))
         if other != (first, second):
-            told = f"{first + second} would mean both {' about '.join(other)} and {first} about {second}"
-            yield Finding("$", f"joints {', '.join(sorted({*other, first, second}))}: {told}; rename one")
+            detail = f"{first + second} would mean both {' about '.join(other)} and {first} about {second}"
+            yield Finding("$", f"joints {', '.join(sorted({*other, first, second}))}: {detail}; rename one")
 
 
 def _guides(group: AnyGroupTable) -> list[tuple[str, GuideTable]]:
@@ -368,8 +371,8 @@ def _check_links(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> It
     """New links have new names; bases and moving guides are carried by one link."""
     for key, guide in _guides(group):
         if guide.joints and (guide.joints[0] == guide.joints[1] or bodies.of(guide.joints) is None):
-            told = f"{guide.joints[0]} and {guide.joints[1]} must be two joints of one moving link"
-            yield Finding(f"{where}.{key}.joints", told + bodies.told_of(guide.joints))
+            detail = f"{guide.joints[0]} and {guide.joints[1]} must be two joints of one moving link"
+            yield Finding(f"{where}.{key}.joints", detail + bodies.carriers_of(guide.joints))
         elif guide.joints and guide.coincident:
             bodies.moments[guide.coincident] = bodies.of(guide.joints) or ""
     match group:
@@ -389,8 +392,8 @@ def _check_links(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> It
             bodies.moments[group.node] = group.link
         case CrossSliderTable(guides=(first, second)):
             if not first.joints and not second.joints:
-                told = "two fixed guides cross in a fixed point: one of them must be on a moving link"
-                yield Finding(f"{where}.guides", told)
+                detail = "two fixed guides cross in a fixed point: one of them must be on a moving link"
+                yield Finding(f"{where}.guides", detail)
         case PlateTable() | PointOnLineTable() | PointTable():
             yield from _check_base(group, bodies, f"{where}.base")
 
@@ -401,14 +404,14 @@ def _check_base(
     held = bodies.links.setdefault(group.link, set())
     on_slot = isinstance(group, PointTable) and set(group.base) == bodies.slots.get(group.link)
     if group.base[0] == group.base[1] or not (on_slot or set(group.base) <= held):
-        told = ", ".join(sorted(held)) or "no joints yet"
+        detail = ", ".join(sorted(held)) or "no joints yet"
         advice = ""
         if group.link in bodies.slots:
             pivot_and_node = ", ".join(
-                sorted(bodies.slots[group.link], key=lambda one: one in bodies.moments)
+                sorted(bodies.slots[group.link], key=lambda joint: joint in bodies.moments)
             )
             advice = f'; points of a slotted link are given by type = "point" from {pivot_and_node}'
-        yield Finding(where, f"must be two joints of link {group.link} ({told}){advice}")
+        yield Finding(where, f"must be two joints of link {group.link} ({detail}){advice}")
     elif on_slot and group.base[0] not in held:
         yield Finding(where, "the pivot comes first, then the slotted link's node")
     held.add(group.node)

@@ -252,6 +252,13 @@ def rates_of(draft: Draft, link: str, about: str, joints: tuple[str, str]) -> No
         draft.rates.setdefault(name, AngularRate(name, vector, joints, pair(*joints)))
 
 
+# The whole construction ---------------------------------------------------------------------------
+
+CACHED = 256
+"""Constructions in the cache: all variants have the same one, and so has the same mechanism again."""
+_cache: dict[Hashable, Construction] = {}
+
+
 def construction_of(
     mechanism: Mechanism, *, accelerations: bool = True, plate_by_similarity: bool = False
 ) -> Construction:
@@ -271,13 +278,8 @@ def construction_of(
     return _cache[form]
 
 
-CACHED = 256
-"""Constructions in the cache: all variants have the same, and so has the same mechanism again."""
-_cache: dict[Hashable, Construction] = {}
-
-
 def _form_of(mechanism: Mechanism) -> Hashable:
-    """All that the construction depends on: names, kinds, sides, and which points are in line."""
+    """Everything that the construction depends on: names, kinds, sides, and which points are in line."""
     in_line = tuple(
         (group.is_ever_flat, group.line_ratio is None)
         for group in mechanism.groups

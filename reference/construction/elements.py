@@ -15,7 +15,7 @@ from reference.geometry import ComplexArray, FloatArray
 
 Parameters = Mapping[str, FloatArray]
 """Real lengths (m) by the pair of joints (``"O1A"``), crank data and the scales kL, kv, ka; see
-`reference.construction.derive.parameters_of`."""
+`reference.construction.graph.parameters_of`."""
 Nodes = Mapping[str, ComplexArray]
 Errors = Mapping[tuple[str, int, str], FloatArray]
 """Errors of drawing, by (node, which of the step's lines or lengths, kind); kinds are ``angle`` (radians, of

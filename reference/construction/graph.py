@@ -6,10 +6,10 @@ its pole). It is data, a directed acyclic graph, and one evaluator answers every
 
 - the exact plan: `evaluate(construction, parameters)`, every node an array over variants;
 - follow-through: the same with the student's nodes in `given` instead of the computed ones;
-- a mistake: the same with a changed step or parameter (`reference.construction.graph.mistakes`);
+- a mistake: the same with a changed step or parameter (`reference.construction.mistakes`);
 - a diagnosis: the same step by step beside what was drawn (`reference.replay.replay`);
 - a tolerance: the same with `errors` on lines, lengths and arcs; its derivative is the propagated
-  drafting error (`reference.construction.graph.uncertainty`);
+  drafting error (`reference.construction.uncertainty`);
 - only what is needed: `wanted` names the nodes asked for, ancestors alone are evaluated.
 """
 

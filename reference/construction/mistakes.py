@@ -1,8 +1,7 @@
-"""Mistakes as operators on the construction: one step or parameter changed, the rest followed through.
+"""Mistakes as operators on the construction: one step or parameter changed, the rest follows from it.
 
-A mistake is data; `commit` makes of a drawing the drawing with that mistake in it. The reader of
-scans uses them as hypotheses, diagnosis as explanations, the simulated student commits them. The
-codes are those of the published contract.
+A mistake is data; `commit` gives the drawing with that mistake in it. The reading uses mistakes as
+hypotheses, the diagnosis as explanations. Their codes are part of the published formats.
 """
 
 import math
@@ -152,7 +151,7 @@ def _quarter(along: Direction, quarters: int) -> Direction:
 
 
 def _with_speed(parameters: Parameters, factor: float) -> Parameters:
-    """All that follows from another crank speed: v by the factor, a by its square."""
+    """The parameters at another crank speed: v by the factor, a by its square."""
     powers = {"v": 1, "a": 2}
     speeds = {
         name: np.asarray(value * factor ** powers[name[0]])
@@ -186,14 +185,15 @@ def _with_figure_turned(construction: Construction, figure: str, quarters: int) 
 
     figures = {
         name: tuple(
-            turned(step) if name == figure else _seen_turned(step, figure, quarters) for step in steps
+            turned(step) if name == figure else _coriolis_of_turned_plan(step, figure, quarters)
+            for step in steps
         )
         for name, steps in construction.figures.items()
     }
     return replace(construction, figures=figures)
 
 
-def _seen_turned(step: Step, figure: str, quarters: int) -> Step:
+def _coriolis_of_turned_plan(step: Step, figure: str, quarters: int) -> Step:
     """A Coriolis component is computed from lengths and senses: a turned velocity plan gives the same."""
     if figure == "velocity_plan" and isinstance(step, Given) and isinstance(step.length, Coriolis):
         return replace(step, length=replace(step.length, quarters=step.length.quarters + quarters))

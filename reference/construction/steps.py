@@ -36,7 +36,7 @@ class Step(Protocol):
         """The nodes it is made from."""
 
     def place(self, view: View) -> ComplexArray:
-        """Where the node lies, millimetres."""
+        """The position of the node, complex millimetres."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,9 @@
-"""How far a hand may miss each node: the derivative of the one construction by the hand's errors.
+"""Propagated drafting errors: the derivative of the construction by the error of each act of drawing.
 
-Each act of drawing (a line set along a direction, a length transferred, a point marked) has an error
-of its own. One evaluation on arrays, an element for each act, tells how each error moves each node;
-they are independent, so that a vector's variance is the sum of their squares. The same evaluation
-with a student's own nodes in place of computed ones tells what follows from these, and how far the
-later acts alone may miss it.
+Each act (a line set along a direction, a length transferred, a point marked) has an independent error.
+One evaluation on arrays, an element for each act, gives how each error moves each node; a vector's
+variance is the sum of the squares. The same evaluation with a student's own nodes in place of computed
+ones gives what follows from these, with the errors of the later acts alone.
 """
 
 from collections.abc import Mapping
@@ -90,10 +89,10 @@ def acts(construction: Construction) -> tuple[Act, ...]:
     return tuple((step.node, slot, kind) for step in construction.steps for slot, kind in acts_of(step))
 
 
-def hand_errors(step: Step, skill: Skill) -> Errors:
-    """The errors of one step's acts, arrays (acts + 1, 1): none in the first row, then one in each.
+def step_errors(step: Step, skill: Skill) -> Errors:
+    """The errors of one step's acts, arrays (acts + 1, 1): none in the first row, then one in each row.
 
-    They are as small as `SMALL` says, in standard deviations.
+    Each is `SMALL` standard deviations.
     """
     own = acts_of(step)
     rows = SMALL * np.eye(len(own), 1 + len(own), 1)[:, :, None]
@@ -105,30 +104,30 @@ def hand_errors(step: Step, skill: Skill) -> Errors:
 
 @dataclass(frozen=True, slots=True)
 class OwnNode:
-    """A node as a student has drawn it, or as measurements lead to it.
+    """A node as a student has drawn it, or as measurements give it.
 
     Attributes
     ----------
     at : complex millimetres
-    moved : (r,) how it is moved by one standard deviation of each error of measuring; None without any
+    shifts : (r,) how one standard deviation of each error of measuring moves it; None without any
     """
 
     at: complex
-    moved: ComplexArray | None = None
+    shifts: ComplexArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class TracedNode:
-    """A node with all that may move it.
+    """A node with its derivative by all errors.
 
     Attributes
     ----------
     at : complex millimetres
-    moved : (m,) by one standard deviation of each error of the hand, then of each of measuring
+    shifts : (m,) by one standard deviation of each drafting error, then of each error of measuring
     """
 
     at: complex
-    moved: ComplexArray
+    shifts: ComplexArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,21 +145,21 @@ class TracedDrawing:
     Attributes
     ----------
     made : each node as its step makes it from the nodes before it, own ones where they are known
-    nodes : each node as it is: the own one where it is known, else as made
-    hand : how many of the errors that may move them are the hand's; those of measuring come after
+    nodes : the own node where it is known, else as made
+    drafting_count : how many of the errors are drafting errors; those of measuring come after them
     """
 
     made: Mapping[str, TracedNode]
     nodes: Mapping[str, TracedNode]
-    hand: int
+    drafting_count: int
 
     def vector(self, tail: str, head: str) -> complex:
-        """What the step of `head` makes of a vector."""
+        """The vector to `head` as the step of `head` makes it, complex mm."""
         return self.made[head].at - self.nodes[tail].at
 
-    def moved(self, tail: str, head: str) -> ComplexArray:
-        """How its end is moved, by one standard deviation of each error."""
-        return np.asarray(self.made[head].moved - self.nodes[tail].moved)
+    def shifts(self, tail: str, head: str) -> ComplexArray:
+        """How one standard deviation of each error moves the vector's end, complex mm."""
+        return np.asarray(self.made[head].shifts - self.nodes[tail].shifts)
 
 
 NO_OWN: Mapping[str, Mapping[str, OwnNode]] = {}
@@ -172,7 +171,7 @@ def trace(
     skill: Skill,
     own: Mapping[str, Mapping[str, OwnNode]] = NO_OWN,
 ) -> TracedDrawing:
-    """Draw a construction with a hand's errors, from a student's own nodes where they are known.
+    """Draw a construction with drafting errors, from a student's own nodes where they are known.
 
     Arguments
     ---------
@@ -180,18 +179,18 @@ def trace(
     own : the student's nodes as each figure is drawn from them, by figure and node: with two sheets the
         second has a sketch of its own
 
-    A node that has no place is nan; what an error moves to no place is taken as not moved by it.
+    A node without a solution is nan; an error that leaves no solution counts as no shift.
     """
     drawing = _Tracing(construction, parameters, skill, own)
     with np.errstate(all="ignore"):
         for figure, steps in construction.figures.items():
             drawing.trace(figure, steps)
-    made = {name: drawing.told(place) for name, place in drawing.made.items()}
+    made = {name: drawing.as_traced(place) for name, place in drawing.made.items()}
     nodes = {
-        name: made[name] if place is drawing.made[name] else drawing.told(place)
+        name: made[name] if place is drawing.made[name] else drawing.as_traced(place)
         for name, place in drawing.nodes.items()
     }
-    return TracedDrawing(made, nodes, drawing.hand)
+    return TracedDrawing(made, nodes, drawing.drafting_count)
 
 
 @dataclass(slots=True)
@@ -203,51 +202,51 @@ class _Tracing:
     skill: Skill
     own: Mapping[str, Mapping[str, OwnNode]]
     errors: Errors = field(init=False)
-    hand: int = field(init=False)
-    measuring: int = field(init=False)
+    drafting_count: int = field(init=False)
+    measuring_count: int = field(init=False)
     made: dict[str, ComplexArray] = field(default_factory=dict)
     nodes: dict[str, ComplexArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         every = acts(self.construction)
         counts = (
-            len(one.moved) for nodes in self.own.values() for one in nodes.values() if one.moved is not None
+            len(one.shifts) for nodes in self.own.values() for one in nodes.values() if one.shifts is not None
         )
-        self.hand, self.measuring = len(every), max(counts, default=0)
-        rows = SMALL * np.eye(self.hand, 1 + self.hand + self.measuring, 1)
+        self.drafting_count, self.measuring_count = len(every), max(counts, default=0)
+        rows = SMALL * np.eye(self.drafting_count, 1 + self.drafting_count + self.measuring_count, 1)
         self.errors = {act: row * self.skill.deviation(act[2]) for act, row in zip(every, rows, strict=True)}
 
     def trace(self, figure: str, steps: tuple[Step, ...]) -> None:
-        """One figure, from the own nodes as it was drawn from them."""
+        """Trace one figure, from the own nodes that belong to it."""
         own = {name: self.placed(one) for name, one in self.own.get(figure, {}).items()}
         view = View({**self.nodes, **own}, self.parameters, self.errors)
-        seen: dict[str, ComplexArray] = view.nodes  # type: ignore[assignment]
+        known: dict[str, ComplexArray] = view.nodes  # type: ignore[assignment]
         for step in steps:
             node = step.node
             mark = view.error(node, 0, "x") + 1j * view.error(node, 0, "y")
             self.made[node] = np.asarray(step.place(view) + mark)
-            seen[node] = self.nodes[node] = own.get(node, self.made[node])
+            known[node] = self.nodes[node] = own.get(node, self.made[node])
 
     def placed(self, one: OwnNode) -> ComplexArray:
-        """An own node, with its errors of measuring."""
-        place = np.full(1 + self.hand + self.measuring, one.at)
-        if one.moved is not None:
-            place[1 + self.hand : 1 + self.hand + len(one.moved)] += SMALL * one.moved
+        """An own node as an array over the errors."""
+        place = np.full(1 + self.drafting_count + self.measuring_count, one.at)
+        if one.shifts is not None:
+            place[1 + self.drafting_count : 1 + self.drafting_count + len(one.shifts)] += SMALL * one.shifts
         return place
 
-    def told(self, place: ComplexArray) -> TracedNode:
-        """A node's place without errors, and how each moves it."""
-        moved = (place[1:] - place[0]) / SMALL
-        return TracedNode(complex(place[0]), np.where(np.isfinite(moved), moved, 0.0))
+    def as_traced(self, place: ComplexArray) -> TracedNode:
+        """A node's position without errors, and its shift by each of them."""
+        shifts = (place[1:] - place[0]) / SMALL
+        return TracedNode(complex(place[0]), np.where(np.isfinite(shifts), shifts, 0.0))
 
 
-def spread(moved: ComplexArray, along: complex) -> EndSpread:
-    """The standard deviations of an end that independent errors move, about a vector's direction.
+def spread(shifts: ComplexArray, along: complex) -> EndSpread:
+    """The standard deviations of a vector's end along the vector and across it, from independent errors.
 
-    Arguments: `along` is the vector; for a zero vector both are what the end is off in any direction.
+    Arguments: `along` is the vector; for a zero vector both are the root of the sum over both axes.
     """
     if along == 0.0:
-        whole = float(np.sqrt(np.sum(np.abs(moved) ** 2)))
+        whole = float(np.sqrt(np.sum(np.abs(shifts) ** 2)))
         return EndSpread(whole, whole)
-    turned = moved * np.conj(along / abs(along))
+    turned = shifts * np.conj(along / abs(along))
     return EndSpread(float(np.sqrt(np.sum(turned.real**2))), float(np.sqrt(np.sum(turned.imag**2))))

@@ -15,7 +15,7 @@ INDEX_SIZE = 0.7
 RISES = {-1: -0.26, 0: 0.0, 1: 0.44}
 """How far a piece is raised, in sizes of its line."""
 ASCENT, DESCENT = 0.76, 0.24
-KEPT = 4096
+CACHE_SIZE = 4096
 _DESCENDING = frozenset("gjpqyQ,;()[]_/ȘșȚțДЦЩдцщруфμβφ")
 
 _WIDTHS_PER_MILLE = {
@@ -92,7 +92,7 @@ def set_pieces(text: Text, size: float) -> Iterator[Placed]:
         right = max(right, start + wide)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def width_of(text: Text, size: float) -> float:
     """How wide a text is set."""
     return max((piece.right + _width(piece) for piece in set_pieces(text, size)), default=0.0)
@@ -102,7 +102,7 @@ def _width(piece: Placed) -> float:
     return sum(_WIDTH.get(letter, _WIDTH_OF_OTHERS) for letter in piece.text) * piece.size
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def rise_and_fall(text: Text, size: float) -> tuple[float, float]:
     """How far a text reaches above and below its line."""
     rise, fall = 0.0, 0.0
@@ -124,6 +124,9 @@ def wrapped(text: str, size: float, wide: float) -> Sequence[str]:
         else:
             lines.append(word)
     return lines
+
+
+# Shapes --------------------------------------------------------------------------------------------
 
 
 A3_MM = (420.0, 297.0)
@@ -249,6 +252,9 @@ def _bounds_of(shape: Shape) -> Bounds:
     return (min(xs), min(ys), max(xs), max(ys))
 
 
+# SVG -----------------------------------------------------------------------------------------------
+
+
 def svg(sheets: Sequence[Sequence[Shape]], page_mm: tuple[float, float] = A3_MM) -> str:
     """The sheets, one under another, as one SVG; one user unit is one millimetre."""
     width, height = page_mm
@@ -315,13 +321,13 @@ def _text(label: Label) -> str:
     style = ' font-style="italic"' if label.italic else ""
     placed = list(set_pieces(label.text, label.size))
     x, y = label.left, label.at[1]
-    look = f'font-size="{label.size:g}" fill="{label.colour}"{style}'
+    attributes = f'font-size="{label.size:g}" fill="{label.colour}"{style}'
     if len(placed) == 1:
         anchor = f'x="{label.at[0]:.3f}" y="{y:.3f}" text-anchor="{label.anchor}"'
-        return f"<text {anchor} {look}>{escape(placed[0].text, quote=False)}</text>"
+        return f"<text {anchor} {attributes}>{escape(placed[0].text, quote=False)}</text>"
     spans = (
         f'<tspan x="{x + piece.right:.3f}" y="{y - piece.above:.3f}" font-size="{piece.size:g}">'
         f"{escape(piece.text, quote=False)}</tspan>"
         for piece in placed
     )
-    return f'<text x="{x:.3f}" y="{y:.3f}" {look}>{"".join(spans)}</text>'
+    return f'<text x="{x:.3f}" y="{y:.3f}" {attributes}>{"".join(spans)}</text>'

@@ -65,7 +65,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class PlacedLabel:
     """A letter in its place, with the thin line to its point where it stands apart."""
 
     wanted: Wanted
@@ -78,13 +78,13 @@ class Standing:
         return (self.label,) if self.leader is None else (self.label, self.leader)
 
 
-def place_labels(wanted: Sequence[Wanted], obstacles: Iterable[Shape], rounds: int = 3) -> list[Standing]:
+def place_labels(wanted: Sequence[Wanted], obstacles: Iterable[Shape], rounds: int = 3) -> list[PlacedLabel]:
     """A place for each letter; those with the least room are placed first, then all once more in turn."""
     segments = segments_of(obstacles)
     points = np.array([one.at for one in wanted]).reshape(-1, 2)
-    tries = [_places_at(one, GAPS_MM, segments, points) for one in wanted]
+    tries = [_candidates_at(one, GAPS_MM, segments, points) for one in wanted]
     order = sorted(range(len(wanted)), key=lambda k: int(np.sum(tries[k].cost < TOUCHING_COST)))
-    standing: dict[int, Standing] = {}
+    standing: dict[int, PlacedLabel] = {}
     crowded: set[int] = set()
     for _ in range(rounds):
         before = dict(standing)
@@ -93,7 +93,7 @@ def place_labels(wanted: Sequence[Wanted], obstacles: Iterable[Shape], rounds: i
             standing[k], cost = tries[k].best(others)
             if cost >= CROSSING_COST and k not in crowded:
                 crowded.add(k)
-                tries[k] = tries[k].with_more(_places_at(wanted[k], FAR_GAPS_MM, segments, points))
+                tries[k] = tries[k].with_more(_candidates_at(wanted[k], FAR_GAPS_MM, segments, points))
                 standing[k], _cost = tries[k].best(others)
         if before == standing:
             break
@@ -101,7 +101,7 @@ def place_labels(wanted: Sequence[Wanted], obstacles: Iterable[Shape], rounds: i
 
 
 @dataclass(frozen=True, slots=True)
-class _Places:
+class _Candidates:
     """The places tried for a letter: boxes (p, 4), and what each costs by itself (p,)."""
 
     wanted: Wanted
@@ -109,12 +109,12 @@ class _Places:
     leaders: FloatArray
     cost: FloatArray
 
-    def with_more(self, far: "_Places") -> "_Places":
+    def with_more(self, far: "_Candidates") -> "_Candidates":
         """These places and others farther off."""
         pairs = ((self.boxes, far.boxes), (self.leaders, far.leaders), (self.cost, far.cost))
-        return _Places(self.wanted, *(np.concatenate(pair) for pair in pairs))
+        return _Candidates(self.wanted, *(np.concatenate(pair) for pair in pairs))
 
-    def best(self, others: Sequence[Standing]) -> tuple[Standing, float]:
+    def best(self, others: Sequence[PlacedLabel]) -> tuple[PlacedLabel, float]:
         """The cheapest place beside the letters that stand already, and its cost."""
         cost = self.cost.copy()
         if others:
@@ -125,20 +125,22 @@ class _Places:
             lines = segments_of(other.leader for other in others if other.leader)
             cost += TOUCHING_COST * np.sum(lengths_inside(self.boxes, lines), axis=1)
         k = int(np.argmin(cost))
-        return self._standing(k), float(cost[k])
+        return self._placed(k), float(cost[k])
 
-    def _standing(self, k: int) -> Standing:
+    def _placed(self, k: int) -> PlacedLabel:
         one = self.wanted
         left, top, _, _ = (float(value) for value in self.boxes[k])
         rise, _ = rise_and_fall(one.text, one.size)
         label = Label((left, top + rise), one.text, one.size, "start", one.colour, one.italic)
         if not np.all(np.isfinite(self.leaders[k])):
-            return Standing(one, label, None)
+            return PlacedLabel(one, label, None)
         x0, y0, x1, y1 = (float(value) for value in self.leaders[k][:4])
-        return Standing(one, label, Stroke((x0, y0), (x1, y1), HAIR_MM, CONSTRUCTION, LEADER_DASH))
+        return PlacedLabel(one, label, Stroke((x0, y0), (x1, y1), HAIR_MM, CONSTRUCTION, LEADER_DASH))
 
 
-def _places_at(wanted: Wanted, gaps: Sequence[float], segments: FloatArray, points: FloatArray) -> _Places:
+def _candidates_at(
+    wanted: Wanted, gaps: Sequence[float], segments: FloatArray, points: FloatArray
+) -> _Candidates:
     """Places all round a point, at each of some distances from its mark."""
     boxes, gap, turn = _boxes_around(wanted, gaps)
     own, others = _distances(boxes, wanted, points)
@@ -147,7 +149,7 @@ def _places_at(wanted: Wanted, gaps: Sequence[float], segments: FloatArray, poin
     touched = lengths_inside(boxes, segments)
     cost = gap + 0.9 * aside + OTHERS_POINT_COST * np.maximum(own + DOUBT_MM - others, 0.0)
     cost += TOUCHING_COST * np.sum(np.where(touched > 0.0, touched + 1.0, 0.0), axis=1)
-    return _Places(wanted, boxes, _leaders(wanted, boxes, doubtful), cost)
+    return _Candidates(wanted, boxes, _leaders(wanted, boxes, doubtful), cost)
 
 
 def _boxes_around(wanted: Wanted, gaps: Sequence[float]) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -35,6 +35,88 @@ from reference.drawing.symbols import point, unit
 from reference.drawing.tables import column
 from reference.plan import Plan
 
+FRAME: Bounds = (20.0, 10.0, 410.0, 287.0)
+COLOURS = {"mechanism": INK, **PLAN_COLOURS}
+WARNING_COLOUR, WARNING_MM = "#c00000", 5.0
+ENGLISH = Wording()
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnSheet:
+    """One A3 sheet of the reference drawing; `fits` is False where a figure is too large for it."""
+
+    shapes: tuple[Shape, ...]
+    fits: bool
+
+
+def reference_drawing(
+    assignment: Assignment,
+    plan: Plan,
+    index: int = 0,
+    wording: Wording = ENGLISH,
+    *,
+    altitude: bool = False,
+) -> list[DrawnSheet]:
+    """The drawing of one variant of a plan on A3, true to scale.
+
+    All on one sheet where it fits, else on the sheets that the assignment asks for, else on as many as
+    are needed. A figure that is too large even so at its scales is told in red on the drawing.
+
+    Arguments: `altitude` draws the right triangles of the normal components on the sketch; raises
+    CallError where the scales do not allow that.
+    """
+    subject = Subject(assignment, plan, index, wording, altitude)
+    figures = figures_of(subject)
+    every = _sheet(subject, list(figures.values()))
+    if every.fits:
+        return [every]
+    asked = [
+        _sheet(subject, [figures[name] for name in page.figures if name in figures])
+        for page in assignment.file.page
+        if not figures.keys().isdisjoint(page.figures)
+    ]
+    return (
+        asked if all(sheet.fits for sheet in asked) else _on_several_sheets(subject, list(figures.values()))
+    )
+
+
+def _on_several_sheets(subject: Subject, figures: Sequence[DrawnFigure]) -> list[DrawnSheet]:
+    """Sheets with as many figures each, in their order, as fit."""
+    sheets: list[tuple[DrawnSheet, list[DrawnFigure]]] = []
+    for figure in figures:
+        together = _sheet(subject, [*sheets[-1][1], figure]) if sheets else None
+        if together is not None and together.fits:
+            sheets[-1] = together, [*sheets[-1][1], figure]
+        else:
+            sheets.append((_sheet(subject, [figure]), [figure]))
+    return [sheet for sheet, _ in sheets]
+
+
+def figures_of(subject: Subject) -> dict[str, DrawnFigure]:
+    """Each figure of a plan by its name."""
+    return {
+        name: sketch(subject) if name == "mechanism" else polygon(subject, name)
+        for name in subject.plan.nodes_mm
+    }
+
+
+def _sheet(subject: Subject, figures: Sequence[DrawnFigure]) -> DrawnSheet:
+    left, top, right, bottom = FRAME
+    corners = ((left, top), (right, top), (right, bottom), (left, bottom))
+    shapes: list[Shape] = [Stroke(corner, corners[(i + 1) % 4], 0.7) for i, corner in enumerate(corners)]
+    beside = column(subject, [figure.name for figure in figures], (right, top), bottom)
+    shapes.extend(beside.shapes)
+    moves, placed = lay_out(figures, FRAME, beside.box)
+    for figure, by in zip(figures, moves, strict=True):
+        shapes.extend(shifted(shape, by) for shape in figure.shapes)
+    if not (placed and beside.fits):
+        at = (left + 5, bottom - 5)
+        shapes.append(Label(at, subject.wording.too_large, WARNING_MM, colour=WARNING_COLOUR))
+    return DrawnSheet(tuple(shapes), placed and beside.fits)
+
+
+# Where figures stand on a sheet --------------------------------------------------------------------
+
 LEAST_GAP_MM = 6.0
 CELL_MM = 2.0
 HALF_A_CELL = 0.5
@@ -50,8 +132,8 @@ def lay_out(figures: Sequence[DrawnFigure], room: Bounds, column: Bounds) -> tup
     its right.
     """
     beside = (room[0], room[1], column[0], room[3])
-    found = _in_rows(figures, beside) or _where_there_is_room(figures, room, column)
-    return (found, True) if found else (_one_on_another(figures, room), False)
+    found = _in_rows(figures, beside) or _packed_by_size(figures, room, column)
+    return (found, True) if found else (_stacked(figures, room), False)
 
 
 def _sizes(figures: Sequence[DrawnFigure]) -> list[tuple[float, float]]:
@@ -63,8 +145,8 @@ def _in_rows(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point] | None
 
     None where every way leaves too little.
     """
-    ways = [_rows(figures, breaks, room) for breaks in product((False, True), repeat=len(figures) - 1)]
-    gap, moves = max(ways, key=lambda way: way[0])
+    layouts = [_rows(figures, breaks, room) for breaks in product((False, True), repeat=len(figures) - 1)]
+    gap, moves = max(layouts, key=lambda layout: layout[0])
     return moves if gap >= LEAST_GAP_MM else None
 
 
@@ -90,9 +172,7 @@ def _rows(figures: Sequence[DrawnFigure], breaks: Sequence[bool], room: Bounds) 
     return gap, moves
 
 
-def _where_there_is_room(
-    figures: Sequence[DrawnFigure], room: Bounds, kept_free: Bounds
-) -> list[Point] | None:
+def _packed_by_size(figures: Sequence[DrawnFigure], room: Bounds, reserved: Bounds) -> list[Point] | None:
     """The largest figure in the middle or in a corner, each other where it keeps farthest from all there.
 
     Of these ways the one whose figures keep farthest apart; None where none has room for all.
@@ -100,17 +180,17 @@ def _where_there_is_room(
     sizes = _sizes(figures)
     if any(width > room[2] - room[0] or height > room[3] - room[1] for width, height in sizes):
         return None
-    ways = [_packed(figures, room, kept_free, corner) for corner in CORNERS]
-    gap, moves = max(ways, key=lambda way: way[0])
+    layouts = [_packed(figures, room, reserved, corner) for corner in CORNERS]
+    gap, moves = max(layouts, key=lambda layout: layout[0])
     return moves if gap > 0.0 else None
 
 
 def _packed(
-    figures: Sequence[DrawnFigure], room: Bounds, kept_free: Bounds, corner: tuple[float, float] | None
+    figures: Sequence[DrawnFigure], room: Bounds, reserved: Bounds, corner: tuple[float, float] | None
 ) -> tuple[float, list[Point]]:
     """How far the figures keep apart, zero where one has no place, and their moves."""
     taken = np.zeros((int((room[3] - room[1]) / CELL_MM), int((room[2] - room[0]) / CELL_MM)), dtype=bool)
-    x0, y0, x1, y1 = (int((side - room[k % 2]) / CELL_MM) for k, side in enumerate(kept_free))
+    x0, y0, x1, y1 = (int((side - room[k % 2]) / CELL_MM) for k, side in enumerate(reserved))
     taken[y0 : y1 + 1, x0 : x1 + 1] = True
     moves: dict[int, Point] = {}
     least = np.inf
@@ -174,10 +254,12 @@ def _roomiest(taken: Mask, mask: Mask, corner: tuple[float, float] | None) -> tu
     return (int(row), int(column)), float(depth[row, column])
 
 
-def _one_on_another(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point]:
+def _stacked(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point]:
     """All from the room's top left corner: what does not fit is at least seen."""
     return [(room[0] - box[0], room[1] - box[1]) for box in (figure.bounds for figure in figures)]
 
+
+# A figure after each of its steps ------------------------------------------------------------------
 
 BEFORE, NOW = "#a3abb3", "#c8380a"
 NOW_WIDTH_MM = 0.3
@@ -244,21 +326,6 @@ def models(subject: Subject, step: Step) -> Iterator[Shape]:
         yield from (Stroke(p, q, MODEL_MM, NOW) for p, q in pairwise(corners))
 
 
-def centre(subject: Subject, name: str) -> Iterator[Shape]:
-    """An instantaneous centre or acceleration pole, with its triangle on the link that it belongs to."""
-    nodes, at = subject.nodes("mechanism"), subject.centres[name]
-    p, q = (nodes[joint] for joint in subject.plan.construction.centres[name].base)
-    yield Stroke(point(p), point(q), MODEL_MM, NOW)
-    for corner in (p, q):
-        yield Stroke(point(corner), point(at), symbols.HAIR_MM, NOW)
-    yield symbols.marked_point(at, NOW)
-    # On a large picture, which is printed smaller, the letter is larger.
-    size = LETTER_MM * max(1.0, abs(at - p) / LARGE_MM)
-    away = unit(at - (p + q) / 2.0)
-    x, y = point(at + 1.1 * size * away)
-    yield Label((x, y + 0.35 * size), subject.letter(name), size, "middle", NOW, italic=True)
-
-
 def _model_joints(step: Step) -> Iterator[tuple[str, ...]]:
     match step:
         case Similar(model=(p, q, r)):
@@ -273,81 +340,16 @@ def _model_joints(step: Step) -> Iterator[tuple[str, ...]]:
             return
 
 
-FRAME: Bounds = (20.0, 10.0, 410.0, 287.0)
-COLOURS = {"mechanism": INK, **PLAN_COLOURS}
-WARNING_COLOUR, WARNING_MM = "#c00000", 5.0
-ENGLISH = Wording()
-
-
-@dataclass(frozen=True, slots=True)
-class DrawnSheet:
-    """One A3 sheet of the reference drawing; `fits` is False where a figure is too large for it."""
-
-    shapes: tuple[Shape, ...]
-    fits: bool
-
-
-def reference_drawing(
-    assignment: Assignment,
-    plan: Plan,
-    index: int = 0,
-    wording: Wording = ENGLISH,
-    *,
-    altitude: bool = False,
-) -> list[DrawnSheet]:
-    """The drawing of one variant of a plan on A3, true to scale.
-
-    All on one sheet where it fits, else on the sheets that the assignment asks for, else on as many as
-    are needed. A figure that is too large even so at its scales is told in red on the drawing.
-
-    Arguments: `altitude` draws the right triangles of the normal components on the sketch; raises
-    CallError where the scales do not allow that.
-    """
-    subject = Subject(assignment, plan, index, wording, altitude)
-    figures = figures_of(subject)
-    every = _sheet(subject, list(figures.values()))
-    if every.fits:
-        return [every]
-    asked = [
-        _sheet(subject, [figures[name] for name in page.figures if name in figures])
-        for page in assignment.file.page
-        if not figures.keys().isdisjoint(page.figures)
-    ]
-    return (
-        asked if all(sheet.fits for sheet in asked) else _one_after_another(subject, list(figures.values()))
-    )
-
-
-def _one_after_another(subject: Subject, figures: Sequence[DrawnFigure]) -> list[DrawnSheet]:
-    """Sheets with as many figures each, in their order, as fit."""
-    sheets: list[tuple[DrawnSheet, list[DrawnFigure]]] = []
-    for figure in figures:
-        together = _sheet(subject, [*sheets[-1][1], figure]) if sheets else None
-        if together is not None and together.fits:
-            sheets[-1] = together, [*sheets[-1][1], figure]
-        else:
-            sheets.append((_sheet(subject, [figure]), [figure]))
-    return [sheet for sheet, _ in sheets]
-
-
-def figures_of(subject: Subject) -> dict[str, DrawnFigure]:
-    """Each figure of a plan by its name."""
-    return {
-        name: sketch(subject) if name == "mechanism" else polygon(subject, name)
-        for name in subject.plan.nodes_mm
-    }
-
-
-def _sheet(subject: Subject, figures: Sequence[DrawnFigure]) -> DrawnSheet:
-    left, top, right, bottom = FRAME
-    corners = ((left, top), (right, top), (right, bottom), (left, bottom))
-    shapes: list[Shape] = [Stroke(corner, corners[(i + 1) % 4], 0.7) for i, corner in enumerate(corners)]
-    beside = column(subject, [figure.name for figure in figures], (right, top), bottom)
-    shapes.extend(beside.shapes)
-    moves, placed = lay_out(figures, FRAME, beside.box)
-    for figure, by in zip(figures, moves, strict=True):
-        shapes.extend(shifted(shape, by) for shape in figure.shapes)
-    if not (placed and beside.fits):
-        at = (left + 5, bottom - 5)
-        shapes.append(Label(at, subject.wording.too_large, WARNING_MM, colour=WARNING_COLOUR))
-    return DrawnSheet(tuple(shapes), placed and beside.fits)
+def centre(subject: Subject, name: str) -> Iterator[Shape]:
+    """An instantaneous centre or acceleration pole, with its triangle on the link that it belongs to."""
+    nodes, at = subject.nodes("mechanism"), subject.centres[name]
+    p, q = (nodes[joint] for joint in subject.plan.construction.centres[name].base)
+    yield Stroke(point(p), point(q), MODEL_MM, NOW)
+    for corner in (p, q):
+        yield Stroke(point(corner), point(at), symbols.HAIR_MM, NOW)
+    yield symbols.marked_point(at, NOW)
+    # On a large picture, which is printed smaller, the letter is larger.
+    size = LETTER_MM * max(1.0, abs(at - p) / LARGE_MM)
+    away = unit(at - (p + q) / 2.0)
+    x, y = point(at + 1.1 * size * away)
+    yield Label((x, y + 0.35 * size), subject.letter(name), size, "middle", NOW, italic=True)

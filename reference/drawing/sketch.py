@@ -15,115 +15,9 @@ from reference.drawing.triangles import altitudes
 from reference.geometry import FloatArray
 from reference.mechanism import Crank, DrivenSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
 
-RADIUS_MM, SWEEP, THRUST_MM = 9.0, 0.9, 10.0
-_DRIVE_LETTER_MM = 3.4
-CLEAR_MM = 0.8
-STARTS = (0.25, -0.25 - SWEEP, 1.5, -1.5 - SWEEP, 2.5)
-"""Where a turning arrow may start, from the crank on in its sense, the best first."""
-Turn = tuple[float, float, float]
-"""Radius, start and sweep."""
-
-
-def drive_arrow(subject: Subject, nodes: dict[str, complex]) -> Iterator[Shape]:
-    """The arrow, unless the driven link stands still."""
-    driver = subject.plan.mechanism.driver
-    if _stands(subject):
-        return
-    if isinstance(driver, DrivenSlider):
-        yield from symbols.arrow(*_thrust(subject, driver, nodes), THIN_MM, INK)
-    else:
-        yield from symbols.turning(nodes[driver.pivot], *_turn(subject, driver, nodes))
-
-
-def drive_letter(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted]:
-    """The angular velocity or the velocity that the arrow stands for."""
-    driver = subject.plan.mechanism.driver
-    if _stands(subject):
-        return
-    if isinstance(driver, DrivenSlider):
-        at = point(sum(_thrust(subject, driver, nodes)) / 2.0)
-        yield Wanted(driver.pin, at, subject.letter(f"v_{driver.pin}"), _DRIVE_LETTER_MM, INK, 0.6)
-    else:
-        radius, start, sweep = _turn(subject, driver, nodes)
-        outward = complex(np.exp(1j * (start + 0.5 * sweep)))
-        at = point(nodes[driver.pivot] + radius * outward)
-        yield Wanted(driver.pin, at, pieces_of(f"omega_{driver.link}"), _DRIVE_LETTER_MM, INK, 0.6, outward)
-
-
-def _rate(subject: Subject) -> float:
-    """The crank's angular velocity, or the driven slider's speed."""
-    driver = subject.plan.mechanism.driver
-    return subject.number(np.asarray(driver.speed if isinstance(driver, DrivenSlider) else driver.omega))
-
-
-def _stands(subject: Subject) -> bool:
-    return _rate(subject) == 0.0
-
-
-def _thrust(subject: Subject, driver: DrivenSlider, nodes: dict[str, complex]) -> tuple[complex, complex]:
-    """Beside the block, in the sense of its velocity, where it meets the fewest links."""
-    block = next(block for block in blocks(subject, nodes) if block.node == driver.pin)
-    along = block.along * float(np.sign(_rate(subject)))
-    above = 1j * block.along * (1 if block.along.real >= 0.0 else -1)
-    length, width = symbols.BLOCK_MM
-    starts = (
-        block.at + above * (width + up) + along * ahead
-        for up in (3.0, 7.0)
-        for ahead in (-length, 2.0, -THRUST_MM - 2.0)
-    )
-    links = _links(subject, nodes)
-    ways = [(start, start + THRUST_MM * along) for start in starts]
-    return min(ways, key=lambda way: _meets(Curve((point(way[0]), point(way[1]))), links))
-
-
-def _turn(subject: Subject, crank: Crank, nodes: dict[str, complex]) -> Turn:
-    """About the crank's pivot, in the sense in which it turns, where it meets the fewest links."""
-    centre = nodes[crank.pivot]
-    arm = nodes[crank.pin] - centre
-    sign, largest = float(np.sign(_rate(subject))), min(RADIUS_MM, 0.45 * abs(arm))
-    links = _links(subject, nodes)
-    turns = [
-        (radius, float(np.angle(arm)) + sign * start, sign * SWEEP)
-        for radius in (largest, 0.7 * largest)
-        for start in STARTS
-    ]
-
-    def met(turn: Turn) -> int:
-        radius, start, sweep = turn
-        return _meets(symbols.arc(centre, radius, start, sweep, THIN_MM), links)
-
-    return min(turns, key=met)
-
-
-def _links(subject: Subject, nodes: dict[str, complex]) -> FloatArray:
-    """The links as segments, millimetres, y down."""
-    return segments_of(Stroke(point(bar.ends[0]), point(bar.ends[1])) for bar in bars(subject, nodes))
-
-
-def _meets(curve: Curve, links: FloatArray) -> int:
-    """How many links a curve meets, or nearly so."""
-    corners = np.array(curve.points)
-    share = np.linspace(0.0, len(corners) - 1.0, 24)
-    places = np.stack(
-        [np.interp(share, np.arange(len(corners)), corners[:, axis]) for axis in (0, 1)], axis=1
-    )
-    boxes = np.hstack([places - CLEAR_MM, places + CLEAR_MM])
-    return int(np.any(lengths_inside(boxes, links) > 0.0, axis=0).sum())
-
-
 LETTER_MM, SMALL_LETTER_MM = 4.2, 3.2
 LINK_NUMBER_MM = 3.0
 PLATE_FILL = "#eef1f4"
-GUIDE_REACH_MM, NEAR_GUIDE_MM = 13.0, 7.0
-AXIS_REACH_MM = 18.0
-NUMBER_SHARES = (0.5, 0.36, 0.64, 0.25, 0.75)
-"""Where along its longest stretch a link's number may stand, the best first."""
-SHORTEST_GUIDE_MM, ROD_CLEAR_MM = 7.0, 1.0
-"""A guide ends where the rod comes nearer to it than this; a shorter one lies on the block's other side."""
-SUPPORTS = (-1j, 1j, -1.0 + 0j, 1.0 + 0j)
-"""Where the ground of a pivot may lie, the best first."""
-SUPPORT_CLEAR_COSINE = 0.62
-"""Of the angle between a link and the ground of its pivot, at most."""
 CAPTION_GAP_MM, CAPTION_MM = 6.0, 3.5
 
 
@@ -167,6 +61,18 @@ def _plates(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
             yield Part(group.node, Area(corners, PLATE_FILL))
 
 
+# Guides and grounds --------------------------------------------------------------------------------
+
+GUIDE_REACH_MM, NEAR_GUIDE_MM = 13.0, 7.0
+AXIS_REACH_MM = 18.0
+SHORTEST_GUIDE_MM, ROD_CLEAR_MM = 7.0, 1.0
+"""A guide ends where the rod comes nearer to it than this; a shorter one lies on the block's other side."""
+SUPPORTS = (-1j, 1j, -1.0 + 0j, 1.0 + 0j)
+"""Where the ground of a pivot may lie, the best first."""
+SUPPORT_CLEAR_COSINE = 0.62
+"""Of the angle between a link and the ground of its pivot, at most."""
+
+
 def _guides(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
     """Ground below a block, or away from a rod that comes from there; the line along which it moves."""
     for block in blocks(subject, nodes):
@@ -177,7 +83,10 @@ def _guides(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
         rod = complex(np.conj(along) * block.rod)
         side = below if _before_rod(rod, below) >= SHORTEST_GUIDE_MM else -below
         behind, ahead = (
-            min(_reach(at, sign * along, nodes), _before_rod(rod, side) if rod.real * sign > 0.0 else np.inf)
+            min(
+                _guide_length(at, sign * along, nodes),
+                _before_rod(rod, side) if rod.real * sign > 0.0 else np.inf,
+            )
             for sign in (-1, 1)
         )
         for shape in symbols.guide(at, along, side, (behind, ahead)):
@@ -192,7 +101,7 @@ def _before_rod(rod: complex, side: int) -> float:
     return (symbols.BLOCK_MM[1] - ROD_CLEAR_MM) * abs(rod.real / rod.imag)
 
 
-def _reach(at: complex, along: complex, nodes: dict[str, complex]) -> float:
+def _guide_length(at: complex, along: complex, nodes: dict[str, complex]) -> float:
     """How far a guide goes: short of a joint that lies near its line."""
     reach = GUIDE_REACH_MM
     for place in nodes.values():
@@ -221,6 +130,12 @@ def support_direction(at: complex, links: Sequence[tuple[complex, complex]]) -> 
 
     clear = [support for support in SUPPORTS if nearest(support) <= SUPPORT_CLEAR_COSINE]
     return clear[0] if clear else min(SUPPORTS, key=nearest)
+
+
+# Joints and links ----------------------------------------------------------------------------------
+
+NUMBER_SHARES = (0.5, 0.36, 0.64, 0.25, 0.75)
+"""Where along its longest stretch a link's number may stand, the best first."""
 
 
 def _joints(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
@@ -293,7 +208,107 @@ def _beside(parts: Sequence[Bar], nodes: dict[str, complex]) -> complex:
     return max(places, key=lambda at: min(10.0, *(abs(at - place) for place in nodes.values())))
 
 
-_NODE_LETTER_MM, _SMALL_NODE_LETTER_MM = 4.2, 3.4
+# The arrow at the driven link ----------------------------------------------------------------------
+
+RADIUS_MM, SWEEP, THRUST_MM = 9.0, 0.9, 10.0
+DRIVE_LETTER_MM = 3.4
+CLEAR_MM = 0.8
+STARTS = (0.25, -0.25 - SWEEP, 1.5, -1.5 - SWEEP, 2.5)
+"""Where a turning arrow may start, from the crank on in its sense, the best first."""
+Turn = tuple[float, float, float]
+"""Radius, start and sweep."""
+
+
+def drive_arrow(subject: Subject, nodes: dict[str, complex]) -> Iterator[Shape]:
+    """The arrow, unless the driven link stands still."""
+    driver = subject.plan.mechanism.driver
+    if _stands_still(subject):
+        return
+    if isinstance(driver, DrivenSlider):
+        yield from symbols.arrow(*_thrust(subject, driver, nodes), THIN_MM, INK)
+    else:
+        yield from symbols.turning(nodes[driver.pivot], *_turn(subject, driver, nodes))
+
+
+def drive_letter(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted]:
+    """The angular velocity or the velocity that the arrow stands for."""
+    driver = subject.plan.mechanism.driver
+    if _stands_still(subject):
+        return
+    if isinstance(driver, DrivenSlider):
+        at = point(sum(_thrust(subject, driver, nodes)) / 2.0)
+        yield Wanted(driver.pin, at, subject.letter(f"v_{driver.pin}"), DRIVE_LETTER_MM, INK, 0.6)
+    else:
+        radius, start, sweep = _turn(subject, driver, nodes)
+        outward = complex(np.exp(1j * (start + 0.5 * sweep)))
+        at = point(nodes[driver.pivot] + radius * outward)
+        yield Wanted(driver.pin, at, pieces_of(f"omega_{driver.link}"), DRIVE_LETTER_MM, INK, 0.6, outward)
+
+
+def _rate(subject: Subject) -> float:
+    """The crank's angular velocity, or the driven slider's speed."""
+    driver = subject.plan.mechanism.driver
+    return subject.number(np.asarray(driver.speed if isinstance(driver, DrivenSlider) else driver.omega))
+
+
+def _stands_still(subject: Subject) -> bool:
+    return _rate(subject) == 0.0
+
+
+def _thrust(subject: Subject, driver: DrivenSlider, nodes: dict[str, complex]) -> tuple[complex, complex]:
+    """Beside the block, in the sense of its velocity, where it meets the fewest links."""
+    block = next(block for block in blocks(subject, nodes) if block.node == driver.pin)
+    along = block.along * float(np.sign(_rate(subject)))
+    above = 1j * block.along * (1 if block.along.real >= 0.0 else -1)
+    length, width = symbols.BLOCK_MM
+    starts = (
+        block.at + above * (width + up) + along * ahead
+        for up in (3.0, 7.0)
+        for ahead in (-length, 2.0, -THRUST_MM - 2.0)
+    )
+    links = _links(subject, nodes)
+    arrows = [(start, start + THRUST_MM * along) for start in starts]
+    return min(arrows, key=lambda arrow: _meets(Curve((point(arrow[0]), point(arrow[1]))), links))
+
+
+def _turn(subject: Subject, crank: Crank, nodes: dict[str, complex]) -> Turn:
+    """About the crank's pivot, in the sense in which it turns, where it meets the fewest links."""
+    centre = nodes[crank.pivot]
+    arm = nodes[crank.pin] - centre
+    sign, largest = float(np.sign(_rate(subject))), min(RADIUS_MM, 0.45 * abs(arm))
+    links = _links(subject, nodes)
+    turns = [
+        (radius, float(np.angle(arm)) + sign * start, sign * SWEEP)
+        for radius in (largest, 0.7 * largest)
+        for start in STARTS
+    ]
+
+    def met(turn: Turn) -> int:
+        radius, start, sweep = turn
+        return _meets(symbols.arc(centre, radius, start, sweep, THIN_MM), links)
+
+    return min(turns, key=met)
+
+
+def _links(subject: Subject, nodes: dict[str, complex]) -> FloatArray:
+    """The links as segments, millimetres, y down."""
+    return segments_of(Stroke(point(bar.ends[0]), point(bar.ends[1])) for bar in bars(subject, nodes))
+
+
+def _meets(curve: Curve, links: FloatArray) -> int:
+    """How many links a curve meets, or nearly so."""
+    corners = np.array(curve.points)
+    share = np.linspace(0.0, len(corners) - 1.0, 24)
+    places = np.stack(
+        [np.interp(share, np.arange(len(corners)), corners[:, axis]) for axis in (0, 1)], axis=1
+    )
+    boxes = np.hstack([places - CLEAR_MM, places + CLEAR_MM])
+    return int(np.any(lengths_inside(boxes, links) > 0.0, axis=0).sum())
+
+
+# Polygons of the plans -----------------------------------------------------------------------------
+
+NODE_LETTER_MM, SMALL_NODE_LETTER_MM = 4.2, 3.4
 OVERRUN_MM = 5.0
 """A construction line goes on past its foot and past the node that it finds."""
 ABSOLUTE_MM, RELATIVE_MM = 0.5, 0.3
@@ -306,7 +321,7 @@ def polygon(subject: Subject, figure: str) -> DrawnFigure:
     drawn = [*_lines(subject, figure, nodes), *_vectors(subject, figure, nodes)]
     pole = subject.plan.construction.poles[figure]
     drawn.append(Part(pole, symbols.marked_point(nodes[pole], colour)))
-    style = Style(_NODE_LETTER_MM, _SMALL_NODE_LETTER_MM, colour, symbols.POINT_RADIUS_MM)
+    style = Style(NODE_LETTER_MM, SMALL_NODE_LETTER_MM, colour, symbols.POINT_RADIUS_MM)
     named = letters(subject, nodes, [part.shape for part in drawn], style)
     return captioned(subject, figure, (*drawn, *named), colour)
 

@@ -98,8 +98,8 @@ class Subject:
     def title(self) -> str:
         """The assignment's title and the variant, in the wording's language."""
         title = self.assignment.file.title.in_language(self.wording.lang)
-        told = self.wording.variant_text(self.plan.variants[self.index])
-        return f"{title}, {told}" if told else title
+        variant_text = self.wording.variant_text(self.plan.variants[self.index])
+        return f"{title}, {variant_text}" if variant_text else title
 
     def number(self, values: FloatArray) -> float:
         """The variant's number, of an array over variants or of a number common to all."""

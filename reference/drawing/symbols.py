@@ -147,6 +147,8 @@ def sense(at: complex, sign: float) -> Iterator[Shape]:
     yield from turning(at, 1.5, start, math.copysign(math.radians(290.0), sign))
 
 
+# Links and blocks of a sketch ----------------------------------------------------------------------
+
 BEYOND_MM = 13.0
 """How far a rod goes on past the block that slides on it."""
 

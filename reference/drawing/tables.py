@@ -78,9 +78,9 @@ def _heading(subject: Subject, at: tuple[float, float]) -> tuple[list[Shape], fl
     lang = subject.wording.lang
     title = subject.assignment.file.title.in_language(lang)
     lines += [(line, TITLE_MM) for line in wrapped(title, TITLE_MM, COLUMN_MM - 2 * EDGE_MM)]
-    told = subject.wording.variant_text(subject.plan.variants[subject.index])
-    if told:
-        lines.append((told, TITLE_MM))
+    variant_text = subject.wording.variant_text(subject.plan.variants[subject.index])
+    if variant_text:
+        lines.append((variant_text, TITLE_MM))
     lines += [(datum, DATA_MM) for datum in _flowed(given_data(subject), COLUMN_MM - 2 * EDGE_MM)]
     for text, size in lines:
         y += LINE_HEIGHT * size

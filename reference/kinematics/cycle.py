@@ -102,7 +102,7 @@ def _followed(mechanism: Mechanism) -> tuple[Continuation, int]:
     """The mechanism followed over its whole cycle, and in how many turns that closes."""
     driver = mechanism.driver
     if not isinstance(driver, Crank):
-        start, reach = float(driver.displacement_m[0]), _reach(mechanism, driver)
+        start, reach = float(driver.displacement_m[0]), _largest_travel(mechanism, driver)
         return follow(mechanism, start, start - reach, start + reach), 0
     start = float(driver.angle_rad[0]) % TURN
     following = follow(mechanism, start, start - TURN, start + 2.0 * TURN)
@@ -132,7 +132,7 @@ def _shifted(following: Continuation, by: float) -> Continuation:
     )
 
 
-def _reach(mechanism: Mechanism, driver: DrivenSlider) -> float:
+def _largest_travel(mechanism: Mechanism, driver: DrivenSlider) -> float:
     """How far a driven slider may go at most, metres: all lengths in line, all distances on the ground."""
     take = one_variant(0)
     places = [complex(take(place)) for place in mechanism.ground_m.values()]
@@ -190,7 +190,7 @@ def _elsewhere(following: Continuation) -> tuple[tuple[float, float], ...]:
     if isinstance(driver, Crank):
         outside = [(following.high, following.low + TURN)]
     else:
-        reach = _reach(following.mechanism, driver)
+        reach = _largest_travel(following.mechanism, driver)
         outside = [
             (following.start - reach, following.low),
             (following.high, following.start + reach),

@@ -41,155 +41,11 @@ from reference.mechanism import (
     Slider,
     SlottedLink,
     Yoke,
-    moved,
+    translated,
 )
 from reference.numbers import cross, larger
 
 EPSILON = float(np.finfo(np.float64).eps)
-EXTENDED = float(np.finfo(np.longdouble).eps)
-"""As `EPSILON` where the processor or compiler has no wider floats."""
-LOSSY = 1e-9
-"""A predicted relative error from which a variant is solved again: 4e-7 mm in a plan of 400 mm, which nobody
-can draw. Ordinary mechanisms stay far below, and solving again takes ten times as long."""
-EXTENDED_ENOUGH = LOSSY * EPSILON / EXTENDED
-"""A predicted relative error up to which extended floats bring it below `LOSSY`; beyond, eighty digits."""
-LEAST_SINE = 8e-16
-"""Of a transmission angle; below it (as between guides at 0 and 180 degrees) there is no solution: the data's
-last digit decides how the mechanism moves."""
-DIGITS = 80
-"""Decimal digits of the last resort."""
-
-
-def refined(
-    mechanism: Mechanism, predicted: FloatArray, sine: FloatArray, *, accelerations: bool
-) -> tuple[NDArray[np.bool_], list[tuple[Solution, NDArray[np.intp]]]]:
-    """Which variants have lost digits, and their new solutions, each with the rows that it is of.
-
-    Arguments
-    ---------
-    predicted : (N,) relative errors; brought up to date in place, infinite where there is no solution
-    sine : (N,) the least of each variant's transmission angles
-    """
-    predicted[~(sine >= LEAST_SINE)] = np.inf
-    again = (predicted > LOSSY) & np.isfinite(predicted)
-    wide = again & (predicted <= EXTENDED_ENOUGH)
-    solutions = []
-    rows = np.flatnonzero(wide)
-    if rows.size:
-        solutions.append(
-            (solve(mechanism, some_variants(rows), accelerations=accelerations, anew=True), rows)
-        )
-        predicted[rows] = np.maximum(predicted[rows] * (EXTENDED / EPSILON), EPSILON)
-    for index in np.flatnonzero(again & ~wide):
-        solution = _in_digits(mechanism, int(index), accelerations)
-        predicted[index] = EPSILON if solution is not None else np.inf
-        if solution is not None:
-            solutions.append((solution, np.array([index])))
-    return again, solutions
-
-
-def _in_digits(mechanism: Mechanism, index: int, accelerations: bool) -> Solution | None:
-    """One variant in eighty digits; None where it divides by zero even so, or does not close."""
-    from mpmath import mp  # noqa: PLC0415 - seldom needed, and slow to import
-
-    with mp.workdps(DIGITS):
-        try:
-            solution = solve(
-                mechanism, one_variant(index, mp.mpmathify), accelerations=accelerations, anew=True
-            )
-        except ZeroDivisionError:
-            return None
-    rates: list[Any] = [
-        number for joint in solution.joints.values() for number in (joint.velocity, joint.acceleration)
-    ]
-    return solution if all(mp.isfinite(rate) for rate in rates) else None
-
-
-ROUNDING = 1e-14
-"""Relative to the mechanism's reach."""
-WHAT_IS_IN_LINE = {
-    Dyad: "its links are in line",
-    Slider: "its rod is perpendicular to the guide",
-    SlottedLink: "the pin is at the link's pivot, or as near to it as the offset lets it",
-    CrossSlider: "its guides are parallel",
-    Yoke: "slot and guide are parallel",
-}
-
-
-def reason(mechanism: Mechanism, broken: NDArray[np.bool_]) -> MechanismError:
-    """The error for the first of the broken variants, which says how many there are."""
-    first = int(np.argmax(broken))
-    where = f" ({int(broken.sum())} of {broken.size} variant(s), the first at index {first})"
-    return reason_at(mechanism, first, "" if broken.size == 1 else where)
-
-
-def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismError:
-    """The error for the variant at an index, from the first group that fails there."""
-    take = one_variant(index, _quiet)
-    groups = mechanism.groups
-    driven = "crank angle" if isinstance(mechanism.driver, Crank) else "displacement of the driven slider"
-    with np.errstate(all="ignore"):
-        for count, group in enumerate(groups):
-            before = solve(replace(mechanism, groups=groups[:count]), take)
-            try:
-                after = solve(replace(mechanism, groups=groups[: count + 1]), take)
-            except ZeroDivisionError:
-                break
-            node = after.joints[group.node]
-            if not np.isfinite(node.position) or np.isnan(after.transmission.get(group.node, 1.0)):
-                gap, reach = _gap(group, before), max(abs(one.position) for one in before.joints.values())
-                # A gap of rounding alone: the group is flat, and its data say so as well as they can.
-                if gap > ROUNDING * reach:
-                    return _open(group, gap, where, driven)
-                return _singular(group, where, driven)
-            if not np.isfinite(node.amplification * np.abs(node.acceleration + node.velocity)):
-                break
-        else:
-            group = min(groups, key=lambda one: float(after.transmission.get(one.node, 1.0)))
-    return _singular(group, where, driven)
-
-
-def _quiet(number: complex) -> np.generic:
-    """NumPy's own scalar: it divides by zero without an error."""
-    scalar: np.generic = np.asarray(number)[()]  # type: ignore[assignment]
-    return scalar
-
-
-def _open(group: Group, gap_m: float, where: str, driven: str) -> MechanismError:
-    return MechanismError(
-        "does_not_assemble",
-        f"the group of {group.node} does not assemble: its links miss each other by {{gap}}{where};"
-        f" check the lengths, the {driven}, and the sides of the groups before it",
-        group=group.node,
-        gap_m=gap_m,
-    )
-
-
-def _singular(group: Group, where: str, driven: str) -> MechanismError:
-    advice = "give slot and guide two directions" if isinstance(group, Yoke) else f"choose another {driven}"
-    why = WHAT_IS_IN_LINE.get(type(group), "its base has no length")
-    message = f"the velocities of the group of {group.node} are not determined: {why}{where}; {advice}"
-    return MechanismError("singular", message, group=group.node)
-
-
-def _gap(group: Group, before: Solution) -> float:
-    """By how much a group fails to close, metres; the group's pins are where `before` has them."""
-    at = {name: joint.position for name, joint in before.joints.items()}
-    take = before.take
-    match group:
-        case Dyad(pins=(p, q)) | Plate(base=(p, q)):
-            distance, first, second = abs(at[q] - at[p]), *map(take, group.lengths_m)
-            gap = max(distance - (first + second), abs(first - second) - distance)
-        case Slider(pin=pin):
-            rail = rail_of(before, group.guide)
-            gap = abs(cross(rail.along, at[pin] - rail.joint.position)) - take(group.length_m)
-        case SlottedLink(pin=pin, pivot=pivot):
-            gap = abs(take(group.offset_m)) - abs(at[pin] - at[pivot])
-        case _:
-            gap = 0.0
-    return float(gap)
-
-
 SAFETY = 32.0
 """Roundings of the formulas themselves, in units of the data's own; held against 50 digits in tests."""
 FEW = 3
@@ -241,7 +97,7 @@ def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> 
     count, origin = _count(mechanism.driver), _origin(mechanism)
     if origin.any():
         # Far from the coordinates' origin, differences of places lose digits: solved about the driven link.
-        motion = _in_doubles(moved(mechanism, -origin), count, accelerations)
+        motion = _in_doubles(translated(mechanism, -origin), count, accelerations)
         motion.position.update({name: place + origin for name, place in motion.position.items()})
     else:
         motion = _in_doubles(mechanism, count, accelerations)
@@ -257,35 +113,6 @@ def _origin(mechanism: Mechanism) -> ComplexArray:
     return mechanism.ground_m[driver.pivot] if isinstance(driver, Crank) else driver.guide_m
 
 
-def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
-    """Solve again what has lost digits; nan where a variant has no motion."""
-    predicted = motion.predicted_error
-    sine = reduce(np.minimum, motion.transmission.values(), np.ones(predicted.shape))
-    motion.recomputed[:], solutions = refined(mechanism, predicted, sine, accelerations=accelerations)
-    for solution, rows in solutions:
-        _put(motion, solution, rows)
-    broken = np.isinf(predicted)
-    for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
-        for values in rates.values():
-            values[broken] = np.nan
-
-
-def _put(motion: Motion, solution: Solution, rows: NDArray[np.intp]) -> None:
-    """Take the solution of some variants over into the motion."""
-    for name, joint in solution.joints.items():
-        motion.position[name][rows] = _rounded(joint.position)
-        motion.velocity[name][rows] = _rounded(joint.velocity)
-        if motion.acceleration:
-            motion.acceleration[name][rows] = _rounded(joint.acceleration)
-    for quantity in ("omega", "epsilon", "transmission"):
-        for name, values in getattr(motion, quantity).items():
-            values[rows] = np.real(_rounded(getattr(solution, quantity)[name]))
-
-
-def _rounded(number: Any) -> Any:  # noqa: ANN401 - of extended floats or of many digits
-    return number if isinstance(number, np.ndarray) else complex(number)
-
-
 def _count(driver: Driver) -> int:
     """The number of variants: the widest of the driver's numbers."""
     if isinstance(driver, Crank):
@@ -293,22 +120,14 @@ def _count(driver: Driver) -> int:
     return max(driver.displacement_m.size, driver.speed.size, driver.acceleration.size)
 
 
+# In doubles: on arrays, or on Python's numbers -----------------------------------------------------
+
+
 def _in_doubles(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
     if count <= FEW:
-        return _one_by_one(mechanism, count, accelerations)
+        return _in_python_numbers(mechanism, count, accelerations)
     with np.errstate(all="ignore"):
         return _on_arrays(mechanism, count, accelerations)
-
-
-def _amplification(solution: Solution) -> Any:  # noqa: ANN401 - an array, or one number
-    """By how much a rounding error may have grown anywhere."""
-    return reduce(larger, [joint.amplification for joint in solution.joints.values()])
-
-
-def _predicted_error(amplification: FloatArray) -> FloatArray:
-    """(N,) what the growth of rounding errors says of the results' error; infinite where it is nan."""
-    predicted = SAFETY * EPSILON * amplification
-    return np.where(np.isnan(predicted), np.inf, predicted)
 
 
 def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
@@ -334,7 +153,7 @@ def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
     )
 
 
-def _one_by_one(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
+def _in_python_numbers(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
     """The same on Python's numbers, a variant after another; where they divide by zero, on arrays."""
     try:
         solutions = [
@@ -371,3 +190,191 @@ def _states(solution: Solution) -> list[complex]:
 def _rates(solution: Solution, accelerations: bool) -> list[float]:
     epsilon = solution.epsilon.values() if accelerations else ()
     return [*solution.omega.values(), *epsilon, *solution.transmission.values()]
+
+
+def _amplification(solution: Solution) -> Any:  # noqa: ANN401 - an array, or one number
+    """By how much a rounding error may have grown anywhere."""
+    return reduce(larger, [joint.amplification for joint in solution.joints.values()])
+
+
+def _predicted_error(amplification: FloatArray) -> FloatArray:
+    """(N,) what the growth of rounding errors says of the results' error; infinite where it is nan."""
+    predicted = SAFETY * EPSILON * amplification
+    return np.where(np.isnan(predicted), np.inf, predicted)
+
+
+# Again with more digits, near a singular position --------------------------------------------------
+
+EXTENDED = float(np.finfo(np.longdouble).eps)
+"""As `EPSILON` where the processor or compiler has no wider floats."""
+LOSSY = 1e-9
+"""A predicted relative error from which a variant is solved again: 4e-7 mm in a plan of 400 mm, which nobody
+can draw. Ordinary mechanisms stay far below, and solving again takes ten times as long."""
+EXTENDED_ENOUGH = LOSSY * EPSILON / EXTENDED
+"""A predicted relative error up to which extended floats bring it below `LOSSY`; beyond, eighty digits."""
+LEAST_SINE = 8e-16
+"""Of a transmission angle; below it (as between guides at 0 and 180 degrees) there is no solution: the data's
+last digit decides how the mechanism moves."""
+DIGITS = 80
+"""Decimal digits of the last resort."""
+
+
+def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
+    """Solve again what has lost digits; nan where a variant has no motion."""
+    predicted = motion.predicted_error
+    sine = reduce(np.minimum, motion.transmission.values(), np.ones(predicted.shape))
+    motion.recomputed[:], solutions = refined(mechanism, predicted, sine, accelerations=accelerations)
+    for solution, rows in solutions:
+        _replace_rows(motion, solution, rows)
+    broken = np.isinf(predicted)
+    for rates in (motion.velocity, motion.acceleration, motion.omega, motion.epsilon):
+        for values in rates.values():
+            values[broken] = np.nan
+
+
+def refined(
+    mechanism: Mechanism, predicted: FloatArray, sine: FloatArray, *, accelerations: bool
+) -> tuple[NDArray[np.bool_], list[tuple[Solution, NDArray[np.intp]]]]:
+    """Which variants have lost digits, and their new solutions, each with the rows that it is of.
+
+    Arguments
+    ---------
+    predicted : (N,) relative errors; brought up to date in place, infinite where there is no solution
+    sine : (N,) the least of each variant's transmission angles
+    """
+    predicted[~(sine >= LEAST_SINE)] = np.inf
+    again = (predicted > LOSSY) & np.isfinite(predicted)
+    wide = again & (predicted <= EXTENDED_ENOUGH)
+    solutions = []
+    rows = np.flatnonzero(wide)
+    if rows.size:
+        solutions.append(
+            (solve(mechanism, some_variants(rows), accelerations=accelerations, anew=True), rows)
+        )
+        predicted[rows] = np.maximum(predicted[rows] * (EXTENDED / EPSILON), EPSILON)
+    for index in np.flatnonzero(again & ~wide):
+        solution = _in_digits(mechanism, int(index), accelerations)
+        predicted[index] = EPSILON if solution is not None else np.inf
+        if solution is not None:
+            solutions.append((solution, np.array([index])))
+    return again, solutions
+
+
+def _in_digits(mechanism: Mechanism, index: int, accelerations: bool) -> Solution | None:
+    """One variant in eighty digits; None where it divides by zero even so, or does not close."""
+    from mpmath import mp  # noqa: PLC0415 - seldom needed, and slow to import
+
+    with mp.workdps(DIGITS):
+        try:
+            solution = solve(
+                mechanism, one_variant(index, mp.mpmathify), accelerations=accelerations, anew=True
+            )
+        except ZeroDivisionError:
+            return None
+    rates: list[Any] = [
+        number for joint in solution.joints.values() for number in (joint.velocity, joint.acceleration)
+    ]
+    return solution if all(mp.isfinite(rate) for rate in rates) else None
+
+
+def _replace_rows(motion: Motion, solution: Solution, rows: NDArray[np.intp]) -> None:
+    """Take the solution of some variants over into the motion."""
+    for name, joint in solution.joints.items():
+        motion.position[name][rows] = _rounded(joint.position)
+        motion.velocity[name][rows] = _rounded(joint.velocity)
+        if motion.acceleration:
+            motion.acceleration[name][rows] = _rounded(joint.acceleration)
+    for quantity in ("omega", "epsilon", "transmission"):
+        for name, values in getattr(motion, quantity).items():
+            values[rows] = np.real(_rounded(getattr(solution, quantity)[name]))
+
+
+def _rounded(number: Any) -> Any:  # noqa: ANN401 - of extended floats or of many digits
+    return number if isinstance(number, np.ndarray) else complex(number)
+
+
+# Why there is no motion ----------------------------------------------------------------------------
+
+ROUNDING = 1e-14
+"""Relative to the mechanism's reach."""
+WHAT_IS_IN_LINE = {
+    Dyad: "its links are in line",
+    Slider: "its rod is perpendicular to the guide",
+    SlottedLink: "the pin is at the link's pivot, or as near to it as the offset lets it",
+    CrossSlider: "its guides are parallel",
+    Yoke: "slot and guide are parallel",
+}
+
+
+def reason(mechanism: Mechanism, broken: NDArray[np.bool_]) -> MechanismError:
+    """The error for the first of the broken variants, which says how many there are."""
+    first = int(np.argmax(broken))
+    where = f" ({int(broken.sum())} of {broken.size} variant(s), the first at index {first})"
+    return reason_at(mechanism, first, "" if broken.size == 1 else where)
+
+
+def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismError:
+    """The error for the variant at an index, from the first group that fails there."""
+    take = one_variant(index, _quiet)
+    groups = mechanism.groups
+    driven = "crank angle" if isinstance(mechanism.driver, Crank) else "displacement of the driven slider"
+    with np.errstate(all="ignore"):
+        for count, group in enumerate(groups):
+            before = solve(replace(mechanism, groups=groups[:count]), take)
+            try:
+                after = solve(replace(mechanism, groups=groups[: count + 1]), take)
+            except ZeroDivisionError:
+                break
+            node = after.joints[group.node]
+            if not np.isfinite(node.position) or np.isnan(after.transmission.get(group.node, 1.0)):
+                gap, reach = _gap(group, before), max(abs(one.position) for one in before.joints.values())
+                # A gap of rounding alone: the group is flat, and its data say so as well as they can.
+                if gap > ROUNDING * reach:
+                    return _does_not_close(group, gap, where, driven)
+                return _singular(group, where, driven)
+            if not np.isfinite(node.amplification * np.abs(node.acceleration + node.velocity)):
+                break
+        else:
+            group = min(groups, key=lambda one: float(after.transmission.get(one.node, 1.0)))
+    return _singular(group, where, driven)
+
+
+def _quiet(number: complex) -> np.generic:
+    """NumPy's own scalar: it divides by zero without an error."""
+    scalar: np.generic = np.asarray(number)[()]  # type: ignore[assignment]
+    return scalar
+
+
+def _does_not_close(group: Group, gap_m: float, where: str, driven: str) -> MechanismError:
+    return MechanismError(
+        "does_not_assemble",
+        f"the group of {group.node} does not assemble: its links miss each other by {{gap}}{where};"
+        f" check the lengths, the {driven}, and the sides of the groups before it",
+        group=group.node,
+        gap_m=gap_m,
+    )
+
+
+def _singular(group: Group, where: str, driven: str) -> MechanismError:
+    advice = "give slot and guide two directions" if isinstance(group, Yoke) else f"choose another {driven}"
+    why = WHAT_IS_IN_LINE.get(type(group), "its base has no length")
+    message = f"the velocities of the group of {group.node} are not determined: {why}{where}; {advice}"
+    return MechanismError("singular", message, group=group.node)
+
+
+def _gap(group: Group, before: Solution) -> float:
+    """By how much a group fails to close, metres; the group's pins are where `before` has them."""
+    at = {name: joint.position for name, joint in before.joints.items()}
+    take = before.take
+    match group:
+        case Dyad(pins=(p, q)) | Plate(base=(p, q)):
+            distance, first, second = abs(at[q] - at[p]), *map(take, group.lengths_m)
+            gap = max(distance - (first + second), abs(first - second) - distance)
+        case Slider(pin=pin):
+            rail = rail_of(before, group.guide)
+            gap = abs(cross(rail.along, at[pin] - rail.joint.position)) - take(group.length_m)
+        case SlottedLink(pin=pin, pivot=pivot):
+            gap = abs(take(group.offset_m)) - abs(at[pin] - at[pivot])
+        case _:
+            gap = 0.0
+    return float(gap)

@@ -16,7 +16,7 @@ from reference.construction.elements import Coriolis, Errors, Normal, View
 from reference.construction.graph import Construction
 from reference.construction.mistakes import Mistake, changed_step, mistakes_of_step
 from reference.construction.steps import Given, Step, TwoLines
-from reference.construction.uncertainty import SMALL, Skill, hand_errors
+from reference.construction.uncertainty import SMALL, Skill, step_errors
 from reference.geometry import ComplexArray, FloatArray
 from reference.numbers import dot
 
@@ -36,26 +36,24 @@ RARITY: Mapping[str, float] = {
     "scale_wrong": 10.0,
     "arithmetic": 22.0,
 }
-"""One step in a hundred or so goes wrong, in one of ten or so ways; a slip in a computation may give any
-length."""
+"""Cost of each mistake: one step in about a hundred goes wrong, in one of about ten ways; a slip in a
+computation may give any length."""
 SOMETHING_ELSE = 9.0
-"""What a step costs that went wrong in a way nobody knows, beside what it makes likely: any place."""
+"""Cost of a step that went wrong in an unknown way, without the cost of its position."""
 ANYWHERE = 2.0 * math.log(100.0)
-"""A length may then be anything within some 100 mm; a place costs twice that."""
+"""Cost of each unknown coordinate or length: it may be anything within some 100 mm."""
 SUSPECT = 9.0
-"""From this squared misfit on (three standard errors) wrong ways are tried."""
-WITHIN = 24.0
-"""Accounts dearer than the cheapest by a hand of the same care by more than this are dropped."""
-AT_MOST = 40
-"""Accounts kept by a hand of one care."""
-
-
+"""From this squared misfit on (three standard errors) mistakes are tried."""
+COST_WINDOW = 24.0
+"""Explanations that cost more than the cheapest one of the same care by more than this are dropped."""
+MOST_BRANCHES = 40
+"""Explanations of one care that are continued."""
 STIFFNESS = 1e-3
-"""How little a node is held to where its step puts it, against what was seen of it."""
+"""Weight of where the step puts a node, relative to what was observed of it."""
 TINY = 1e-6
 """Millimetres; a shorter vector has no direction."""
 SETTLING = 2
-"""Steps in which a node is moved to the lengths seen of it."""
+"""Steps in which a node is moved to the observed lengths."""
 
 Covariance = tuple[float, float, float]
 """mm^2: variance along x, covariance, variance along y."""
@@ -63,15 +61,14 @@ Covariance = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """A node, or a vector that ends in it, as drawn.
+    """The position of a node, or a vector that ends in it, as drawn.
 
     Attributes
     ----------
-    node : where it ends
-    tail : the node from which it is seen; None for a place about the figure's origin
-    value : complex millimetres, or a length where it has no direction
-    spread : how far it may be missed; of what has a direction by its reading alone, the hand's own errors
-        come to it
+    node : the node, or the vector's head
+    tail : the vector's tail; None for a position about the figure's origin
+    value : complex millimetres, or a length where the direction is not known
+    spread : its covariance; with a direction that of the reading alone, without drafting errors
     """
 
     node: str
@@ -83,23 +80,23 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class Observations:
-    """What somebody drew.
+    """A drawing as read or measured.
 
     Attributes
     ----------
-    seen : its nodes and vectors
-    sketches : by plan, the mechanism's joints as drawn beside it, where that is a sketch of its own
+    entries : its nodes and vectors
+    sketches : by plan, the mechanism's joints as drawn beside it, where that is another sketch
     """
 
-    seen: tuple[Observation, ...]
+    entries: tuple[Observation, ...]
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
 
 
-def by_node(construction: Construction, seen: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
-    """What was seen, by the end that is made later; vectors seen the other way round are turned."""
+def by_node(construction: Construction, entries: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
+    """The observations by the node that is made later; vectors that end at the earlier node are reversed."""
     order = {step.node: index for index, step in enumerate(construction.steps)}
     found: dict[str, tuple[Observation, ...]] = {}
-    for one in seen:
+    for one in entries:
         if one.tail is not None and order[one.tail] > order[one.node]:
             value = -one.value if one.has_direction else one.value
             one = replace(one, node=one.tail, tail=one.node, value=value)  # noqa: PLW2901 - the same vector
@@ -107,9 +104,11 @@ def by_node(construction: Construction, seen: Iterable[Observation]) -> dict[str
     return found
 
 
-def seen_later(construction: Construction, seen: Mapping[str, tuple[Observation, ...]]) -> frozenset[str]:
-    """The nodes that were seen, or that something seen is made from or reckoned from, rightly or wrongly."""
-    wanted = set(seen) | {one.tail for ones in seen.values() for one in ones if one.tail is not None}
+def needed_nodes(
+    construction: Construction, entries: Mapping[str, tuple[Observation, ...]]
+) -> frozenset[str]:
+    """The observed nodes and all from which these may be made, with the right steps or with wrong ones."""
+    wanted = set(entries) | {one.tail for ones in entries.values() for one in ones if one.tail is not None}
     # A wrong line may be taken by any link, and through a pole.
     wanted.update(step.node for step in construction.figures["mechanism"])
     wanted.update(construction.poles.values())
@@ -121,59 +120,59 @@ def seen_later(construction: Construction, seen: Mapping[str, tuple[Observation,
 
 @dataclass(frozen=True, slots=True)
 class NodeObservations:
-    """What was seen of one node. Arrays of places end in the branches' axis.
+    """The observations of one node; the last axis of arrays is that of the branches.
 
     Attributes
     ----------
     turned : (branches,) factor by which its plan is turned as a whole, None where in no branch
-    care : (branches,) how many times a usual hand's standard deviations
+    care : (branches,) drafting errors as multiples of the usual ones
     """
 
-    seen: tuple[Observation, ...]
+    entries: tuple[Observation, ...]
     turned: ComplexArray | None
     care: FloatArray
 
     def __bool__(self) -> bool:
-        return bool(self.seen)
+        return bool(self.entries)
 
     def value(self, one: Observation) -> ComplexArray | complex:
-        """As it would stand in a plan that is not turned."""
+        """The observed value in a plan that is not turned."""
         if self.turned is None or not one.has_direction:
             return one.value
         return np.asarray(one.value / self.turned)
 
     @property
-    def tells_place(self) -> bool:
-        """Whether what was seen leaves the node only one place."""
-        return any(one.has_direction for one in self.seen)
+    def fixes_place(self) -> bool:
+        """Whether the observations leave only one position for the node."""
+        return any(one.has_direction for one in self.entries)
 
     @property
     def freedom(self) -> int:
-        """How many numbers were seen."""
-        return sum(2 if one.has_direction else 1 for one in self.seen)
+        """The number of observed coordinates and lengths."""
+        return sum(2 if one.has_direction else 1 for one in self.entries)
 
     @property
     def anywhere(self) -> float:
-        """What any place at all costs."""
+        """The cost of any position, made in an unknown way."""
         return SOMETHING_ELSE + ANYWHERE * min(self.freedom, 2)
 
-    def held_against(
-        self, place: ComplexArray, moved: ComplexArray | None, nodes: Mapping[str, ComplexArray]
+    def misfit_and_cost(
+        self, place: ComplexArray, shifts: ComplexArray | None, nodes: Mapping[str, ComplexArray]
     ) -> tuple[FloatArray, FloatArray]:
-        """The squared misfit of places in standard deviations, infinite where there is none, and its cost.
+        """The squared misfit of positions in standard deviations (inf where there is none), and its cost.
 
-        The cost is -2 log of the density of what was seen, millimetres: wide errors make each place rarer.
+        The cost is -2 log of the density of the observations per mm: wide errors make each position rarer.
 
-        Arguments: `place` (ways, branches); `moved` (ways, acts, branches) is how far the acts of a usual
-        hand move it.
+        Arguments: `place` (alternatives, branches); `shifts` (alternatives, acts, branches) is how far each
+        usual drafting error moves it.
         """
         misfit, width = np.zeros(place.shape), np.zeros(place.shape)
-        for one in self.seen:
+        for one in self.entries:
             vector = place if one.tail is None else place - nodes[one.tail]
             if one.has_direction:
-                squared, variance = _off(self.value(one) - vector, one.spread, moved)
+                squared, variance = _squared_residual(self.value(one) - vector, one.spread, shifts)
             else:
-                squared, variance = _off_length(abs(one.value), vector, one.spread)
+                squared, variance = _squared_length_residual(abs(one.value), vector, one.spread)
             misfit += squared
             width += np.log(variance)
         misfit /= self.care**2
@@ -182,24 +181,24 @@ class NodeObservations:
         return np.where(is_there, misfit, np.inf), np.where(is_there, whole, np.inf)
 
     def settled(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> ComplexArray:
-        """Places moved to what was seen, by as little as possible where that leaves it open."""
-        first = self.seen[0]
+        """Positions moved to the observations, by as little as possible where lengths alone are known."""
+        first = self.entries[0]
         if first.has_direction:
             tail = 0.0 if first.tail is None else nodes[first.tail]
             return np.broadcast_to(tail + self.value(first), place.shape)
         for _ in range(SETTLING):
-            moved = place + self._shift(place, nodes)
-            place = np.where(np.isfinite(moved), moved, place)
+            settled = place + self._shift(place, nodes)
+            place = np.where(np.isfinite(settled), settled, place)
         return place
 
     def _shift(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> ComplexArray:
-        """A Gauss-Newton step towards the lengths seen."""
-        tails = [one.tail for one in self.seen]
+        """A Gauss-Newton step towards the observed lengths."""
+        tails = [one.tail for one in self.entries]
         vectors = np.array([place if tail is None else place - nodes[tail] for tail in tails])
         lengths = np.abs(vectors)
         is_long = lengths > TINY
         along = np.where(is_long, vectors / np.maximum(lengths, TINY), 0.0)
-        wanted = np.array([abs(one.value) for one in self.seen])[:, None]
+        wanted = np.array([abs(one.value) for one in self.entries])[:, None]
         pull = (along * (wanted - lengths)).sum(axis=0)
         x, y = along.real, along.imag
         xx, yy, xy = (x * x).sum(axis=0) + STIFFNESS, (y * y).sum(axis=0) + STIFFNESS, (x * y).sum(axis=0)
@@ -207,12 +206,14 @@ class NodeObservations:
         return np.asarray(((yy * x - xy * y) + 1j * (xx * y - xy * x)) / (xx * yy - xy**2))
 
 
-def _off(off: ComplexArray, spread: Covariance, moved: ComplexArray | None) -> tuple[FloatArray, FloatArray]:
+def _squared_residual(
+    residual: ComplexArray, spread: Covariance, shifts: ComplexArray | None
+) -> tuple[FloatArray, FloatArray]:
     """Deviations squared, in standard deviations, and the determinants of their covariances."""
-    x, y = off.real, off.imag
+    x, y = residual.real, residual.imag
     xx, xy, yy = (np.asarray(one) for one in spread)
-    if moved is not None:
-        across, up = moved.real, moved.imag
+    if shifts is not None:
+        across, up = shifts.real, shifts.imag
         xx = xx + np.einsum("kah,kah->kh", across, across)
         xy = xy + np.einsum("kah,kah->kh", across, up)
         yy = yy + np.einsum("kah,kah->kh", up, up)
@@ -220,24 +221,28 @@ def _off(off: ComplexArray, spread: Covariance, moved: ComplexArray | None) -> t
     return np.asarray((yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant), np.asarray(determinant)
 
 
-def _off_length(seen_mm: float, vector: ComplexArray, spread: Covariance) -> tuple[FloatArray, FloatArray]:
+def _squared_length_residual(
+    drawn_mm: float, vector: ComplexArray, spread: Covariance
+) -> tuple[FloatArray, FloatArray]:
     """Deviations of lengths squared, in standard deviations, and their variances."""
     length, x, y = np.abs(vector), vector.real, vector.imag
     xx, xy, yy = spread
     along = (xx * x * x + 2.0 * xy * x * y + yy * y * y) / np.maximum(length, TINY) ** 2
     variance = np.where(length > TINY, along, xx + yy)
-    return np.asarray((seen_mm - length) ** 2 / variance), variance
+    return np.asarray((drawn_mm - length) ** 2 / variance), variance
 
+
+# Mistakes of a step, and their costs ---------------------------------------------------------------
 
 LEAST_FACTOR, MOST_FACTOR = 0.02, 30.0
-"""A computed length off by more than that is something else than a slip."""
+"""A computed length that is wrong by a larger or smaller factor is no slip in its computation."""
 SLIP = "arithmetic"
 
 WrongSteps = tuple[tuple[Mistake, Step], ...]
 
 
 class Repertoire:
-    """The wrong ways of a construction's steps and a usual hand's errors in them, kept for a whole class."""
+    """The mistakes in the steps of a construction and their usual drafting errors, computed once."""
 
     def __init__(self, construction: Construction, skill: Skill) -> None:
         self.construction = construction
@@ -255,36 +260,37 @@ class Repertoire:
     def errors(self, step: Step) -> Errors:
         """The errors of a step's acts."""
         if step.node not in self._errors:
-            self._errors[step.node] = hand_errors(step, self.skill)
+            self._errors[step.node] = step_errors(step, self.skill)
         return self._errors[step.node]
 
 
-KEPT = 32
-"""So many constructions' repertoires are kept: a class draws one, or one for each position."""
-_kept: deque[Repertoire] = deque(maxlen=KEPT)
+CACHE_SIZE = 32
+"""Repertoires in the cache: a class draws one construction, or one for each position."""
+_repertoires: deque[Repertoire] = deque(maxlen=CACHE_SIZE)
 
 
 def repertoire_of(construction: Construction, skill: Skill) -> Repertoire:
-    """The repertoire of a construction, kept: a class draws one and the same."""
-    for repertoire in _kept:
+    """The repertoire of a construction, from the cache where it is there."""
+    for repertoire in _repertoires:
         if repertoire.construction is construction and repertoire.skill == skill:
             return repertoire
     repertoire = Repertoire(construction, skill)
-    _kept.append(repertoire)
+    _repertoires.append(repertoire)
     return repertoire
 
 
 @dataclass(frozen=True, slots=True)
 class StepAlternatives:
-    """Ways to make a step in each branch, the right one first; arrays (ways, branches).
+    """The alternatives for a step in each branch, the right one first; arrays (alternatives, branches).
 
     Attributes
     ----------
-    cost : of what was seen by each way, with how rare it is
-    misfit : squared, of what was seen; zero for something else, that fits anything
-    mistakes : by way; None for the right one and for something else
+    place : the node's position, complex mm
+    cost : of the observations, with the cost of the mistake
+    misfit : squared, of the observations; zero for an unknown way, which fits anything
+    mistakes : by alternative; None for the right one and for an unknown way
     factors : of a slip, by branch
-    others : how many ways at the end are something else
+    others : how many alternatives at the end are unknown ways
     """
 
     place: ComplexArray
@@ -294,18 +300,18 @@ class StepAlternatives:
     factors: FloatArray | None = None
     others: int = 0
 
-    def made(self, way: int, branch: int) -> tuple[Mistake, ...]:
-        """The mistake of a way in a branch, as a tuple of one or none."""
-        mistake = self.mistakes[way]
+    def made(self, choice: int, branch: int) -> tuple[Mistake, ...]:
+        """The mistake of an alternative in a branch, as a tuple of one or none."""
+        mistake = self.mistakes[choice]
         if mistake is None:
             return ()
         if mistake.code == SLIP and self.factors is not None:
             mistake = replace(mistake, factor=float(self.factors[branch]))
         return (mistake,)
 
-    def is_something_else(self, way: int) -> bool:
-        """Whether nobody knows what was done."""
-        return way >= len(self.mistakes) - self.others
+    def is_something_else(self, choice: int) -> bool:
+        """Whether an alternative is an unknown way."""
+        return choice >= len(self.mistakes) - self.others
 
     def __add__(self, more: "StepAlternatives") -> "StepAlternatives":
         return StepAlternatives(
@@ -320,71 +326,73 @@ class StepAlternatives:
 
 @dataclass(frozen=True, slots=True)
 class StepContext:
-    """Where a step is made: the nodes so far in each branch, and what was seen of the new one."""
+    """What a step is compared with: the nodes so far in each branch, and the observations of the new one."""
 
     nodes: Mapping[str, ComplexArray]
     known: Mapping[str, FloatArray]
-    sight: NodeObservations
+    observed: NodeObservations
     repertoire: Repertoire
 
     @property
     def count(self) -> int:
         """How many branches there are."""
-        return len(self.sight.care)
+        return len(self.observed.care)
 
     def right(self, step: Step) -> StepAlternatives:
         """The step as it should be made."""
-        return self._ways(step, [(None, step)])
+        return self._alternatives(step, [(None, step)])
 
     def wrong(self, step: Step) -> StepAlternatives:
         """The step with each mistake in it."""
-        return self._ways(step, self.repertoire.wrong(step))
+        return self._alternatives(step, self.repertoire.wrong(step))
 
     def slips(self, step: Given) -> StepAlternatives | None:
-        """The right direction with a length that was computed wrongly, as long as it was drawn."""
-        seen, view = self.sight.seen, View(self.nodes, self.known)
-        one = next((one for one in seen if one.tail == step.start or one.has_direction), None)
+        """The right direction with a wrongly computed length, as drawn; None where none is computed."""
+        entries, view = self.observed.entries, View(self.nodes, self.known)
+        one = next((one for one in entries if one.tail == step.start or one.has_direction), None)
         if one is None or not isinstance(step.length, Normal | Coriolis):
             return None
         right = step.factor * step.length.at(view)
         if one.has_direction:
             tail = 0.0 if one.tail is None else self.nodes[one.tail]
-            drawn = dot(tail + self.sight.value(one) - self.nodes[step.start], step.along.at(view))
+            drawn = dot(tail + self.observed.value(one) - self.nodes[step.start], step.along.at(view))
         else:
             drawn = np.abs(one.value) * np.sign(right)
         factors = np.asarray(drawn / right)
         is_within = (factors > LEAST_FACTOR) & (factors < MOST_FACTOR)
         factors = np.broadcast_to(np.where(is_within, factors, np.nan), (self.count,))
         changed = replace(step, factor=step.factor * factors)  # type: ignore[arg-type]
-        return replace(self._ways(step, [(Mistake(SLIP, step.node), changed)]), factors=factors)
+        return replace(self._alternatives(step, [(Mistake(SLIP, step.node), changed)]), factors=factors)
 
     def something_else(self, right: StepAlternatives) -> StepAlternatives:
-        """The node where it was drawn, whatever made it; from lengths alone on either side."""
-        sight, nodes = self.sight, self.nodes
+        """The node where it was drawn, made in an unknown way; from lengths alone both possible positions."""
+        observed, nodes = self.observed, self.nodes
         start = np.where(np.isfinite(right.place[0]), right.place[0], 0.0)
         starts = [start]
-        if not sight.tells_place and len(sight.seen) > 1:
-            tails = [0.0 if one.tail is None else nodes[one.tail] for one in sight.seen[:2]]
+        if not observed.fixes_place and len(observed.entries) > 1:
+            tails = [0.0 if one.tail is None else nodes[one.tail] for one in observed.entries[:2]]
             base = np.asarray(tails[1] - tails[0])
             along = np.where(np.abs(base) > 0.0, base / np.abs(base), 1.0)
             starts.append(np.asarray(tails[0] + along**2 * np.conj(start - tails[0])))
-        place = np.array([sight.settled(one, nodes) for one in starts])
+        place = np.array([observed.settled(one, nodes) for one in starts])
         zero = np.zeros(place.shape)
-        return StepAlternatives(place, zero + sight.anywhere, zero, (None,) * len(starts), others=len(starts))
+        return StepAlternatives(
+            place, zero + observed.anywhere, zero, (None,) * len(starts), others=len(starts)
+        )
 
-    def _ways(self, step: Step, steps: Sequence[tuple[Mistake | None, Step]]) -> StepAlternatives:
+    def _alternatives(self, step: Step, steps: Sequence[tuple[Mistake | None, Step]]) -> StepAlternatives:
         mistakes = tuple(mistake for mistake, _ in steps)
         if not steps:
             empty = np.zeros((0, self.count))
             return StepAlternatives(empty.astype(np.complex128), empty, empty, ())
-        place, moved = self._placed(step, [changed for _, changed in steps])
-        misfit, cost = self.sight.held_against(place, moved, self.nodes)
+        place, shifts = self._placed(step, [changed for _, changed in steps])
+        misfit, cost = self.observed.misfit_and_cost(place, shifts, self.nodes)
         rarity = np.array([0.0 if one is None else RARITY[one.code] for one in mistakes])
         return StepAlternatives(place, cost + rarity[:, None], misfit, mistakes)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:
-        """Where each puts the node, and how far each act of a usual hand moves it (ways, acts, branches)."""
-        errors = self.repertoire.errors(step) if self.sight.tells_place else {}
+        """Where each step puts the node, and how each usual error moves it (steps, acts, branches)."""
+        errors = self.repertoire.errors(step) if self.observed.fixes_place else {}
         view = View(self.nodes, self.known, errors)
         if not errors:
             return np.array([_shaped(one, (self.count,)) for one in _places(steps, view)]), None
@@ -399,7 +407,7 @@ def _shaped(place: ComplexArray, shape: tuple[int, ...]) -> ComplexArray:
 
 
 def _places(steps: Sequence[Step], view: View) -> Iterator[ComplexArray]:
-    """Where each of a step's versions puts its node; a line that several share is drawn once."""
+    """Where each of the alternative steps puts the node; a line that several share is drawn once."""
     drawn: dict[tuple[int, int], tuple[ComplexArray, ComplexArray]] = {}
     for step in steps:
         if not isinstance(step, TwoLines):

@@ -1,12 +1,11 @@
-"""A finished drawing replayed step by step: at each step the right way first, then the wrong ones.
+"""A finished drawing replayed step by step, to find how each step was made.
 
-The same construction once more, with what was drawn beside it. Every branch of the replay is one
-explanation of the drawing: how each step was made, and where its node came to lie. A step that the
-right way explains is left alone; where it does not, each mistake that
-`reference.construction.mistakes` knows for that step opens a branch, and "something else" one more.
-Later steps start from what was drawn, as the student did, so that one mistake does not hide the next.
-Branches are arrays: all are drawn at once, for drafting errors of every size. The ways to make one
-step and what each costs are in `reference.replay.explanations`.
+Every branch of the replay is one explanation of the drawing: how each step was made, and where its node
+lies. Where the right step does not explain what was drawn, each mistake that
+`reference.construction.mistakes` has for that step opens a branch, and an unknown way one more. Later
+steps start from what was drawn, as the student did, so that one mistake does not hide the next.
+Branches are arrays and are evaluated together, for drafting errors of several sizes. The alternatives
+for one step and their costs are in `reference.replay.explanations`.
 """
 
 from collections import ChainMap
@@ -21,17 +20,17 @@ from reference.construction.steps import Given, Step
 from reference.construction.uncertainty import Skill
 from reference.geometry import ComplexArray, FloatArray
 from reference.replay.explanations import (
-    AT_MOST,
+    COST_WINDOW,
+    MOST_BRANCHES,
     SUSPECT,
-    WITHIN,
     NodeObservations,
     Observation,
     Observations,
     StepAlternatives,
     StepContext,
     by_node,
+    needed_nodes,
     repertoire_of,
-    seen_later,
 )
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
@@ -40,13 +39,13 @@ BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 @dataclass(frozen=True, slots=True)
 class Root:
-    """Where an account begins: mistakes of the whole drawing, and what they change.
+    """The start of an explanation: mistakes of the whole drawing, and what they change.
 
     Attributes
     ----------
     parameters : those that differ
     turned : by plan, the factor by which it is turned as a whole
-    cost : of supposing it
+    cost : of these mistakes
     """
 
     made: tuple[Mistake, ...] = ()
@@ -57,14 +56,14 @@ class Root:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """One way in which the drawing may have been made.
+    """One explanation of a drawing.
 
     Attributes
     ----------
-    care : how many times a usual hand's standard deviations
+    care : drafting errors as a multiple of the usual ones
     made : the mistakes, in the order of construction
-    unexplained : nodes whose steps went wrong in no known way
-    branches, index : the replay that it comes from, and which of its branches it is
+    unexplained : nodes whose steps were made in an unknown way
+    branches, index : all branches of the replay, and which of them this is
     """
 
     cost: float
@@ -76,76 +75,82 @@ class Replay:
 
     @property
     def is_innocent(self) -> bool:
-        """Whether everything was made rightly."""
+        """Whether it has no mistake and no unexplained step."""
         return not self.made and not self.unexplained
 
     @property
     def right(self) -> Mapping[str, float]:
-        """By node seen, root mean square misfit in standard deviations if its step were made rightly."""
+        """By observed node, the root mean square misfit of the right step in standard deviations."""
         return {node: float(misfit[self.index]) for node, misfit in self.branches.right.items()}
 
 
 def replay(
     drawing: Drawing,
-    work: Observations,
+    observations: Observations,
     roots: Sequence[Root],
     skill: Skill,
     *,
     cares: Sequence[float] = (1.0,),
     blind: bool = False,
 ) -> list[Replay]:
-    """The accounts of a drawing, the likeliest first.
+    """The explanations of a drawing, the likeliest first.
 
     Arguments
     ---------
     drawing : the right one at its scales, parameters scalar
-    skill : of a usual hand
-    cares : the hands supposed, as multiples of its standard deviations
-    blind : mistakes are also tried at steps of which what was seen tells no place, one to an account
+    skill : usual drafting errors
+    cares : the sizes of drafting errors that are tried, as multiples of the usual ones
+    blind : try mistakes also at steps whose node's position was not observed, one to an explanation
     """
-    construction, told = drawing.construction, by_node(drawing.construction, work.seen)
+    construction, by_name = drawing.construction, by_node(drawing.construction, observations.entries)
     branches = _open(drawing, roots, cares)
-    needed = seen_later(construction, told)
+    needed = needed_nodes(construction, by_name)
     repertoire = repertoire_of(construction, skill)
     with np.errstate(all="ignore"):
         for figure, steps in construction.figures.items():
-            sketch = {name: np.asarray(place) for name, place in work.sketches.get(figure, {}).items()}
+            sketch = {
+                name: np.asarray(place) for name, place in observations.sketches.get(figure, {}).items()
+            }
             for step in steps:
                 if step.node in needed:
-                    here, nodes = told.get(step.node, ()), ChainMap(sketch, branches.nodes)
-                    bench = StepContext(nodes, branches.known, branches.sight(here, figure), repertoire)
-                    branches.go_on(step, figure, here, _ways(step, bench, branches.is_blind, blind=blind))
-    return branches.accounts()
+                    here, nodes = by_name.get(step.node, ()), ChainMap(sketch, branches.nodes)
+                    context = StepContext(nodes, branches.known, branches.observed(here, figure), repertoire)
+                    branches.go_on(
+                        step, figure, here, _alternatives(step, context, branches.is_blind, blind=blind)
+                    )
+    return branches.explanations()
 
 
-def _ways(step: Step, bench: StepContext, has_guessed: BoolArray, *, blind: bool) -> StepAlternatives:
-    """The right way to make a step, and the wrong ones where that does not explain what was seen.
+def _alternatives(
+    step: Step, context: StepContext, has_guessed: BoolArray, *, blind: bool
+) -> StepAlternatives:
+    """The right step, and the wrong ones where it does not explain the observations.
 
-    Arguments: `has_guessed` tells the branches that suppose a mistake that nothing told of.
+    Arguments: `has_guessed` marks the branches that already have a mistake without an observation.
     """
-    right, sight = bench.right(step), bench.sight
+    right, observed = context.right(step), context.observed
     is_suspect = right.misfit[0] > SUSPECT
-    is_guess = blind and not sight.tells_place
+    is_guess = blind and not observed.fixes_place
     if not is_guess and not is_suspect.any():
         return right
-    wrong = bench.wrong(step)
+    wrong = context.wrong(step)
     if is_guess:
         wrong.cost[:, has_guessed & ~is_suspect] = np.inf
-    ways = right + wrong
-    if not sight or not is_suspect.any():
-        return ways
-    slips = bench.slips(step) if isinstance(step, Given) else None
+    alternatives = right + wrong
+    if not observed or not is_suspect.any():
+        return alternatives
+    slips = context.slips(step) if isinstance(step, Given) else None
     if slips is not None:
-        ways += slips
-        if not sight.tells_place:
-            # Of a computed length seen as a length alone, whatever it is may be a slip.
-            return ways
-    return ways + bench.something_else(right)
+        alternatives += slips
+        if not observed.fixes_place:
+            # Where a computed length alone is observed, any value may be a slip.
+            return alternatives
+    return alternatives + context.something_else(right)
 
 
 @dataclass(slots=True)
 class _Branches:
-    """All accounts so far, arrays of shape (branches,)."""
+    """All explanations so far, arrays of shape (branches,)."""
 
     nodes: dict[str, ComplexArray]
     known: dict[str, FloatArray]
@@ -157,48 +162,50 @@ class _Branches:
     unexplained: list[tuple[str, ...]]
     right: dict[str, FloatArray]
 
-    def sight(self, seen: tuple[Observation, ...], figure: str) -> NodeObservations:
-        """What was seen of a node of a figure."""
-        return NodeObservations(seen, self.turned.get(figure), self.care)
+    def observed(self, entries: tuple[Observation, ...], figure: str) -> NodeObservations:
+        """The observations of a node of a figure, with the turn and the care of each branch."""
+        return NodeObservations(entries, self.turned.get(figure), self.care)
 
-    def go_on(self, step: Step, figure: str, seen: tuple[Observation, ...], ways: StepAlternatives) -> None:
-        """Each way in each branch: the likeliest of them."""
-        costs, place, right = self.cost + ways.cost, ways.place[0], ways.misfit[0]
-        if len(ways.mistakes) == 1:
+    def go_on(
+        self, step: Step, figure: str, entries: tuple[Observation, ...], alternatives: StepAlternatives
+    ) -> None:
+        """Continue with the likeliest pairs of an alternative and a branch."""
+        costs, place, right = self.cost + alternatives.cost, alternatives.place[0], alternatives.misfit[0]
+        if len(alternatives.mistakes) == 1:
             self.cost = costs[0]
         else:
             which, index = self._likeliest(costs)
-            place, right = ways.place[which, index], right[index]
+            place, right = alternatives.place[which, index], right[index]
             self._take(index)
             self.cost = costs[which, index]
-            if not any(one.has_direction for one in seen):
+            if not any(one.has_direction for one in entries):
                 self.is_blind = self.is_blind | ((which > 0) & (right <= SUSPECT))
-            for row, (way, branch) in enumerate(zip(which.tolist(), index.tolist(), strict=True)):
-                self.made[row] += ways.made(way, branch)
-                if ways.is_something_else(way):
+            for row, (choice, branch) in enumerate(zip(which.tolist(), index.tolist(), strict=True)):
+                self.made[row] += alternatives.made(choice, branch)
+                if alternatives.is_something_else(choice):
                     self.unexplained[row] += (step.node,)
-        if seen:
-            sight = self.sight(seen, figure)
-            place = sight.settled(place, self.nodes)
-            self.right[step.node] = np.sqrt(right / sight.freedom)
+        if entries:
+            observed = self.observed(entries, figure)
+            place = observed.settled(place, self.nodes)
+            self.right[step.node] = np.sqrt(right / observed.freedom)
         self.nodes[step.node] = place
 
     def _likeliest(self, costs: FloatArray) -> tuple[IntArray, IntArray]:
-        """The ways and branches that go on, by hands of each care the likeliest first."""
-        kept = []
+        """The alternatives and branches that go on, the likeliest first within each care."""
+        chosen = []
         for care in np.unique(self.care):
             columns = np.flatnonzero(self.care == care)
             own = costs[:, columns]
-            order = np.argsort(own, axis=None)[:AT_MOST]
+            order = np.argsort(own, axis=None)[:MOST_BRANCHES]
             least = own.flat[order[0]]
-            order = order[own.flat[order] <= least + WITHIN] if np.isfinite(least) else order[:1]
-            way, column = np.unravel_index(order, own.shape)
-            kept.append((way, columns[column]))
-        which, index = (np.concatenate(parts) for parts in zip(*kept, strict=True))
+            order = order[own.flat[order] <= least + COST_WINDOW] if np.isfinite(least) else order[:1]
+            choice, column = np.unravel_index(order, own.shape)
+            chosen.append((choice, columns[column]))
+        which, index = (np.concatenate(parts) for parts in zip(*chosen, strict=True))
         return which, index
 
     def _take(self, index: IntArray) -> None:
-        """Only these branches, in this order; one may be taken several times."""
+        """Keep these branches, in this order; one may be taken several times."""
         arrays: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]
         for arrays in (self.nodes, self.known, self.turned, self.right):  # type: ignore[assignment]
             arrays.update({name: array[index] for name, array in arrays.items() if np.ndim(array)})
@@ -206,8 +213,8 @@ class _Branches:
         self.made = [self.made[i] for i in index]
         self.unexplained = [self.unexplained[i] for i in index]
 
-    def accounts(self) -> list[Replay]:
-        """What the branches have come to, the likeliest first."""
+    def explanations(self) -> list[Replay]:
+        """The branches as explanations, the likeliest first."""
         return [
             Replay(float(self.cost[i]), float(self.care[i]), self.made[i], self.unexplained[i], self, i)
             for i in np.argsort(self.cost, kind="stable").tolist()
@@ -216,7 +223,7 @@ class _Branches:
 
 
 def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float]) -> _Branches:
-    """A branch for each root and hand."""
+    """A branch for each root and care."""
     starts = [(root, care) for care in cares for root in roots]
     known = {name: np.asarray(value) for name, value in drawing.parameters.items()}
     for name in {name for root in roots for name in root.parameters}:

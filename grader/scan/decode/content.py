@@ -1,4 +1,4 @@
-"""What a PDF page would cost to render, counted before any pixel is made."""
+"""The cost of rendering a PDF page, counted before any pixel is made."""
 
 import io
 import math
@@ -36,7 +36,7 @@ _BYTES_A_PLANE = {"/JPXDecode": 8}
 
 
 @dataclass(slots=True)
-class Drawn:
+class PageContent:
     """What carrying out a page's commands would draw.
 
     Attributes
@@ -51,9 +51,9 @@ class Drawn:
     damage: str = ""
 
 
-def drawn_by(file: InputFile, number: int, page: pikepdf.Page) -> Drawn:
+def drawn_by(file: InputFile, number: int, page: pikepdf.Page) -> PageContent:
     """What a page draws; raises InputFileError for more than a drawing can have."""
-    walk = _Walk(file, number, page)
+    walk = _ContentWalk(file, number, page)
     contents = page.obj.get("/Contents")
     streams = list(contents) if isinstance(contents, pikepdf.Array) else [contents] if contents else []
     left = MAX_CONTENT
@@ -87,14 +87,14 @@ def _appearances(annotation: pikepdf.Object) -> list[pikepdf.Stream]:
     return [state for state in states if isinstance(state, pikepdf.Stream)]
 
 
-class _Walk:
+class _ContentWalk:
     """Follows the streams of one page; each is parsed once."""
 
     def __init__(self, file: InputFile, number: int, page: pikepdf.Page) -> None:
         self.file, self.number = file, number
         self.area = abs(_area(page.mediabox))
         self.resources = page.obj.get("/Resources")
-        self.drawn = Drawn()
+        self.drawn = PageContent()
         self.costs: dict[tuple[int, int], float] = {}
         self.open: set[tuple[int, int]] = set()
 

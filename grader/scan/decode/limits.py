@@ -1,7 +1,7 @@
-"""What is let in: files read once, their kind by their first bytes, and bounds on what they ask for.
+"""Input files: read once, their kind known by their first bytes, their size and memory limited.
 
-All bounds are checked before pixels are made. What a page needs is counted in bytes of memory: the file,
-the pixels as decoded, and their grey.
+All limits are checked before pixels are made. The memory of a page is that of the file, of the pixels as
+decoded, and of their grey.
 
 Codes of `InputFileError` raised in this package:
 

@@ -83,7 +83,7 @@ def _page(file: InputFile, number: int) -> Page | None:
                 if filters_of(image) == ["/DCTDecode"]:
                     # What renders the page would fill the rest of a damaged one without a word.
                     pictures.decode(file, number, image.read_raw_bytes())
-            taken = _rendered(file, number, len(leaves), _as_understood(file, document))
+            taken = _rendered(file, number, len(leaves), _repaired(file, document))
     return replace(taken, damage=drawn.damage)
 
 
@@ -167,13 +167,13 @@ def _decoded(file: InputFile, number: int, image: pikepdf.PdfImage) -> GreyImage
         return None
 
 
-def _as_understood(file: InputFile, document: pikepdf.Pdf) -> bytes:
-    """The file; where qpdf had to mend it, as mended: what is rendered must be what was judged."""
+def _repaired(file: InputFile, document: pikepdf.Pdf) -> bytes:
+    """The file's bytes, as repaired where qpdf had to: what is rendered must be what was counted."""
     if not document.get_warnings():
         return file.data
-    mended = io.BytesIO()
-    document.save(mended)
-    return mended.getvalue()
+    repaired = io.BytesIO()
+    document.save(repaired)
+    return repaired.getvalue()
 
 
 def _rendered(file: InputFile, number: int, pages: int, data: bytes) -> Page:

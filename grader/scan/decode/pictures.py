@@ -16,6 +16,8 @@ from grader.scan.decode.limits import Door, InputFile, check_memory, check_size,
 from grader.scan.pixels import MM_PER_INCH
 from reference.errors import InputFileError
 
+# Grey levels --------------------------------------------------------------------------------------
+
 _BYTE = 8
 _BAND_ROWS = 512
 """A band of an A3 page at 600 dpi in colour is 15 MB."""
@@ -97,6 +99,8 @@ def from_pillow(image: Image.Image) -> GreyImage:
     return np.asarray(image.convert("L"), dtype=np.uint8).copy()
 
 
+# Resolution and orientation -----------------------------------------------------------------------
+
 _ORIENTATION_TAG = 274
 """EXIF 2.3 and TIFF 6.0."""
 _INCH, _CENTIMETRE = 2, 3
@@ -168,6 +172,8 @@ def _orientation(image: Image.Image) -> int:
         return 1
 
 
+# JPEG ---------------------------------------------------------------------------------------------
+
 _HARMLESS = ("extraneous bytes", "Invalid SOS parameters", "unknown Adobe color transform")
 """Warnings of libjpeg that leave the picture whole."""
 _JPEG_END = b"\xff\xd9"
@@ -189,7 +195,11 @@ def _jpeg_page(file: InputFile, number: int) -> Page | None:
         raise truncated(file, 1)
     four_inks = check_header(file, 1, file.data) in _FOUR_INKS
     tags = tags_within(file.data)
-    grey = _four_inks(file.data) if four_inks else decode(file, 1, file.data)
+    if four_inks:
+        with Image.open(io.BytesIO(file.data)) as image:
+            grey = from_pillow(image)
+    else:
+        grey = decode(file, 1, file.data)
     return Page(file.name, 1, tags.unmirrored(grey), tags.dpi, tags.turn_deg)
 
 
@@ -221,28 +231,24 @@ def decode(file: InputFile, page: int, data: bytes) -> GreyImage:
     libjpeg fills what is missing with grey and only warns: the warning is an error here.
     """
     try:
-        return _plane(simplejpeg.decode_jpeg(data, colorspace="GRAY", strict=True))
+        return _luma_of(data, strict=True)
     except ValueError as error:
         message = str(error)
     if any(sign in message for sign in _CUT_OFF):
         raise truncated(file, page)
     if not any(harmless in message for harmless in _HARMLESS):
         raise damaged(file, page, message)
-    return _plane(simplejpeg.decode_jpeg(data, colorspace="GRAY", strict=False))
+    return _luma_of(data, strict=False)
 
 
-def _plane(image: GreyImage) -> GreyImage:
-    """The only channel of a (h, w, 1) image."""
-    return image[..., 0]
-
-
-def _four_inks(data: bytes) -> GreyImage:
-    with Image.open(io.BytesIO(data)) as image:
-        return from_pillow(image)
+def _luma_of(data: bytes, *, strict: bool) -> GreyImage:
+    plane: GreyImage = simplejpeg.decode_jpeg(data, colorspace="GRAY", strict=strict)[..., 0]
+    return plane
 
 
 JPEG = Door(_jpeg_page)
 
+# PNG ----------------------------------------------------------------------------------------------
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _HEADER, _FRAME = struct.Struct(">IIBBxxx"), struct.Struct(">I4s")
@@ -276,7 +282,7 @@ def _png_page(file: InputFile, number: int) -> Page | None:
         raise truncated(file, 1)
     tags = _tags(file, chunks)
     # Profiles, texts and the frames of an animation never reach the decoder: they could unpack to anything.
-    stored = np.frombuffer(_written([one for one in chunks if one[0] in _PIXELS]), dtype=np.uint8)
+    stored = np.frombuffer(_written([chunk for chunk in chunks if chunk[0] in _PIXELS]), dtype=np.uint8)
     pixels = cv2.imdecode(stored, cv2.IMREAD_UNCHANGED)
     if pixels is None:
         raise damaged(file, 1, "it cannot be decoded")
@@ -313,7 +319,7 @@ def _written(chunks: Chunks) -> bytes:
 
 def _tags(file: InputFile, chunks: Chunks) -> Tags:
     """Resolution and orientation: those of one white pixel with the picture's description."""
-    described = [one for one in chunks if one[0] in _DESCRIPTION]
+    described = [chunk for chunk in chunks if chunk[0] in _DESCRIPTION]
     if sum(len(data) for _, data in described) > _MAX_DESCRIPTION:
         raise damaged(file, 1, f"its texts are longer than {_MAX_DESCRIPTION // 1_000_000} MB")
     header = (b"IHDR", _HEADER.pack(1, 1, 8, 0))

@@ -9,20 +9,12 @@ import cv2
 import numpy as np
 
 from grader.inputs.scale_text import ByRule, Declared, ParsedScale, parse_scale
-from grader.printed.layout import SCALE_BOXES
-from grader.records import (
-    ACCELERATION_PLAN,
-    MECHANISM,
-    VELOCITY_PLAN,
-    Box,
-    FloatArray,
-    GreyImage,
-    Page,
-    Sheet,
-    Written,
-)
+from grader.printed.layout import SCALE_BOXES, SCALE_OF
+from grader.records import Box, FloatArray, GreyImage, Page, Sheet, Written
 from grader.scan.handwriting.model import COLUMN, JUNK, Lattice, Segment, lattice_of, normalised, recognise
 from grader.scan.pixels import cut_out
+
+# What may stand in a scale's box, sign by sign ----------------------------------------------------
 
 _DIGIT_SIGNS: Mapping[str, str] = {"0": "o", **{digit: digit for digit in "123456789"}}
 """The sign that each digit looks like."""
@@ -195,14 +187,14 @@ def _tails(name: str, after: tuple[str, ...]) -> Iterable[Move]:
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class ScaleText:
     """A text that may be written, and the logarithm of its likelihood."""
 
     text: str
     log: float
 
 
-def texts_of(lattice: Lattice, name: str) -> tuple[list[Text], float]:
+def texts_of(lattice: Lattice, name: str) -> tuple[list[ScaleText], float]:
     """Texts that the box of a scale may hold, likeliest first; and the log likelihood of signs at will.
 
     The second value is what the ink would be worth if any signs might stand in any order: a text that
@@ -232,7 +224,7 @@ def texts_of(lattice: Lattice, name: str) -> tuple[list[Text], float]:
     for (state, text), score in beams[-1].items():
         if state.is_end:
             ended[text] = max(score, ended.get(text, -np.inf))
-    texts = sorted((Text(text, score) for text, score in ended.items()), key=lambda text: -text.log)
+    texts = sorted((ScaleText(text, score) for text, score in ended.items()), key=lambda text: -text.log)
     return texts, float(free[-1])
 
 
@@ -275,6 +267,8 @@ def _placed(segment: Segment, line: tuple[float, float, float]) -> FloatArray:
 _COLUMNS: Mapping[str, int] = {sign: column for sign, column in COLUMN.items() if sign}
 
 
+# Scales -------------------------------------------------------------------------------------------
+
 _PX_PER_MM = 12.0
 """Resolution at which writing is read: a digit of 3 mm is as high as the recogniser's picture, and more."""
 _BORDER_MM, _CELL_BORDER_MM = 0.55, 0.4
@@ -287,7 +281,6 @@ _LARGE, _HARDLY = 1000.0, -4.0
 """From here on, a number lost its decimal point more likely than that anybody chose the scale."""
 _MOST_TEXTS = 200
 """The likeliest, among which those that mean the same are put together."""
-_SCALE_OF: Mapping[str, str] = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
 _DIGITS = "0123456789"
 _LEAST_PEAK = 40
 """Of 255: a cell whose darkest ink is fainter is empty."""
@@ -310,7 +303,7 @@ def written_scales(page: Page, sheet: Sheet, units: Mapping[str, str] | None = N
 
     Arguments: `units` are the units of bare numbers where the assignment says them, by scale.
     """
-    names = [_SCALE_OF[figure] for figure in sheet.zones if figure in _SCALE_OF]
+    names = [SCALE_OF[figure] for figure in sheet.zones if figure in SCALE_OF]
     if not names:
         return {}
     scales = {}
@@ -332,12 +325,12 @@ def read_scale(lattice: Lattice, name: str, bare_unit: str | None = None) -> Wri
     total = sum(share for _, share in shares.values())
     fits = float(np.exp(min(0.0, best - at_will + _FOREIGN * lattice.count)))
     ranked = sorted(
-        ((text, fits * share / total) for text, share in shares.values()), key=lambda one: -one[1]
+        ((text, fits * share / total) for text, share in shares.values()), key=lambda spelling: -spelling[1]
     )
     return Written(ranked[0][0], ranked[0][1], tuple(ranked[1:4]))
 
 
-def _by_meaning(texts: list[Text], name: str, bare_unit: str | None) -> dict[object, tuple[str, float]]:
+def _by_meaning(texts: list[ScaleText], name: str, bare_unit: str | None) -> dict[object, tuple[str, float]]:
     """Texts that mean the same put together: the likeliest spelling, and the log of their sum."""
     meanings: dict[object, tuple[str, float]] = {}
     for candidate in texts:

@@ -51,14 +51,14 @@ def find_letters(ink: Ink, boxes: Sequence[Box] | None = None) -> Letters:
     pieces = _pieces(mask, unit, _LEAST_MM)
     rest = mask.copy()
     for piece in pieces:
-        if drawn[piece.place][piece.own > 0].mean() < _TOUCHED:
-            rest[piece.place] &= 1 - piece.own
+        if drawn[piece.window][piece.own > 0].mean() < _TOUCHED:
+            rest[piece.window] &= 1 - piece.own
     pieces = _but_words(pieces)
     cut = _pieces(_without(rest, drawn, _usual_px(ink)), unit, _STUB_MM)
     whole = np.arange(len(pieces) + len(cut)) < len(pieces)
     pieces = [*pieces, *cut]
     box = np.array([piece.box for piece in pieces], dtype=np.float64).reshape(-1, 4)
-    pictures = [normalised(grey[piece.place] * piece.own) for piece in pieces]
+    pictures = [normalised(grey[piece.window] * piece.own) for piece in pieces]
     probability = recognise(pictures, box[:, 2:], COOLING, STRANGE)
     # A box's edge lies between pixels; the centre of pixel q is at q / unit mm.
     box[:, :2] += [left - 0.5, top - 0.5]
@@ -89,22 +89,22 @@ def _mask(grey: GreyImage, unit: float) -> GreyImage:
 
 
 @dataclass(frozen=True, slots=True)
-class _Piece:
+class _InkPiece:
     """A connected piece of ink: left, top, width, height in pixels, and 1 where it has ink."""
 
     box: tuple[int, int, int, int]
     own: GreyImage
 
     @property
-    def place(self) -> tuple[slice, slice]:
+    def window(self) -> tuple[slice, slice]:
         x, y, w, h = self.box
         return slice(y, y + h), slice(x, x + w)
 
 
-def _pieces(mask: GreyImage, unit: float, least_mm: float) -> list[_Piece]:
+def _pieces(mask: GreyImage, unit: float, least_mm: float) -> list[_InkPiece]:
     """The pieces of a mask that are neither too small nor too large for a sign."""
     contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-    pieces: list[_Piece] = []
+    pieces: list[_InkPiece] = []
     for index, contour in enumerate(contours):
         if hierarchy[0, index, 3] >= 0:
             continue
@@ -113,11 +113,11 @@ def _pieces(mask: GreyImage, unit: float, least_mm: float) -> list[_Piece]:
             continue
         own = np.zeros((h, w), dtype=np.uint8)
         cv2.drawContours(own, [contour], 0, 1, cv2.FILLED, offset=(-x, -y))
-        pieces.append(_Piece((x, y, w, h), own & mask[y : y + h, x : x + w]))
+        pieces.append(_InkPiece((x, y, w, h), own & mask[y : y + h, x : x + w]))
     return pieces if len(pieces) <= _MOST else []
 
 
-def _but_words(pieces: list[_Piece]) -> list[_Piece]:
+def _but_words(pieces: list[_InkPiece]) -> list[_InkPiece]:
     """The pieces without those that stand in a line with many others."""
     if len(pieces) <= _WORDS:
         return pieces
@@ -125,9 +125,9 @@ def _but_words(pieces: list[_Piece]) -> list[_Piece]:
     beside = x.T - x - w < _GAP * np.maximum(h, h.T)
     level = np.minimum(y + h, (y + h).T) - np.maximum(y, y.T) > _LEVEL * np.minimum(h, h.T)
     line = np.arange(len(pieces))
-    for one, other in np.argwhere(beside & level & (x < x.T)):
-        if line[one] != line[other]:
-            line[line == line[other]] = line[one]
+    for first, second in np.argwhere(beside & level & (x < x.T)):
+        if line[first] != line[second]:
+            line[line == line[second]] = line[first]
     many = np.bincount(line)[line] > _WORDS
     return [piece for piece, is_word in zip(pieces, many, strict=True) if not is_word]
 

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from grader.records import FloatArray, GreyImage
 from grader.scan.pixels import Float32Array
 
+# Signs --------------------------------------------------------------------------------------------
+
 JUNK = ""
 """No sign at all: pieces of strokes, arrowheads, arcs, crossings, two letters run together."""
 SIGNS: tuple[str, ...] = (
@@ -52,16 +54,16 @@ COLUMN: dict[str, int] = {**_OWN, **{sign: _OWN[twin] for sign, twin in TWINS.it
 """The column of each sign, and of those that look like it, among the probabilities."""
 
 
+# Features -----------------------------------------------------------------------------------------
+
 SIDE_PX = 28
-"""Side of the picture that is looked at; the sign's longer side fills all but the margin."""
+"""Side of a sign's picture; the sign's longer side fills all but the margin."""
 _MARGIN_PX = 3
 """Around the sign: its border's gradient lies inside the picture."""
 _ORIENTATIONS = 8
 """Directions that borders are sorted by."""
-_CELLS = 6
-"""Cells along a side for the directions of borders,"""
-_ZONES = 7
-"""and for the ink."""
+_CELLS, _ZONES = 6, 7
+"""Cells along a side: for the directions of borders, and for the ink."""
 _LOBE = 0.6
 """A border counts for a direction as far as its part along it exceeds this share of its strength."""
 _LEAST_PX = 1.0
@@ -128,6 +130,8 @@ def _weights(cells: int) -> Float32Array:
     off = np.abs(np.arange(SIDE_PX)[None, :] - centre[:, None]) / pitch
     return np.asarray(np.clip(1.0 - off, 0.0, None), dtype=np.float32)
 
+
+# The network --------------------------------------------------------------------------------------
 
 COOLING, STRANGE = 0.43, 0.02
 """On a drawing, in hands that nobody has seen: what scores are multiplied by, and the share of signs of
@@ -207,6 +211,8 @@ def recognise(
     return (1.0 - strange) * known + strange / len(SIGNS)
 
 
+# Signs of a line ----------------------------------------------------------------------------------
+
 _LEAST_PEAK = 40
 """Of 255: a line whose darkest ink is fainter is empty."""
 _INK = 0.3
@@ -268,7 +274,9 @@ def lattice_of(grey: GreyImage, px_per_mm: float) -> Lattice:
     for first in range(len(pieces)):
         for last in range(first + 1, min(first + _MERGED, len(pieces)) + 1):
             box = _around(pieces[first:last])
-            if last > first + 1 and not _may_be_one(pieces[first:last]):
+            # The pieces of one sign stand over one another, or side by side without a gap.
+            pairs = pairwise(piece.box for piece in pieces[first:last])
+            if not all(_over(*pair) or _beside(*pair) for pair in pairs):
                 continue
             boxes.append(box)
             crops.append(normalised(_cut(grey, pieces[first:last], box)))
@@ -346,23 +354,18 @@ def _around(pieces: list[_Piece]) -> _Box:
     return left, top, right - left, bottom - top
 
 
-def _may_be_one(pieces: list[_Piece]) -> bool:
-    """Whether pieces stand over one another, or side by side without a gap, as those of one sign do."""
-    return all(_over(one.box, other.box) or _beside(one.box, other.box) for one, other in pairwise(pieces))
-
-
-def _over(one: _Box, other: _Box) -> bool:
-    shared = min(one[0] + one[2], other[0] + other[2]) - max(one[0], other[0])
-    small, tall = sorted((one, other), key=lambda box: box[3])
+def _over(first: _Box, second: _Box) -> bool:
+    shared = min(first[0] + first[2], second[0] + second[2]) - max(first[0], second[0])
+    small, tall = sorted((first, second), key=lambda box: box[3])
     # A small piece at the foot of a tall one is a point or a comma of its own.
     at_foot = small[3] < 0.5 * tall[3] and small[1] + small[3] / 2.0 > tall[1] + 0.75 * tall[3]
-    return shared >= _SHARED * min(one[2], other[2]) and not at_foot
+    return shared >= _SHARED * min(first[2], second[2]) and not at_foot
 
 
-def _beside(one: _Box, other: _Box) -> bool:
-    shared = min(one[1] + one[3], other[1] + other[3]) - max(one[1], other[1])
-    gap = max(one[0], other[0]) - min(one[0] + one[2], other[0] + other[2])
-    return shared >= _SHARED * min(one[3], other[3]) and gap <= _BROKEN_PX
+def _beside(first: _Box, second: _Box) -> bool:
+    shared = min(first[1] + first[3], second[1] + second[3]) - max(first[1], second[1])
+    gap = max(first[0], second[0]) - min(first[0] + first[2], second[0] + second[2])
+    return shared >= _SHARED * min(first[3], second[3]) and gap <= _BROKEN_PX
 
 
 def _cut(grey: GreyImage, pieces: list[_Piece], box: _Box) -> GreyImage:

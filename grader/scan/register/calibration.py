@@ -1,4 +1,4 @@
-"""The calibration page read back: what printer and scanner do to millimetres.
+"""The calibration page read: the errors of scale, skew and length of printer and scanner.
 
 The printed markers give the scales along the sheet's axes and their skew by a linear fit to their
 middles, which ink that spreads does not move. Segments of known length, read as strokes of a drawing
@@ -23,11 +23,12 @@ from grader.scan.strokes.ink import find_ink
 
 _LEAST_MARKERS = 4
 """Two scales and a skew, with markers left over to tell their errors."""
-_SCALE_TOLD, _UNEQUAL_TOLD, _SKEW_TOLD_DEG = 0.003, 0.001, 0.05
+_SCALE_REPORTED, _UNEQUAL_REPORTED, _SKEW_REPORTED_DEG = 0.003, 0.001, 0.05
 """Relative scale error, difference of the axes and skew that are worth a remedy."""
-_OFF_TOLD_MM = 0.12
+_RESIDUAL_REPORTED_MM = 0.12
 """Markers on a flat page stay below this."""
-_LENGTH_TOLD_MM = 0.15
+_LENGTH_REPORTED_MM = 0.15
+ALL_IS_WELL = "printer and scanner are fit for grading"
 _PHOTO_MM = 0.4
 """Markers farther off a linear map than this are a camera's view, not a scanner's."""
 _NEAR_MM, _NEAR_RAD = 1.5, 0.03
@@ -47,7 +48,7 @@ class _Linear:
 
 
 def calibrate(path: Path, number: int = 1) -> CalibrationDocument | Unread:
-    """What one scan of the calibration page says, or why it says nothing.
+    """Measure one scan of the calibration page; Unread with the reason where it cannot be measured.
 
     Raises InputFileError for a file that cannot be used.
     """
@@ -190,29 +191,29 @@ def _advice(document: CalibrationDocument) -> list[str]:
         if document.scale_x is None or document.scale_y is None
         else (document.scale_x + document.scale_y) / 2.0
     )
-    if scale is not None and abs(scale - 1.0) > _SCALE_TOLD:
+    if scale is not None and abs(scale - 1.0) > _SCALE_REPORTED:
         advice.append(
             f"lengths come out at {100.0 * scale:.2f} % of their size: print at 100 % without fitting to the"
             " page, and scan without scaling; printed sheets stay right, plain ones are as much off"
         )
     elif scale is None and not document.camera:
         advice.append("the file states no resolution: only the ratio of the scales is known")
-    if document.unequal is not None and abs(document.unequal) > _UNEQUAL_TOLD:
+    if document.unequal is not None and abs(document.unequal) > _UNEQUAL_REPORTED:
         advice.append(
             f"lengths along the sheet come out {100.0 * document.unequal:+.2f} % against those across it: use"
             " printed sheets, whose markers undo it, or rule the frame with care"
         )
-    if document.skew_deg is not None and abs(document.skew_deg) > _SKEW_TOLD_DEG:
+    if document.skew_deg is not None and abs(document.skew_deg) > _SKEW_REPORTED_DEG:
         advice.append(f"right angles come out {document.skew_deg:+.2f} degrees off: the paper is fed askew")
-    if document.residual_mm > _OFF_TOLD_MM:
+    if document.residual_mm > _RESIDUAL_REPORTED_MM:
         advice.append("markers are off any even map: the page was not flat, or its feed is uneven")
     segments = document.segments
     if segments.read < 0.9 * segments.printed:
         few = f"only {segments.read} of {segments.printed} segments are read"
         advice.append(f"{few}: scan sharper and darker, at 300 dpi")
-    elif segments.length_rms_mm is not None and segments.length_rms_mm > _LENGTH_TOLD_MM:
+    elif segments.length_rms_mm is not None and segments.length_rms_mm > _LENGTH_REPORTED_MM:
         advice.append("lengths of the segments scatter: scan at 300 dpi, grey, not black and white")
-    return advice or ["printer and scanner are fit for grading"]
+    return advice or [ALL_IS_WELL]
 
 
 def residual_map(document: CalibrationDocument, magnified: float = 200.0) -> str:

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 from grader.records import FloatArray, GreyImage, Lens, Page, Sheet
 from grader.scan.pixels import Flat, cut_across, inverted, lengths_and_directions, mapped
 from grader.scan.register.fitting import (
-    Marked,
+    MarkedPoints,
     Projection,
     Side,
     fit_projection,
@@ -94,7 +94,7 @@ def _middle(shape: tuple[int, ...]) -> tuple[FloatArray, float]:
 # By markers ---------------------------------------------------------------------------------------
 
 
-def find_bend(marked: Marked, plain: Projection, shape: tuple[int, int]) -> tuple[float, Projection]:
+def find_bend(marked: MarkedPoints, plain: Projection, shape: tuple[int, int]) -> tuple[float, Projection]:
     """The bend that best explains marked points, and the map of the straightened picture.
 
     Arguments: `plain` is the map without a bend, given back with 0 where a bend explains little.

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from grader.printed.layout import PAGE_MM
 from grader.records import FloatArray
 from grader.scan.pixels import MM_PER_INCH, inverted, local_axes, mapped
-from grader.scan.register.homography import PAPER, Model
+from grader.scan.register.homography import PAPER, Outline
 from grader.scan.register.lines import RIDGE, LongLine
 
 _POINTS = 5
@@ -43,7 +43,7 @@ _TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Solution:
+class LeastSquares:
     """Parameters (p,) that fit best, their covariance (p, p) and chi squared."""
 
     params: FloatArray
@@ -51,7 +51,7 @@ class Solution:
     chi2: float
 
 
-def solve(residuals: Callable[[FloatArray], FloatArray], start: FloatArray) -> Solution:
+def solve(residuals: Callable[[FloatArray], FloatArray], start: FloatArray) -> LeastSquares:
     """Least squares by Levenberg and Marquardt from a good first guess, residuals in standard errors.
 
     Raises numpy.linalg.LinAlgError for fewer residuals than parameters, and where they are not finite.
@@ -63,7 +63,7 @@ def solve(residuals: Callable[[FloatArray], FloatArray], start: FloatArray) -> S
     slope = partial(_derivative, residuals)
     fit = least_squares(residuals, start, slope, method="lm", x_scale="jac", **tolerances)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac)
-    return Solution(np.asarray(fit.x), np.asarray(covariance), 2.0 * float(fit.cost))
+    return LeastSquares(np.asarray(fit.x), np.asarray(covariance), 2.0 * float(fit.cost))
 
 
 def _derivative(function: Callable[[FloatArray], FloatArray], params: FloatArray) -> FloatArray:
@@ -73,7 +73,7 @@ def _derivative(function: Callable[[FloatArray], FloatArray], params: FloatArray
     return np.stack(columns, axis=-1).reshape(-1, len(params))
 
 
-def scale_error(to_matrix: Callable[[FloatArray], FloatArray], solution: Solution) -> float:
+def scale_error(to_matrix: Callable[[FloatArray], FloatArray], solution: LeastSquares) -> float:
     """Relative standard error of the mean scale of a fitted map."""
     gradient = _derivative(lambda params: np.array([log_scale(to_matrix(params))]), solution.params)[0]
     return float(np.sqrt(max(gradient @ solution.covariance @ gradient, 0.0)))
@@ -146,7 +146,7 @@ class Side:
     """A long line taken for one side of a model: sheet coordinate `axis` (0 x, 1 y) is `value` mm on it."""
 
     line: LongLine
-    model: Model
+    model: Outline
     axis: int
     value: float
 
@@ -231,7 +231,7 @@ def _shadow_px(side: Side) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Marked:
+class MarkedPoints:
     """Corners of markers, on the sheet and as seen.
 
     Attributes
@@ -288,7 +288,7 @@ class Projection:
         return np.asarray(np.sqrt(spread / 2.0) / _px_per_mm(middle))
 
 
-def fit_projection(marked: Marked) -> Projection:
+def fit_projection(marked: MarkedPoints) -> Projection:
     """The plainest map that explains at least four marked corners; ValueError for fewer.
 
     Few points cannot tell a perspective apart from noise and would extrapolate it wildly, so the freest
@@ -304,7 +304,7 @@ def fit_projection(marked: Marked) -> Projection:
         at = mapped(homography_of(params[1:], centre, size), marked.mm + params[0] * marked.outward)
         return np.asarray(at - marked.px)
 
-    def fitted(start: FloatArray) -> Solution:
+    def fitted(start: FloatArray) -> LeastSquares:
         se_px = _POINT_SE_MM * float(np.hypot(*start[1:3])) / size
         # What is known of the gain beforehand is one more datum.
         return solve(lambda p: np.append(off_px(p).ravel() / se_px, p[0] / _GAIN_SE_MM), start)

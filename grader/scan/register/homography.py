@@ -6,13 +6,11 @@ import numpy as np
 
 from grader.printed.layout import FRAME_MM, PAGE_MM
 from grader.records import Box, FloatArray, Page
-from grader.scan.pixels import MM_PER_INCH, inverted, local_axes, mapped
+from grader.scan.pixels import MM_PER_INCH, TITLE_BLOCK_MM, inverted, local_axes, mapped
 from grader.scan.register.lines import RIDGE, LongLine
 
 _MARGIN_MM = 10.0
 """Around a drawing without a frame: the least that ISO 5457 leaves."""
-_CORNER_MM = (215.0, 80.0)
-"""Width and height of the corner in which a title block may lie."""
 _INSET_MM = 7.0
 """The frame's own bottom line, and the paper's edge, are no part of the block."""
 _SQUARE_MM = 2.5
@@ -38,7 +36,7 @@ HALVES_ADVICE = (
 
 
 @dataclass(frozen=True, slots=True)
-class Model:
+class Outline:
     """A rectangle on the upright sheet.
 
     Attributes
@@ -58,13 +56,13 @@ class Model:
         return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
 
 
-PAPER = Model("paper", (0.0, 0.0, *PAGE_MM), 0.35)
-ISO = Model("iso", (*FRAME_MM[:2], FRAME_MM[0] + FRAME_MM[2], FRAME_MM[1] + FRAME_MM[3]), 0.3)
-GOST = Model("gost", (20.0, 5.0, 415.0, 292.0), 0.3)
+PAPER = Outline("paper", (0.0, 0.0, *PAGE_MM), 0.35)
+ISO = Outline("iso", (*FRAME_MM[:2], FRAME_MM[0] + FRAME_MM[2], FRAME_MM[1] + FRAME_MM[3]), 0.3)
+GOST = Outline("gost", (20.0, 5.0, 415.0, 292.0), 0.3)
 FRAMES = (ISO, GOST)
 
 
-def drawable(model: Model | None) -> Box:
+def drawable(model: Outline | None) -> Box:
     """The box inside a frame, or, without one, inside the least margin."""
     x0, y0, x1, y1 = (_MARGIN_MM, _MARGIN_MM, *ISO.box[2:]) if model is None else model.box
     return (x0, y0, x1 - x0, y1 - y0)
@@ -95,7 +93,7 @@ def _ruled_mm(ends: FloatArray) -> float:
     span = np.abs(ends[:, 1] - ends[:, 0])
     low, high = ends.min(axis=1), ends.max(axis=1)
     level = span[:, 0] > span[:, 1]
-    near = (low[:, 0] > PAGE_MM[0] - _CORNER_MM[0]) & (low[:, 1] > PAGE_MM[1] - _CORNER_MM[1])
+    near = (low[:, 0] > PAGE_MM[0] - TITLE_BLOCK_MM[0]) & (low[:, 1] > PAGE_MM[1] - TITLE_BLOCK_MM[1])
     inner = (high[:, 0] < PAGE_MM[0]) & (high[:, 1] < PAGE_MM[1] - np.where(level, _INSET_MM, 0.0))
     ruled = near & inner & (span.min(axis=1) < _SQUARE_MM) & (span.max(axis=1) > _LEAST_MM)
     if np.count_nonzero(ruled & level) < _LEAST_LEVEL:

@@ -9,7 +9,7 @@ from grader.printed.layout import PAGE_MM
 from grader.records import FloatArray
 from grader.scan.pixels import MM_PER_INCH, inverted, mapped, through_corners
 from grader.scan.register.fitting import Side, affine_of, affine_params
-from grader.scan.register.homography import FRAMES, PAPER, Model, drawn_ends, title_block_mm
+from grader.scan.register.homography import FRAMES, PAPER, Outline, drawn_ends, title_block_mm
 from grader.scan.register.lines import RIDGE, STEP, LongLine
 
 _LINES_EACH_WAY = 12
@@ -36,7 +36,8 @@ _FLAT = 1e-9
 """Least determinant of a map that can be inverted."""
 _CAMERA_SE = 0.015
 """How far off a camera's view may be, by the lines' errors: right angle in radians, ratio of the axes."""
-_LOOKED_AT = 80
+_MOST_READINGS = 80
+"""Readings whose sides are compared with the lines, the best first."""
 _BLOCK_MM = 200.0
 """Length of a title block's ruled lines that counts as much as one side that agrees."""
 _BLOCK_WORTH = 3.0
@@ -53,7 +54,7 @@ class Hypothesis:
     perspective: bool
     score: float
     sides: tuple[Side, ...] = ()
-    frame: Model | None = None
+    frame: Outline | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +80,10 @@ def hypotheses(
             if trust > 0.0:
                 readings += _in_each_turn(corners, model, trust, shape, resolution)
     drawn = drawn_ends(lines)
-    best = sorted(readings, key=lambda hypothesis: -hypothesis.score)[:_LOOKED_AT]
-    return sorted((_agreed(one, lines, drawn) for one in best), key=lambda hypothesis: -hypothesis.score)
+    best = sorted(readings, key=lambda hypothesis: -hypothesis.score)[:_MOST_READINGS]
+    return sorted(
+        (_agreed(reading, lines, drawn) for reading in best), key=lambda hypothesis: -hypothesis.score
+    )
 
 
 def _agreed(hypothesis: Hypothesis, lines: list[LongLine], drawn: FloatArray) -> Hypothesis:
@@ -109,7 +112,7 @@ def _quadrilaterals(lines: list[LongLine], shape: tuple[int, int]) -> list[tuple
     return [(left, top, right, bottom) for left, right in pairs[0] for top, bottom in pairs[1]]
 
 
-def _kind_trust(model: Model, quad: tuple[LongLine, ...]) -> float:
+def _kind_trust(model: Outline, quad: tuple[LongLine, ...]) -> float:
     """How well the looks of four lines fit a model: frames are drawn, edges are steps."""
     kinds = [line.kind for line in quad]
     if model is not PAPER:
@@ -123,7 +126,7 @@ def _kind_trust(model: Model, quad: tuple[LongLine, ...]) -> float:
 
 def _in_each_turn(
     corners: FloatArray,
-    model: Model,
+    model: Outline,
     trust: float,
     shape: tuple[int, int],
     resolution: Resolution | None,
@@ -145,7 +148,7 @@ def _in_each_turn(
     return readings
 
 
-def _quad_map(model: Model, corners: FloatArray) -> FloatArray | None:
+def _quad_map(model: Outline, corners: FloatArray) -> FloatArray | None:
     """Homography from a model's corners to pixels; None for corners that span no area."""
     matrix = through_corners(model.corners(), corners)
     good = bool(np.all(np.isfinite(matrix))) and abs(np.linalg.det(matrix)) > _FLAT
@@ -202,7 +205,7 @@ def _worth(side: Side) -> float:
     )
 
 
-def match_sides(mm_to_px: FloatArray, lines: list[LongLine]) -> tuple[tuple[Side, ...], Model | None]:
+def match_sides(mm_to_px: FloatArray, lines: list[LongLine]) -> tuple[tuple[Side, ...], Outline | None]:
     """Long lines that lie on a side of the paper or of one frame, and which frame that is."""
     inverse = inverted(mm_to_px)
     by_model = {model.name: on_sides(inverse, model, lines) for model in (PAPER, *FRAMES)}
@@ -214,7 +217,7 @@ def match_sides(mm_to_px: FloatArray, lines: list[LongLine]) -> tuple[tuple[Side
 
 
 def on_sides(
-    inverse: FloatArray, model: Model, lines: list[LongLine], within_mm: float = _MATCH_MM
+    inverse: FloatArray, model: Outline, lines: list[LongLine], within_mm: float = _MATCH_MM
 ) -> list[Side]:
     """For each side of a model the long line that lies on it best, where one does."""
     if not lines:

@@ -36,11 +36,13 @@ from grader.scan.pixels import (
     through_corners,
 )
 from grader.scan.register.distortion import find_bend
-from grader.scan.register.fitting import Marked, Projection, fit_projection
+from grader.scan.register.fitting import MarkedPoints, Projection, fit_projection
 from grader.scan.register.homography import rotation_deg
 
+# The code -----------------------------------------------------------------------------------------
+
 _LONG_SIDES_PX = (1700, 3400)
-"""At about 4 px/mm a module has 3 pixels; a phone's photo may need a closer look."""
+"""At about 4 px/mm a module has 3 pixels; a phone's photo may need twice as many."""
 _CLOSE_UP_PX_PER_MM = 10.0
 """A module of the code has about 8 pixels."""
 _MARGIN_MM = 3.0
@@ -52,18 +54,16 @@ _BLUR_PX, _SHARPER = 6.0, 1.5
 def identify(page: Page, mm_to_px: FloatArray | None = None) -> Identity | None:
     """What the page's code says; None without a code of ours, or with two that differ.
 
-    Arguments
-    ---------
-    mm_to_px : the printed sheet's map, where known: the code is then looked for in its place first
+    Arguments: `mm_to_px` is the printed sheet's map, where known: its place is then searched first.
     """
-    for look in _looks(page.grey, mm_to_px):
-        identities = _read(look)
+    for picture in _code_pictures(page.grey, mm_to_px):
+        identities = _read(picture)
         if identities:
             return identities.pop() if len(identities) == 1 else None
     return None
 
 
-def _looks(grey: GreyImage, mm_to_px: FloatArray | None) -> Iterator[GreyImage]:
+def _code_pictures(grey: GreyImage, mm_to_px: FloatArray | None) -> Iterator[GreyImage]:
     """Pictures in which the code may be read, the cheapest first."""
     if mm_to_px is not None:
         x, y, wide, high = CODE_MM
@@ -91,10 +91,12 @@ def _read(grey: GreyImage) -> set[Identity]:
     return {identity for identity in identities if identity is not None}
 
 
+# The markers --------------------------------------------------------------------------------------
+
 _DETECTION_PX = 1600
 """Long side of the picture on which markers are looked for: on A3 a marker's cell has 7 pixels."""
 _CLOSER_PX = 3200
-"""Second look, for photos in which the sheet is a small part."""
+"""The second time, for photos in which the sheet is a small part."""
 _LEAST_MARKERS = 2
 """One marker settles a map too badly far from it."""
 _LEAST_APART_MM = 100.0
@@ -118,7 +120,7 @@ _USUAL_LENGTH_MM = 60.0
 """Of a vector: what the map leaves unexplained is an error of lengths over this distance."""
 _FLAT_MM = 0.12
 """Misfit from which paper that is not flat is told; printers and flatbeds stay under 0.1."""
-_SCALE_TOLD = 0.004
+_SCALE_REPORTED = 0.004
 """Printers and scanners together stay below this."""
 _SCALE_NEAR = 0.1
 """Up to here a printed page may pass for the right size."""
@@ -150,12 +152,12 @@ class _Markers:
     """Refined corners of one template's markers, and the marker (n,) that each is of."""
 
     template: Template
-    corners: Marked
+    corners: MarkedPoints
     owner: NDArray[np.intp]
 
     def take(self, keep: BoolArray) -> "_Markers":
         """Some of the corners."""
-        corners = Marked(self.corners.mm[keep], self.corners.px[keep], self.corners.outward[keep])
+        corners = MarkedPoints(self.corners.mm[keep], self.corners.px[keep], self.corners.outward[keep])
         return _Markers(self.template, corners, self.owner[keep])
 
     @property
@@ -229,7 +231,7 @@ def _markers(grey: GreyImage, quads: dict[int, FloatArray]) -> _Markers | None:
     mm = MARKER_CORNERS[places]
     outward = (mm - mm.mean(axis=1, keepdims=True)) / (MARKER_MM / 2.0)
     owner = np.broadcast_to(places[:, None], whole.shape)
-    return _Markers(template, Marked(mm[whole], px[whole], outward[whole]), owner[whole])
+    return _Markers(template, MarkedPoints(mm[whole], px[whole], outward[whole]), owner[whole])
 
 
 def _detector() -> cv2.aruco.ArucoDetector:
@@ -304,7 +306,7 @@ def _sheet(page: Page, markers: _Markers, fit: Projection) -> Sheet:
     )
 
 
-def _lens(page: Page, corners: Marked, plain: Projection, printed_se: float) -> Lens | None:
+def _lens(page: Page, corners: MarkedPoints, plain: Projection, printed_se: float) -> Lens | None:
     bend, fit = find_bend(corners, plain, (page.grey.shape[0], page.grey.shape[1]))
     if not bend:
         return None
@@ -336,7 +338,7 @@ def _against_resolution(page: Page, fit: Projection, px_per_mm: float) -> tuple[
     size = px_per_mm / stated
     if not 1.0 / _SCALE_FAR < size < _SCALE_FAR:
         return _PRINTER_SE, ()
-    if abs(size - 1.0) < _SCALE_TOLD:
+    if abs(size - 1.0) < _SCALE_REPORTED:
         return _printed_se(float(np.log(size))), ()
     message = (
         f"by the file's resolution the printed sheet has {100 * size:.1f} % of its size:"

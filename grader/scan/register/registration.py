@@ -17,7 +17,7 @@ from grader.scan.register.fitting import Fit, affine_of, fit_sides
 from grader.scan.register.homography import (
     HALVES_ADVICE,
     PAPER,
-    Model,
+    Outline,
     drawable,
     drawn_ends,
     looks_a4,
@@ -30,11 +30,51 @@ from grader.scan.register.hypotheses import Hypothesis, Resolution, hypotheses, 
 from grader.scan.register.lines import LongLine, long_lines, without_grid
 from grader.scan.register.markers import identify
 
+_LEAST_IN_PICTURE = 0.95
+"""Share of the drawing area below which the picture shows a part of the sheet only."""
+_BESIDE_MM = 3.0
+"""A place so far beside the picture still counts: the map's own error, and a frame cut close."""
+
+
+def register(page: Page) -> tuple[Sheet | Unread, Identity | None]:
+    """The page's map from millimetres to pixels, or why there is none; and whose page it is by its code.
+
+    A printed sheet's code is searched in its place; on other pages only a reduced picture is searched.
+    """
+    printed = markers.register(page)
+    identity = (None if printed is None else printed.identity) or identify(page)
+    sheet = printed or register_plain(page)
+    if isinstance(sheet, Unread):
+        hint = f"; the page is as large as A4, and {HALVES_ADVICE}" if looks_a4(page) else ""
+        return Unread(sheet.name, f"{sheet.reason}{hint}"), identity
+    share = _share_in_picture(page, sheet)
+    if share < _LEAST_IN_PICTURE:
+        reason = f"only {100.0 * share:.0f} % of the sheet is in the picture; {HALVES_ADVICE}"
+        return Unread("sheet", reason), identity
+    return sheet, identity
+
+
+def rectify(page: Page) -> Sheet | Unread:
+    """The page's map from millimetres to pixels; Unread with the reason where there is none."""
+    return register(page)[0]
+
+
+def _share_in_picture(page: Page, sheet: Sheet) -> float:
+    """Share of the drawing area that lies in the picture."""
+    x, y, wide, high = sheet.drawable_mm
+    mm = np.stack(np.meshgrid(np.linspace(x, x + wide, 31), np.linspace(y, y + high, 21)), axis=-1)
+    at = mapped(sheet.mm_to_px, mm)
+    beside = _BESIDE_MM * sheet.px_per_mm
+    return float(np.mean(np.all((at > -beside) & (at < page.grey.shape[::-1] + np.array(beside)), axis=-1)))
+
+
+# Plain sheets -------------------------------------------------------------------------------------
+
 _LEAST_PX_PER_MM = 3.0
 """Along the long side: below this a pencil's stroke is less than a pixel wide."""
 _USUAL_DPI = (100.0, 150.0, 200.0, 240.0, 250.0, 300.0, 400.0, 500.0, 600.0, 800.0, 1200.0)
 """Resolutions that scanners and copiers for A3 offer."""
-_UNSET_DPI_PLAIN = (72.0, 96.0)
+_DEFAULT_DPI = (72.0, 96.0)
 """What programs write when they do not know; no evidence either way."""
 _A3_SLACK_MM = (40.0, 22.0)
 """A scanner's window may be this much larger than the sheet; paper that is cut off is not A3."""
@@ -48,15 +88,13 @@ _NO_FIT_MM = 1.5
 """Sides that disagree by more are not those of one A3 sheet."""
 _VAGUE_SE = 0.02
 """A scale less sure than this is no better than a guess."""
-_MOST_SIDES = 3
-"""Sides by which a frame is known,"""
-_SOME_SIDES = 2
-"""and those of the paper that must be seen beside it."""
+_MOST_SIDES, _SOME_SIDES = 3, 2
+"""A frame is known by three of its sides, if two sides of the paper are found too."""
 _ALL_SIDES = 4
 _COPY_SE = 0.012
 """Copiers enlarge or reduce by a per cent or two unless told not to."""
 _SAMPLED, _WHITE = 7, 255
-"""Pixels between those that are looked at, and the value of white ones."""
+"""Every seventh pixel is tested; the value of white ones."""
 _FAR_OFF_MM = 1.5
 """A side farther off after the fit was taken for the wrong line."""
 _EDGE_WITHIN_MM = 6.0
@@ -86,7 +124,7 @@ def register_plain(page: Page) -> Sheet | Unread:
     ranked = hypotheses(lines, shape, resolution)
     if ranked:
         rival = None if dpi is not None else _rival_scale(ranked)
-        best = _as_told(ranked, page.turn_deg)
+        best = _turned_as_stated(ranked, page.turn_deg)
         sheet = _from_lines(page, best, lines, dpi, problems)
         if isinstance(sheet, Sheet) and rival is not None:
             sheet = _with_rival(sheet, rival)
@@ -98,7 +136,7 @@ def register_plain(page: Page) -> Sheet | Unread:
     return _from_resolution(page, resolution, lines, problems)
 
 
-def _as_told(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
+def _turned_as_stated(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
     """The best reading; of the half turns that the drawing does not tell apart, the one the file asks for."""
     best = [reading for reading in ranked if reading.score > ranked[0].score - _SAME]
     return min(best, key=lambda reading: off_turn_deg(reading.mm_to_px, turn_deg))
@@ -110,8 +148,8 @@ def _rival_scale(ranked: list[Hypothesis]) -> float | None:
     A sheet's edge may pass for a frame, their sides are nearly in the same ratio; a stated resolution
     tells them apart.
     """
-    likely = [one for one in ranked if one.score > ranked[0].score - _AS_LIKELY]
-    scales = np.log([_px_per_mm(one.mm_to_px, 1.0) for one in likely])
+    likely = [reading for reading in ranked if reading.score > ranked[0].score - _AS_LIKELY]
+    scales = np.log([_px_per_mm(reading.mm_to_px, 1.0) for reading in likely])
     off = float(np.abs(scales - scales[0]).max())
     return off if off > _ANOTHER_SCALE else None
 
@@ -137,7 +175,7 @@ def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
     """The stated resolution where the page is about A3 by it, else a usual one by which it is."""
     if page.dpi is not None and _is_a3(page, page.dpi):
         return Resolution(page.dpi, stated=True)
-    if page.dpi is not None and page.dpi[0] not in _UNSET_DPI_PLAIN:
+    if page.dpi is not None and page.dpi[0] not in _DEFAULT_DPI:
         high, wide = page.grey.shape
         size = f"{wide / page.dpi[0] * MM_PER_INCH:.0f} x {high / page.dpi[1] * MM_PER_INCH:.0f}"
         message = f"by its stated resolution the page is {size} mm, not A3"
@@ -298,7 +336,7 @@ def _tilt(lines: list[LongLine]) -> float:
     return float(np.array(angles)[order][np.searchsorted(cumulated, cumulated[-1] / 2.0)])
 
 
-def _sheet(fit: Fit, frame: Model | None, scale_se: float, problems: list[Problem]) -> Sheet:
+def _sheet(fit: Fit, frame: Outline | None, scale_se: float, problems: list[Problem]) -> Sheet:
     matrix = fit.mm_to_px / fit.mm_to_px[2, 2]
     return Sheet(
         mm_to_px=matrix,
@@ -311,41 +349,3 @@ def _sheet(fit: Fit, frame: Model | None, scale_se: float, problems: list[Proble
         drawable_mm=drawable(frame),
         problems=tuple(problems),
     )
-
-
-_LEAST_IN_PICTURE = 0.95
-"""Share of the drawing area below which the picture shows a part of the sheet only."""
-_BESIDE_MM = 3.0
-"""A place so far beside the picture still counts: the map's own error, and a frame cut close."""
-
-
-def register(page: Page) -> tuple[Sheet | Unread, Identity | None]:
-    """The page's map from millimetres to pixels, or why there is none; and whose page it is by its code.
-
-    A printed sheet's code is looked for in its place; elsewhere a quick look must do.
-    """
-    printed = markers.register(page)
-    identity = (None if printed is None else printed.identity) or identify(page)
-    sheet = printed or register_plain(page)
-    if isinstance(sheet, Unread):
-        hint = f"; the page is as large as A4, and {HALVES_ADVICE}" if looks_a4(page) else ""
-        return Unread(sheet.name, f"{sheet.reason}{hint}"), identity
-    share = _share_in_picture(page, sheet)
-    if share < _LEAST_IN_PICTURE:
-        reason = f"only {100.0 * share:.0f} % of the sheet is in the picture; {HALVES_ADVICE}"
-        return Unread("sheet", reason), identity
-    return sheet, identity
-
-
-def rectify(page: Page) -> Sheet | Unread:
-    """The page's map from millimetres to pixels, or, false in a condition, why there is none."""
-    return register(page)[0]
-
-
-def _share_in_picture(page: Page, sheet: Sheet) -> float:
-    """Share of the drawing area that lies in the picture."""
-    x, y, wide, high = sheet.drawable_mm
-    mm = np.stack(np.meshgrid(np.linspace(x, x + wide, 31), np.linspace(y, y + high, 21)), axis=-1)
-    at = mapped(sheet.mm_to_px, mm)
-    beside = _BESIDE_MM * sheet.px_per_mm
-    return float(np.mean(np.all((at > -beside) & (at < page.grey.shape[::-1] + np.array(beside)), axis=-1)))

@@ -10,8 +10,8 @@ from grader.records import FloatArray
 from grader.scan.pixels import (
     BoolArray,
     Cuts,
+    FittedLines,
     Flat,
-    Lines,
     cut_across,
     lengths_and_directions,
     parts,
@@ -264,7 +264,9 @@ def _mean_of(values: FloatArray, which: BoolArray) -> FloatArray:
     return np.asarray(np.where(which, values, 0.0).sum(axis=1) / np.maximum(which.sum(axis=1), 1))
 
 
-def _standard_errors(along: FloatArray, lines: Lines, px_per_mm: float) -> tuple[FloatArray, FloatArray]:
+def _standard_errors(
+    along: FloatArray, lines: FittedLines, px_per_mm: float
+) -> tuple[FloatArray, FloatArray]:
     """(across at the middle in px, direction in radians), (k,) each, of lines through cuts.
 
     Cuts nearer to each other than the wobble's own waves say nothing new; where a stroke was seen

@@ -241,6 +241,8 @@ def _runs(level: FloatArray) -> list[tuple[int, int]]:
     return runs
 
 
+# Tips of arrowheads -------------------------------------------------------------------------------
+
 STEP_MM = 0.15
 """Of the bands' pixels, along and across."""
 HALF = 15

@@ -37,6 +37,53 @@ from grader.scan.strokes.regions import (
 from grader.scan.strokes.seeds import PX_PER_MM, Seeds, find_seeds, without_squares, working_scale
 from grader.scan.strokes.symbols import arcs, find_circles, led_to
 
+_DARK = 64.0
+"""Of 255, a quarter of white: paper in photos is brighter than 130, a negative's darker than 20."""
+_MAP_PX_PER_MM = 6.0
+"""Resolution of the ink map: a stroke of 0.3 mm is two pixels wide."""
+
+
+def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> Ink | Unread:
+    """Everything drawn inside the frame of a registered page; Unread with the reason where it is no drawing.
+
+    Arguments: `boxes` is where strokes are searched, sheet mm; all of `sheet.drawable_mm` by default.
+    """
+    grey = brightness(page, sheet, boxes)
+    if grey < _DARK:
+        return Unread(
+            "ink",
+            f"half of it is as dark as {grey:.0f} of 255 or darker: a picture with its tones inverted, a"
+            " pattern, or a photo taken in the dark? Scan the sheet in greyscale, dark lines on white paper",
+        )
+    flat = flatten(page.grey)
+    scale = working_scale(sheet.px_per_mm)
+    contrast = without_squares(flat.reduced(scale))
+    seeds = find_seeds(contrast)
+    components = find_components(seeds)
+    field = field_of(seeds, sheet, scale, boxes)
+    strokes = find_strokes(flat, seeds, components, field)
+    if isinstance(strokes, Unread):
+        return strokes
+    circles = find_circles(flat, seeds, components, field)
+    circles = circles[led_to(circles, strokes)]
+    strokes = take(strokes, ~arcs(strokes, circles))
+    hatched = hatching(strokes)
+    marks = np.concatenate([mark_boxes(components, field), boxes_around(strokes, hatched)])
+    strokes = take(strokes, ~hatched)
+    tips = find_tips(flat, strokes, sheet.mm_to_px)
+    return Ink(strokes, circles, marks, _ink_map(contrast, scale, sheet), tips=tips)
+
+
+def _ink_map(contrast: GreyImage, scale: float, sheet: Sheet) -> InkMap:
+    """Contrast of the whole sheet, upright, from the page reduced by `scale`."""
+    to_px = reduction(scale) @ sheet.mm_to_px
+    # The centre of the map's pixel q is at q / 6 mm.
+    box = (-0.5 / _MAP_PX_PER_MM, -0.5 / _MAP_PX_PER_MM, *sheet.page_mm)
+    return InkMap(cut_out(contrast, to_px, box, _MAP_PX_PER_MM, outside=0), _MAP_PX_PER_MM)
+
+
+# Strokes ------------------------------------------------------------------------------------------
+
 _OFF_MM = 0.25
 """Pieces this near to one line are of it; strokes further apart are told apart."""
 _GAP_MM = 2.3
@@ -67,22 +114,6 @@ _COVERED = 0.85
 _SE_END_MM = 0.8
 _SE_MERGED_MM = 2.5
 """Ends err by this much, measured on simulated students: lines run on along their neighbours."""
-_ALIKE_DEG = 11.0
-"""Short hatching strokes are drawn by free hand,"""
-_LONG_ALIKE_DEG = 5.0
-"""long ones along a set square."""
-_APART_MM = (0.5, 6.0)
-"""Nearer strokes are one drawn twice, farther ones no hatching."""
-_LEAST_ALIKE = 4
-"""A family of short strokes has more."""
-_LEAST_LONG_ALIKE = 6
-"""A slider, its guide and a link along it make five level lines."""
-_LONGEST_MM = 60.0
-"""Across the largest plate."""
-_RATIO = 2.5
-"""Of the longer to the shorter of two neighbours in hatching."""
-_WEIGHT_RATIO = 1.35
-"""Of the width times darkness of two neighbours: one pen, one pressure."""
 
 
 def find_strokes(flat: Flat, seeds: Seeds, components: Components, field: Field) -> Strokes | Unread:
@@ -109,7 +140,7 @@ def _too_many(count: int) -> Unread:
 
 def take(strokes: Strokes, which: BoolArray) -> Strokes:
     """The chosen strokes."""
-    return Strokes(*(getattr(strokes, one.name)[which] for one in fields(Strokes)))
+    return Strokes(*(getattr(strokes, column.name)[which] for column in fields(Strokes)))
 
 
 def _lines(full: FloatArray, seeds: Seeds, components: Components, usable: BoolArray, scale: float) -> Pieces:
@@ -204,6 +235,24 @@ def _records(flat: Flat, fitted: Fitted, merged: BoolArray, field: Field) -> Str
 # Hatching -----------------------------------------------------------------------------------------
 
 
+_SHORT_PARALLEL_DEG = 11.0
+"""Largest angle between neighbours in hatching: short strokes are drawn freehand."""
+_LONG_PARALLEL_DEG = 5.0
+"""The same of long ones, which are drawn along a set square."""
+_APART_MM = (0.5, 6.0)
+"""Nearer strokes are one drawn twice, farther ones no hatching."""
+_MOST_SHORT = 4
+"""A family of short strokes in hatching has more members."""
+_MOST_LONG = 6
+"""A slider, its guide and a link along it make five level lines."""
+_LONGEST_MM = 60.0
+"""Across the largest plate."""
+_RATIO = 2.5
+"""Of the longer to the shorter of two neighbours in hatching."""
+_WEIGHT_RATIO = 1.35
+"""Of the width times darkness of two neighbours: one pen, one pressure."""
+
+
 def hatching(strokes: Strokes) -> BoolArray:
     """Which strokes are hatching.
 
@@ -213,7 +262,7 @@ def hatching(strokes: Strokes) -> BoolArray:
     length = lengths_and_directions(strokes.ends)[0]
     rows = np.flatnonzero(length < _LONGEST_MM)
     result = np.zeros(len(strokes), dtype=bool)
-    if len(rows) <= _LEAST_ALIKE:
+    if len(rows) <= _MOST_SHORT:
         return result
     weight = (strokes.width * strokes.darkness)[rows]
     first, second, aside = _linked(strokes.ends[rows], length[rows], weight)
@@ -221,7 +270,7 @@ def hatching(strokes: Strokes) -> BoolArray:
     left[first[aside > 0]] = right[first[aside < 0]] = True
     # The last of a family may be the link or the side that runs along it: short ones alone are safe.
     family, short, between = _family_size(first, second, len(rows)), length[rows] < _SHORT_MM, left & right
-    result[rows] = np.where(short, family > _LEAST_ALIKE, (family > _LEAST_LONG_ALIKE) & between)
+    result[rows] = np.where(short, family > _MOST_SHORT, (family > _MOST_LONG) & between)
     return result
 
 
@@ -242,7 +291,9 @@ def _linked(ends: FloatArray, length: FloatArray, weight: FloatArray) -> tuple[R
     first, second = np.divmod(np.concatenate(pairs), count)
     sine = np.abs(u[first, 0] * u[second, 1] - u[first, 1] * u[second, 0])
     shorter, longer = np.minimum(length[first], length[second]), np.maximum(length[first], length[second])
-    limit = np.where(shorter < _SHORT_MM, np.sin(np.radians(_ALIKE_DEG)), np.sin(np.radians(_LONG_ALIKE_DEG)))
+    limit = np.where(
+        shorter < _SHORT_MM, np.sin(np.radians(_SHORT_PARALLEL_DEG)), np.sin(np.radians(_LONG_PARALLEL_DEG))
+    )
     linked = (sine < limit) & (longer < _RATIO * shorter)
     lighter, heavier = np.minimum(weight[first], weight[second]), np.maximum(weight[first], weight[second])
     linked &= heavier < _WEIGHT_RATIO * lighter
@@ -264,50 +315,3 @@ def boxes_around(strokes: Strokes, which: BoolArray) -> FloatArray:
     """(j, 4) boxes x, y, w, h of the chosen strokes."""
     low, high = strokes.ends[which].min(axis=1), strokes.ends[which].max(axis=1)
     return np.column_stack([low, high - low]).reshape(-1, 4)
-
-
-_DARK = 64.0
-"""Of 255, a quarter of white: paper in photos is brighter than 130, a negative's darker than 20."""
-_MAP_PX_PER_MM = 6.0
-"""Resolution of the ink map: a stroke of 0.3 mm is two pixels wide."""
-
-
-def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> Ink | Unread:
-    """Everything drawn inside the frame of a registered page, or, false in a condition, why it is no drawing.
-
-    Arguments
-    ---------
-    boxes : where to look, in sheet mm; all of `sheet.drawable_mm` by default
-    """
-    grey = brightness(page, sheet, boxes)
-    if grey < _DARK:
-        return Unread(
-            "ink",
-            f"half of it is as dark as {grey:.0f} of 255 or darker: a picture with its tones inverted, a"
-            " pattern, or a photo taken in the dark? Scan the sheet in greyscale, dark lines on white paper",
-        )
-    flat = flatten(page.grey)
-    scale = working_scale(sheet.px_per_mm)
-    contrast = without_squares(flat.reduced(scale))
-    seeds = find_seeds(contrast)
-    components = find_components(seeds)
-    field = field_of(seeds, sheet, scale, boxes)
-    strokes = find_strokes(flat, seeds, components, field)
-    if isinstance(strokes, Unread):
-        return strokes
-    circles = find_circles(flat, seeds, components, field)
-    circles = circles[led_to(circles, strokes)]
-    strokes = take(strokes, ~arcs(strokes, circles))
-    hatched = hatching(strokes)
-    marks = np.concatenate([mark_boxes(components, field), boxes_around(strokes, hatched)])
-    strokes = take(strokes, ~hatched)
-    tips = find_tips(flat, strokes, sheet.mm_to_px)
-    return Ink(strokes, circles, marks, _ink_map(contrast, scale, sheet), tips=tips)
-
-
-def _ink_map(contrast: GreyImage, scale: float, sheet: Sheet) -> InkMap:
-    """Contrast of the whole sheet, upright, from the page reduced by `scale`."""
-    to_px = reduction(scale) @ sheet.mm_to_px
-    # The centre of the map's pixel q is at q / 6 mm.
-    box = (-0.5 / _MAP_PX_PER_MM, -0.5 / _MAP_PX_PER_MM, *sheet.page_mm)
-    return InkMap(cut_out(contrast, to_px, box, _MAP_PX_PER_MM, outside=0), _MAP_PX_PER_MM)

@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from grader.records import Box, FloatArray, Page, Sheet
 from grader.scan.pixels import (
+    TITLE_BLOCK_MM,
     BoolArray,
     Float32Array,
     at_full_size,
@@ -164,10 +165,10 @@ def _fitted(ends: FloatArray, length: FloatArray) -> FloatArray:
     return np.stack([centre + t.min() * u, centre + t.max() * u])
 
 
+# Where drawings are looked for --------------------------------------------------------------------
+
 _FRAME_MM = 1.5
 """Inside of the frame's middle line: its pen and the registration's error."""
-_BLOCK_MM = (215.0, 80.0)
-"""Width and height of the corner in which a title block may lie."""
 _SQUARE = 0.05
 """Of its length: how far askew a ruled line may be."""
 _PIECE_MM = 3.0
@@ -289,7 +290,7 @@ def _ruled(ends: FloatArray, sheet: Sheet) -> FloatArray:
     span = np.abs(ends[:, 1] - ends[:, 0])
     low, high = ends.min(axis=1), ends.max(axis=1)
     ruled = (span.min(axis=1) < np.maximum(_SQUARE * span.max(axis=1), 0.2)) & (span.max(axis=1) >= _PIECE_MM)
-    ruled &= (low[:, 0] > right - _BLOCK_MM[0]) & (low[:, 1] > bottom - _BLOCK_MM[1])
+    ruled &= (low[:, 0] > right - TITLE_BLOCK_MM[0]) & (low[:, 1] > bottom - TITLE_BLOCK_MM[1])
     ruled &= (high[:, 0] < right - _EDGE_MM) & (high[:, 1] < bottom - _EDGE_MM)
     lines = join(ends[ruled], np.ones(int(ruled.sum())), _OFF_MM, _BROKEN_MM).ends
     size = np.abs(lines[:, 1] - lines[:, 0]).max(axis=1)
@@ -302,6 +303,8 @@ def _in_box(points: FloatArray, box: Box) -> BoolArray:
         (points[:, 0] >= x) & (points[:, 0] <= x + w) & (points[:, 1] >= y) & (points[:, 1] <= y + h)
     )
 
+
+# Pieces of ink ------------------------------------------------------------------------------------
 
 _MARK_MM = 8.0
 """Larger pieces of ink are no single letter."""

@@ -187,9 +187,7 @@ def _usual(width: FloatArray, weight: FloatArray) -> float:
 def squares_darkness(contrast: GreyImage) -> float:
     """Darkness of printed squares, 0..255 of contrast, 0 where there are none.
 
-    Arguments
-    ---------
-    contrast : 0 = paper .. 255 = black, at about 6 px/mm
+    Arguments: `contrast` is 0 (paper) to 255 (black), at about 6 px/mm.
 
     Lines that fill most of a strip, at equal distances, in most strips of both directions. Slanted
     strokes never fill a strip, and a table's lines are too few.

@@ -1,4 +1,4 @@
-"""What is ink but no stroke of a vector: circles, squares of graph paper, hatching."""
+"""Circles: rings of joints and poles, and the short strokes that are pieces of them."""
 
 import cv2
 import numpy as np
@@ -43,13 +43,13 @@ _HOLLOW_AT = 0.55
 _EDGE_BYTES = 12.0
 """Rise of the contrast across a border of ink, at least."""
 _CHORD = 0.65
-"""Of the radius: a piece of the ring lies at least so far from the centre,"""
+"""Of the radius: least distance of a piece of the ring from the centre."""
 _TANGENT_MM = 0.35
-"""and at most so far outside of the ring;"""
+"""Largest distance of a piece of the ring outside of it."""
 _CHORD_MM = 6.0
-"""it is shorter than this"""
+"""Largest length of a piece of the ring."""
 _CHORD_PAST_MM = 2.2
-"""and ends no farther from the ring."""
+"""Largest distance of its ends outside of the ring."""
 
 
 def find_circles(flat: Flat, seeds: Seeds, components: Components, field: Field) -> FloatArray:

@@ -1,6 +1,6 @@
 import pytest
 
-from grader.comparison.criteria import held_against_written
+from grader.comparison.criteria import compared_with_cells
 from grader.comparison.evidence import DrawnVector
 from grader.comparison.verdicts import MarkRange
 from grader.feedback.sentences import FULL, HINTS
@@ -13,9 +13,7 @@ RULER_MM = 0.5
 
 
 def held(drawn_mm, written, se_mm=0.05):
-    return held_against_written(
-        RIGHT, DrawnVector(drawn_mm, se_mm, 0.0, 0.1, SURE), written, TOLERANCE, LEAST
-    )
+    return compared_with_cells(RIGHT, DrawnVector(drawn_mm, se_mm, 0.0, 0.1, SURE), written, TOLERANCE, LEAST)
 
 
 def test_a_written_length_far_from_the_drawn_one_is_for_a_person_whatever_the_mark_would_be():

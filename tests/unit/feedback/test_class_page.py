@@ -11,7 +11,8 @@ from grader.documents import (
     ReadSheets,
     StandingDocument,
 )
-from grader.feedback.class_page import folders_of, index_page, write_index
+from grader.feedback.class_page import index_page, write_index
+from grader.files import result_folders
 from grader.language import LANGUAGES
 from tests.unit.feedback.parsed import Page
 from tests.unit.feedback.works import HOSTILE, criterion, report, results
@@ -26,7 +27,7 @@ def test_the_index_links_every_report_where_it_is(tmp_path):
     text = (tmp_path / "index.html").read_text(encoding="utf-8")
     for folder in ("s07", "s08/1", "s08/2", "s08/unknown"):
         assert f'href="{folder}/feedback.html"' in text
-    assert folders_of(reports) == ["s07", "s08/1", "s08/2", "s08/unknown"]
+    assert result_folders(reports) == ["s07", "s08/1", "s08/2", "s08/unknown"]
 
 
 def test_the_index_counts_states_and_lists_what_matches_nobody():

@@ -7,7 +7,7 @@ import pytest
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.feedback.redo_steps import with_mistakes_told
+from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import criterion_feedback
 from grader.feedback.student_page import About, StudentPage, feedback_page
 from grader.language import LANGUAGES, tongue
@@ -55,7 +55,7 @@ def told(judged, level, lang="en"):
     names = PUMP.file.names
     sentences = {one.criterion: criterion_feedback(one, lang, level, names) for one in judgement.outcomes}
     report = report_of(task, judgement, "s07", language=lang, sentences=sentences)
-    report = with_mistakes_told(report, judgement, PUMP, VARIANT, lang, level)
+    report = with_mistakes_explained(report, judgement, PUMP, VARIANT, lang, level)
     outcomes = {one.name: one for one in judgement.outcomes}
     picture = measured_picture(
         "s07.json", submission.measured, task.construction, outcomes, show_expected=level == "full"

@@ -6,10 +6,10 @@ from grader.documents import QuantityDocument, ScaleDocument
 from grader.feedback.class_page import (
     commonest,
     distribution_svg,
+    follow_through,
     hardest,
     histogram,
     open_shares,
-    share_followed,
     shares,
     spread,
     waiting,
@@ -84,7 +84,7 @@ def test_that_comes_first_which_one_look_decides_most_of():
 def test_follow_through_is_counted_by_points_students_and_criteria():
     one = report(criteria=[criterion("v_B", "follow_through", 5.0), criterion("v_D", "follow_through", 2.0)])
     two = report(criteria=[criterion("v_B", "follow_through", 5.0), criterion("v_D", "full", 5.0)])
-    found = share_followed(results(report(), one, two))
+    found = follow_through(results(report(), one, two))
     assert (found.points, found.reports) == (12.0, [one, two])
     assert found.criteria == [("Vector v_B", 2), ("Vector v_D", 1)]
 

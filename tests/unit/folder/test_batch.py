@@ -2,8 +2,8 @@ import json
 
 import pytest
 
-from grader.files import OutputError
-from grader.folder.batch import Batch, folders_of, grade, needs_person
+from grader.files import OutputError, result_folders
+from grader.folder.batch import Batch, grade, needs_person
 from grader.inputs.measurements import StudentSubmission
 from grader.rubric import load_rubric
 from grader.solution.document import plan_document
@@ -128,4 +128,4 @@ def test_results_that_cannot_be_written_are_told_before_anything_is_marked(class
 def test_several_positions_have_a_folder_each():
     handed_in = [("a", 1), ("a", 2), ("b", 1)]
     submissions = [StudentSubmission(student, Variant(position=position)) for student, position in handed_in]
-    assert folders_of(submissions) == ["a/1", "a/2", "b"]
+    assert result_folders(submissions) == ["a/1", "a/2", "b"]

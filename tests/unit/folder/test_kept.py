@@ -31,7 +31,7 @@ from grader.folder.cache import (
     store_reading,
 )
 from grader.folder.changes import standing_text
-from grader.folder.inventory import identify_page, survey_folder
+from grader.folder.inventory import identify_page, take_inventory
 from grader.overlay.picture import backdrop
 from grader.records import (
     Figure,
@@ -214,7 +214,7 @@ class SlowStrokes(Inline):
 
 def test_a_page_whose_strokes_take_too_long_still_has_the_owner_that_its_code_says(tmp_path):
     path = samples_folder() / "pump" / "s06_1.jpg"
-    contents = survey_folder(
+    contents = take_inventory(
         [path], path.parent, None, SlowStrokes(), lambda *_: None, PageCache(tmp_path / "pages")
     )
     (page,) = contents[0].pages

@@ -74,7 +74,7 @@ def drawn(n, *, turn_deg=0.0, seed=0, hand_mm=0.2):
 @pytest.mark.parametrize("n", [1, 10, 20])
 def test_a_drawing_of_one_students_variant_suggests_that_student(n):
     sheet = PageRef("x.jpg", 1, 1)
-    (suggestion,) = suggest([sheet], ROSTER, PUMP, look=lambda _: drawn(n)).suggestions
+    (suggestion,) = suggest([sheet], ROSTER, PUMP, strokes_of=lambda _: drawn(n)).suggestions
     assert suggestion.row.n == n
     assert not suggestion.sure
     assert suggestion.row.student_id in suggestion.why
@@ -88,7 +88,7 @@ def test_likeness_tells_neighbours_apart_by_two_degrees():
 
 @pytest.mark.parametrize("strokes", [None, np.zeros((0, 2, 2)), drawn(15), drawn(10)[-40:]])
 def test_a_drawing_that_looks_like_nobodys_variant_suggests_nobody(strokes):
-    (suggestion,) = suggest([PageRef("x.jpg", 1, 1)], ROSTER, PUMP, look=lambda _: strokes).suggestions
+    (suggestion,) = suggest([PageRef("x.jpg", 1, 1)], ROSTER, PUMP, strokes_of=lambda _: strokes).suggestions
     assert suggestion.row is None
     assert "looks like" not in suggestion.why
 
@@ -96,12 +96,12 @@ def test_a_drawing_that_looks_like_nobodys_variant_suggests_nobody(strokes):
 def test_students_of_one_variant_are_all_named_and_only_an_order_chooses():
     roster = parse_roster("student_id,name,n\ns1,A,5\ns2,B,16\ns3,C,5\n")
     pages = [page(1), page(2)]
-    draft = suggest(pages, roster, PUMP, look=lambda source: drawn((16, 5)[source.page - 1]))
-    other = suggest(pages[::-1], roster, PUMP, look=lambda source: drawn((16, 5)[source.page - 1]))
+    draft = suggest(pages, roster, PUMP, strokes_of=lambda source: drawn((16, 5)[source.page - 1]))
+    other = suggest(pages[::-1], roster, PUMP, strokes_of=lambda source: drawn((16, 5)[source.page - 1]))
     assert by_page(draft) == {"class.pdf#1": ("s2", False), "class.pdf#2": ("s3", False)}
     assert by_page(other) == {"class.pdf#2": ("s1", False), "class.pdf#1": ("s2", False)}
     backwards = suggest(
-        [page(1), page(2), page(3, 3)], roster, PUMP, look=lambda s: drawn((16, 5, 16)[s.page - 1])
+        [page(1), page(2), page(3, 3)], roster, PUMP, strokes_of=lambda s: drawn((16, 5, 16)[s.page - 1])
     )
     assert backwards.suggestions[1].row is None
     assert "s1, s3" in backwards.suggestions[1].why
@@ -110,23 +110,27 @@ def test_students_of_one_variant_are_all_named_and_only_an_order_chooses():
 def test_a_choice_between_students_of_one_variant_follows_the_rosters_order_where_all_pages_do():
     roster = parse_roster("student_id,name,n\ns1,A,5\ns2,B,16\ns3,C,5\ns4,D,25\n")
     pages = [page(number, 5) for number in range(1, 6)]
-    in_order = suggest(pages, roster, PUMP, look=lambda source: drawn((5, 5, 16, 5, 25)[source.page - 1]))
+    in_order = suggest(
+        pages, roster, PUMP, strokes_of=lambda source: drawn((5, 5, 16, 5, 25)[source.page - 1])
+    )
     assert [student for student, _ in by_page(in_order).values()] == ["s1", "s1", "s2", "s3", "s4"]
     assert not any(suggestion.sure for suggestion in in_order.suggestions)
-    mixed = suggest(pages, roster, PUMP, look=lambda source: drawn((25, 5, 16, 5, 16)[source.page - 1]))
+    mixed = suggest(pages, roster, PUMP, strokes_of=lambda source: drawn((25, 5, 16, 5, 16)[source.page - 1]))
     assert [student for student, _ in by_page(mixed).values()] == ["s4", None, "s2", None, "s2"]
 
 
 def test_only_pages_that_are_not_certain_are_looked_at():
     looked = []
     pages = [page(1, identity=code("s2", 10)), page(2), page(3, blank=True)]
-    suggest(pages, ROSTER, PUMP, look=looked.append)
+    suggest(pages, ROSTER, PUMP, strokes_of=looked.append)
     assert looked == [pages[1]]
 
 
 def test_a_drawing_that_speaks_against_the_order_is_believed_and_both_are_told():
     order = {1: 10, 2: 1, 3: 20}
-    draft = suggest([page(1), page(2), page(3)], ROSTER, PUMP, look=lambda source: drawn(order[source.page]))
+    draft = suggest(
+        [page(1), page(2), page(3)], ROSTER, PUMP, strokes_of=lambda source: drawn(order[source.page])
+    )
     assert by_page(draft) == {
         "class.pdf#1": ("s2", False),
         "class.pdf#2": ("s1", False),
@@ -150,7 +154,7 @@ def test_pages_that_come_out_even_are_suggested_in_order_to_be_checked():
 
 def test_sources_that_disagree_are_left_to_the_person_whatever_is_drawn():
     contested = PageRef("s1.jpg", 1, 1, identity=code("s2", 10))
-    (suggestion,) = suggest([contested], ROSTER, PUMP, look=lambda _: drawn(1)).suggestions
+    (suggestion,) = suggest([contested], ROSTER, PUMP, strokes_of=lambda _: drawn(1)).suggestions
     assert suggestion.row is None
     assert "s1" in suggestion.why
     assert "s2" in suggestion.why

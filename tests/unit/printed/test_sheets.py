@@ -7,6 +7,7 @@ import pypdfium2
 import pytest
 
 from grader.inputs.roster import RosterRow
+from grader.language import tongue
 from grader.printed.answer_sheet import (
     calibration_segments,
     cells_of,
@@ -308,7 +309,7 @@ def test_indices_are_set_below_and_above():
     ],
 )
 def test_data_are_written_as_people_write_them(value, lang, told):
-    assert number(value, lang) == told
+    assert number(value, tongue(lang).decimal_mark) == told
 
 
 def test_lines_are_never_wider_than_the_box():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference.construction.graph import evaluate
-from reference.construction.uncertainty import SMALL, OwnNode, Skill, acts, hand_errors, spread, trace
+from reference.construction.uncertainty import SMALL, OwnNode, Skill, acts, spread, step_errors, trace
 from tests.hands import task_for
 
 SKILL = Skill(angle_deg=0.3, place_mm=0.25, mark_mm=0.1)
@@ -35,7 +35,7 @@ def test_many_drawings_scatter_as_the_derivative_says(name, n, position):
     for vector in task.construction.vectors.values():
         exact = found.vector(vector.tail, vector.head)
         off = np.asarray(drawn[vector.head] - drawn[vector.tail]) - exact
-        meant = spread(found.moved(vector.tail, vector.head), exact)
+        meant = spread(found.shifts(vector.tail, vector.head), exact)
         turned = off * np.conj(exact / abs(exact)) if exact else off
         assert np.std(turned.real) == pytest.approx(meant.along, rel=WITHIN), vector.name
         assert np.std(turned.imag) == pytest.approx(meant.across, rel=WITHIN), vector.name
@@ -47,8 +47,8 @@ def test_without_own_nodes_a_drawing_is_the_exact_one_and_every_act_moves_someth
     found, exact = traced(task), evaluate(task.construction, task.parameters)
     for node, place in exact.items():
         assert abs(found.made[node].at - complex(np.ravel(place)[0])) < ROUNDING_MM
-    moved = np.array([found.nodes[node].moved for node in exact])
-    assert np.all(np.abs(moved).max(axis=0) > 0.0)
+    shifts = np.array([found.nodes[node].shifts for node in exact])
+    assert np.all(np.abs(shifts).max(axis=0) > 0.0)
 
 
 def test_own_nodes_are_taken_as_drawn_and_only_what_comes_after_may_be_missed():
@@ -60,11 +60,11 @@ def test_own_nodes_are_taken_as_drawn_and_only_what_comes_after_may_be_missed():
         for figure, steps in task.construction.figures.items()
     }
     found = traced(task, by_figure)
-    moved = found.moved("o", "d")
+    shifts = found.shifts("o", "d")
     of_d = [index for index, act in enumerate(acts(task.construction)) if act[0] == "d"]
-    assert np.abs(moved[of_d]).min() > 0.0
-    assert np.abs(np.delete(moved, of_d)).max() < ROUNDING_MM
-    assert np.abs(moved).max() < np.abs(traced(task).moved("o", "d")).max() * 10.0
+    assert np.abs(shifts[of_d]).min() > 0.0
+    assert np.abs(np.delete(shifts, of_d)).max() < ROUNDING_MM
+    assert np.abs(shifts).max() < np.abs(traced(task).shifts("o", "d")).max() * 10.0
 
 
 def test_what_measuring_leaves_open_is_told_after_the_hands_errors():
@@ -72,10 +72,10 @@ def test_what_measuring_leaves_open_is_told_after_the_hands_errors():
     places = evaluate(task.construction, task.parameters)
     at = complex(np.ravel(places["c"])[0])
     found = traced(task, {"velocity_plan": {"c": OwnNode(at, np.array([0.2, 0.2j]))}})
-    assert found.hand == len(acts(task.construction))
-    moved = found.made["d"].moved
-    assert len(moved) == found.hand + 2
-    assert np.abs(moved[found.hand :]).max() > 0.0
+    assert found.drafting_count == len(acts(task.construction))
+    shifts = found.made["d"].shifts
+    assert len(shifts) == found.drafting_count + 2
+    assert np.abs(shifts[found.drafting_count :]).max() > 0.0
 
 
 def test_a_zero_vector_may_be_off_in_any_direction():
@@ -88,7 +88,7 @@ def test_a_zero_vector_may_be_off_in_any_direction():
 def test_a_steps_own_errors_are_small_and_one_at_a_time():
     task = task_for("pump", 7)
     step = task.construction.step("b")
-    errors = hand_errors(step, SKILL)
+    errors = step_errors(step, SKILL)
     for row, ((_, _, kind), values) in enumerate(errors.items(), start=1):
         assert np.count_nonzero(values) == 1
         assert values[row, 0] == pytest.approx(SMALL * SKILL.deviation(kind))

@@ -20,7 +20,7 @@ from reference.mechanism import (
     Slider,
     SlottedLink,
     Yoke,
-    moved,
+    translated,
 )
 
 HALF_TURN = np.pi
@@ -141,7 +141,7 @@ def test_a_data_of_one_entry_hold_for_all_variants():
 def test_a_mechanism_far_from_the_origin_moves_as_exactly_as_at_home():
     assignment = load_assignment("shaper")
     at_home = assignment.mechanism(assignment.variants())
-    far = move(moved(at_home, np.full(30, 2.0**20 + 2.0**20 * 1j)))
+    far = move(translated(at_home, np.full(30, 2.0**20 + 2.0**20 * 1j)))
     near = move(at_home)
     for joint, velocity in near.velocity.items():
         assert np.all(np.abs(far.velocity[joint] - velocity) <= FAR_OFF * np.max(np.abs(velocity)))

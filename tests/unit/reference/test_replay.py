@@ -151,7 +151,7 @@ def test_a_second_sketch_is_what_its_plan_is_drawn_from():
     again = evaluate(right.construction, right.parameters, given={**velocities, **joints})
     accelerations = [one.node for one in right.construction.figures["acceleration_plan"]]
     places = {**first, **{name: complex(again[name]) for name in accelerations}}
-    seen = nodes_of(right, places).seen
+    seen = nodes_of(right, places).entries
     beside = replay(right, Observations(seen, {"acceleration_plan": second}), [Root()], USUAL)[0]
     without = replay(right, Observations(seen), [Root()], USUAL)[0]
     assert beside.is_innocent

@@ -16,7 +16,7 @@ import tifffile
 from PIL import Image
 
 from grader.folder.cache import PageCache
-from grader.folder.inventory import survey_folder
+from grader.folder.inventory import take_inventory
 from grader.pipeline import open_page
 from grader.records import Page, PageRef
 from grader.scan.decode import limits, pictures
@@ -119,7 +119,7 @@ def test_pages_of_any_accepted_size_come_through_the_sheet_stage(seed):
 
 def surveyed(path):
     """The pages of one file, as a run over its folder finds them."""
-    (survey,) = survey_folder(
+    (survey,) = take_inventory(
         [path], path.parent, None, Inline(), lambda *_: None, PageCache(path.parent / "notes")
     )
     return survey.pages

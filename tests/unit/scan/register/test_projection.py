@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from grader.printed.layout import MARKER_CORNERS, MARKER_MM
-from grader.scan.register.fitting import Marked, fit_projection
+from grader.scan.register.fitting import MarkedPoints, fit_projection
 
 NOISE_MM = 0.02
 GRID_MM = np.stack(np.meshgrid(np.linspace(25, 400, 6), np.linspace(50, 260, 5)), axis=-1).reshape(-1, 2)
@@ -19,7 +19,7 @@ def seen(matrix, markers, seed, noise_mm=NOISE_MM, gain_mm=0.0):
     points = corners.reshape(-1, 2)
     scale = np.sqrt(abs(np.linalg.det(matrix[:2, :2])))
     noise = np.random.default_rng(seed).normal(0.0, noise_mm * scale, points.shape)
-    return Marked(points, apply(matrix, points + gain_mm * outward) + noise, outward)
+    return MarkedPoints(points, apply(matrix, points + gain_mm * outward) + noise, outward)
 
 
 FLATBED = np.array([[11.8, 0.2, 30.0], [-0.2, 11.8, 90.0], [0.0, 0.0, 1.0]])
@@ -67,4 +67,4 @@ def test_unequal_axes_are_followed():
 
 def test_too_few_points_are_a_wrong_call():
     with pytest.raises(ValueError, match="4 points"):
-        fit_projection(Marked(np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, 2))))
+        fit_projection(MarkedPoints(np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, 2))))
