@@ -47,7 +47,7 @@ from grader.documents import (
 )
 from grader.printed.layout import SCALE_OF
 from grader.rubric import RubricFile, check_rubric
-from reference.authored.assignment import TRADITIONS, Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
 from reference.construction.derive import construction_of, image_name
 from reference.construction.graph import Construction, ancestors
@@ -344,7 +344,7 @@ def lint_document(result: Lint) -> LintDocument:
         scales=[
             LintScales(
                 name=proposal.name,
-                **{name: ends_of(getattr(proposal.scales, name)) for name in ("kL", "kv", "ka")},
+                **{name: ends_of(getattr(proposal.scales, name)) for name in SCALE_NAMES},
                 room=proposal.room,
                 shortest_mm=proposal.shortest_mm,
                 under_8_mm=proposal.under_8_mm,

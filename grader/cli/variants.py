@@ -18,7 +18,7 @@ from grader.cycle.quantities import CycleSubject, Extreme, Selection, cycle_csv,
 from grader.files import write_whole
 from grader.language import Tongue, tongue
 from grader.solution.document import plan_documents
-from reference.authored.assignment import Assignment, Variant, load_assignment
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant, load_assignment
 from reference.errors import CallError, MechanismError
 from reference.kinematics.cycle import cycle
 from reference.plan import Plan, exact_plan
@@ -128,7 +128,7 @@ def _show_table(assignment: Assignment, plan: Plan) -> None:
     table = new_table("variant", "kL\nm/mm", "kv\n(m/s)/mm", "ka\n(m/s^2)/mm", *names)
     lengths = {name: abs(plan.drawn_mm(name)) for name in names}
     for index, variant in enumerate(plan.variants):
-        scales = [f"{getattr(plan.scales, name)[index]:.4g}" for name in ("kL", "kv", "ka")]
+        scales = [f"{getattr(plan.scales, name)[index]:.4g}" for name in SCALE_NAMES]
         table.add_row(str(variant), *scales, *(f"{lengths[name][index]:.2f}" for name in names))
     console.print(table)
     console.print("all vectors, values and directions: --csv FILE, --pdf FILE or --json", style="dim")

@@ -11,7 +11,6 @@ from grader.comparison.task import Task, Yardstick, unit_of
 from grader.comparison.verdicts import FULL, NONE, Limit, MarkRange, mark
 from grader.inputs.scale_text import (
     EXAMPLES,
-    SCALE_NAMES,
     SURE,
     ByRule,
     Declared,
@@ -22,6 +21,7 @@ from grader.inputs.scale_text import (
 from grader.outcomes import Reason, UsedScale
 from grader.records import Problem, Reading, Unread, Written
 from grader.rubric import ToleranceTable
+from reference.authored.assignment import SCALE_NAMES
 from reference.construction.uncertainty import spread
 
 TELLING = 2

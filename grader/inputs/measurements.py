@@ -24,7 +24,6 @@ from pydantic import ValidationError
 from grader.documents import MeasurementsDocument
 from grader.inputs.roster import MAX_LINES, delimiter_of, surplus_of, table_lines, whole_number, why_no_id
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
-from grader.inputs.scale_text import SCALE_NAMES
 from grader.records import (
     ACCELERATION_PLAN,
     VELOCITY_PLAN,
@@ -35,7 +34,7 @@ from grader.records import (
     ReadVector,
     Unread,
 )
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.authored.toml_file import findings_of
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, coincident

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
-from grader.inputs.scale_text import SCALE_NAMES
 from grader.language import LANGUAGES
 from grader.records import Problem
+from reference.authored.assignment import SCALE_NAMES
 from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
 
 _STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")

@@ -15,10 +15,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.records import Written
-from reference.authored.assignment import Assignment, Scales, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.mechanism import Crank
 
-SCALE_NAMES = ("kL", "kv", "ka")
 SURE = 0.9
 """Probability from which a text read in a printed box is taken for what was written."""
 MAX_LENGTH = 120

@@ -18,7 +18,7 @@ from grader.scan.decode import pictures
 from grader.scan.decode.content import SHOWS_TEXT, drawn_by, filters_of, plain_pixels
 from grader.scan.decode.limits import MAX_PAGES, Door, InputFile, check_memory, check_pages, check_size
 from grader.scan.decode.pictures import from_pillow, plausible, to_grey
-from grader.scan.pixels import MM_PER_INCH
+from reference.drawing.canvas import MM_PER_INCH
 from reference.errors import InputFileError
 
 RENDER_DPI = 300.0

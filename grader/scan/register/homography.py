@@ -6,8 +6,9 @@ import numpy as np
 
 from grader.printed.layout import FRAME_MM, PAGE_MM
 from grader.records import Box, FloatArray, Page
-from grader.scan.pixels import MM_PER_INCH, TITLE_BLOCK_MM, inverted, local_axes, mapped
+from grader.scan.pixels import TITLE_BLOCK_MM, inverted, local_axes, mapped
 from grader.scan.register.lines import RIDGE, LongLine
+from reference.drawing.canvas import MM_PER_INCH
 
 _MARGIN_MM = 10.0
 """Around a drawing without a frame: the least that ISO 5457 leaves."""

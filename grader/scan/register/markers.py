@@ -24,7 +24,6 @@ from grader.printed.layout import (
 )
 from grader.records import FloatArray, GreyImage, Identity, Lens, Page, Problem, Sheet
 from grader.scan.pixels import (
-    MM_PER_INCH,
     BoolArray,
     at_full_size,
     cut_out,
@@ -38,6 +37,7 @@ from grader.scan.pixels import (
 from grader.scan.register.distortion import find_bend
 from grader.scan.register.fitting import MarkedPoints, Projection, fit_projection
 from grader.scan.register.homography import rotation_deg
+from reference.drawing.canvas import MM_PER_INCH
 
 # The code -----------------------------------------------------------------------------------------
 
