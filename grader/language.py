@@ -1,13 +1,7 @@
 r"""Languages of what students and instructors read: English, Romanian, Russian.
 
 English texts stand in the code and are the keys; `locale/<lang>/LC_MESSAGES/planmark.po` holds the
-other languages. After a text has changed (more in `docs/translating.md`)::
-
-    pybabel extract -F grader/locale/babel.cfg -k N_ --no-location --sort-output --no-wrap \
-        -o grader/locale/planmark.pot .
-    pybabel update -D planmark -i grader/locale/planmark.pot -d grader/locale \
-        --no-fuzzy-matching --no-wrap --ignore-obsolete
-    pybabel compile -D planmark -d grader/locale
+other languages. `docs/translating.md` says what to do after a text has changed.
 """
 
 import gettext as gnu

@@ -253,6 +253,25 @@ def pdf_of_a_heavy_stamp():
         return pdf_bytes(pdf)
 
 
+def pdf_of_a_heavy_mask():
+    """PDF of a soft mask that draws nested forms: a state of the page, nothing that it draws itself."""
+    with pikepdf.open(io.BytesIO(pdf_of_nested_forms(group=True))) as pdf:
+        page = pdf.pages[0]
+        mask = DICTIONARY(Type=NAME.Mask, S=NAME.Luminosity, G=page.Resources.XObject.F)
+        page.Resources = DICTIONARY(ExtGState=DICTIONARY(G=DICTIONARY(Type=NAME.ExtGState, SMask=mask)))
+        page.Contents = pdf.make_stream(b"/G gs 0 0 842 595 re f")
+        return pdf_bytes(pdf)
+
+
+def pdf_of_large_inline_images(count=40, side=30_000):
+    """PDF of pictures of 900 million pixels each among its drawing commands, without their data."""
+    pdf = pikepdf.new()
+    page = pdf.add_blank_page(page_size=A4_PT)
+    image = b"q 842 0 0 595 0 0 cm BI /W %d /H %d /BPC 1 /CS /G /F /A85 ID ~> EI Q\n" % (side, side)
+    page.Contents = pdf.make_stream(image * count)
+    return pdf_bytes(pdf)
+
+
 def pdf_of_a_large_image(side=40_000):
     """PDF with a stamp over an image of 1600 million pixels, deflated twice to 200 bytes."""
     pdf = pikepdf.new()

@@ -44,11 +44,10 @@ from grader.documents import (
     LintScales,
     LintVariant,
     LintWorst,
-    VariantDocument,
 )
 from grader.printed.layout import SCALE_OF
 from grader.rubric import RubricFile, check_rubric
-from reference.authored.assignment import TRADITIONS, Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
 from reference.construction.derive import construction_of, image_name
 from reference.construction.graph import Construction, ancestors
@@ -340,22 +339,12 @@ def lint_document(result: Lint) -> LintDocument:
     return LintDocument(
         assignment=result.assignment.id,
         needs_a_person=result.needs_a_person,
-        findings=[
-            LintFindingDocument(
-                severity=finding.severity,
-                code=finding.code,
-                file=finding.file,
-                path=finding.path,
-                message=finding.message,
-                variants=[VariantDocument(**_numbers(variant)) for variant in finding.variants],
-            )
-            for finding in result.findings
-        ],
+        findings=[LintFindingDocument.model_validate(finding) for finding in result.findings],
         variants=list(result.rows),
         scales=[
             LintScales(
                 name=proposal.name,
-                **{name: ends_of(getattr(proposal.scales, name)) for name in ("kL", "kv", "ka")},
+                **{name: ends_of(getattr(proposal.scales, name)) for name in SCALE_NAMES},
                 room=proposal.room,
                 shortest_mm=proposal.shortest_mm,
                 under_8_mm=proposal.under_8_mm,

@@ -16,7 +16,7 @@ from grader.documents import LintLeast
 from grader.printed.layout import FRAME_MM, MARGIN_MM, SCALE_OF, TEMPLATES, Template, template_for
 from grader.records import MECHANISM, Box
 from grader.rubric import RubricFile
-from reference.authored.assignment import Assignment, Scales, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.geometry import FloatArray
 from reference.plan import ZERO_SHARE, Plan
 
@@ -455,7 +455,7 @@ def suggestions(proposed: Sequence[Proposal], plan: Plan, figures: Collection[st
     texts = {}
     for index, variant in enumerate(plan.variants):
         if each.short[index] < own.short[index] or own.room < 1.0:
-            scales = Scales(*(getattr(each.scales, name)[index : index + 1] for name in ("kL", "kv", "ka")))
+            scales = Scales(*(getattr(each.scales, name)[index : index + 1] for name in SCALE_NAMES))
             texts[variant] = (
                 f"{written(scales, names)}: {each.short[index]} instead of {own.short[index]} asked vectors"
                 f" under {WELL_READ_MM:g} mm"

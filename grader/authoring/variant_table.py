@@ -18,7 +18,7 @@ import numpy as np
 
 from grader.authoring.round_scales import is_zero
 from grader.language import Tongue
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.drawing.canvas import (
     A3_MM,
     Area,
@@ -283,7 +283,7 @@ def _spread(
 
 def _column(column: Column, assignment: Assignment, words: Tongue) -> _Cells:
     shown = assignment.file.names.get(column.over, column.over)
-    over = scale_pieces(shown) if column.over in {"kL", "kv", "ka"} else pieces_of(shown)
+    over = scale_pieces(shown) if column.over in SCALE_NAMES else pieces_of(shown)
     digits = column.digits
     if column.kind == "g":
         largest = float(np.nanmax(np.abs(column.values), initial=0.0))

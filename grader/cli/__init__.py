@@ -3,14 +3,15 @@
 import gc
 import os
 
-from grader.cli.commands import app
+from grader.cli import commands  # noqa: F401 - registers the commands on the application
+from grader.cli.app import app
 
 COLLECT_FROM = 50_000
 """New objects before Python looks for cycles: imports make many that all stay, and each look costs time."""
 
 
 def main() -> None:
-    """Run ``planmark``; see `grader.cli.commands` for exit statuses."""
+    """Run ``planmark``; see `grader.cli.app` for exit statuses."""
     gc.set_threshold(COLLECT_FROM)
     # planmark has no plugins of pydantic; a search for them reads the metadata of every installed package.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")

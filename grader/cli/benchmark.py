@@ -18,7 +18,7 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from grader.cli.commands import new_table, progress
+from grader.cli.app import new_table, progress
 from grader.files import samples_folder
 from grader.inputs.roster import read_roster
 from grader.pipeline import open_page, read_pages

@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from grader.cli.commands import check_language
+from grader.cli.app import check_language
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
 from grader.feedback.sentences import mistake_feedback, reason_sentence
@@ -31,7 +31,7 @@ def check_measured(
     level: str,
     page: Path | None = None,
 ) -> bool:
-    """Tell right and off for every value of a measurement file; whether anything is off.
+    """Print right or off for every value of a measurement file; whether anything is off.
 
     With a `page`, one student's values are drawn and told in that file, too.
     """
@@ -119,15 +119,15 @@ def _tell(
         return
     table = Table(box=None, show_header=False)
     names = assignment.file.names
-    for one in checked:
-        mark, style = MARKS[one.result]
+    for value in checked:
+        mark, style = MARKS[value.result]
         # What is right needs one reason: the others say what would be off, had it not been accepted.
-        shown = one.reasons[:1] if one.result == "right" else one.reasons
+        shown = value.reasons[:1] if value.result == "right" else value.reasons
         sentence = " ".join(reason_sentence(reason, words, level, names) for reason in shown)
         numbers = ""
-        if level == "full" and one.measured and one.expected:
-            numbers = f"{_number(one.measured)} / {_number(one.expected)}"
-        table.add_row(f"[{style}]{mark}[/{style}]", names.get(one.name, one.name), numbers, sentence)
+        if level == "full" and value.measured and value.expected:
+            numbers = f"{_number(value.measured)} / {_number(value.expected)}"
+        table.add_row(f"[{style}]{mark}[/{style}]", names.get(value.name, value.name), numbers, sentence)
     console.print(table, highlight=False)
 
 

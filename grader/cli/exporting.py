@@ -7,7 +7,7 @@ from typing import Any, Literal
 import typer
 from pydantic import BaseModel
 
-from grader.cli.commands import check_language
+from grader.cli.app import check_language
 from grader.documents import (
     SCHEMA_VERSION,
     CalibrationDocument,

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import typer
 
+from grader.cli.app import check_language, new_table, progress
 from grader.cli.checking import checked_level
-from grader.cli.commands import check_language, new_table, progress
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
 from grader.feedback.class_page import CAUSES, SIGNS, waiting
 from grader.files import samples_folder
@@ -151,14 +151,10 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
     typer.echo(f"{len(results.reports)} submissions: {told or 'none'}")
     page = out / "index.html"
-    _list(
-        f"Moved since the last run: {len(results.moved)}", [_change_line(one) for one in results.moved], page
-    )
-    _list(
-        "Look alike (no accusation; hold both beside each other):",
-        [_similar_line(one) for one in results.alike],
-        page,
-    )
+    changes = [_change_line(change) for change in results.moved]
+    _list(f"Moved since the last run: {len(results.moved)}", changes, page)
+    pairs = [_similar_line(pair) for pair in results.alike]
+    _list("Look alike (no accusation; hold both beside each other):", pairs, page)
     _list("A person must look at:", list(_waiting(results)), page)
     typer.echo(f"Look at {page}; for programs there is {out / 'results.json'}")
 

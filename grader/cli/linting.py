@@ -11,7 +11,7 @@ from rich.table import Table
 from grader.authoring.findings import named
 from grader.authoring.lint import Lint, lint, lint_document
 from grader.authoring.round_scales import WELL_READ_MM, Proposal, ends_of, ratio_text
-from grader.cli.commands import new_table
+from grader.cli.app import new_table
 from grader.documents import LintLeast, LintVariant, LintWorst
 from grader.files import write_whole
 from grader.rubric import load_rubric
@@ -22,7 +22,7 @@ from reference.drawing.sheets import FRAME, reference_drawing
 from reference.geometry import FloatArray
 
 SHOWN_ROWS = 40
-"""More variants than that are told in ranges."""
+"""More variants than that stand in ranges."""
 REASON_MM, REASON_COLOUR = 4.0, "#a03014"
 """Of the line under the drawing's frame that says why this variant."""
 COLOURS = {"fault": "bold red", "warning": "yellow", "hint": "cyan"}

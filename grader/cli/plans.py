@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import typer
 
-from grader.cli.commands import new_table
+from grader.cli.app import new_table
 from grader.files import write_whole
 from grader.language import tongue
 from grader.solution.document import plan_document

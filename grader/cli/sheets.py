@@ -10,7 +10,7 @@ import typer
 
 from grader.authoring.lint import lint
 from grader.authoring.round_scales import suggestions
-from grader.cli.commands import check_language, progress
+from grader.cli.app import check_language, progress
 from grader.documents import CalibrationDocument
 from grader.files import write_whole
 from grader.folder.cache import PageCache
@@ -31,26 +31,26 @@ from reference.errors import CallError, InputFileError
 
 
 def calibrate_scans(scans: Sequence[Path], svg: Path | None, *, as_json: bool) -> bool:
-    """Tell what scans of the calibration page say; whether anything is to be done."""
-    found: list[CalibrationDocument] = []
+    """Measure scans of the calibration page and print the result; whether anything is to be done."""
+    documents: list[CalibrationDocument] = []
     unread = False
     with Workers(1, Limits(), __name__) as workers:
         pages = [(path, page + 1) for path in scans for page in range(result_of(workers, count_pages, path))]
         for path, page in pages:
-            one = result_of(workers, calibrate, path, page)
-            if isinstance(one, Unread):
+            document = result_of(workers, calibrate, path, page)
+            if isinstance(document, Unread):
                 unread = True
-                typer.echo(f"{path.name}, page {page}: {one.reason}", err=True)
+                typer.echo(f"{path.name}, page {page}: {document.reason}", err=True)
                 continue
-            found.append(one)
+            documents.append(document)
             if not as_json:
-                _print_page(one)
+                _print_page(document)
     if as_json:
-        typer.echo(json.dumps([one.model_dump(mode="json") for one in found], indent=2))
-    if svg is not None and found:
-        write_whole(svg, residual_map(found[0]))
+        typer.echo(json.dumps([document.model_dump(mode="json") for document in documents], indent=2))
+    if svg is not None and documents:
+        write_whole(svg, residual_map(documents[0]))
         typer.echo(f"{svg}: where the page is off, magnified", err=True)
-    return unread or any(one.advice != [ALL_IS_WELL] for one in found)
+    return unread or any(document.advice != [ALL_IS_WELL] for document in documents)
 
 
 def _print_page(page: CalibrationDocument) -> None:
@@ -64,14 +64,14 @@ def _print_page(page: CalibrationDocument) -> None:
             f"  unequal scale {100.0 * page.unequal:+.3f} %, right angles off by {page.skew_deg:+.3f} degrees"
         )
     typer.echo(f"  markers off an even map by {page.residual_mm:.3f} mm")
-    seen = page.segments
-    typer.echo(f"  {seen.read} of {seen.printed} segments read")
-    if seen.length_rms_mm is not None:
-        mean, rms, worst = seen.length_mean_mm, seen.length_rms_mm, seen.length_worst_mm
+    segments = page.segments
+    typer.echo(f"  {segments.read} of {segments.printed} segments read")
+    if segments.length_rms_mm is not None:
+        mean, rms, worst = segments.length_mean_mm, segments.length_rms_mm, segments.length_worst_mm
         typer.echo(
             f"  their lengths are off by {mean:+.3f} mm on the mean, {rms:.3f} rms, {worst:.3f} at worst"
         )
-        turn, place = seen.direction_rms_deg, seen.place_rms_mm
+        turn, place = segments.direction_rms_deg, segments.place_rms_mm
         typer.echo(f"  directions {turn:.3f} degrees rms, places {place:.3f} mm rms")
     for line in page.advice:
         typer.echo(f"  {line}")
@@ -108,18 +108,18 @@ def print_sheets(
 
 
 def _suggest_scales(name: str, roster: Path) -> None:
-    """Tell the instructor whose drawing would be easier to read at other scales, and at which."""
+    """Print whose drawing would be easier to read at other scales, and at which."""
     assignment = load_assignment(name)
-    found = lint(assignment, rubric_of(assignment))
-    if found.plan is None:
+    result = lint(assignment, rubric_of(assignment))
+    if result.plan is None:
         return
     drawn = {figure for page in assignment.file.page for figure in page.figures}
-    told = suggestions(found.scales, found.plan, drawn)
+    texts = suggestions(result.scales, result.plan, drawn)
     lines: dict[Variant, str] = {}
     for row in read_roster(roster).rows:
         variant = assignment.variant(row.n, row.position)
-        if variant in told:
-            lines.setdefault(variant, told[variant])
+        if variant in texts:
+            lines.setdefault(variant, texts[variant])
     if not lines:
         return
     typer.echo(
@@ -155,7 +155,7 @@ def draft_matches(
         contents = take_inventory(paths, folder, names_of(assignment), workers, tell, cache)
         sources = [page for content in contents for page in content.pages]
         draft = suggest(sources, roster, assignment, pages_per_student=pages_per_student)
-        loose = [one.source for one in draft.suggestions if not one.sure]
+        loose = [suggestion.source for suggestion in draft.suggestions if not suggestion.sure]
         strokes: dict[PageRef, FloatArray] = {}
         for done, (index, ends) in enumerate(
             workers.run(_strokes, [(cache, page) for page in loose]), start=1
@@ -166,7 +166,7 @@ def draft_matches(
         draft = suggest(
             sources, roster, assignment, strokes_of=strokes.get, pages_per_student=pages_per_student
         )
-        shown = [one.source for one in draft.suggestions]
+        shown = [suggestion.source for suggestion in draft.suggestions]
         thumbnails = dict(workers.run(_thumbnail, [(cache, page) for page in shown]))
     entries = []
     for index, suggestion in enumerate(draft.suggestions):

@@ -12,13 +12,13 @@ import typer
 
 from grader.authoring.variant_checks import broken_findings, broken_variants
 from grader.authoring.variant_table import class_csv
-from grader.cli.commands import check_language, new_table, progress
+from grader.cli.app import check_language, new_table, progress
 from grader.cli.plans import check_crank
 from grader.cycle.quantities import CycleSubject, Extreme, Selection, cycle_csv, extremes, strokes_of
 from grader.files import write_whole
 from grader.language import Tongue, tongue
 from grader.solution.document import plan_documents
-from reference.authored.assignment import Assignment, Variant, load_assignment
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant, load_assignment
 from reference.errors import CallError, MechanismError
 from reference.kinematics.cycle import cycle
 from reference.plan import Plan, exact_plan
@@ -57,7 +57,7 @@ def show_class(
 ) -> bool:
     """Write the plans of all variants as JSON, as a table, or on pages; without any, a short table.
 
-    Variants that cannot be solved are told and left out; whether there are any.
+    Variants that cannot be solved are listed and left out; returns whether there are any.
     """
     check_crank(crank_mm)
     check_language(lang)
@@ -82,7 +82,7 @@ def show_class(
 
 
 def _sound(assignment: Assignment) -> list[Variant]:
-    """The variants that can be solved; the others are told."""
+    """The variants that can be solved; the others are printed as left out."""
     variants = assignment.variants()
     broken = broken_variants(assignment, variants)
     without = {one.variant for one in broken}
@@ -128,7 +128,7 @@ def _show_table(assignment: Assignment, plan: Plan) -> None:
     table = new_table("variant", "kL\nm/mm", "kv\n(m/s)/mm", "ka\n(m/s^2)/mm", *names)
     lengths = {name: abs(plan.drawn_mm(name)) for name in names}
     for index, variant in enumerate(plan.variants):
-        scales = [f"{getattr(plan.scales, name)[index]:.4g}" for name in ("kL", "kv", "ka")]
+        scales = [f"{getattr(plan.scales, name)[index]:.4g}" for name in SCALE_NAMES]
         table.add_row(str(variant), *scales, *(f"{lengths[name][index]:.2f}" for name in names))
     console.print(table)
     console.print("all vectors, values and directions: --csv FILE, --pdf FILE or --json", style="dim")
@@ -261,25 +261,25 @@ def _number(subject: CycleSubject, driven: float) -> str:
 
 def _range(subject: CycleSubject) -> Iterator[str]:
     """How far the driven link goes, what stops it, and what it passes."""
-    found = subject.cycle
-    what = "crank" if found.is_turned else "driven slider"
-    here = f"this variant: {_at(subject, found.start)}"
-    if found.turns:
+    cycle = subject.cycle
+    what = "crank" if cycle.is_turned else "driven slider"
+    here = f"this variant: {_at(subject, cycle.start)}"
+    if cycle.turns:
         yield f"the crank turns fully; {here}"
     else:
-        ends = [_at(subject, float(end)) for end in (found.driven[0], found.driven[-1])]
+        ends = [_at(subject, float(end)) for end in (cycle.driven[0], cycle.driven[-1])]
         yield f"the {what} moves from {ends[0]} to {ends[1]}; {here}"
-        for stop in found.following.stops:
+        for stop in cycle.following.stops:
             if stop is None:
                 yield "  nothing stops it on one side"
             else:
                 yield f"  {_at(subject, stop.at)}: {stop.node}, {stop.why}"
-    if found.turns > 1:
+    if cycle.turns > 1:
         yield "after a turn it is in its other assembly: the cycle is two turns"
-    for low, high in found.elsewhere:
+    for low, high in cycle.elsewhere:
         yield f"it assembles from {_at(subject, low)} to {_at(subject, high)} as well, out of reach from here"
     flat: dict[str, list[str]] = {}
-    for event in found.passed:
+    for event in cycle.passed:
         flat.setdefault(event.node, []).append(_at(subject, event.at))
     for node, places in flat.items():
         yield f"flat position of {node} at {' and '.join(places)}: passed smoothly, nothing is told in it"

@@ -17,7 +17,7 @@ from grader.comparison.evidence import Evidence
 from grader.comparison.own import Nodes, PlanBasis, known, other_mechanism, own_nodes
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task, TaskSegment
-from grader.inputs.scale_text import SCALE_NAMES
+from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Coriolis, Normal
 from reference.construction.graph import AngularRate
 from reference.construction.mistakes import Drawing, Mistake, commit

@@ -9,8 +9,8 @@ import numpy as np
 
 from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.task import Task
-from grader.inputs.scale_text import SCALE_NAMES
 from grader.records import MECHANISM
+from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Coriolis, Normal, Parameters, View
 from reference.construction.graph import Construction, Vector, evaluate, parameters_of
 from reference.construction.steps import ArcAndLine, Given, Step, TwoArcs

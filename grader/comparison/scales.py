@@ -4,14 +4,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, cast
 
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
-from grader.comparison.task import Task, unit_of
+from grader.comparison.task import Task, Yardstick, unit_of
 from grader.comparison.verdicts import FULL, NONE, Limit, MarkRange, mark
 from grader.inputs.scale_text import (
     EXAMPLES,
-    SCALE_NAMES,
     SURE,
     ByRule,
     Declared,
@@ -22,6 +21,7 @@ from grader.inputs.scale_text import (
 from grader.outcomes import Reason, UsedScale
 from grader.records import Problem, Reading, Unread, Written
 from grader.rubric import ToleranceTable
+from reference.authored.assignment import SCALE_NAMES
 from reference.construction.uncertainty import spread
 
 TELLING = 2
@@ -112,7 +112,7 @@ def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Sca
         if shown is not None:
             # A crank that agrees with the scale proposed was drawn at that one, a little off.
             proposed = task.rule_scales["kL"]
-            return proposed if _is_confirmed(task, evidence, name, proposed) else shown[0] / shown[1]
+            return proposed if _is_confirmed(task, evidence, name, proposed, shown) else shown[0] / shown[1]
     key = ("rule", *known.items())
     scales = task.cached(key, lambda: task.assignment.scales([task.variant], **known))
     return float(getattr(scales, name)[0])
@@ -121,17 +121,22 @@ def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Sca
 # What the drawing shows ----------------------------------------------------------------------------
 
 
-def _evidence_of(task: Task, evidence: Evidence, name: str) -> tuple[float, float, float] | None:
-    """What shows a scale on the drawing: real value, drawn millimetres, standard error; None without it."""
+def _evidence_of(
+    task: Task, evidence: Evidence, name: str, *, however_doubtful: bool = False
+) -> tuple[float, float, float] | None:
+    """What shows a scale on the drawing: real value, drawn millimetres, standard error; None without it.
+
+    Arguments: `however_doubtful` takes a vector whatever its confidence.
+    """
     if name == "kL":
-        if task.yardstick is None or evidence.yardstick_mm is None:
+        if task.yardstick is None or evidence.yardstick_mm is None or evidence.yardstick_mm[0] <= 0.0:
             return None
         return (task.yardstick.length_m, *evidence.yardstick_mm)
     vector = f"{name[1]}_{task.pin}"
     drawn = evidence.vector(vector)
     if drawn is None or drawn.length_mm <= 0.0 or not task.real.get(vector):
         return None
-    if drawn.confidence < task.rubric.least_confidence:
+    if drawn.confidence < task.rubric.least_confidence and not however_doubtful:
         return None
     return abs(task.real[vector]), drawn.length_mm, drawn.se_mm
 
@@ -141,7 +146,7 @@ def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> fl
     shown = _evidence_of(task, evidence, name)
     if shown is None or name == "kL":
         return None
-    if _is_confirmed(task, evidence, name, used):
+    if _is_confirmed(task, evidence, name, used, shown):
         return None
     other = shown[0] / shown[1]
     return other if _fitting(task, evidence, name, other) > _fitting(task, evidence, name, used) else None
@@ -220,22 +225,24 @@ def _followed_instead(
     Arguments: `rule` is the assignment's, None where the declared one is that.
     """
     shown = _evidence_of(task, evidence, name)
-    if shown is None or _is_confirmed(task, evidence, name, declared):
+    if shown is None or _is_confirmed(task, evidence, name, declared, shown):
         return None
     other = shown[0] / shown[1]
     if name == "kL":
         # A crank drawn too long beside links that are right is a wrong crank, no wrong scale.
         return None if _links_at(task, evidence, declared) > _links_at(task, evidence, other) else other
     # A drawing that follows the rule contradicts another declaration.
-    follows_rule = rule is not None and _is_confirmed(task, evidence, name, rule)
+    follows_rule = rule is not None and _is_confirmed(task, evidence, name, rule, shown)
     return other if follows_rule else _contradiction(task, evidence, name, declared)
 
 
-def _is_confirmed(task: Task, evidence: Evidence, name: str, scale: float) -> bool:
-    """Whether a scale agrees with the drawn length within its tolerance and uncertainty."""
-    shown = _evidence_of(task, evidence, name)
-    if shown is None:
-        return False
+def _is_confirmed(
+    task: Task, evidence: Evidence, name: str, scale: float, shown: tuple[float, float, float]
+) -> bool:
+    """Whether a scale agrees with the drawn length within its tolerance and uncertainty.
+
+    Arguments: `shown` is what `_evidence_of` the scale gives.
+    """
     expected_mm = shown[0] / scale
     residual = abs(expected_mm - shown[1])
     plain = task.rubric.tolerance_of(name).length_at(expected_mm)
@@ -246,8 +253,6 @@ def _allowed_mm(task: Task, evidence: Evidence, name: str, expected_mm: float) -
     """The tolerance (mm) of the length that shows a scale, widened by its propagated drafting error."""
     table, hand = task.rubric.tolerance_of(name), task.rubric.hand
     plain, ends = table.length_at(expected_mm), _ends(task, name)
-    if ends is None:
-        return plain
     drawn = task.traced(task.rule_scales)
     uncertainty = hand.sigmas * spread(drawn.shifts(*ends), drawn.vector(*ends)).along
     if not evidence.has_sheets:
@@ -255,12 +260,13 @@ def _allowed_mm(task: Task, evidence: Evidence, name: str, expected_mm: float) -
     return max(plain, min(uncertainty, hand.at_most * plain))
 
 
-def _ends(task: Task, name: str) -> tuple[str, str] | None:
-    """Tail and head of the link or vector that shows a scale."""
+def _ends(task: Task, name: str) -> tuple[str, str]:
+    """Tail and head of what shows a scale; there must be evidence of it."""
     if name == "kL":
-        return None if task.yardstick is None else (task.yardstick.tail, task.yardstick.head)
-    vector = task.construction.vectors.get(f"{name[1]}_{task.pin}")
-    return None if vector is None else (vector.tail, vector.head)
+        yardstick = cast("Yardstick", task.yardstick)
+        return yardstick.tail, yardstick.head
+    vector = task.construction.vectors[f"{name[1]}_{task.pin}"]
+    return vector.tail, vector.head
 
 
 # Which of the declarations count -------------------------------------------------------------------
@@ -423,18 +429,6 @@ def _is_borne_out(
     if value is None:
         return isinstance(_parsed_text(task, name, text), ByRule)
     ruled = float(getattr(task.assignment.scales([task.variant], **known), name)[0])
-    tried = [ruled, *_drawn(task, evidence, name)]
+    shown = _evidence_of(task, evidence, name, however_doubtful=True)
+    tried = [ruled] if shown is None else [ruled, shown[0] / shown[1]]
     return any(abs(value / one - 1.0) <= within for one in tried if one > 0.0)
-
-
-def _drawn(task: Task, evidence: Evidence, name: str) -> list[float]:
-    """The scale that the drawing shows, whatever its confidence; empty where it shows none."""
-    if name == "kL":
-        if task.yardstick is None or evidence.yardstick_mm is None or evidence.yardstick_mm[0] <= 0.0:
-            return []
-        return [task.yardstick.length_m / evidence.yardstick_mm[0]]
-    vector = f"{name[1]}_{task.pin}"
-    drawn = evidence.vector(vector)
-    if drawn is None or drawn.length_mm <= 0.0 or not task.real.get(vector):
-        return []
-    return [abs(task.real[vector]) / drawn.length_mm]

@@ -8,9 +8,8 @@ from typing import TypeVar, cast
 
 import numpy as np
 
-from grader.inputs.scale_text import SCALE_NAMES
 from grader.rubric import RubricFile, ToleranceTable
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.elements import Parameters
 from reference.construction.graph import Construction, evaluate
 from reference.construction.uncertainty import Skill, TracedDrawing, trace

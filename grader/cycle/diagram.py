@@ -27,11 +27,11 @@ from grader.cycle.quantities import (
 )
 from grader.language import N_, Tongue
 from reference.authored.assignment import Assignment, Variant
-from reference.drawing.canvas import pieces_of
+from reference.drawing.canvas import MM_PER_INCH, pieces_of
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import PointOnLine, SlotPoint
 
-MM = 1.0 / 25.4
+MM = 1.0 / MM_PER_INCH
 """Inches, matplotlib's unit of pages."""
 LANDSCAPE_MM, PORTRAIT_MM, WIDE_MM = (297.0, 210.0), (210.0, 297.0), (420.0, 297.0)
 PANELS_SHARE = 0.62

@@ -270,8 +270,8 @@ class _Output:
 
 def strokes_of(subject: CycleSubject) -> tuple[OutputStroke, ...]:
     """Of all sliders on fixed guides and all links hinged to the ground that go to and fro."""
-    found = (_stroke(subject, output) for output in _outputs(subject))
-    return tuple(stroke for stroke in found if stroke.dead_points)
+    strokes = (_stroke(subject, output) for output in _outputs(subject))
+    return tuple(stroke for stroke in strokes if stroke.dead_points)
 
 
 def _outputs(subject: CycleSubject) -> Iterator[_Output]:
@@ -389,10 +389,10 @@ def _refined(subject: CycleSubject, quantity: CycleQuantity, values: FloatArray,
         return Extreme(value, (at,))
     for _ in range(ROUNDS):
         points = np.linspace(low, high, POINTS)
-        found = sign * subject.values_at(quantity, points)
-        k = int(np.nanargmax(found)) if np.isfinite(found).any() else 0
-        if found[k] > sign * value:
-            at, value = float(points[k]), sign * float(found[k])
+        signed = sign * subject.values_at(quantity, points)
+        k = int(np.nanargmax(signed)) if np.isfinite(signed).any() else 0
+        if signed[k] > sign * value:
+            at, value = float(points[k]), sign * float(signed[k])
         low, high = points[max(k - 1, 0)], points[min(k + 1, POINTS - 1)]
     return Extreme(value, (at,))
 

@@ -61,8 +61,8 @@ def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> 
     order = [step.node for step in construction.steps]
     if node not in order:
         return []
-    found = speaker_of(subject, tongue)
-    speaker = PlainSpeaker(found.subject, found.tongue, found.view)
+    usual = speaker_of(subject, tongue)
+    speaker = PlainSpeaker(usual.subject, usual.tongue, usual.view)
     touched = _touched(construction.steps, node)
     figure = construction.figure_of(node)
     own = [step for step in touched if construction.figure_of(step.node) == figure]

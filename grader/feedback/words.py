@@ -49,9 +49,9 @@ def symbols(text: str) -> Markup:
     """Text with names of vectors, rates and scales set with their indices; everything else escaped."""
     parts: list[Markup] = []
     end = 0
-    for found in _NAME.finditer(text):
-        parts += [escape(text[end : found.start()]), _symbol(found)]
-        end = found.end()
+    for match in _NAME.finditer(text):
+        parts += [escape(text[end : match.start()]), _symbol(match)]
+        end = match.end()
     return Markup("").join([*parts, escape(text[end:])])
 
 

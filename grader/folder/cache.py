@@ -232,7 +232,7 @@ class PageCache:
 
     Attributes
     ----------
-    asked : what is looked for on them
+    asked : what is read on them
     key : digest of all that a page's scan depends on, beside the page
     printed_key : the same of what is read in the cells of a printed sheet
     """

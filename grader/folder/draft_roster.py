@@ -23,11 +23,10 @@ import simplejpeg
 
 from grader.folder.owners import How, Owned, assign_pages
 from grader.inputs.roster import COLUMNS, DRAFT_COLUMNS, Roster, RosterRow
-from grader.inputs.scale_text import SCALE_NAMES
 from grader.language import N_, Tongue, tongue
 from grader.records import FloatArray, GreyImage, PageRef, Problem
 from grader.scan.pixels import shrink
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, bars, evaluate, parameters_of
 from reference.errors import CallError

@@ -2,7 +2,7 @@
 
 Files, pages, blank backs, QR codes, measurements; everything but the roster and the files of tools. Each
 file is opened and each page is decoded in a worker: a page that ends its worker is that page's problem
-alone. What an earlier run found in a file of the same content is not looked for again.
+alone. The contents of files that an earlier run has read are taken from the cache.
 """
 
 import os
@@ -52,7 +52,7 @@ def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[
     """
     top = folder.resolve()
     none = {path.resolve() for path in (*passed_over, *([roster] if roster else []), folder / "roster.csv")}
-    found: list[Path] = []
+    paths: list[Path] = []
     shut: list[Path] = []
     for where, folders, files in os.walk(folder, onerror=lambda error: shut.append(Path(error.filename))):
         folders[:] = [
@@ -62,9 +62,9 @@ def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[
             path = Path(where) / name
             real = path.resolve()
             if not is_tool_file(name) and real not in none and real.is_relative_to(top):
-                found.append(path)
-        found += [Path(where) / name for name in folders if _named_as_file(Path(where) / name)]
-    return sorted(found + shut, key=lambda path: natural_key(path.relative_to(folder).as_posix()))
+                paths.append(path)
+        paths += [Path(where) / name for name in folders if _named_as_file(Path(where) / name)]
+    return sorted(paths + shut, key=lambda path: natural_key(path.relative_to(folder).as_posix()))
 
 
 def shown_name(path: Path, folder: Path) -> str:
@@ -102,7 +102,7 @@ class FileContent:
 
     Attributes
     ----------
-    pages : also those that cannot be decoded, so that their owner is told
+    pages : also those that cannot be decoded: they belong to somebody
     measurements : of a measurement file
     refused : a measurement file that cannot be used at all
     students : whom such a file names in itself
@@ -171,7 +171,7 @@ def code_of(page: PageRef) -> PageRef:
 
 
 def _with_problem(page: PageRef, problem: Problem, workers: Pool) -> PageRef:
-    """A page that could not be scanned; its owner is told, where strokes alone ended the worker."""
+    """A page that could not be scanned, with its problem, and its code where that can still be read."""
     if problem.code in ENDED:
         ((_, known),) = workers.run(code_of, [(page,)])
         page = page if isinstance(known, Problem) else known

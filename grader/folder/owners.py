@@ -2,7 +2,7 @@
 
 Sources, the first that speaks decides: the page's QR code; the roster's `scans`; the roster's order
 over one class file (`--pages-per-student`); the file's name. All that speak must agree: a page on
-which two disagree is unmatched, with both told. Codes of the problems:
+which two disagree is unmatched, and the problem names both. Codes of the problems:
 
 | code | meaning |
 |---|---|

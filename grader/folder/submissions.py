@@ -203,9 +203,9 @@ def _unmatched(entered: Measurements, why: str) -> Problem:
 
 
 def _blank_only(owners: PageOwners, roster: Roster | None) -> list[Owned]:
-    """Blank pages whose file's name tells a student who has no other page: to be told, not passed over."""
+    """Blank pages whose file's name names a student who has no other page: they are the student's."""
     having = {owned.student_id for owned in owners.owned}
-    found: dict[str, Owned] = {}
+    pages: dict[str, Owned] = {}
     for source in owners.blank:
         stem = PurePath(source.file).stem
         improvised = [stem] if why_no_id(stem) is None else []
@@ -213,8 +213,8 @@ def _blank_only(owners: PageOwners, roster: Roster | None) -> list[Owned]:
         if student is not None and student not in having:
             rows = () if roster is None else roster.rows_of(student)
             position = rows[0].position if len(rows) == 1 else None
-            found.setdefault(source.file, Owned(source, student, None, position, (How.NAME,)))
-    return list(found.values())
+            pages.setdefault(source.file, Owned(source, student, None, position, (How.NAME,)))
+    return list(pages.values())
 
 
 def _submission(assignment: Assignment, key: Key, gathered: _Gathered, lang: str) -> StudentSubmission:
@@ -243,8 +243,8 @@ def _agreed(name: str, values: Iterable[int | None], problems: list[Problem]) ->
     """The number that all sources give; where they differ, None and a problem: it is not guessed."""
     known = list(dict.fromkeys(value for value in values if value is not None))
     if len(known) > 1:
-        told = " and ".join(str(value) for value in known)
-        problems.append(Problem(f"{name}_disagrees", f"the sources give different {name}: {told}"))
+        numbers = " and ".join(str(value) for value in known)
+        problems.append(Problem(f"{name}_disagrees", f"the sources give different {name}: {numbers}"))
         return None
     return known[0] if known else None
 

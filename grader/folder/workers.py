@@ -29,10 +29,11 @@ _WATCH_S = 0.05
 _STALLED_S = 30.0
 """Past every time limit without any result: a worker was killed while it took its task, which is lost."""
 _ROUNDS = 3
-"""Pools started one after the other without a single result: then what is left is told as crashed."""
+"""Pools started one after the other without a single result: then what is left has the problem `crashed`."""
 _KILLED = -9
 """Exit code of a process that somebody else killed: the system for want of memory, or a person."""
 _MEGABYTE = 1_000_000
+_ADVICE = "scan or export it again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,9 +184,6 @@ class Workers:
                     if psutil.Process(worker.pid).memory_info().rss > limit:
                         self._over_memory.add(worker.pid or 0)
                         worker.kill()
-
-
-_ADVICE = "scan or export it again"
 
 
 def _workers() -> list[BaseProcess]:

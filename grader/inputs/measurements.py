@@ -24,7 +24,6 @@ from pydantic import ValidationError
 from grader.documents import MeasurementsDocument
 from grader.inputs.roster import MAX_LINES, delimiter_of, surplus_of, table_lines, whole_number, why_no_id
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
-from grader.inputs.scale_text import SCALE_NAMES
 from grader.records import (
     ACCELERATION_PLAN,
     VELOCITY_PLAN,
@@ -35,7 +34,7 @@ from grader.records import (
     ReadVector,
     Unread,
 )
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.authored.toml_file import findings_of
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, coincident
@@ -227,6 +226,17 @@ def _columns(names: Names) -> Mapping[str, tuple[str, str]]:
     return {f"{name}{end}": (table, name) for table, end in TABLES.items() for name in known[table]}
 
 
+@dataclass(frozen=True, slots=True)
+class _NoValue:
+    """What stands in a JSON file in place of a value, and why it is none."""
+
+    text: str
+    why: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
 @dataclass(slots=True)
 class _Entries:
     """What one student entered, while it is being read; what is refused costs that entry alone.
@@ -252,7 +262,7 @@ class _Entries:
             path = f"line {self.line}, {path}" if path else f"line {self.line}"
         self.faults.append(Finding(path, why))
 
-    def number(self, path: str, column: str, text: str, value: "float | _NoValue") -> None:
+    def number(self, path: str, column: str, text: str, value: float | _NoValue) -> None:
         """Enter the number that a column or table has, or note why it is refused."""
         why = value.why if isinstance(value, _NoValue) else self._refusal(column, value)
         if why is None and isinstance(value, float):
@@ -273,7 +283,7 @@ class _Entries:
             return "a direction is from -360 to 360 degrees"
         return None
 
-    def scale(self, path: str, name: str, text: "str | _NoValue") -> None:
+    def scale(self, path: str, name: str, text: str | _NoValue) -> None:
         """Enter a scale as declared, or note why it is refused."""
         if isinstance(text, str) and len(text) > LONGEST_SCALE:
             text = _NoValue(f"{text[:40]}...", f"a scale has at most {LONGEST_SCALE} characters")
@@ -347,7 +357,7 @@ def _did_you_mean(near: Sequence[str]) -> str:
 
 
 def _line(header: list[str], cells: list[str], delimiter: str, entries: _Entries) -> Measurements:
-    """What one line says; what it says wrongly is left out and told."""
+    """What one line says; what is wrong in it is left out and reported."""
     known = {name: cell.strip() for name, cell in zip(header, cells, strict=False) if name and cell.strip()}
     surplus = surplus_of(header, cells, delimiter)
     if surplus is not None:
@@ -373,7 +383,10 @@ def _line(header: list[str], cells: list[str], delimiter: str, entries: _Entries
     return entries.measurements(owner, numbers.get("n"), numbers.get("position"), is_usable=is_usable)
 
 
-def _number(text: str, delimiter: str) -> "float | _NoValue":
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+
+
+def _number(text: str, delimiter: str) -> float | _NoValue:
     plain = text.replace("\N{MINUS SIGN}", "-")
     if delimiter == ";":
         plain = plain.replace(",", ".", 1)
@@ -382,9 +395,6 @@ def _number(text: str, delimiter: str) -> "float | _NoValue":
     comma = "," in text and delimiter == ","
     advice = "; write a decimal point, or separate fields by semicolons" if comma else ""
     return _NoValue(text, f"is no number{advice}")
-
-
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 
 
 def reading_of(
@@ -449,17 +459,6 @@ def _name_of(column: str) -> str:
 # JSON ---------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class _NoValue:
-    """What stands in a JSON file in place of a value, and why it is none."""
-
-    text: str
-    why: str
-
-    def __str__(self) -> str:
-        return self.text
-
-
 def _object(pairs: Sequence[tuple[str, object]]) -> dict[str, object]:
     """An object of JSON; a key that is there twice has no value: nothing says which is meant."""
     table: dict[str, object] = {}
@@ -480,13 +479,13 @@ def _shown(value: object) -> str:
     return "a list or table" if isinstance(value, list | dict) else str(value)[:40]
 
 
+MOST_DIGITS = 18
+"""Of a whole number that fits 64 bits."""
+
+
 def _whole_number(digits: str) -> int | float:
     """Python refuses to read whole numbers of thousands of digits, and no number here has so many."""
     return int(digits) if len(digits) <= MOST_DIGITS else float(digits)
-
-
-MOST_DIGITS = 18
-"""Of a whole number that fits 64 bits."""
 
 
 def _parse_json(text: str, file: str, names: Names) -> Measurements:

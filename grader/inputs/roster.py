@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
-from grader.inputs.scale_text import SCALE_NAMES
 from grader.language import LANGUAGES
 from grader.records import Problem
+from reference.authored.assignment import SCALE_NAMES
 from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
 
 _STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
@@ -33,7 +33,7 @@ MAX_LINES = 20_000
 _MAX_BYTES = 20_000_000
 """So many lines of a thousand characters."""
 _ALMOST = 0.75
-"""Likeness from which an unknown column is taken for a misspelt one."""
+"""Similarity from which an unknown column is taken for a misspelt one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,8 +187,8 @@ def surplus_of(header: Sequence[str], cells: Sequence[str], delimiter: str) -> s
     """What is wrong with a line of more fields than there are columns; None for any other."""
     if not any(cell.strip() for cell in cells[len(header) :]):
         return None
-    told = f"has {len(cells)} fields, the first line names {len(header)} columns"
-    return f"{told}; quote a field that holds a '{delimiter}'"
+    message = f"has {len(cells)} fields, the first line names {len(header)} columns"
+    return f"{message}; quote a field that holds a '{delimiter}'"
 
 
 def whole_number(text: str, delimiter: str) -> int | None:
@@ -300,8 +300,8 @@ def _check_together(rows: list[RosterRow]) -> Iterator[Finding]:
         key = (row.student_id, row.position)
         if key in first:
             where = "" if row.position is None else f" in position {row.position}"
-            told = f"{row.student_id}{where} is on line {first[key]} already"
-            yield Finding(f"line {row.line}, student_id", told)
+            message = f"{row.student_id}{where} is on line {first[key]} already"
+            yield Finding(f"line {row.line}, student_id", message)
         first.setdefault(key, row.line)
     yield from _check_case(rows)
     yield from _check_positions(rows)
@@ -327,8 +327,8 @@ def _check_positions(rows: list[RosterRow]) -> Iterator[Finding]:
         if len(several) > 1 and any(row.position is not None for row in several):
             for row in several:
                 if row.position is None:
-                    told = f"is empty, but {row.student_id} has other lines with positions"
-                    yield Finding(f"line {row.line}, position", told)
+                    message = f"is empty, but {row.student_id} has other lines with positions"
+                    yield Finding(f"line {row.line}, position", message)
 
 
 def _check_scans(rows: list[RosterRow]) -> Iterator[Finding]:

@@ -15,10 +15,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.records import Written
-from reference.authored.assignment import Assignment, Scales, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.mechanism import Crank
 
-SCALE_NAMES = ("kL", "kv", "ka")
 SURE = 0.9
 """Probability from which a text read in a printed box is taken for what was written."""
 MAX_LENGTH = 120
@@ -131,17 +130,17 @@ def _parse_chain(name: str, parts: list[str], bare_unit: str | None) -> ParsedSc
         raise _NotUnderstoodError(f"'{last}' is no rule for {name}")
     if ":" in last:
         return Declared(_ratio(name, last))
-    found = _quantities(last)
-    if bare_unit is not None and found[0].is_bare:
-        found = _quantities(f"{last} {_clean(bare_unit)}")
-    fitting = {q.value for q in found if q.fits(name)}
+    quantities = _quantities(last)
+    if bare_unit is not None and quantities[0].is_bare:
+        quantities = _quantities(f"{last} {_clean(bare_unit)}")
+    fitting = {q.value for q in quantities if q.fits(name)}
     if len(fitting) == 1:
         return Declared(_positive(fitting.pop() / PAPER_MM_PER_M, last))
     if len(parts) > 1:
-        paired = _correspondence(name, parts[-2], found)
+        paired = _correspondence(name, parts[-2], quantities)
         if paired is not None:
             return Declared(_positive(paired / PAPER_MM_PER_M, last))
-    raise _NotUnderstoodError(_misfit(name, last, found[0]))
+    raise _NotUnderstoodError(_misfit(name, last, quantities[0]))
 
 
 def _positive(value: float, text: str) -> float:
@@ -285,13 +284,13 @@ class _Reader:
         self.place = 0
 
     def read(self) -> _Quantity:
-        found = self.product(depth=0)
+        quantity = self.product(depth=0)
         if self.tokens[self.place]:
             raise _NotUnderstoodError(f"'{self.tokens[self.place]}' is not understood in '{self.text}'")
-        return found
+        return quantity
 
     def product(self, depth: int) -> _Quantity:
-        found = self.power(depth)
+        quantity = self.power(depth)
         divided = False
         while (word := self.tokens[self.place]) not in {"", ")", "+", "-", "^"}:
             sign = -1 if divided and self.rest_is_divisor else 1
@@ -301,8 +300,8 @@ class _Reader:
                     sign, divided = -1, True
             elif _is_number(word) and _is_number(self.tokens[self.place - 1]):
                 raise _NotUnderstoodError(f"'{self.text}' has two numbers side by side")
-            found = found.times(self.power(depth), sign)
-        return found
+            quantity = quantity.times(self.power(depth), sign)
+        return quantity
 
     def power(self, depth: int) -> _Quantity:
         is_unit = self.tokens[self.place].isalpha()
@@ -369,11 +368,11 @@ def _ratio(name: str, text: str) -> float:
             raise _NotUnderstoodError(f"'{text}': a scale is a positive number")
         return _positive(real.value / paper.value / PAPER_MM_PER_M, text)
     is_one = re.fullmatch(r"1(?:\.0*)?\s*[^\W\d]+", sides[0]) is not None
-    found = _correspondence(name, sides[0], [real]) if is_one else None
-    if found is None:
+    per_m = _correspondence(name, sides[0], [real]) if is_one else None
+    if per_m is None:
         # "0.3 m : 60 mm" may be meant as a division: never guessed.
         raise _NotUnderstoodError(f"'{text}' does not begin with one unit on paper, such as 1 mm")
-    return _positive(found / PAPER_MM_PER_M, text)
+    return _positive(per_m / PAPER_MM_PER_M, text)
 
 
 def _correspondence(name: str, paper_text: str, real: list[_Quantity]) -> float | None:
@@ -384,8 +383,8 @@ def _correspondence(name: str, paper_text: str, real: list[_Quantity]) -> float 
         return None
     if (paper.metres, paper.seconds) != (1, 0) or paper.value <= 0.0:
         return None
-    found = {q.times(paper, -1).value for q in real if q.times(paper, -1).fits(name)}
-    return found.pop() if len(found) == 1 else None
+    values = {q.times(paper, -1).value for q in real if q.times(paper, -1).fits(name)}
+    return values.pop() if len(values) == 1 else None
 
 
 # Scales that count before anything is marked --------------------------------------------------------
@@ -393,12 +392,12 @@ def _correspondence(name: str, paper_text: str, real: list[_Quantity]) -> float 
 
 def sure_texts(readings: Sequence[Mapping[str, Written]]) -> dict[str, str]:
     """What is surely read in the boxes of some pages, by scale; before anything else was read there."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for name in SCALE_NAMES:
         boxes = [written[name] for written in readings if name in written]
         if boxes and all(box.confidence >= SURE for box in boxes):
-            found[name] = max(boxes, key=lambda box: box.confidence).text
-    return found
+            texts[name] = max(boxes, key=lambda box: box.confidence).text
+    return texts
 
 
 def declared_scales(assignment: Assignment, variant: Variant, texts: Mapping[str, str]) -> Scales:

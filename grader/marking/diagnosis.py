@@ -17,7 +17,7 @@ import numpy as np
 
 from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.elements import Along, Line
 from reference.construction.graph import Construction, parameters_of
 from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
@@ -27,7 +27,6 @@ from reference.replay.explanations import RARITY, Observations
 from reference.replay.replay import Replay, Root, replay
 
 OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
-SCALES = frozenset({"kL", "kv", "ka"})
 
 
 # The explanations of a drawing ---------------------------------------------------------------------
@@ -172,7 +171,7 @@ def _other_variants(case: Case) -> Iterator[Root]:
     table = {
         name: np.broadcast_to(value, (len(variants),))
         for name, value in together.items()
-        if name not in SCALES - case.assumed and np.ndim(value) and np.ptp(value) > 0.0
+        if name not in set(SCALE_NAMES) - case.assumed and np.ndim(value) and np.ptp(value) > 0.0
     }
     for index, variant in enumerate(variants):
         if variant != case.variant and table:
@@ -356,7 +355,7 @@ def _losses_explained(
 
 
 def _touches(mistake: Mistake, scale: str, ends: set[str], reach: frozenset[str]) -> bool:
-    if mistake.at in SCALES:
+    if mistake.at in SCALE_NAMES:
         return mistake.at in {scale, "kL"}
     if mistake.code == "labels_swapped":
         return bool(ends & set(mistake.other))

@@ -5,11 +5,10 @@ from dataclasses import asdict
 
 from grader.comparison.task import Task
 from grader.documents import ReadingDocument, ReportDocument, Status
-from grader.inputs.scale_text import SCALE_NAMES
 from grader.outcomes import Judgement, NamedMistake, Outcome
 from grader.records import Figure, Problem, ScannedPage, Sheet
 from grader.rubric import RubricFile
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 
 STAGES = ("decode", "sheet", "ink", "reading")
 

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.drawing.canvas import A3_MM
@@ -68,7 +68,7 @@ _MARKER_Y_MM = (14.0, 271.0)
 CODE_MM: Box = (363.0, 13.0, 28.0, 28.0)
 """Where the QR code is printed, quiet zone included."""
 SCALE_BOXES: dict[str, Box] = {
-    name: (306.0, 13.0 + 9.5 * row, 53.0, 8.0) for row, name in enumerate(("kL", "kv", "ka"))
+    name: (306.0, 13.0 + 9.5 * row, 53.0, 8.0) for row, name in enumerate(SCALE_NAMES)
 }
 SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
 """The scale that each figure is drawn at."""

@@ -16,7 +16,8 @@ from grader.records import Box, FloatArray, GreyImage
 Float32Array = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
 
-MM_PER_INCH = 25.4
+TITLE_BLOCK_MM = (215.0, 80.0)
+"""Width and height of the corner of a sheet in which a title block may lie."""
 _PAPER_LONG_SIDE_PX = 640
 """Resolution of the paper's brightness: about 1.5 px/mm on A3."""
 _CLOSE_PX = 17

@@ -30,7 +30,7 @@ from grader.similarity.submission import (
     fitting,
     scales_used,
 )
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.derive import construction_of
 from reference.construction.elements import View
 from reference.construction.graph import Construction
@@ -45,7 +45,6 @@ LARGEST_SHARE = 0.7
 """up to this."""
 RARE = -9.0
 """Log of the chance of two placements below which each drawing is also compared with the other's variant."""
-SCALES = ("kL", "kv", "ka")
 GROSS = 4.0
 """An error so many times as large as the student's usual one is a mistake or a misreading."""
 TAIL = 2.5
@@ -220,7 +219,7 @@ def _raw_errors(
     nodes: dict[str, ComplexArray] = {}
     known = plan.drawing.parameters
     view = View(nodes, known)
-    copied = View(nodes, {**known, **{name: np.asarray(known[name] / (1.0 + SMALL)) for name in SCALES}})
+    copied = View(nodes, {**known, **{name: np.asarray(known[name] / (1.0 + SMALL)) for name in SCALE_NAMES}})
     errors, by_scale = [], []
     with np.errstate(invalid="ignore", divide="ignore"):
         for step in plan.construction.steps:

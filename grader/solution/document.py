@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from grader.documents import PlanDocument, PlanVector, ScalesDocument
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray, FloatArray
 from reference.kinematics.motion import Motion
@@ -123,7 +123,7 @@ def _columns(plan: Plan) -> _Columns:
         "value": lists({name: np.abs(plan.vectors_si[name]) for name in vectors}),
         "drawn_mm": lists({name: np.abs(plan.drawn_mm(name)) for name in vectors}),
         "direction_deg": lists({name: plan.direction_deg(name) for name in vectors}),
-        "scale": lists({name: getattr(plan.scales, name) for name in ("kL", "kv", "ka")}),
+        "scale": lists({name: getattr(plan.scales, name) for name in SCALE_NAMES}),
         "rate": lists(plan.rates),
         "conditioning": lists(conditioning(plan)),
     }

@@ -82,8 +82,8 @@ def explain(subject: Subject, tongue: Tongue) -> list[PlanSection]:
 
 def _centre_steps(speaker: Speaker) -> list[Step]:
     """The steps of the centres that lie on any paper at all."""
-    found = speaker.subject.centres
-    return [step for name, step in speaker.subject.plan.construction.centres.items() if name in found]
+    on_paper = speaker.subject.centres
+    return [step for name, step in speaker.subject.plan.construction.centres.items() if name in on_paper]
 
 
 def _explanation(speaker: Speaker, number: int, step: Step) -> ExplainedStep:

@@ -140,6 +140,9 @@ class Variant:
         return ", ".join(parts) or "the only variant"
 
 
+SCALE_NAMES = ("kL", "kv", "ka")
+
+
 @dataclass(frozen=True, slots=True)
 class Scales:
     """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm."""
@@ -223,13 +226,13 @@ class Assignment:
         elif rule.crank_mm is not None:
             known["crank_mm"] = rule.crank_mm(known)
         declared = {"kL": kL, "kv": kv, "ka": ka}
-        for name in ("kL", "kv", "ka"):
+        for name in SCALE_NAMES:
             given = declared[name]
             known[name] = getattr(rule, name)(known) if given is None else np.asarray(given, float)
             if name == "kL" and given is not None and "crank_m" in known:
                 known["crank_mm"] = np.asarray(known["crank_m"]) / known[name]
         shape = (len(variants),)
-        return Scales(*(np.broadcast_to(known[name], shape) for name in ("kL", "kv", "ka")))
+        return Scales(*(np.broadcast_to(known[name], shape) for name in SCALE_NAMES))
 
 
 def _speeds(driver: Driver) -> dict[str, Value]:
@@ -309,7 +312,7 @@ def _check_formulas(assignment: Assignment) -> list[Finding]:
 
     def proposed_scales(variants: list[Variant]) -> None:
         scales = assignment.scales(variants)
-        for name in ("kL", "kv", "ka"):
+        for name in SCALE_NAMES:
             if not np.all((getattr(scales, name) > 1.0 / LARGEST) & (getattr(scales, name) < LARGEST)):
                 raise FormulaError(f"{name} must be above zero for every variant")
 

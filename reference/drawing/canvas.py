@@ -130,6 +130,7 @@ def wrapped(text: str, size: float, wide: float) -> Sequence[str]:
 
 
 A3_MM = (420.0, 297.0)
+MM_PER_INCH = 25.4
 
 INK = "#1b1f24"
 CONSTRUCTION = "#7d8791"

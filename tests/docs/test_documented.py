@@ -8,7 +8,7 @@ import pytest
 import typer
 from pydantic import BaseModel
 
-from grader.cli.commands import app
+from grader.cli.app import app
 from grader.cli.exporting import schema_names
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference.authored import assignment, mechanism

@@ -11,7 +11,7 @@ import pytest
 import typer.main
 from typer.testing import CliRunner
 
-from grader.cli import commands
+from grader.cli.commands import app
 from grader.cli.exporting import schema
 
 ROOT = Path(__file__).parents[2]
@@ -69,7 +69,7 @@ def definitions(folder, *, with_guide):
 
 
 def planmark(command):
-    return CliRunner().invoke(commands, shlex.split(command))
+    return CliRunner().invoke(app, shlex.split(command))
 
 
 def test_the_documentation_shows_every_platform_and_thing():
@@ -95,7 +95,7 @@ def test_every_command_of_the_documentation_writes_its_file(desk, command):
 
 
 def test_every_option_is_documented():
-    parameters = typer.main.get_command(commands).commands["export"].params
+    parameters = typer.main.get_command(app).commands["export"].params
     options = {option for parameter in parameters for option in parameter.opts if option.startswith("--")}
     assert options <= set(re.findall(r"--[a-z-]+", DOCUMENT))
 

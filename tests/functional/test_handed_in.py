@@ -5,7 +5,7 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from grader.cli import commands
+from grader.cli.commands import app
 from grader.files import samples_folder
 
 GOOD = json.loads((samples_folder() / "pump" / "s08.json").read_text(encoding="utf-8"))
@@ -56,7 +56,7 @@ STATUS = {
 
 def graded(folder, out, *options):
     call = ["grade", folder, "--assignment", "pump", "--out", out, "--jobs", "1", *options]
-    return CliRunner().invoke(commands, [str(part) for part in call])
+    return CliRunner().invoke(app, [str(part) for part in call])
 
 
 @pytest.fixture(scope="module")

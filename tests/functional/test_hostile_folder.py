@@ -10,7 +10,7 @@ import pikepdf
 import pytest
 from typer.testing import CliRunner
 
-from grader.cli import commands
+from grader.cli.commands import app
 
 REFUSED = {
     "s10_zero.jpg": "file_empty",
@@ -31,7 +31,7 @@ NOBODYS = "bad\udcff\udcfename.jpg"
 
 def graded(folder, out):
     call = ["grade", folder, "--assignment", "pump", "--out", out, "--jobs", "1"]
-    return CliRunner().invoke(commands, [str(part) for part in call])
+    return CliRunner().invoke(app, [str(part) for part in call])
 
 
 def png_of(side):

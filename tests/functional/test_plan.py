@@ -8,7 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from grader.cli.commands import app
+from grader.cli.app import app
 from grader.cli.exporting import schema, schema_names
 from reference.authored.assignment import library
 

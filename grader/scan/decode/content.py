@@ -20,7 +20,7 @@ from reference.errors import InputFileError
 MAX_CONTENT = 32_000_000
 """Bytes of drawing commands on a page, each as often as it is carried out; exported drawings have 5 MB."""
 _OPERATORS = "Do gs scn SCN Tf Tj TJ ' \" BI ID EI"
-_SHOWS_TEXT = frozenset(("Tj", "TJ", "'", '"'))
+SHOWS_TEXT = frozenset(("Tj", "TJ", "'", '"'))
 _PIXELS_A_BYTE = 64
 """Pixels of an image that take as long as one byte of drawing commands."""
 _GROUP_PIXELS_A_BYTE = 24
@@ -136,7 +136,7 @@ class _ContentWalk:
         uses: Counter[tuple[str, str]] = Counter()
         for instruction in pikepdf.parse_content_stream(holder, _OPERATORS):
             operator, operands = str(instruction.operator), instruction.operands
-            if operator in _SHOWS_TEXT:
+            if operator in SHOWS_TEXT:
                 uses["letters", ""] += sum(_letters(operand) for operand in operands)
             elif operator == "INLINE IMAGE":
                 image = operands[0]

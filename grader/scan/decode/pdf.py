@@ -3,9 +3,10 @@
 import io
 import logging
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import cast
 
 import numpy as np
@@ -14,10 +15,10 @@ import pypdfium2
 
 from grader.records import FloatArray, GreyImage, Page
 from grader.scan.decode import pictures
-from grader.scan.decode.content import drawn_by, filters_of, plain_pixels
+from grader.scan.decode.content import SHOWS_TEXT, drawn_by, filters_of, plain_pixels
 from grader.scan.decode.limits import MAX_PAGES, Door, InputFile, check_memory, check_pages, check_size
 from grader.scan.decode.pictures import from_pillow, plausible, to_grey
-from grader.scan.pixels import MM_PER_INCH
+from reference.drawing.canvas import MM_PER_INCH
 from reference.errors import InputFileError
 
 RENDER_DPI = 300.0
@@ -36,7 +37,6 @@ _SHOWN = 0.94
 _SQUARE = 1e-3
 """Of the image's size: by more than rounding askew, it is resampled by what renders the page."""
 _PAINTS = frozenset(("S", "s", "f", "F", "f*", "B", "B*", "b", "b*", "sh", "BI", "INLINE IMAGE"))
-_SHOWS_TEXT = frozenset(("Tj", "TJ", "'", '"'))
 _INVISIBLE_TEXT = 3
 """Text mode of what optical character recognition lays over a scan."""
 
@@ -45,7 +45,7 @@ _UNIT: Matrix = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 
 
 logging.getLogger("pikepdf").setLevel(logging.CRITICAL)
-"""What is wrong with a file is told by an error; the library's own words on it would be in the way."""
+"""A damaged file raises an error of ours; the library's own messages would only repeat it."""
 if hasattr(pikepdf.settings, "set_qpdf_limits"):
     pikepdf.settings.set_qpdf_limits(
         flate_max_memory=MAX_UNPACKED, run_length_max_memory=MAX_UNPACKED, png_max_memory=MAX_UNPACKED,
@@ -97,19 +97,14 @@ def _leaves(document: pikepdf.Pdf) -> list[pikepdf.Object | None]:
         if isinstance(node, pikepdf.Dictionary) and isinstance(node.get("/Kids"), pikepdf.Array):
             if node.objgen not in known:  # a list that holds itself has no end
                 kids = list(node.Kids)
-                _hand_down(node, kids)
+                for kid, name in product(kids, _INHERITED):
+                    if isinstance(kid, pikepdf.Dictionary) and name in node and name not in kid:
+                        kid[name] = node[name]
                 nodes += reversed(kids)
             known.add(node.objgen)
         else:
             leaves.append(node if isinstance(node, pikepdf.Dictionary) else None)
     return leaves
-
-
-def _hand_down(node: pikepdf.Object, kids: Iterable[pikepdf.Object]) -> None:
-    for kid in kids:
-        for name in _INHERITED:
-            if isinstance(kid, pikepdf.Dictionary) and name in node and name not in kid:
-                kid[name] = node[name]
 
 
 def _unreadable(file: InputFile, number: int, why: str) -> InputFileError:
@@ -220,7 +215,7 @@ def _only_image(page: pikepdf.Page) -> Placement | None:
                 text_mode = int(operands[0])
             elif name == "Do":
                 images.append((cast("pikepdf.Stream", page.resources.XObject[str(operands[0])]), matrix))
-            elif name in _PAINTS or (name in _SHOWS_TEXT and text_mode != _INVISIBLE_TEXT):
+            elif name in _PAINTS or (name in SHOWS_TEXT and text_mode != _INVISIBLE_TEXT):
                 return None
     except (pikepdf.PdfError, AttributeError, KeyError, TypeError, ValueError):
         return None

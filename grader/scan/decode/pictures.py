@@ -13,7 +13,7 @@ from PIL import Image
 
 from grader.records import GreyImage, Page
 from grader.scan.decode.limits import Door, InputFile, check_memory, check_size, damaged, truncated
-from grader.scan.pixels import MM_PER_INCH
+from reference.drawing.canvas import MM_PER_INCH
 from reference.errors import InputFileError
 
 # Grey levels --------------------------------------------------------------------------------------

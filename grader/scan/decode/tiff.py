@@ -31,7 +31,7 @@ from grader.scan.decode.limits import (
 from grader.scan.decode.pictures import Dpi, from_unit, of_four_inks, tags_of, to_grey
 
 logging.getLogger("tifffile").setLevel(logging.CRITICAL)
-"""What is wrong with a file is told by an error; the library's own words on it would be in the way."""
+"""A damaged file raises an error of ours; the library's own messages would only repeat it."""
 
 _MAX_SEGMENTS = 500_000
 """Strips or tiles: A2 at 600 dpi in tiles of 16 x 16 has 540,000, in strips of one row 14,000."""

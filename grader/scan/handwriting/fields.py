@@ -291,7 +291,7 @@ _LEAST_MM = 1.0
 _DUST_MM = 0.35
 """Nor is it a part of one."""
 _SOFTEN_MM = 0.11
-"""A pencil's grain breaks strokes: they are closed before pieces are told from dust."""
+"""A pencil's grain breaks strokes: they are closed before dust is left out."""
 _FULL = 0.97
 """Share of a cell that is less inked than the middle of a stroke."""
 _NO_TENTHS = 0.5
@@ -411,7 +411,7 @@ def _sign(grey: GreyImage) -> GreyImage | None:
 
 
 def _length(places: Sequence[int | None], probability: FloatArray) -> tuple[float, float]:
-    """The number in a row of cells; a digit is told from the other digits and from what is no sign."""
+    """The number in a row of cells, and the probability that every digit of it is right."""
     columns = [COLUMN[digit] for digit in _DIGITS]
     value, sure = 0.0, 1.0
     for place in places:

@@ -14,12 +14,13 @@ from grader.documents import CalibrationDocument, CalibrationPoint, CalibrationS
 from grader.printed.answer_sheet import calibration_segments
 from grader.records import FloatArray, Page, Unread
 from grader.scan.decode.pages import page_of
-from grader.scan.pixels import MM_PER_INCH, lengths_and_directions
+from grader.scan.pixels import lengths_and_directions
 from grader.scan.register.distortion import straighten
 from grader.scan.register.homography import UNSET_DPI
 from grader.scan.register.markers import middles
 from grader.scan.register.registration import rectify
 from grader.scan.strokes.ink import find_ink
+from reference.drawing.canvas import MM_PER_INCH
 
 _LEAST_MARKERS = 4
 """Two scales and a skew, with markers left over to tell their errors."""

@@ -75,7 +75,7 @@ def straightened(grey: GreyImage, bend: float) -> GreyImage:
 def straighten(page: Page, sheet: Sheet) -> tuple[Page, Sheet]:
     """The page as a lens without bend would have stored it, and its sheet; the same where none was found.
 
-    To be done before strokes are looked for: a bent stroke is not straight, and its place is off by
+    To be done before strokes are searched: a bent stroke is not straight, and its place is off by
     half a millimetre on usual phones. `sheet.lens.stored` keeps the map of the stored picture.
     """
     if sheet.lens is None or sheet.mm_to_px is sheet.lens.straight:
@@ -128,7 +128,7 @@ def find_lens(flat: Flat, stored: FloatArray, sides: list[Side]) -> Lens | None:
     """The lens's bend, with the map of the straightened picture, or None where none shows.
 
     Unknowns: the homography, the bend, and each side's own offset and tilt (a hand's error) within
-    `Model.side_se_mm`; what remains bent on all sides alike is the lens.
+    `Outline.side_se_mm`; what remains bent on all sides alike is the lens.
     """
     traces = [trace for side in sides if (trace := _traced(flat, side)) is not None]
     if len(traces) < _LEAST_SIDES:

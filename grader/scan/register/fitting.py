@@ -9,9 +9,10 @@ from scipy.optimize import least_squares
 
 from grader.printed.layout import PAGE_MM
 from grader.records import FloatArray
-from grader.scan.pixels import MM_PER_INCH, inverted, local_axes, mapped
+from grader.scan.pixels import inverted, local_axes, mapped
 from grader.scan.register.homography import PAPER, Outline
 from grader.scan.register.lines import RIDGE, LongLine
+from reference.drawing.canvas import MM_PER_INCH
 
 _POINTS = 5
 """Places along a side at which it is compared with the map: enough to notice a bent one."""

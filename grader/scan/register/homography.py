@@ -6,13 +6,12 @@ import numpy as np
 
 from grader.printed.layout import FRAME_MM, PAGE_MM
 from grader.records import Box, FloatArray, Page
-from grader.scan.pixels import MM_PER_INCH, inverted, local_axes, mapped
+from grader.scan.pixels import TITLE_BLOCK_MM, inverted, local_axes, mapped
 from grader.scan.register.lines import RIDGE, LongLine
+from reference.drawing.canvas import MM_PER_INCH
 
 _MARGIN_MM = 10.0
 """Around a drawing without a frame: the least that ISO 5457 leaves."""
-TITLE_BLOCK_MM = (215.0, 80.0)
-"""Width and height of the corner in which a title block may lie."""
 _INSET_MM = 7.0
 """The frame's own bottom line, and the paper's edge, are no part of the block."""
 _SQUARE_MM = 2.5

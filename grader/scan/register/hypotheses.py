@@ -7,10 +7,11 @@ import numpy as np
 
 from grader.printed.layout import PAGE_MM
 from grader.records import FloatArray
-from grader.scan.pixels import MM_PER_INCH, inverted, mapped, through_corners
+from grader.scan.pixels import inverted, mapped, through_corners
 from grader.scan.register.fitting import Side, affine_of, affine_params
 from grader.scan.register.homography import FRAMES, PAPER, Outline, drawn_ends, title_block_mm
 from grader.scan.register.lines import RIDGE, STEP, LongLine
+from reference.drawing.canvas import MM_PER_INCH
 
 _LINES_EACH_WAY = 12
 """Of the longest lines in each direction: a title block adds a few to the four of paper and frame."""

@@ -96,7 +96,7 @@ class LongLine:
     kind : `ridge`, a drawn stroke; `step`, a border between bright and dark
     bright : for a step the side that is bright: +1 below or right of it, -1 above or left
     ends : (2, 2) left and right, or upper and lower, end
-    inked : share of the length that was seen
+    inked : share of the length that is inked
     width : of a drawn line's ink, px; 0 for a step
     dark : contrast of a drawn line's ink, 0..1
     """

@@ -24,7 +24,6 @@ from grader.printed.layout import (
 )
 from grader.records import FloatArray, GreyImage, Identity, Lens, Page, Problem, Sheet
 from grader.scan.pixels import (
-    MM_PER_INCH,
     BoolArray,
     at_full_size,
     cut_out,
@@ -38,6 +37,7 @@ from grader.scan.pixels import (
 from grader.scan.register.distortion import find_bend
 from grader.scan.register.fitting import MarkedPoints, Projection, fit_projection
 from grader.scan.register.homography import rotation_deg
+from reference.drawing.canvas import MM_PER_INCH
 
 # The code -----------------------------------------------------------------------------------------
 
@@ -119,7 +119,7 @@ stated resolution, and there together with what the scanner does."""
 _USUAL_LENGTH_MM = 60.0
 """Of a vector: what the map leaves unexplained is an error of lengths over this distance."""
 _FLAT_MM = 0.12
-"""Misfit from which paper that is not flat is told; printers and flatbeds stay under 0.1."""
+"""Misfit from which paper is reported as not flat; printers and flatbeds stay under 0.1."""
 _SCALE_REPORTED = 0.004
 """Printers and scanners together stay below this."""
 _SCALE_NEAR = 0.1
@@ -375,18 +375,18 @@ def _refined(grey: GreyImage, guess_px: FloatArray) -> tuple[FloatArray, BoolArr
     slanted marker's sides stay straight lines.
     """
     px = np.asarray(guess_px, dtype=np.float64)
-    seen = np.zeros(px.shape[:2], dtype=bool)
+    whole = np.zeros(px.shape[:2], dtype=bool)
     for _ in range(_ROUNDS):
         to_px = [through_corners(_START, corners) for corners in px]
         offsets, crossed = _edges(grey, to_px)
         along = np.broadcast_to(_T, offsets.shape)
         lines = robust_lines(along, offsets, crossed.astype(np.float64), _NOISE_FLOOR)
         good = (crossed.mean(axis=1) >= _LEAST_SHARE).reshape(-1, 4)
-        seen = good & np.roll(good, 1, axis=1)
+        whole = good & np.roll(good, 1, axis=1)
         unit = _corners(lines.a.reshape(-1, 4), lines.b.reshape(-1, 4))
         refined = np.stack([mapped(matrix, corners) for matrix, corners in zip(to_px, unit, strict=True)])
-        px = np.where(seen[..., None], refined, px)
-    return px, seen
+        px = np.where(whole[..., None], refined, px)
+    return px, whole
 
 
 _T = np.linspace(_ENDS, 1.0 - _ENDS, _SAMPLES)
@@ -417,11 +417,11 @@ def _crossings(values: FloatArray) -> tuple[FloatArray, BoolArray]:
     # The crossing next to the guess: strokes of the student farther out are of no matter.
     distance = np.where(change, np.abs(_Y[:-1] + _Y[1:])[None, None, :], np.inf)
     at = distance.argmin(axis=2)
-    seen = np.isfinite(distance.min(axis=2)) & (white - black > _LEAST_CONTRAST)
+    crossed = np.isfinite(distance.min(axis=2)) & (white - black > _LEAST_CONTRAST)
     below = np.take_along_axis(values, at[..., None], axis=2)[..., 0]
     above = np.take_along_axis(values, at[..., None] + 1, axis=2)[..., 0]
     share = np.clip((level - below) / np.maximum(above - below, 1e-9), 0.0, 1.0)
-    return np.asarray(_Y[at] + share * (_Y[1] - _Y[0])), seen
+    return np.asarray(_Y[at] + share * (_Y[1] - _Y[0])), crossed
 
 
 def _corners(a: FloatArray, b: FloatArray) -> FloatArray:

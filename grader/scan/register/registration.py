@@ -10,7 +10,7 @@ import numpy as np
 
 from grader.printed.layout import PAGE_MM
 from grader.records import FloatArray, Identity, Page, Problem, Sheet, Unread
-from grader.scan.pixels import MM_PER_INCH, Flat, flatten, inverted, local_axes, mapped
+from grader.scan.pixels import Flat, flatten, inverted, local_axes, mapped
 from grader.scan.register import markers
 from grader.scan.register.distortion import find_lens
 from grader.scan.register.fitting import Fit, affine_of, fit_sides
@@ -29,6 +29,7 @@ from grader.scan.register.homography import (
 from grader.scan.register.hypotheses import Hypothesis, Resolution, hypotheses, on_sides
 from grader.scan.register.lines import LongLine, long_lines, without_grid
 from grader.scan.register.markers import identify
+from reference.drawing.canvas import MM_PER_INCH
 
 _LEAST_IN_PICTURE = 0.95
 """Share of the drawing area below which the picture shows a part of the sheet only."""
@@ -92,7 +93,7 @@ _MOST_SIDES, _SOME_SIDES = 3, 2
 """A frame is known by three of its sides, if two sides of the paper are found too."""
 _ALL_SIDES = 4
 _COPY_SE = 0.012
-"""Copiers enlarge or reduce by a per cent or two unless told not to."""
+"""Copiers enlarge or reduce by a per cent or two by default."""
 _SAMPLED, _WHITE = 7, 255
 """Every seventh pixel is tested; the value of white ones."""
 _FAR_OFF_MM = 1.5

@@ -304,10 +304,10 @@ def _middles(
     own : where the left and the right border stand out of the strokes beside
     free : where a border, if it is a band's, may be this stroke's
     """
-    pen, seen = width[:, None], np.isfinite(cuts.left)
-    left, right = np.where(seen, cuts.left, 0.0), np.where(seen, cuts.right, 0.0)
+    pen, inked = width[:, None], np.isfinite(cuts.left)
+    left, right = np.where(inked, cuts.left, 0.0), np.where(inked, cuts.right, 0.0)
     (own_left, own_right), across = own, right - left
-    both = seen & own_left & own_right
+    both = inked & own_left & own_right
     lone = both & (across <= _SINGLE * pen) & (across >= _THIN * pen)
     from_left, from_right = left + pen / 2.0, right - pen / 2.0
     left_off, right_off = (
@@ -317,9 +317,9 @@ def _middles(
     border = np.where(left_off <= right_off, from_left, from_right)
     blot = both & (across > _SINGLE * pen) & (np.minimum(left_off, right_off) <= _NEAR_MM * unit)
     offset = np.select([lone, both, own_left], [(left + right) / 2.0, border, from_left], from_right)
-    sided = seen & (own_left ^ own_right)
+    sided = inked & (own_left ^ own_right)
     weight = np.select([lone, blot, sided], [1.0, _BLOT_WEIGHT, _BORDER_WEIGHT], 0.0)
-    return _Middles(offset, weight, lone, np.zeros_like(seen))
+    return _Middles(offset, weight, lone, np.zeros_like(inked))
 
 
 def _of_guesses(cuts: Cuts, guesses: Fitted, taken: FloatArray, unit: float) -> _Middles:
@@ -350,9 +350,9 @@ def _beside_neighbours(
     half = (0.5 * strokes.width[there] / np.abs(cosine))[..., None]
     reaches = np.isfinite(at)
     # Borders of the neighbours that lie in the same ink.
-    seen = np.isfinite(cuts.left)[:, None]
-    here = reaches & (at - half < np.where(seen, cuts.right[:, None], 0.0))
-    here &= at + half > np.where(seen, cuts.left[:, None], 0.0)
+    inked = np.isfinite(cuts.left)[:, None]
+    here = reaches & (at - half < np.where(inked, cuts.right[:, None], 0.0))
+    here &= at + half > np.where(inked, cuts.left[:, None], 0.0)
     lowest = np.where(here, at - half, np.inf).min(axis=1)
     highest = np.where(here, at + half, -np.inf).max(axis=1)
     width = strokes.width[rows]

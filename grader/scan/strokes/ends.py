@@ -84,17 +84,17 @@ def _along(flat: Flat, ends: FloatArray, fitted: Fitted, px_per_mm: float, count
     level = _INKED * fitted.darkness
     reach = _REACH_MM * px_per_mm + float(fitted.width.max(initial=1.0))
     cuts = cut_across(flat, ends, count, reach, 0.35 * fitted.width, level)
-    seen = np.isfinite(cuts.left)
+    inked = np.isfinite(cuts.left)
     pen = fitted.width[:, None]
     limit = np.maximum(_OFF_MM * px_per_mm, 2.0 * fitted.noise)[:, None]
     off = np.minimum.reduce(
         [
-            np.abs(np.where(seen, cuts.offset, 0.0)),
-            np.abs(np.where(seen, cuts.left + pen / 2.0, 0.0)),
-            np.abs(np.where(seen, cuts.right - pen / 2.0, 0.0)),
+            np.abs(np.where(inked, cuts.offset, 0.0)),
+            np.abs(np.where(inked, cuts.left + pen / 2.0, 0.0)),
+            np.abs(np.where(inked, cuts.right - pen / 2.0, 0.0)),
         ]
     )
-    return np.where(seen, np.where(off <= limit, _OWN, _OTHER), _PAPER)
+    return np.where(inked, np.where(off <= limit, _OWN, _OTHER), _PAPER)
 
 
 def _last_own(state: FloatArray) -> tuple[FloatArray, BoolArray]:

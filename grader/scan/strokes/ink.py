@@ -85,7 +85,7 @@ def _ink_map(contrast: GreyImage, scale: float, sheet: Sheet) -> InkMap:
 # Strokes ------------------------------------------------------------------------------------------
 
 _OFF_MM = 0.25
-"""Pieces this near to one line are of it; strokes further apart are told apart."""
+"""Pieces this near to a line belong to it; farther ones are other strokes."""
 _GAP_MM = 2.3
 """Gaps within a stroke's border: where another crosses it, and in pencil."""
 _FITTED_OFF_MM = 0.16

@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from grader.records import Box, FloatArray, Page, Sheet
 from grader.scan.pixels import (
+    TITLE_BLOCK_MM,
     BoolArray,
     Float32Array,
     at_full_size,
@@ -19,7 +20,6 @@ from grader.scan.pixels import (
     parts,
     reached,
 )
-from grader.scan.register.homography import TITLE_BLOCK_MM
 from grader.scan.strokes.seeds import PX_PER_MM, Seeds
 
 _TURN = 0.16
@@ -165,7 +165,7 @@ def _fitted(ends: FloatArray, length: FloatArray) -> FloatArray:
     return np.stack([centre + t.min() * u, centre + t.max() * u])
 
 
-# Where drawings are looked for --------------------------------------------------------------------
+# The field of drawings --------------------------------------------------------------------
 
 _FRAME_MM = 1.5
 """Inside of the frame's middle line: its pen and the registration's error."""
@@ -193,7 +193,7 @@ _SAMPLES = 64
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """Where on the sheet drawings are looked for.
+    """The part of the sheet in which strokes are searched.
 
     Attributes
     ----------

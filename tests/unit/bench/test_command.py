@@ -6,6 +6,7 @@ import pytest
 import typer.testing
 
 from grader.cli import benchmark
+from grader.cli.app import app
 from grader.cli.benchmark import (
     ReadingRow,
     SolverRow,
@@ -14,7 +15,6 @@ from grader.cli.benchmark import (
     measure_solver,
     vector_results,
 )
-from grader.cli.commands import app
 from grader.records import VELOCITY_PLAN, Figure, Reading, ReadVector
 from reference.authored.assignment import load_assignment
 from reference.plan import exact_plan

@@ -13,9 +13,7 @@ RULER_MM = 0.5
 
 
 def held(drawn_mm, written, se_mm=0.05):
-    return compared_with_cells(
-        RIGHT, DrawnVector(drawn_mm, se_mm, 0.0, 0.1, SURE), written, TOLERANCE, LEAST
-    )
+    return compared_with_cells(RIGHT, DrawnVector(drawn_mm, se_mm, 0.0, 0.1, SURE), written, TOLERANCE, LEAST)
 
 
 def test_a_written_length_far_from_the_drawn_one_is_for_a_person_whatever_the_mark_would_be():

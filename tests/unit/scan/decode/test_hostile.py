@@ -55,6 +55,8 @@ REFUSED = {
     hostile.pdf_of_a_narrow_pattern: "pdf_too_heavy",
     hostile.pdf_of_a_heavy_font: "pdf_too_heavy",
     hostile.pdf_of_a_heavy_stamp: "pdf_too_heavy",
+    hostile.pdf_of_a_heavy_mask: "pdf_too_heavy",
+    hostile.pdf_of_large_inline_images: "pdf_too_heavy",
     hostile.pdf_of_a_large_image: "image_too_large",
     hostile.pdf_of_a_large_page: "image_too_large",
 }

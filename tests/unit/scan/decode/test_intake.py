@@ -12,6 +12,7 @@ import pytest
 import tifffile
 from PIL import Image
 
+from grader.scan.decode import limits
 from grader.scan.decode.pages import count_pages, is_blank, pages_of
 from reference.errors import InputFileError
 
@@ -439,4 +440,38 @@ def test_a_faint_pencil_drawing_is_not_blank(tmp_path):
     cv2.line(grey, (300, 300), (600, 700), 165, 2, cv2.LINE_AA)
     path = tmp_path / "faint.png"
     Image.fromarray(grey).save(path)
+    assert not is_blank(only_page(path))
+
+
+def packed_in_a_pdf(path, data, name, **entries):
+    """A PDF of one page, its image's data packed as given, with colours from the data or as given."""
+    pdf, page = raw_pdf(data, **entries)
+    page.Resources.XObject.Scan.Filter = pikepdf.Name(f"/{name}")
+    pdf.save(path)
+    return path
+
+
+def test_a_scan_packed_by_jpeg_2000_is_taken_out_as_stored(tmp_path):
+    buffer = io.BytesIO()
+    Image.fromarray(drawing()).save(buffer, "JPEG2000", irreversible=False)
+    path = packed_in_a_pdf(tmp_path / "scan.pdf", buffer.getvalue(), "JPXDecode")
+    assert np.array_equal(only_page(path).grey, drawing())
+
+
+def test_a_jpeg_2000_of_more_pixels_than_its_page_says_is_not_unpacked(tmp_path, monkeypatch):
+    monkeypatch.setattr(limits, "MAX_PIXELS", 2 * drawing().size)
+    buffer = io.BytesIO()
+    Image.fromarray(np.kron(drawing(), np.ones((2, 2), np.uint8))).save(buffer, "JPEG2000")
+    path = packed_in_a_pdf(tmp_path / "scan.pdf", buffer.getvalue(), "JPXDecode")
+    with pytest.raises(InputFileError) as caught:
+        list(pages_of(path))
+    assert caught.value.code == "image_too_large"
+
+
+@pytest.mark.parametrize("annotations", [[42], [pikepdf.Dictionary(Subtype=pikepdf.Name.Link)]])
+def test_annotations_that_draw_nothing_do_not_matter(tmp_path, annotations):
+    path = tmp_path / "noted.pdf"
+    pdf, page = raw_pdf(zlib.compress(drawing().tobytes()), **GREY8)
+    page.Annots = pdf.make_indirect(annotations)
+    pdf.save(path)
     assert not is_blank(only_page(path))

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from grader.cli.commands import app
+from grader.cli.app import app
 from grader.printed.answer_sheet import make_calibration
 from grader.records import Unread
 from grader.scan.register.calibration import calibrate, residual_map
