@@ -175,7 +175,7 @@ def _table(assignment: Assignment, submissions: Sequence[ComparedSubmission]) ->
 
 
 def _spread(by_act: FloatArray, grain_mm: FloatArray) -> FloatArray:
-    """(students, fields) standard deviation of a usual hand's values, mm."""
+    """(students, fields) standard deviation of values with usual drafting errors, mm."""
     return np.asarray(np.sqrt((by_act**2).sum(axis=2) + READ_OFF_MM**2 + grain_mm**2 / 12.0))
 
 

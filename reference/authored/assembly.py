@@ -139,7 +139,7 @@ def build_driver(file: MechanismFile, values: Mapping[str, Value], count: int) -
 
 
 def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _LinkAxes) -> Group:
-    """One group; a fault of its numbers is told with its place in the file."""
+    """One group; an error in its numbers names its place in the file."""
     try:
         return _group(table, numbers, bodies)
     except FormulaError as error:

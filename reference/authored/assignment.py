@@ -80,7 +80,7 @@ class PageTable(Authored):
 
 
 class GivenTable(Authored):
-    """One datum as told to the student: label = value unit."""
+    """One datum as the student reads it: label = value unit."""
 
     label: str
     value: FormulaText

@@ -22,7 +22,7 @@ TOUCHING_MM = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Wording:
-    """Words and the decimal mark of a language; English unless told otherwise."""
+    """Words and the decimal mark of a language; English by default."""
 
     lang: str = "en"
     decimal_mark: str = "."
