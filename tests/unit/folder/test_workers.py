@@ -84,7 +84,7 @@ def test_processes_killed_at_any_moment_lose_no_call():
 
 
 PARENT = """
-from grader.workers import Limits, Workers
+from grader.folder.workers import Limits, Workers
 from tests.unit.folder import calls
 if __name__ == "__main__":
     with Workers(2, Limits(), calls.__name__) as workers:
