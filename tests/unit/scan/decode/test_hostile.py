@@ -19,8 +19,7 @@ from grader.folder.cache import PageCache
 from grader.folder.inventory import take_inventory
 from grader.pipeline import open_page
 from grader.records import Page, PageRef
-from grader.scan.decode import pages as intake
-from grader.scan.decode import pictures
+from grader.scan.decode import limits, pictures
 from grader.scan.decode.limits import MAX_FILE_BYTES, InputFile, load
 from grader.scan.decode.pages import count_pages, is_blank, page_of, pages_of
 from grader.scan.decode.tiff import Coding, damaged_row
@@ -76,7 +75,7 @@ def test_profiles_and_texts_of_a_png_are_not_unpacked():
 LARGE = """
 import sys, numpy as np
 sys.path.insert(0, {project!r})
-from grader.intake import page_of
+from grader.scan.decode.pages import page_of
 print(page_of({path!r}, 1).grey.shape)
 """
 
@@ -257,7 +256,7 @@ def test_a_file_that_grows_while_it_is_read_is_not_taken_for_whole(tmp_path, mon
     path = tmp_path / "scan.png"
     path.write_bytes(bytes(100))
     shorter = os.stat_result((*path.stat()[:6], 50, *path.stat()[7:]))
-    monkeypatch.setattr(intake.grader.intake.limits.os, "fstat", lambda _: shorter)
+    monkeypatch.setattr(limits.os, "fstat", lambda _: shorter)
     with pytest.raises(InputFileError) as caught:
         load(path)
     assert caught.value.code == "file_changed"
