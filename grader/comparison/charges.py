@@ -177,10 +177,7 @@ class Charges:
         return self.known_wrong[node]
 
     def _is_wrong(self, node: str) -> bool:
-        task = self.task
-        own = self.own_position(node)
-        if own is None:
-            return False
+        task, own = self.task, self.own_position(node)
         exact = task.nodes(self.used)[node]
         if task.construction.figure_of(node) == MECHANISM:
             exact *= self.used["kL"] / self.followed["kL"]
@@ -198,14 +195,11 @@ class Charges:
         is_laid_off = isinstance(self.task.construction.step(segment.head), Given)
         return is_laid_off and drawn is not None and drawn.direction_rad is None
 
-    def own_position(self, node: str) -> complex | None:
-        """An own node as read or measured, or as lengths lead to it."""
+    def own_position(self, node: str) -> complex:
+        """A known own node as read or measured, or as lengths lead to it."""
         if node in self.evidence.nodes:
             return self.evidence.nodes[node]
-        for nodes in self.following.own(self.used).values():
-            if node in nodes:
-                return nodes[node].at
-        return None
+        return next(nodes[node].at for nodes in self.following.own(self.used).values() if node in nodes)
 
     def wrong(self, relies_on: frozenset[str]) -> frozenset[str]:
         """The wrong ones among nodes and scales: charged, or off and not judged within tolerance."""

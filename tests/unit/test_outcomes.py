@@ -1,0 +1,23 @@
+"""What is known of a named mistake: the names by which reports and sentences use it."""
+
+import pytest
+
+from grader.outcomes import NamedMistake
+from reference.construction.mistakes import Mistake
+
+
+@pytest.mark.parametrize(
+    ("mistake", "detail"),
+    [
+        (Mistake("labels_swapped", "b", other=("b", "c")), {"first": "b", "second": "c"}),
+        (Mistake("other_variant", "all", n=8), {"n": 8}),
+        (Mistake("other_variant", "all", n=8, position=2), {"n": 8, "position": 2}),
+        (Mistake("figure_rotated", "velocity_plan", quarters=3), {"degrees": 270.0}),
+        (Mistake("wrong_link", "b", other=("A", "B")), {"other": "AB"}),
+        (Mistake("arithmetic", "b", factor=2.0), {"factor": 2.0}),
+        (Mistake("normal_reversed", "n_BA"), {}),
+    ],
+)
+def test_a_mistake_tells_what_its_sentence_needs(mistake, detail):
+    assert NamedMistake(mistake, (), 1.0).detail == detail
+    assert NamedMistake(mistake, (), 1.0, {"from": "b"}).detail == {**detail, "from": "b"}
