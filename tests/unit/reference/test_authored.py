@@ -25,6 +25,7 @@ from reference.authored.toml_file import load, validate
 from reference.drawing.canvas import svg
 from reference.drawing.sheets import reference_drawing
 from reference.errors import AuthoredFileError, CallError, MechanismError, PlanmarkError
+from reference.mechanism import PointOnLine
 from reference.plan import exact_plan
 from tests import every_group
 
@@ -410,6 +411,13 @@ def test_a_plate_that_is_not_flat_needs_its_side():
     file = validate(MechanismFile, table, "the file")
     with pytest.raises(FormulaError, match=r"group\[4\]: side of C is missing: C may lie .* of A -> B"):
         build_mechanism(file, {"n": np.ones(1)}, 1)
+
+
+def test_a_point_given_on_its_base_divides_it():
+    point = {"type": "point", "node": "M", "base": ["A", "B"], "link": "6", "at": [140, 0]}
+    group = every_group.mechanism(point).groups[-1]
+    assert isinstance(group, PointOnLine)
+    np.testing.assert_allclose(group.ratio, 140 / 350, rtol=1e-15)
 
 
 def test_names_that_are_no_table_are_a_fault_of_the_file():
