@@ -1,1 +1,11 @@
-"""A plan as it is drawn, step by step; evaluated, changed by a mistake, with drafting errors."""
+"""A plan as it is drawn, step by step; evaluated, changed by a mistake, with drafting errors.
+
+Read first `graph`: the construction and its one evaluator, with a worked four-bar.
+
+- `elements`: directions, lengths and lines, as a step sees them
+- `steps`: what makes one node from earlier nodes
+- `graph`: the construction, evaluated
+- `derive`: a mechanism's construction, written down from its joints and links
+- `mistakes`: one step or parameter changed, the rest followed through
+- `uncertainty`: how far drafting errors move each node, and so the tolerance
+"""
