@@ -158,6 +158,16 @@ class ToleranceDocument(Document):
     """Whether it is more than the rubric states, because a careful hand's small errors add up here."""
 
 
+class DecidedDocument(Document):
+    """Who decided a verdict in the program's place, when (ISO 8601), what it was before, and why."""
+
+    by: str
+    at: str
+    before: Verdict | None
+    """Null where the decision moved a node and the verdict follows from it."""
+    comment: str = ""
+
+
 class CriterionDocument(Document):
     """The verdict on one criterion of the rubric."""
 
@@ -173,6 +183,12 @@ class CriterionDocument(Document):
     expected: QuantityDocument
     tolerance: ToleranceDocument
     confidence: Share
+    probability: Share | None = None
+    """That the verdict is right; under review, of the likeliest one. Null in reports of earlier versions."""
+    proposed: Verdict | None = None
+    """Under review, the likeliest verdict."""
+    decided: DecidedDocument | None = None
+    """Where a person decided."""
     mistake: str | None = None
     """Code of the mistake that explains a loss."""
     feedback: str = ""
@@ -248,6 +264,12 @@ class ReportDocument(Document):
     """Null while anything is under review, and for a submission missing or unreadable."""
     score_range: tuple[float, float] | None
     max_score: float
+    expected_score: float | None = None
+    """The mean of the score over what the verdicts may be; null where nothing was judged."""
+    added: float = 0.0
+    """Points that a person added to the score, or took away."""
+    comment: str = ""
+    """A person's, on the whole submission."""
     criteria: list[CriterionDocument] = []
     mistakes: list[MistakeDocument] = []
     scales: dict[ScaleName, ScaleDocument] = {}
@@ -322,6 +344,20 @@ class AlikeDocument(Document):
     compared: int = 0
 
 
+class StaleDecisionDocument(Document):
+    """A decision that was not applied, because what it was about has changed since: its line and why."""
+
+    line: int
+    student_id: str
+    position: int | None = None
+    criterion: str
+    verdict: str
+    by: str = ""
+    at: str = ""
+    comment: str = ""
+    reason: str
+
+
 class ResultsDocument(Document):
     """A class's results; `moved` against the run before, empty after the first; `alike` sheets."""
 
@@ -331,6 +367,10 @@ class ResultsDocument(Document):
     unmatched: list[UnmatchedDocument] = []
     moved: list[MovedDocument] = []
     alike: list[AlikeDocument] = []
+    stale: list[StaleDecisionDocument] = []
+    """Decisions that wait for a person to look again."""
+    expected_wrong: float | None = None
+    """How many of the settled verdicts are expected to be wrong, by their probabilities."""
 
 
 # Plan: the exact plan of a variant ----------------------------------------------------------------
