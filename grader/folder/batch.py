@@ -24,7 +24,18 @@ from grader.folder.cache import (
     stage_digest,
     store_reading,
 )
-from grader.folder.changes import Inputs, changes_since, earlier, inputs_of, note_inputs, noted_inputs
+from grader.folder.changes import (
+    CACHE_FOLDER,
+    Inputs,
+    RunNote,
+    changes_since,
+    earlier,
+    inputs_of,
+    note_inputs,
+    note_run,
+    noted_inputs,
+    noted_run,
+)
 from grader.folder.inventory import FileContent, Progress, submissions, take_inventory
 from grader.folder.owners import Unmatched, assign_pages
 from grader.folder.submissions import Unusable, submissions_of
@@ -34,14 +45,13 @@ from grader.inputs.roster import Roster, read_roster
 from grader.lms.table import write_summary
 from grader.marking.report import unjudged_report
 from grader.pipeline import mark, read_submission
-from grader.records import Problem, ScannedPage
-from grader.rubric import RubricFile, asked_of
+from grader.records import PageRef, Problem, ScannedPage
+from grader.rubric import RubricFile, asked_of, rubric_of
 from grader.similarity.groups import find_similar
 from grader.similarity.submission import compared_submission
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, PlanmarkError
 
-CACHE_FOLDER = ".planmark"
 _PASSING = "file_changed"
 """A problem that the next run need not have: nothing that has it is cached."""
 
@@ -79,8 +89,29 @@ class Batch:
     with_ghosts: bool = True
 
 
+@dataclass(frozen=True, slots=True)
+class Graded:
+    """A class as a run left it.
+
+    Attributes
+    ----------
+    jobs : in the order of the results' reports
+    pages : every page handed in, whoever's it is
+    """
+
+    results: ResultsDocument
+    jobs: tuple["Job", ...]
+    pages: tuple[PageRef, ...]
+    cache: PageCache
+
+
 def grade(batch: Batch, progress: Progress, workers: Pool | None = None) -> ResultsDocument:
-    """Grade all that was handed in, and write the reports, pages and results.
+    """Grade all that was handed in, and write the reports, pages and results; arguments as of `graded`."""
+    return graded(batch, progress, workers).results
+
+
+def graded(batch: Batch, progress: Progress, workers: Pool | None = None) -> Graded:
+    """The class as `grade` leaves it, with what a review needs beside the results.
 
     Arguments: `workers` are made as the batch says where they are not given.
 
@@ -100,7 +131,7 @@ def grade(batch: Batch, progress: Progress, workers: Pool | None = None) -> Resu
 
 def _graded(
     batch: Batch, roster: Roster | None, files: Sequence[Path], progress: Progress, workers: Pool
-) -> ResultsDocument:
+) -> Graded:
     notes = batch.out / CACHE_FOLDER
     names, cache = names_of(batch.assignment), _page_cache(batch)
     contents = take_inventory(files, batch.folder, names, workers, progress, cache)
@@ -120,7 +151,35 @@ def _graded(
     )
     _write_results(batch, results, students)
     note_inputs(notes, inputs)
-    return results
+    note_run(_note_of(batch), notes, batch.folder)
+    pages = tuple(page for content in contents for page in content.pages)
+    return Graded(results, tuple(jobs), pages, cache)
+
+
+def _note_of(batch: Batch) -> RunNote:
+    return RunNote(
+        assignment=str(batch.assignment.path),
+        folder=batch.folder.resolve(),
+        out=batch.out.resolve(),
+        roster=None if batch.roster is None else batch.roster.resolve(),
+        pages_per_student=batch.pages_per_student,
+        lang=batch.lang,
+        level=batch.level,
+        with_ghosts=batch.with_ghosts,
+    )
+
+
+def noted_batch(folder: Path) -> Batch:
+    """The last run whose folder of results, or of submissions, this is.
+
+    Raises CallError where nothing says so, AuthoredFileError for an assignment with faults.
+    """
+    note = noted_run(folder)
+    assignment = load_assignment(note.assignment)
+    return Batch(
+        assignment, rubric_of(assignment), note.folder, note.out, note.roster, note.pages_per_student,
+        lang=note.lang, level=note.level, with_ghosts=note.with_ghosts,
+    )  # fmt: skip
 
 
 def _nothing(batch: Batch) -> CallError:
@@ -329,7 +388,7 @@ def _read(batch: Batch, cache: PageCache, submission: StudentSubmission) -> list
 def _mark_one(batch: Batch, cache: PageCache, job: Job) -> ReportDocument:
     """Mark one submission and write its files; its key last, so that it stands for all of them."""
     submission, where = job.submission, batch.out / job.folder
-    pages = _pages_read(batch, cache, job)
+    pages = pages_read(batch, cache, job)
     report, pictures = mark(
         submission, pages, batch.assignment, batch.rubric, batch.level, with_ghosts=batch.with_ghosts
     )
@@ -340,7 +399,7 @@ def _mark_one(batch: Batch, cache: PageCache, job: Job) -> ReportDocument:
     return report
 
 
-def _pages_read(batch: Batch, cache: PageCache, job: Job) -> list[ScannedPage]:
+def pages_read(batch: Batch, cache: PageCache, job: Job) -> list[ScannedPage]:
     """The pages as read by an earlier run, else now."""
     folder = batch.out / CACHE_FOLDER / "readings"
     known = cached_reading(folder, job.name, job.reading_key, cache)
