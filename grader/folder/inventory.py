@@ -24,7 +24,16 @@ from reference.errors import InputFileError
 # The files handed in ------------------------------------------------------------------------------
 
 _TOOL_NAMES = frozenset(
-    {"thumbs.db", "desktop.ini", "layout.json", "results.json", "summary.csv", "index.html", "truth.jsonl"}
+    {
+        "thumbs.db",
+        "desktop.ini",
+        "layout.json",
+        "results.json",
+        "summary.csv",
+        "index.html",
+        "truth.jsonl",
+        "decisions.csv",
+    }
 )
 _TOOL_STARTS = (".", "~$", "__MACOSX")
 _TOOL_ENDS = (".part", ".tmp", ".bak", ".crdownload", "~")
