@@ -13,6 +13,7 @@ from grader.comparison.own import PlanBasis
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task
 from grader.documents import Verdict
+from grader.marking.confirming import confirmed
 from grader.marking.diagnosis import LEAST_CONFIDENCE, Case, Lost, drawn_instead, explained, named
 from grader.marking.settling import at_stake, charged_where_made, of_another
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
@@ -34,6 +35,9 @@ LOST = CHARGED | {"follow_through", "review"}
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission, explain)
+    surer = confirmed(task, submission, comparison, case_of)
+    if surer is not None:
+        submission, comparison = surer, compare(task, surer, explain)
     mistakes = _named(task, comparison)
     mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes), *_not_drawn(task, comparison))
     outcomes = charged_where_made(task, comparison.outcomes, mistakes)
