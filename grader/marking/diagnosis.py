@@ -33,7 +33,7 @@ OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
 
 FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
-BEYOND_DOUBT = 20.0
+BEYOND_DOUBT = 12.0
 """A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
 LEAST_WRONG = 0.06
 """Of a scale's logarithm: a smaller error is no mistake to be named, drafting errors reach it."""
@@ -243,7 +243,7 @@ SURE_TOGETHER = 0.8
 LEAST_RIVAL = 0.1
 """A rival less likely than this is not named."""
 MOST_RIVALS = 3
-SUSPICIOUS, GROSS = 2.0, 5.0
+SUSPICIOUS, GROSS = 2.0, 3.0
 """RMS misfits of a step in standard deviations of this drawing's errors: between the two a mistake is too
 slight to be named. (Below the first the mistake shows elsewhere.)"""
 Key = tuple[str, str]
@@ -366,8 +366,10 @@ def _is_about(mistake: Mistake, scale: str) -> bool:
     return mistake.at == scale or mistake.code == "other_variant"
 
 
+SPEED_FACTORS = (RPM_FACTOR, 60.0, 0.5 / math.pi)
+"""omega = n; 2 pi n, the minute's seconds forgotten; n / 60, the full turn's 2 pi forgotten."""
 RPM_WITHIN = 0.03
-"""Relative: a scale wrong by 30/pi (squared for accelerations) this nearly was computed from rev/min."""
+"""Relative: a scale wrong by such a factor (squared for accelerations) this nearly was computed from it."""
 LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
 
 
@@ -400,6 +402,8 @@ def _line_of(step: Step, slot: int) -> dict[str, str]:
 
 
 def _code_of_scale(name: str, factor: float) -> str:
-    powers = {"kv": 1, "ka": 2}
-    rpm = RPM_FACTOR ** powers.get(name, 0)
-    return "rpm_not_converted" if name in powers and abs(factor / rpm - 1.0) <= RPM_WITHIN else "scale_wrong"
+    power = {"kv": 1, "ka": 2}.get(name)
+    if power is None:
+        return "scale_wrong"
+    is_speed = any(abs(factor / one**power - 1.0) <= RPM_WITHIN for one in SPEED_FACTORS)
+    return "rpm_not_converted" if is_speed else "scale_wrong"

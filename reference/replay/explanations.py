@@ -14,7 +14,7 @@ import numpy as np
 from reference import geometry
 from reference.construction.elements import Coriolis, Errors, Normal, View
 from reference.construction.graph import Construction
-from reference.construction.mistakes import Mistake, changed_step, mistakes_of_step
+from reference.construction.mistakes import Mistake, changed_step, mistakes_of_step, rarer_mistakes_of_step
 from reference.construction.steps import Given, Step, TwoLines
 from reference.construction.uncertainty import SMALL, Skill, step_errors
 from reference.geometry import ComplexArray, FloatArray
@@ -38,6 +38,8 @@ RARITY: Mapping[str, float] = {
 }
 """Cost of each mistake: one step in about a hundred goes wrong, in one of about ten ways; a slip in a
 computation may give any length."""
+RARER = 3.0
+"""What a mistake costs more that is seldom made."""
 SOMETHING_ELSE = 9.0
 """Cost of a step that went wrong in an unknown way, without the cost of its position."""
 ANYWHERE = 2.0 * math.log(100.0)
@@ -248,6 +250,7 @@ class Repertoire:
         self.construction = construction
         self.skill = skill
         self._wrong: dict[str, WrongSteps] = {}
+        self._rarer: dict[str, WrongSteps] = {}
         self._errors: dict[str, Errors] = {}
 
     def wrong(self, step: Step) -> WrongSteps:
@@ -256,6 +259,13 @@ class Repertoire:
             mistakes = mistakes_of_step(step, self.construction)
             self._wrong[step.node] = tuple((one, changed_step(one, self.construction)) for one in mistakes)
         return self._wrong[step.node]
+
+    def rarer(self, step: Step) -> WrongSteps:
+        """The same of mistakes that are seldom made."""
+        if step.node not in self._rarer:
+            mistakes = rarer_mistakes_of_step(step, self.construction)
+            self._rarer[step.node] = tuple((one, changed_step(one, self.construction)) for one in mistakes)
+        return self._rarer[step.node]
 
     def errors(self, step: Step) -> Errors:
         """The errors of a step's acts."""
@@ -343,8 +353,13 @@ class StepContext:
         return self._alternatives(step, [(None, step)])
 
     def wrong(self, step: Step) -> StepAlternatives:
-        """The step with each mistake in it."""
+        """The step with each usual mistake in it."""
         return self._alternatives(step, self.repertoire.wrong(step))
+
+    def rarer(self, step: Step) -> StepAlternatives:
+        """The step with each mistake in it that is seldom made."""
+        found = self._alternatives(step, self.repertoire.rarer(step))
+        return replace(found, cost=found.cost + RARER)
 
     def slips(self, step: Given) -> StepAlternatives | None:
         """The right direction with a wrongly computed length, as drawn; None where none is computed."""

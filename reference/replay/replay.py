@@ -134,6 +134,11 @@ def _alternatives(
     if not is_guess and not is_suspect.any():
         return right
     wrong = context.wrong(step)
+    if is_suspect.any() or isinstance(step, Given):
+        rarer = context.rarer(step)
+        if not isinstance(step, Given):
+            rarer.cost[:, ~is_suspect] = np.inf
+        wrong += rarer
     if is_guess:
         wrong.cost[:, has_guessed & ~is_suspect] = np.inf
     alternatives = right + wrong
