@@ -18,7 +18,7 @@ import numpy as np
 from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.construction.elements import Along, Line
+from reference.construction.elements import Along, Line, Parameters
 from reference.construction.graph import Construction, parameters_of
 from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
 from reference.construction.steps import Step, TwoLines
@@ -33,7 +33,7 @@ OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
 
 FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
-BEYOND_DOUBT = 12.0
+BEYOND_DOUBT = 8.0
 """A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
 LEAST_WRONG = 0.06
 """Of a scale's logarithm: a smaller error is no mistake to be named, drafting errors reach it."""
@@ -54,6 +54,7 @@ class Case:
     skill : usual drafting errors
     followed : scales that the drawing follows although others were declared
     assumed : scales that nobody declared
+    otherwise : the drawing without a measurement that contradicts others, each a possible reading of it
     """
 
     drawing: Drawing
@@ -63,12 +64,17 @@ class Case:
     skill: Skill
     followed: Mapping[str, float] = field(default_factory=dict)
     assumed: frozenset[str] = frozenset()
+    otherwise: tuple[Observations, ...] = ()
 
 
 def explained(case: Case) -> tuple[Replay, ...]:
     """The explanations of a drawing, the likeliest first; none where it may well be right."""
     roots = [Root(), *_other_scales(case)]
     explanations = replay(case.drawing, case.observations, roots, case.skill, cares=CARES)
+    for observations in case.otherwise:
+        others = replay(case.drawing, observations, roots, case.skill, cares=CARES)
+        if others and (not explanations or others[0].cost < explanations[0].cost):
+            case, explanations = replace(case, observations=observations), others
     innocent = _cost_if_right(explanations)
     if explanations and not _is_clear(explanations, case):
         explanations = _searched_further(case, roots, explanations)
@@ -176,10 +182,25 @@ def _other_variants(case: Case) -> Iterator[Root]:
     for index, variant in enumerate(variants):
         if variant != case.variant and table:
             parameters = {name: np.asarray(value[index]) for name, value in table.items()}
+            parameters |= _scales_of_the_drawn_driver(case, parameters)
             other = Mistake(
                 "other_variant", "mechanism", n=variant.n, position=variant.position, parameters=parameters
             )
             yield Root((other,), parameters, cost=RARITY["other_variant"])
+
+
+def _scales_of_the_drawn_driver(case: Case, parameters: Parameters) -> Parameters:
+    """The scales that nobody declared, as they follow from the drawn driven link with another's data."""
+    own = case.drawing.parameters
+    scales = {}
+    for scale in sorted(case.assumed & {"kv", "ka"}):
+        names = [name for name in own if name.startswith(f"{scale[1]}_")]
+        sizes = [
+            math.hypot(*(float(known.get(name, own[name])) for name in names)) for known in (parameters, own)
+        ]
+        if all(sizes):
+            scales[scale] = np.asarray(own[scale] * sizes[0] / sizes[1])
+    return scales
 
 
 def _swaps(drawing: Drawing, explanation: Replay) -> Iterator[Mistake]:

@@ -38,6 +38,10 @@ RARITY: Mapping[str, float] = {
 }
 """Cost of each mistake: one step in about a hundred goes wrong, in one of about ten ways; a slip in a
 computation may give any length."""
+KNOWN_SLIP = 11.0
+"""Of a slip by one of `SLIPS`: less rare than any other."""
+SLIPS = (0.1, 0.5, 2.0, 10.0)
+"""A decimal point, a half or a double: the commonest slips in computing a length."""
 RARER = 3.0
 """What a mistake costs more that is seldom made."""
 SOMETHING_ELSE = 9.0
@@ -88,10 +92,12 @@ class Observations:
     ----------
     entries : its nodes and vectors
     sketches : by plan, the mechanism's joints as drawn beside it, where that is another sketch
+    cost : of taking it so: of measurements that contradict each other, or are left out
     """
 
     entries: tuple[Observation, ...]
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
+    cost: float = 0.0
 
 
 def by_node(construction: Construction, entries: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
@@ -263,7 +269,7 @@ class Repertoire:
     def rarer(self, step: Step) -> WrongSteps:
         """The same of mistakes that are seldom made."""
         if step.node not in self._rarer:
-            mistakes = rarer_mistakes_of_step(step, self.construction)
+            mistakes = (*rarer_mistakes_of_step(step, self.construction), *_known_slips(step))
             self._rarer[step.node] = tuple((one, changed_step(one, self.construction)) for one in mistakes)
         return self._rarer[step.node]
 
@@ -272,6 +278,17 @@ class Repertoire:
         if step.node not in self._errors:
             self._errors[step.node] = step_errors(step, self.skill)
         return self._errors[step.node]
+
+
+def _known_slips(step: Step) -> Iterator[Mistake]:
+    """The commonest slips in a length that is computed."""
+    if isinstance(step, Given) and isinstance(step.length, Normal | Coriolis):
+        yield from (Mistake(SLIP, step.node, factor=factor) for factor in SLIPS)
+
+
+def _rarity(mistake: Mistake) -> float:
+    """The cost of a mistake."""
+    return KNOWN_SLIP if mistake.code == SLIP and mistake.factor in SLIPS else RARITY[mistake.code]
 
 
 CACHE_SIZE = 32
@@ -315,7 +332,7 @@ class StepAlternatives:
         mistake = self.mistakes[choice]
         if mistake is None:
             return ()
-        if mistake.code == SLIP and self.factors is not None:
+        if mistake.code == SLIP and mistake.factor == 1.0 and self.factors is not None:
             mistake = replace(mistake, factor=float(self.factors[branch]))
         return (mistake,)
 
@@ -402,7 +419,7 @@ class StepContext:
             return StepAlternatives(empty.astype(np.complex128), empty, empty, ())
         place, shifts = self._placed(step, [changed for _, changed in steps])
         misfit, cost = self.observed.misfit_and_cost(place, shifts, self.nodes)
-        rarity = np.array([0.0 if one is None else RARITY[one.code] for one in mistakes])
+        rarity = np.array([0.0 if one is None else _rarity(one) for one in mistakes])
         return StepAlternatives(place, cost + rarity[:, None], misfit, mistakes)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:

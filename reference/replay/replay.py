@@ -103,7 +103,7 @@ def replay(
     blind : try mistakes also at steps whose node's position was not observed, one to an explanation
     """
     construction, by_name = drawing.construction, by_node(drawing.construction, observations.entries)
-    branches = _open(drawing, roots, cares)
+    branches = _open(drawing, roots, cares, observations.cost)
     needed = needed_nodes(construction, by_name)
     repertoire = repertoire_of(construction, skill)
     with np.errstate(all="ignore"):
@@ -227,8 +227,8 @@ class _Branches:
         ]
 
 
-def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float]) -> _Branches:
-    """A branch for each root and care."""
+def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float], cost: float) -> _Branches:
+    """A branch for each root and care; `cost` is that of what is observed."""
     starts = [(root, care) for care in cares for root in roots]
     known = {name: np.asarray(value) for name, value in drawing.parameters.items()}
     for name in {name for root in roots for name in root.parameters}:
@@ -239,7 +239,7 @@ def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float]) -> _B
         nodes={},
         known=known,
         turned={plan: np.array([root.turned.get(plan, 1.0) for root, _ in starts]) for plan in plans},
-        cost=np.array([root.cost for root, _ in starts]),
+        cost=np.array([cost + root.cost for root, _ in starts]),
         care=np.array([care for _, care in starts]),
         is_blind=np.zeros(len(starts), np.bool_),
         made=[root.made for root, _ in starts],
