@@ -18,10 +18,10 @@ import numpy as np
 from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.construction.elements import Along, Line, Parameters
+from reference.construction.elements import Along, Line, Parameters, Scaled
 from reference.construction.graph import Construction, parameters_of
 from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
-from reference.construction.steps import Step, TwoLines
+from reference.construction.steps import Given, Step, TwoLines
 from reference.construction.uncertainty import Skill
 from reference.replay.explanations import RARITY, Observations
 from reference.replay.replay import Replay, Root, replay
@@ -89,17 +89,29 @@ def _searched_further(case: Case, roots: Sequence[Root], explanations: Sequence[
     Large drafting errors are also tried as usual ones with some mistake. Where one mistake explains all, and
     directions were observed, mistakes of the whole drawing are not tried.
     """
-    best = explanations[0]
+    best, scales = explanations[0], list(roots)
     if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
-        roots = [*roots, *_of_the_whole(case)]
+        whole = list(_of_the_whole(case))
+        roots = [*roots, *(_both(scale, one) for scale in roots for one in whole)]
     cares = sorted({best.care, min(best.care, USUAL)})
     found = replay(case.drawing, case.observations, roots, case.skill, cares=cares, blind=True) or [
         *explanations
     ]
     for swap in _swaps(case.drawing, found[0]):
         root, observations = Root((swap,), cost=RARITY[swap.code]), _renamed(case.observations, swap.other)
-        found += replay(case.drawing, observations, [root], case.skill, cares=cares)
+        both = [_both(scale, root) for scale in scales]
+        found += replay(case.drawing, observations, both, case.skill, cares=cares)
     return sorted(found, key=lambda explanation: explanation.cost)
+
+
+def _both(one: Root, other: Root) -> Root:
+    """Two roots at once; of what both change, as the second does."""
+    return Root(
+        (*one.made, *other.made),
+        {**one.parameters, **other.parameters},
+        {**one.turned, **other.turned},
+        one.cost + other.cost,
+    )
 
 
 def _is_explained(explanation: Replay) -> bool:
@@ -190,16 +202,27 @@ def _other_variants(case: Case) -> Iterator[Root]:
 
 
 def _scales_of_the_drawn_driver(case: Case, parameters: Parameters) -> Parameters:
-    """The scales that nobody declared, as they follow from the drawn driven link with another's data."""
-    own = case.drawing.parameters
-    scales = {}
-    for scale in sorted(case.assumed & {"kv", "ka"}):
+    """The scales that nobody declared, as they follow from the driven link's vectors with another's data."""
+    construction, own, scales = case.drawing.construction, case.drawing.parameters, {}
+    for plan, scale in (("velocity_plan", "kv"), ("acceleration_plan", "ka")):
+        pole = construction.poles.get(plan)
+        if pole is None or scale not in case.assumed:
+            continue
         names = [name for name in own if name.startswith(f"{scale[1]}_")]
-        sizes = [
-            math.hypot(*(float(known.get(name, own[name])) for name in names)) for known in (parameters, own)
-        ]
-        if all(sizes):
-            scales[scale] = np.asarray(own[scale] * sizes[0] / sizes[1])
+        size = math.hypot(*(float(parameters.get(name, own[name])) for name in names))
+        head = next(
+            one.node
+            for one in reversed(construction.figures[plan])
+            if isinstance(one, Given) and isinstance(one.length, Scaled)
+        )
+        drawn = (
+            abs(one.value)
+            for one in case.observations.entries
+            if one.node == head and one.tail in {None, pole}
+        )
+        length = next(drawn, 0.0)
+        if length > 0.0 and size > 0.0:
+            scales[scale] = np.asarray(size / length)
     return scales
 
 
@@ -272,7 +295,7 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """The criteria that lost points, or may lose some, by the vector and by the scale they ask for."""
+    """The criteria that lost points, or may lose some, by the vector or link and by the scale they ask for."""
 
     vectors: Mapping[str, str]
     scales: Mapping[str, str]
@@ -355,24 +378,36 @@ def _in_order(made: Sequence[Mistake], construction: Construction) -> list[Mista
 def _losses_explained(
     explanation: Replay, construction: Construction, lost: Lost
 ) -> dict[Mistake, list[str]]:
-    """The lost criteria that each mistake explains: each is given to the last mistake upstream."""
+    """The lost criteria that each mistake explains: each is given to the last mistake upstream.
+
+    A mistake for which that leaves nothing has all that it touches, together with later ones.
+    """
     made = _in_order(explanation.made, construction)
     explains: dict[Mistake, list[str]] = {
         mistake: [name for scale, name in lost.scales.items() if _is_about(mistake, scale)]
         for mistake in made
     }
     reach = {mistake: affected(mistake, construction) for mistake in made}
+    touched: dict[Mistake, list[str]] = {mistake: [] for mistake in made}
     for name, criterion in lost.vectors.items():
-        vector = construction.vectors[name]
-        if vector.head in explanation.unexplained:
+        scale, tail, head = _ends_of(name, construction)
+        if head in explanation.unexplained:
             continue
-        touching = [
-            one for one in made if _touches(one, vector.scale, {vector.tail, vector.head}, reach[one])
-        ]
-        own = [one for one in touching if one.at == vector.head]
+        touching = [one for one in made if _touches(one, scale, {tail, head}, reach[one])]
+        own = [one for one in touching if one.at == head]
         for mistake in (own or touching)[-1:]:
             explains[mistake].append(criterion)
-    return explains
+        for mistake in touching:
+            touched[mistake].append(criterion)
+    return {mistake: explains[mistake] or touched[mistake] for mistake in made}
+
+
+def _ends_of(name: str, construction: Construction) -> tuple[str, str, str]:
+    """The scale of a vector or link, its tail and its head."""
+    if name in construction.vectors:
+        vector = construction.vectors[name]
+        return vector.scale, vector.tail, vector.head
+    return ("kL", *construction.links[name])
 
 
 def _touches(mistake: Mistake, scale: str, ends: set[str], reach: frozenset[str]) -> bool:

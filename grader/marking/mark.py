@@ -35,7 +35,8 @@ def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
     """The mistakes that explain lost points, or points that may be lost."""
     scales, vectors = comparison.settled, task.construction.vectors
     lost = [one for one in comparison.outcomes if one.verdict in LOST]
-    by_vector = {one.name: one.criterion for one in lost if one.name in vectors}
+    links = task.construction.links
+    by_vector = {one.name: one.criterion for one in lost if one.name in vectors or one.name in links}
     by_scale = {one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED}
     is_other_scale = any(scale.other and not scale.used.assumed for scale in scales.values())
     if not by_vector and not is_other_scale:

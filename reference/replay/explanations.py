@@ -44,6 +44,8 @@ SLIPS = (0.1, 0.5, 2.0, 10.0)
 """A decimal point, a half or a double: the commonest slips in computing a length."""
 RARER = 3.0
 """What a mistake costs more that is seldom made."""
+AN_OTHER_LINE = 3.0
+"""And what it costs more to take a whole line that belongs to another vector: there are many."""
 SOMETHING_ELSE = 9.0
 """Cost of a step that went wrong in an unknown way, without the cost of its position."""
 ANYWHERE = 2.0 * math.log(100.0)
@@ -288,7 +290,10 @@ def _known_slips(step: Step) -> Iterator[Mistake]:
 
 def _rarity(mistake: Mistake) -> float:
     """The cost of a mistake."""
-    return KNOWN_SLIP if mistake.code == SLIP and mistake.factor in SLIPS else RARITY[mistake.code]
+    if mistake.code == SLIP and mistake.factor in SLIPS:
+        return KNOWN_SLIP
+    is_line = mistake.code == "wrong_intersection" and mistake.other[0][:2] in {"v_", "a_"}
+    return RARITY[mistake.code] + (AN_OTHER_LINE if is_line else 0.0)
 
 
 CACHE_SIZE = 32
