@@ -18,12 +18,12 @@ import numpy as np
 from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.construction.elements import Along, Line, Parameters, Scaled
-from reference.construction.graph import Construction, parameters_of
+from reference.construction.elements import Along, Line, Nodes, Parameters, Scaled
+from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
 from reference.construction.steps import Given, Step, TwoLines
 from reference.construction.uncertainty import Skill
-from reference.replay.explanations import RARITY, Observations
+from reference.replay.explanations import RARITY, SLIP, Observations
 from reference.replay.replay import Replay, Root, replay
 
 OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
@@ -83,25 +83,80 @@ def explained(case: Case) -> tuple[Replay, ...]:
     return tuple(explanations)
 
 
-def _searched_further(case: Case, roots: Sequence[Root], explanations: Sequence[Replay]) -> list[Replay]:
+def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence[Replay]) -> list[Replay]:
     """The explanations with mistakes of the whole drawing, and at steps without an observation.
 
     Large drafting errors are also tried as usual ones with some mistake. Where one mistake explains all, and
-    directions were observed, mistakes of the whole drawing are not tried.
+    directions were observed, mistakes of the whole drawing are not tried. `scales` are the roots without
+    other mistakes than in the scales.
     """
-    best, scales = explanations[0], list(roots)
+    best, whole = explanations[0], [Root()]
     if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
-        whole = list(_of_the_whole(case))
-        roots = [*roots, *(_both(scale, one) for scale in roots for one in whole)]
+        whole = [Root(), *_of_the_whole(case)]
+    roots = [_both(scale, one) for one in whole for scale in scales]
     cares = sorted({best.care, min(best.care, USUAL)})
-    found = replay(case.drawing, case.observations, roots, case.skill, cares=cares, blind=True) or [
-        *explanations
-    ]
-    for swap in _swaps(case.drawing, found[0]):
-        root, observations = Root((swap,), cost=RARITY[swap.code]), _renamed(case.observations, swap.other)
-        both = [_both(scale, root) for scale in scales]
-        found += replay(case.drawing, observations, both, case.skill, cares=cares)
-    return sorted(found, key=lambda explanation: explanation.cost)
+    found = _replayed(case, roots, cares) or [*explanations]
+    swaps = [*_swaps(case, found[0])]
+    found = _by_cost(found, *(_replayed(case, scales, cares, swap) for swap in swaps))
+    scale = _scale_of_slips(case, found[0])
+    if scale is not None:
+        further = [_both(scale, one) for one in roots]
+        found = _by_cost(found, *(_replayed(case, further, cares, swap) for swap in (None, *swaps)))
+    return _by_cost(found, _with_another_guess(case, roots, found[0], cares))
+
+
+def _replayed(
+    case: Case, roots: Sequence[Root], cares: Sequence[float], swap: Mistake | None = None
+) -> list[Replay]:
+    """The explanations with mistakes at steps without an observation, or with two letters swapped."""
+    if swap is None:
+        return replay(case.drawing, case.observations, roots, case.skill, cares=cares, blind=True)
+    swapped = Root((swap,), cost=RARITY[swap.code])
+    observations = _renamed(case.observations, swap.other)
+    return replay(case.drawing, observations, [_both(one, swapped) for one in roots], case.skill, cares=cares)
+
+
+def _by_cost(*found: Sequence[Replay]) -> list[Replay]:
+    """All explanations, the likeliest first."""
+    return sorted((one for some in found for one in some), key=lambda explanation: explanation.cost)
+
+
+ONE_FACTOR = 0.08
+"""Of a logarithm: slips by factors as near as this to each other are one wrong scale."""
+
+
+def _scale_of_slips(case: Case, best: Replay) -> Root | None:
+    """The scale ka that computed components follow, where several are off by one factor; else None."""
+    logs = [math.log(one.factor) for one in best.made if one.code == SLIP]
+    if len(logs) < 2 or max(logs) - min(logs) > ONE_FACTOR:
+        return None
+    factor = math.exp(sum(logs) / len(logs))
+    made = () if "ka" in case.assumed else (Mistake("scale_wrong", "ka", factor=factor),)
+    parameters = {"ka": np.asarray(case.drawing.parameters["ka"] / factor)}
+    return Root(made, parameters, cost=RARITY["scale_wrong"])
+
+
+def _with_another_guess(
+    case: Case, roots: Sequence[Root], best: Replay, cares: Sequence[float]
+) -> list[Replay]:
+    """The explanations with a second mistake at a step without an observation, on top of the first one.
+
+    Nothing where the best explanation has no such mistake, or leaves nothing to explain.
+    """
+    seen = {one.node for one in case.observations.entries}
+    steps = {step.node for step in case.drawing.construction.steps}
+    first = [one for one in best.made if one.at in steps - seen]
+    if not first or (len(best.made) == 1 and not best.unexplained):
+        return []
+    drawing = case.drawing
+    for one in first:
+        drawing = commit(one, drawing)
+    of_the_whole = {_key(one) for one in best.made} & {_key(one) for root in roots for one in root.made}
+    start = next(root for root in roots if {_key(one) for one in root.made} == of_the_whole)
+    guessed = Root(tuple(first), cost=sum(RARITY[one.code] for one in first))
+    return replay(
+        drawing, case.observations, [_both(start, guessed)], case.skill, cares=cares, blind=True
+    )
 
 
 def _both(one: Root, other: Root) -> Root:
@@ -226,17 +281,48 @@ def _scales_of_the_drawn_driver(case: Case, parameters: Parameters) -> Parameter
     return scales
 
 
-def _swaps(drawing: Drawing, explanation: Replay) -> Iterator[Mistake]:
-    """Pairs of images in one plan that may have each other's letters: both are wrong in the explanation."""
-    construction = drawing.construction
+def _swaps(case: Case, explanation: Replay) -> Iterator[Mistake]:
+    """Pairs of images in one plan that may have each other's letters.
+
+    Both are wrong in the explanation, or the right plan has the lengths observed with the letters swapped.
+    """
+    construction = case.drawing.construction
     off = {*explanation.unexplained, *(mistake.at for mistake in explanation.made)}
+    nodes = evaluate(construction, case.drawing.parameters)
     for figure, pole in construction.poles.items():
         images = sorted(
             v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
         )
         for pair in combinations(images, 2):
-            if off >= set(pair):
+            if off >= set(pair) or (off and _has_lengths_swapped(case, figure, pair, nodes)):
                 yield Mistake("labels_swapped", pair[0], other=pair)
+
+
+MOST_FIT, FIT_MM, FIT_SHARE = 0.9, 1.5, 0.03
+"""So many of the lengths must fit, within so many millimetres or such a share, at whatever scale."""
+LEAST_LENGTHS = 4
+
+
+def _has_lengths_swapped(case: Case, figure: str, pair: tuple[str, str], nodes: Nodes) -> bool:
+    """Whether a right plan with two letters swapped has the lengths observed."""
+    steps = {step.node for step in case.drawing.construction.figures[figure]}
+    observed = [one for one in case.observations.entries if one.node in steps and not one.has_direction]
+    if len(observed) < LEAST_LENGTHS:
+        return False
+    other = {pair[0]: pair[1], pair[1]: pair[0]}
+    right = np.array(
+        [
+            abs(complex(nodes[other.get(one.node, one.node)] - nodes[other.get(one.tail or "", one.tail or "")]))
+            for one in observed
+        ]
+    )
+    drawn = np.array([abs(one.value) for one in observed])
+    is_long = right > FIT_MM
+    if not is_long.any():
+        return False
+    right *= np.median(drawn[is_long] / right[is_long])
+    fits = np.abs(drawn - right) <= np.maximum(FIT_MM, FIT_SHARE * right)
+    return bool(np.mean(fits) >= MOST_FIT)
 
 
 def _renamed(observations: Observations, pair: tuple[str, ...]) -> Observations:
