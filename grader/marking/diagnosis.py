@@ -154,9 +154,7 @@ def _with_another_guess(
     of_the_whole = {_key(one) for one in best.made} & {_key(one) for root in roots for one in root.made}
     start = next(root for root in roots if {_key(one) for one in root.made} == of_the_whole)
     guessed = Root(tuple(first), cost=sum(RARITY[one.code] for one in first))
-    return replay(
-        drawing, case.observations, [_both(start, guessed)], case.skill, cares=cares, blind=True
-    )
+    return replay(drawing, case.observations, [_both(start, guessed)], case.skill, cares=cares, blind=True)
 
 
 def _both(one: Root, other: Root) -> Root:
@@ -312,7 +310,11 @@ def _has_lengths_swapped(case: Case, figure: str, pair: tuple[str, str], nodes: 
     other = {pair[0]: pair[1], pair[1]: pair[0]}
     right = np.array(
         [
-            abs(complex(nodes[other.get(one.node, one.node)] - nodes[other.get(one.tail or "", one.tail or "")]))
+            abs(
+                complex(
+                    nodes[other.get(one.node, one.node)] - nodes[other.get(one.tail or "", one.tail or "")]
+                )
+            )
             for one in observed
         ]
     )
@@ -381,7 +383,7 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """The criteria that lost points, or may lose some, by the vector or link and by the scale they ask for."""
+    """The criteria that lost points, or may lose some, by vector, link and scale."""
 
     vectors: Mapping[str, str]
     scales: Mapping[str, str]

@@ -46,8 +46,11 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Cas
     }
     parameters = {**task.parameters, **used}
     entries = _lengths_observed(task, evidence, parameters)
+    directions = _directions_of_the_sketch(task, evidence, {name: float(one) for name, one in used.items()})
     best, *otherwise = (
-        Observations((*_nodes_observed(task, evidence, nodes), *entries), evidence.sketches, nodes.cost)
+        Observations(
+            (*_nodes_observed(task, evidence, nodes), *entries), evidence.sketches, nodes.cost, directions
+        )
         for nodes in _adjusted_nodes(task, evidence)
     )
     return Case(
@@ -92,6 +95,27 @@ def _lengths_observed(task: Task, evidence: Evidence, parameters: Parameters) ->
         spread = _covariance(traced.shifts(vector.tail, vector.head), read_mm)
         entries.append(Observation(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
     return entries
+
+
+def _directions_of_the_sketch(
+    task: Task, evidence: Evidence, scales: Mapping[str, float]
+) -> dict[tuple[str, str], float]:
+    """The standard error (rad) of each direction on a sketch that was not handed in, by pair of joints."""
+    if evidence.has_sketch:
+        return {}
+    traced = task.traced(scales)
+    found = {}
+    for vector in task.construction.vectors.values():
+        for tail, head in {vector.link, vector.link and vector.link[::-1]} - {None}:
+            along = traced.made[head].at - traced.made[tail].at
+            if abs(along) > LEAST_LINK_MM:
+                across = ((traced.made[head].shifts - traced.made[tail].shifts) / along).imag
+                found[tail, head] = float(np.sqrt(across @ across))
+    return found
+
+
+LEAST_LINK_MM = 1.0
+"""Two joints nearer than this have no direction between them."""
 
 
 def _with_computing(task: Task, evidence: Evidence, node: str, read: Covariance | None) -> Covariance:
@@ -191,7 +215,9 @@ def _equations(
             for end, sign in ((vector.head, 1.0), (vector.tail, -1.0)):
                 if end in nodes:
                     column = 2 * nodes.index(end)
-                    rows[2 * index + row, column : column + 2] = sign * np.array([axis.real, axis.imag]) / sigma
+                    rows[2 * index + row, column : column + 2] = (
+                        sign * np.array([axis.real, axis.imag]) / sigma
+                    )
         drawn[2 * index] = abs(along) / sigmas[0]
     return rows, drawn
 
@@ -203,7 +229,11 @@ def _least_squares(rows: FloatArray, drawn: FloatArray, nodes: Sequence[str]) ->
     residuals = rows @ places - drawn
     found = {name: complex(*places[2 * i : 2 * i + 2]) for i, name in enumerate(nodes)}
     spreads = {
-        name: (float(normal[2 * i, 2 * i]), float(normal[2 * i, 2 * i + 1]), float(normal[2 * i + 1, 2 * i + 1]))
+        name: (
+            float(normal[2 * i, 2 * i]),
+            float(normal[2 * i, 2 * i + 1]),
+            float(normal[2 * i + 1, 2 * i + 1]),
+        )
         for i, name in enumerate(nodes)
     }
     return _Nodes(found, spreads, float(residuals @ residuals)), float(np.abs(residuals).max())

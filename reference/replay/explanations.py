@@ -5,14 +5,14 @@ drawn node, with its covariance, and for each mistake how rare it is.
 """
 
 import math
-from collections import deque
+from collections import ChainMap, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from reference import geometry
-from reference.construction.elements import Coriolis, Errors, Normal, View
+from reference.construction.elements import Along, Coriolis, Direction, Errors, Line, Normal, View
 from reference.construction.graph import Construction
 from reference.construction.mistakes import Mistake, changed_step, mistakes_of_step, rarer_mistakes_of_step
 from reference.construction.steps import Given, Step, TwoLines
@@ -95,11 +95,14 @@ class Observations:
     entries : its nodes and vectors
     sketches : by plan, the mechanism's joints as drawn beside it, where that is another sketch
     cost : of taking it so: of measurements that contradict each other, or are left out
+    directions_rad : by pair of joints, the standard error of the direction between them on a sketch that was
+        not handed in
     """
 
     entries: tuple[Observation, ...]
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
     cost: float = 0.0
+    directions_rad: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
 
 def by_node(construction: Construction, entries: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
@@ -259,7 +262,7 @@ class Repertoire:
         self.skill = skill
         self._wrong: dict[str, WrongSteps] = {}
         self._rarer: dict[str, WrongSteps] = {}
-        self._errors: dict[str, Errors] = {}
+        self._errors: dict[tuple[str, int], Errors] = {}
 
     def wrong(self, step: Step) -> WrongSteps:
         """The mistakes that can be made in a step, with the step as each makes it."""
@@ -275,11 +278,14 @@ class Repertoire:
             self._rarer[step.node] = tuple((one, changed_step(one, self.construction)) for one in mistakes)
         return self._rarer[step.node]
 
-    def errors(self, step: Step) -> Errors:
-        """The errors of a step's acts."""
-        if step.node not in self._errors:
-            self._errors[step.node] = step_errors(step, self.skill)
-        return self._errors[step.node]
+    def errors(self, step: Step, further: int) -> Errors:
+        """The errors of a step's acts, with so many rows left free for further errors at the end."""
+        key = (step.node, further)
+        if key not in self._errors:
+            free = np.zeros((further, 1))
+            own = step_errors(step, self.skill)
+            self._errors[key] = {act: np.concatenate((row, free)) for act, row in own.items()}
+        return self._errors[key]
 
 
 def _known_slips(step: Step) -> Iterator[Mistake]:
@@ -358,12 +364,17 @@ class StepAlternatives:
 
 @dataclass(frozen=True, slots=True)
 class StepContext:
-    """What a step is compared with: the nodes so far in each branch, and the observations of the new one."""
+    """What a step is compared with: the nodes so far in each branch, and the observations of the new one.
+
+    `measured` are the nodes of its figure that were measured roughly, see `measured_nodes`.
+    """
 
     nodes: Mapping[str, ComplexArray]
     known: Mapping[str, FloatArray]
     observed: NodeObservations
     repertoire: Repertoire
+    measured: Mapping[str, ComplexArray] = field(default_factory=dict)
+    directions_rad: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -428,15 +439,80 @@ class StepContext:
         return StepAlternatives(place, cost + rarity[:, None], misfit, mistakes)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:
-        """Where each step puts the node, and how each usual error moves it (steps, acts, branches)."""
-        errors = self.repertoire.errors(step) if self.observed.fixes_place else {}
-        view = View(self.nodes, self.known, errors)
-        if not errors:
+        """Where each step puts the node, and how each usual error moves it (steps, errors, branches)."""
+        if not self.observed.fixes_place:
+            view = View(self.nodes, self.known)
             return np.array([_shaped(one, (self.count,)) for one in _places(steps, view)]), None
+        groups = self._measured(step, steps)
+        rows = 2 * (max(groups.values()) + 1) if groups else 0
+        errors = self._with_sketch(step, self.repertoire.errors(step, rows))
+        if not errors and not rows:
+            view = View(self.nodes, self.known)
+            return np.array([_shaped(one, (self.count,)) for one in _places(steps, view)]), None
+        count = 1 + len(errors) + rows
+        moved = {name: self._moved(name, count - rows + 2 * group, count) for name, group in groups.items()}
+        view = View(ChainMap(moved, self.nodes) if moved else self.nodes, self.known, errors)  # type: ignore[arg-type]
         mark = view.error(step.node, 0, "x") + 1j * view.error(step.node, 0, "y")
-        shape = (len(mark) if np.ndim(mark) else 1, self.count)
+        shape = (count, self.count)
         place = np.array([_shaped(one, shape) for one in _places(steps, view)]) + mark
         return place[:, 0], (place[:, 1:] - place[:, :1]) / SMALL
+
+    def _with_sketch(self, step: Step, errors: Errors) -> Errors:
+        """The errors with those of the sketch's directions, where these are known no better."""
+        usual = self.repertoire.skill.deviation("angle")
+        if not self.directions_rad or not usual:
+            return errors
+        found = {**errors}
+        for slot, along in enumerate(_directions(step)):
+            act = (step.node, slot, "angle")
+            own = self.directions_rad.get((along.tail, along.head)) if isinstance(along, Along) else None
+            if own and act in found:
+                found[act] = found[act] * math.hypot(1.0, own / usual)
+        return found
+
+    def _measured(self, step: Step, steps: Sequence[Step]) -> dict[str, int]:
+        """The measured nodes from which the steps start, by the group whose rows their errors have.
+
+        The right step's first two nodes have rows of their own, all others share theirs: no step uses two.
+        """
+        groups: dict[str, int] = {}
+        for name in (*step.needs, *(name for one in steps for name in one.needs)):
+            if name in self.measured and name not in groups:
+                groups[name] = min(len(groups), 2)
+        return groups
+
+    def _moved(self, name: str, row: int, count: int) -> ComplexArray:
+        """A node, moved by its error along both axes of the covariance in two rows."""
+        shifts = np.zeros((count, 1), np.complex128)
+        shifts[row : row + 2, 0] = SMALL * self.measured[name]
+        return np.asarray(self.nodes[name] + shifts)
+
+
+def _directions(step: Step) -> tuple[Direction | None, ...]:
+    """The directions of a step's lines, in the order of their slots."""
+    match step:
+        case TwoLines(first=first, second=second):
+            return tuple(one.along if isinstance(one, Line) else None for one in (first, second))
+        case Given(along=along):
+            return (along,)
+    return ()
+
+
+LEAST_MEASURED_MM = 0.25
+"""Nodes that are known better than this are taken as exact where a step starts from them."""
+
+
+def measured_nodes(entries: Mapping[str, tuple[Observation, ...]]) -> dict[str, ComplexArray]:
+    """The nodes whose positions were measured roughly, and how two independent errors move each."""
+    found = {}
+    for node, observed in entries.items():
+        first = observed[0]
+        if first.tail is None and first.has_direction:
+            xx, xy, yy = first.spread
+            if max(xx, yy) > LEAST_MEASURED_MM**2:
+                along, across = math.sqrt(xx), max(yy - xy * xy / xx, 0.0)
+                found[node] = np.array([along + 1j * xy / along, 1j * math.sqrt(across)])
+    return found
 
 
 def _shaped(place: ComplexArray, shape: tuple[int, ...]) -> ComplexArray:

@@ -29,6 +29,7 @@ from reference.replay.explanations import (
     StepAlternatives,
     StepContext,
     by_node,
+    measured_nodes,
     needed_nodes,
     repertoire_of,
 )
@@ -105,16 +106,20 @@ def replay(
     construction, by_name = drawing.construction, by_node(drawing.construction, observations.entries)
     branches = _open(drawing, roots, cares, observations.cost)
     needed = needed_nodes(construction, by_name)
-    repertoire = repertoire_of(construction, skill)
+    repertoire, rough = repertoire_of(construction, skill), measured_nodes(by_name)
     with np.errstate(all="ignore"):
         for figure, steps in construction.figures.items():
             sketch = {
                 name: np.asarray(place) for name, place in observations.sketches.get(figure, {}).items()
             }
+            measured = {step.node: rough[step.node] for step in steps if step.node in rough}
             for step in steps:
                 if step.node in needed:
                     here, nodes = by_name.get(step.node, ()), ChainMap(sketch, branches.nodes)
-                    context = StepContext(nodes, branches.known, branches.observed(here, figure), repertoire)
+                    observed = branches.observed(here, figure)
+                    context = StepContext(
+                        nodes, branches.known, observed, repertoire, measured, observations.directions_rad
+                    )
                     branches.go_on(
                         step, figure, here, _alternatives(step, context, branches.is_blind, blind=blind)
                     )
