@@ -48,8 +48,8 @@ AN_OTHER_LINE = 3.0
 """And what it costs more to take a whole line that belongs to another vector: there are many."""
 SOMETHING_ELSE = 9.0
 """Cost of a step that went wrong in an unknown way, without the cost of its position."""
-ANYWHERE = 2.0 * math.log(100.0)
-"""Cost of each unknown coordinate or length: it may be anything within some 100 mm."""
+AREA_MM = 100.0
+"""An unknown coordinate or length may be anything within so many millimetres, or within its own size."""
 SUSPECT = 9.0
 """From this squared misfit on (three standard errors) mistakes are tried."""
 COST_WINDOW = 24.0
@@ -167,7 +167,8 @@ class NodeObservations:
     @property
     def anywhere(self) -> float:
         """The cost of any position, made in an unknown way."""
-        return SOMETHING_ELSE + ANYWHERE * min(self.freedom, 2)
+        size_mm = max(AREA_MM, *(abs(one.value) for one in self.entries))
+        return SOMETHING_ELSE + 2.0 * math.log(size_mm) * min(self.freedom, 2)
 
     def misfit_and_cost(
         self, place: ComplexArray, shifts: ComplexArray | None, nodes: Mapping[str, ComplexArray]
