@@ -117,10 +117,17 @@ def _graded(
         unmatched=unmatched,
         moved=changes_since(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
         alike=similar_of_run(batch.assignment, jobs, reports, notes / "readings"),
+        expected_wrong=_expected_wrong(reports),
     )
     _write_results(batch, results, students)
     note_inputs(notes, inputs)
     return results
+
+
+def _expected_wrong(reports: Sequence[ReportDocument]) -> float:
+    """How many of all settled verdicts are wrong in the mean, by their probabilities."""
+    settled = [one for report in reports for one in report.criteria if one.verdict != "review"]
+    return round(sum(1.0 - one.probability for one in settled if one.probability is not None), 3)
 
 
 def _nothing(batch: Batch) -> CallError:
