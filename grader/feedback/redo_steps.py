@@ -167,5 +167,8 @@ def _subject(judgement: Judgement, assignment: Assignment, variant: Variant, spe
 def _redo(subject: Subject, mistake: NamedMistake, speaker: Tongue, level: Level) -> list[str]:
     """The steps from the mistake on; none where there is no single step that it was made at."""
     vectors = subject.plan.construction.vectors
+    if mistake.code == "arithmetic" and mistake.at in vectors:
+        # Its value is wrong, the drawing can stay.
+        return []
     node = vectors[mistake.at].head if mistake.at in vectors else mistake.at
     return redo(subject, speaker, node, with_numbers=level == "full")

@@ -159,7 +159,8 @@ def _adjusted_nodes(task: Task, evidence: Evidence) -> list[_Nodes]:
     Where these do not close, the cheapest first: the nodes by all entries, and without one of them.
     """
     if evidence.has_sheets:
-        return [_Nodes(evidence.nodes)]
+        read = {name: (se_mm**2, 0.0, se_mm**2) for name, se_mm in evidence.se_mm.items()}
+        return [_Nodes(evidence.nodes, read)]
     found = [_Nodes({}, {}, 0.0)]
     for figure in task.construction.poles:
         plans = _adjusted_plan(task, evidence, figure)

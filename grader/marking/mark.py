@@ -28,7 +28,12 @@ def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission, explain)
     mistakes = _named(task, comparison)
-    mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes), *_not_drawn(task, comparison))
+    mistakes = (
+        *mistakes,
+        *_swapped_letters(task, submission, mistakes),
+        *_not_drawn(task, comparison),
+        *_slips(task, comparison),
+    )
     outcomes = charged_where_made(task, comparison.outcomes, mistakes)
     outcomes = at_stake(task.rubric, of_another(task.rubric, outcomes, mistakes))
     outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in outcomes)
@@ -112,6 +117,27 @@ def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
         if one.name in vectors and ("not_drawn" in codes or is_left_blank):
             sure = NOT_DRAWN if evidence.has_sheets else 1.0
             found.append(NamedMistake(Mistake("vector_missing", one.name), (one.criterion,), sure))
+    return found
+
+
+VALUE_OFF = frozenset({"value_too_large", "value_too_small", "value_reversed"})
+SLIPPED = 0.95
+"""Confidence in a slip: the drawing that the value comes from is right, or follows rightly."""
+
+
+def _slips(task: Task, comparison: Comparison) -> list[NamedMistake]:
+    """Values that were computed wrongly from a vector that is right, or follows rightly."""
+    verdicts = {one.name: one.verdict for one in comparison.outcomes}
+    found = []
+    for one in comparison.outcomes:
+        rate = task.construction.rates.get(one.name)
+        is_value_off = one.verdict in CHARGED and VALUE_OFF & {reason.code for reason in one.reasons}
+        is_of_right_vector = rate is not None and verdicts.get(rate.vector) in {"full", "follow_through"}
+        if one.mistake == "arithmetic" or (is_value_off and is_of_right_vector):
+            value, right = one.measured.value, one.expected.value
+            factor = value / right if value and right else 1.0
+            slip = Mistake("arithmetic", one.name, factor=factor)
+            found.append(NamedMistake(slip, (one.criterion,), SLIPPED))
     return found
 
 
