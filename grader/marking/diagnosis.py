@@ -34,7 +34,7 @@ OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
 FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
 BEYOND_DOUBT = 8.0
-"""A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
+"""A mistake is named only where the drawing made rightly by any hand costs this much more: 50 to 1."""
 LEAST_WRONG = 0.06
 """Of a scale's logarithm: a smaller error is no mistake to be named, drafting errors reach it."""
 USUAL = 1.0

@@ -105,8 +105,9 @@ def _directions_of_the_sketch(
         return {}
     traced = task.traced(scales)
     found = {}
-    for vector in task.construction.vectors.values():
-        for tail, head in {vector.link, vector.link and vector.link[::-1]} - {None}:
+    links = {vector.link for vector in task.construction.vectors.values() if vector.link is not None}
+    for link in links:
+        for tail, head in (link, link[::-1]):
             along = traced.made[head].at - traced.made[tail].at
             if abs(along) > LEAST_LINK_MM:
                 across = ((traced.made[head].shifts - traced.made[tail].shifts) / along).imag
@@ -186,13 +187,13 @@ def _adjusted_plan(task: Task, evidence: Evidence, figure: str) -> list[_Nodes]:
     nodes = [node for node in known if node != task.construction.poles[figure]]
     if not entries:
         return [_Nodes({})]
-    rows, drawn = _equations(task, entries, nodes)
-    whole, sigmas = _least_squares(rows, drawn, nodes)
+    rows, values = _equations(task, entries, nodes)
+    whole, sigmas = _least_squares(rows, values, nodes)
     if sigmas <= CLOSES:
         return [replace(whole, cost=0.0)]
-    kept = [np.delete(np.arange(len(drawn)), (2 * index, 2 * index + 1)) for index in range(len(entries))]
+    kept = [np.delete(np.arange(len(values)), (2 * index, 2 * index + 1)) for index in range(len(entries))]
     others = [
-        _least_squares(rows[keep], drawn[keep], nodes)[0]
+        _least_squares(rows[keep], values[keep], nodes)[0]
         for keep in kept
         if np.linalg.matrix_rank(rows[keep]) == 2 * len(nodes)
     ]
