@@ -375,6 +375,8 @@ SURE_TOGETHER = 0.8
 LEAST_RIVAL = 0.1
 """A rival less likely than this is not named."""
 MOST_RIVALS = 3
+MOST_SLIPS = 2
+"""Where more computed lengths do not fit, it is no slip in each, but something else."""
 SUSPICIOUS, GROSS = 2.0, 3.0
 """RMS misfits of a step in standard deviations of this drawing's errors: between the two a mistake is too
 slight to be named. (Below the first the mistake shows elsewhere.)"""
@@ -394,6 +396,7 @@ def named(explanations: Sequence[Replay], construction: Construction, lost: Lost
     if not explanations:
         return ()
     best, shares = explanations[0], _Shares(explanations)
+    slips = sum(one.code == SLIP for one in best.made)
     explains, mistakes = _losses_explained(best, construction, lost), []
     for mistake in _in_order(best.made, construction):
         key, share = _key(mistake), shares.of(_key(mistake))
@@ -401,6 +404,7 @@ def named(explanations: Sequence[Replay], construction: Construction, lost: Lost
         together = share + sum(shares.instead(key, _key(one)) for one in rivals)
         is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
         is_shown = explains[mistake] or mistake.code == "other_variant"
+        is_shown = is_shown and (mistake.code != SLIP or slips <= MOST_SLIPS)
         if is_shown and is_sure and not _is_slight(mistake, best):
             others = tuple(_record(one, construction, (), shares.instead(key, _key(one))) for one in rivals)
             mistakes.append(_record(mistake, construction, tuple(explains[mistake]), share, others))

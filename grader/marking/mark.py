@@ -113,7 +113,8 @@ def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
     found = []
     for one in comparison.outcomes:
         codes = {reason.code for reason in one.reasons}
-        is_left_blank = "not_measured" in codes and not evidence.has_sheets and one.verdict == "none"
+        is_table = bool(evidence.measured) and not evidence.has_sheets
+        is_left_blank = "not_measured" in codes and is_table and one.verdict == "none"
         if one.name in vectors and ("not_drawn" in codes or is_left_blank):
             sure = NOT_DRAWN if evidence.has_sheets else 1.0
             found.append(NamedMistake(Mistake("vector_missing", one.name), (one.criterion,), sure))
@@ -121,21 +122,30 @@ def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
 
 
 VALUE_OFF = frozenset({"value_too_large", "value_too_small", "value_reversed"})
+LEAST_SLIPPED_MM = 10.0
+"""A value from a shorter vector may be off because it was read badly."""
+LEAST_SLIP = 0.2
+"""An angular quantity that is wrong by a smaller share may come from lengths measured badly."""
 SLIPPED = 0.95
 """Confidence in a slip: the drawing that the value comes from is right, or follows rightly."""
 
 
 def _slips(task: Task, comparison: Comparison) -> list[NamedMistake]:
     """Values that were computed wrongly from a vector that is right, or follows rightly."""
-    verdicts = {one.name: one.verdict for one in comparison.outcomes}
+    sure = {
+        one.name
+        for one in comparison.outcomes
+        if one.verdict in {"full", "follow_through"} and (one.measured.length_mm or 0.0) >= LEAST_SLIPPED_MM
+    }
     found = []
     for one in comparison.outcomes:
         rate = task.construction.rates.get(one.name)
         is_value_off = one.verdict in CHARGED and VALUE_OFF & {reason.code for reason in one.reasons}
-        is_of_right_vector = rate is not None and verdicts.get(rate.vector) in {"full", "follow_through"}
-        if one.mistake == "arithmetic" or (is_value_off and is_of_right_vector):
-            value, right = one.measured.value, one.expected.value
-            factor = value / right if value and right else 1.0
+        is_of_right_vector = rate is not None and rate.vector in sure
+        value, right = one.measured.value, one.expected.value
+        factor = value / right if value and right else 1.0
+        is_slip = is_value_off and is_of_right_vector and abs(factor - 1.0) >= LEAST_SLIP
+        if one.mistake == "arithmetic" or is_slip:
             slip = Mistake("arithmetic", one.name, factor=factor)
             found.append(NamedMistake(slip, (one.criterion,), SLIPPED))
     return found
