@@ -4,27 +4,24 @@ Where it is nearly certain what was done, the explanation predicts every vector 
 read in doubt and lies just where it is predicted was read rightly, however wrong it is.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from grader.comparison.criteria import Comparison
-from grader.comparison.evidence import DrawnVector, Evidence, Submission
-from grader.comparison.scales import Scale
+from grader.comparison.evidence import DrawnVector, Submission
 from grader.comparison.task import Task
-from grader.marking.diagnosis import Case, drawn_instead
+from grader.marking.diagnosis import drawn_instead
+from grader.marking.drawn import case_of
 from grader.records import Figure
 from reference.construction.graph import evaluate
 
-CaseOf = Callable[[Task, Evidence, Mapping[str, Scale]], Case]
 AGREES, BY_CHANCE = 0.95, 0.03
 """Probabilities that a vector lies where it is predicted: of one read rightly, and of another stroke."""
 
 
-def confirmed(
-    task: Task, submission: Submission, comparison: Comparison, case_of: CaseOf
-) -> Submission | None:
+def confirmed(task: Task, submission: Submission, comparison: Comparison) -> Submission | None:
     """The submission, surer of what its explanation predicts; None where that changes nothing."""
     explanations = () if comparison.explanation is None else comparison.explanation.explanations
     least, evidence = task.rubric.least_confidence, comparison.evidence

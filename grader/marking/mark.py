@@ -11,7 +11,7 @@ from grader.comparison.task import Task
 from grader.documents import Verdict
 from grader.marking.confirming import confirmed
 from grader.marking.diagnosis import LEAST_CONFIDENCE, Lost, named
-from grader.marking.drawn import case_of, explain
+from grader.marking.drawn import explain
 from grader.marking.settling import at_stake, charged_where_made, of_another
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
 from grader.rubric import CriterionTable, RubricFile
@@ -28,7 +28,7 @@ LOST = CHARGED | {"follow_through", "review"}
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission, explain)
-    surer = confirmed(task, submission, comparison, case_of)
+    surer = confirmed(task, submission, comparison)
     if surer is not None:
         submission, comparison = surer, compare(task, surer, explain)
     mistakes = _named(task, comparison)
