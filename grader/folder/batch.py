@@ -113,6 +113,7 @@ def _graded(
     inputs = inputs_of_run(batch.assignment, batch.rubric, jobs, contents)
     results = ResultsDocument(
         assignment=batch.assignment.id,
+        titles={one.id: one.title.in_language(batch.lang) for one in batch.rubric.criterion},
         reports=reports,
         unmatched=unmatched,
         moved=changes_since(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
