@@ -46,8 +46,8 @@ def test_every_mistake_of_the_contract_has_words():
     ("lang", "text"),
     [
         ("en", "It is too long by 2.3\u00a0mm (tolerance ±1.0\u00a0mm)."),
-        ("ro", "Este prea lung cu 2,3\u00a0mm (toleranță ±1,0\u00a0mm)."),
-        ("ru", "Длиннее, чем нужно, на 2,3\u00a0мм (допуск ±1,0\u00a0мм)."),
+        ("ro", "Segmentul este prea lung cu 2,3\u00a0mm (toleranță ±1,0\u00a0mm)."),
+        ("ru", "Отрезок длиннее, чем нужно, на 2,3\u00a0мм (допуск ±1,0\u00a0мм)."),
     ],
 )
 def test_a_length_off_is_told_in_the_language_with_its_decimal_mark(lang, text):
