@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from grader.documents import CriterionDocument, QuantityDocument, ReportDocument, ToleranceDocument
+from grader.documents import QuantityDocument, ReportDocument, ToleranceDocument
 from grader.language import N_, Tongue
 from reference.drawing.subject import SCALE_UNITS
 
@@ -71,11 +71,16 @@ def score_text(report: ReportDocument, speaker: Tongue) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Points that are scaled together: those given, those that could be, and what these are worth."""
+    """Points that are scaled together: those given, those that could be, and by what they are scaled."""
 
     given: float
     judged: float
-    worth: float
+    factor: float
+
+    @property
+    def result(self) -> float:
+        """What it gives of the score."""
+        return self.given * self.factor
 
 
 def score_line(report: ReportDocument, speaker: Tongue) -> str:
@@ -83,52 +88,54 @@ def score_line(report: ReportDocument, speaker: Tongue) -> str:
 
     Empty where nothing was judged.
     """
-    parts = _parts(report.criteria)
-    in_full = sum(part.worth for part in parts)
-    if not in_full:
+    parts = _parts(report)
+    if not parts:
         return ""
-    factors = [part.worth / part.judged * report.max_score / in_full for part in parts]
-    settled = sum(part.given * factor for part, factor in zip(parts, factors, strict=True))
-    return " ".join((_settled(report, parts, factors, speaker), *_open_and_added(report, settled, speaker)))
+    return " ".join((_settled(report, parts, speaker), *_open_and_added(report, parts, speaker)))
 
 
-def _parts(criteria: Sequence[CriterionDocument]) -> list[Part]:
+def settled_points(report: ReportDocument) -> float | None:
+    """What the points of the rows give together, in points of the score; None where nothing was judged."""
+    parts = _parts(report)
+    return sum(part.result for part in parts) if parts else None
+
+
+def _parts(report: ReportDocument) -> list[Part]:
     """Each section with a weight of its own, of which anything was judged, and all others together."""
     parts = []
-    for section in dict.fromkeys(criterion.section for criterion in criteria):
-        own = [criterion for criterion in criteria if criterion.section == section]
+    for section in dict.fromkeys(criterion.section for criterion in report.criteria):
+        own = [criterion for criterion in report.criteria if criterion.section == section]
         judged = sum(one.max_points for one in own if one.verdict != "not_judged")
-        whole = sum(one.max_points for one in own)
         if judged:
-            given = sum(one.points or 0.0 for one in own)
-            parts.append(Part(given, judged, judged if section is None else whole))
-    return parts
+            whole = judged if section is None else sum(one.max_points for one in own)
+            parts.append(Part(sum(one.points or 0.0 for one in own), judged, whole / judged))
+    in_full = sum(part.judged * part.factor for part in parts)
+    return [replace(part, factor=part.factor * report.max_score / in_full) for part in parts]
 
 
-def _settled(report: ReportDocument, parts: Sequence[Part], factors: Sequence[float], speaker: Tongue) -> str:
+def _settled(report: ReportDocument, parts: Sequence[Part], speaker: Tongue) -> str:
     def points(value: float) -> str:
         return speaker.trimmed(value, 2)
 
-    given, judged = sum(part.given for part in parts), sum(part.judged for part in parts)
-    if all(math.isclose(factor, 1.0) for factor in factors):
-        return speaker.gettext(SUM) % {"sum": points(given)}
-    result = sum(part.given * factor for part, factor in zip(parts, factors, strict=True))
-    known = {"sum": points(given), "judged": points(judged), "maximum": points(report.max_score)}
-    if all(math.isclose(factor, factors[0]) for factor in factors):
-        return speaker.gettext(SCALED) % {**known, "result": points(result)}
-    terms = (
-        f"{points(part.given)} × {speaker.trimmed(factor, 4)}"
-        for part, factor in zip(parts, factors, strict=True)
-    )
-    return speaker.gettext(WEIGHTED) % {"terms": " + ".join(terms), "result": points(result)}
+    first = parts[0].factor
+    known = {
+        "sum": points(sum(part.given for part in parts)),
+        "judged": points(sum(part.judged for part in parts)),
+        "maximum": points(report.max_score),
+        "result": points(sum(part.result for part in parts)),
+        "terms": " + ".join(f"{points(part.given)} × {speaker.trimmed(part.factor, 4)}" for part in parts),
+    }
+    is_one = all(math.isclose(part.factor, first) for part in parts)
+    text = (SUM if math.isclose(first, 1.0) else SCALED) if is_one else WEIGHTED
+    return speaker.gettext(text) % known
 
 
-def _open_and_added(report: ReportDocument, settled: float, speaker: Tongue) -> Iterator[str]:
+def _open_and_added(report: ReportDocument, parts: Sequence[Part], speaker: Tongue) -> Iterator[str]:
     """What waits, and what a person added or took off."""
     if report.score is None and report.score_range is not None:
-        low, high = (end - report.added - settled for end in report.score_range)
-        known = {"low": speaker.trimmed(max(low, 0.0), 2), "high": speaker.trimmed(high, 2)}
-        yield speaker.gettext(WAITS) % known
+        settled = sum(part.result for part in parts) + report.added
+        low, high = (max(end - settled, 0.0) for end in report.score_range)
+        yield speaker.gettext(WAITS) % {"low": speaker.trimmed(low, 2), "high": speaker.trimmed(high, 2)}
     if report.added:
         yield added_text(report, speaker)
 
