@@ -85,7 +85,7 @@ FULL: dict[str, str] = {
     "unread": N_("It could not be read on the sheet (%(reason)s)."),
     "entry_refused": N_("An entry that it rests on cannot be used (%(reason)s): a person must look."),
     "doubtful": N_("It was read with too little certainty (%(confidence)s)."),
-    UNSURE: N_("It was read with too little certainty: %(reason)s."),
+    UNSURE: N_("It was read with too little certainty (%(reason)s)."),
     "near_limit": N_(
         "It lies so near the limit of the tolerance that the scan cannot decide (standard error %(se)s)."
     ),

@@ -129,7 +129,7 @@ def test_what_was_read_is_not_called_unread():
     unread = Reason("unread", {"reason": "n_BA, on which it hangs, was not read for certain"})
     doubtful = Reason("doubtful", {"confidence": 0.4})
     read = replace(outcome("review", doubtful, unread), measured=Quantity(48.1, 255.0))
-    told = "It was read with too little certainty: n_BA, on which it hangs, was not read for certain."
+    told = "It was read with too little certainty (n_BA, on which it hangs, was not read for certain)."
     assert criterion_feedback(read, "en") == told
     assert criterion_feedback(read, "en", "hint") == "It was read with too little certainty."
     assert criterion_feedback(outcome("review", unread), "en").startswith("It could not be read")
