@@ -27,8 +27,8 @@ PLACEHOLDER = re.compile(r"%\((\w+)\)[sd]|\{(\w+)\}")
 KEYWORDS = {"_": None, "gettext": None, "N_": None, "ngettext": (1, 2)}
 HEAD = """# Every sentence, in all languages
 
-Written by `python -m docs.make_sentences` from the catalogues ([translating.md](translating.md)); a test holds
-it complete. Names and numbers are examples. `/` stands between the forms for 1, 3 and 20.
+Written by `python -m docs.make_sentences` from the catalogues ([translating.md](translating.md)); a test
+holds it complete. Names and numbers are examples. `/` stands between the forms for 1, 3 and 20.
 """
 
 Row = tuple[str, ...]

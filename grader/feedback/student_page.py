@@ -37,6 +37,7 @@ NUMBER, POSITION, PAGE = N_("number"), N_("position"), N_("page")
 WIDENED = N_("widened")
 FROM_OWN = N_("from your own values")
 """Beside what was expected where that follows from the student's own earlier values."""
+MAY_BE_WRONG = N_("What may be wrong")
 AS_MEASURED = N_("drawn from the entered measurements")
 SHEET = N_("the sheet")
 DETAIL = N_("a closer look")
@@ -352,6 +353,12 @@ class StudentPage:
 
         known = (mistake for mistake in self.report.mistakes if mistake.code in MISTAKES)
         return [self._action(mistake) for mistake in sorted(known, key=first)]
+
+    @property
+    def title_of_wrong(self) -> str:
+        """The heading of what is wrong, or may be: while nothing has lost points it is not certain."""
+        is_certain = self.group("lost").rows or not all(action.is_open for action in self.actions)
+        return self.group("lost").title if is_certain else self.speaker.gettext(MAY_BE_WRONG)
 
     def _action(self, mistake: MistakeDocument) -> Action:
         criteria = {criterion.id: criterion for criterion in self.report.criteria}

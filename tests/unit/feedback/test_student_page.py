@@ -43,7 +43,9 @@ def test_a_mistake_of_which_everything_waits_is_not_called_certain():
     waits = [criterion("v_A", "review", None), criterion("v_B", "review", None)]
     one = report(criteria=waits, mistakes=[mistake("wrong_link", "b", ["v_A", "v_B"])])
     assert page_of(one).actions[0].is_open
-    assert "Not certain yet" in feedback_page(one, [], "en")
+    told = Page(feedback_page(one, [], "en")).text
+    assert "What may be wrong Wrong link" in told.replace("Line drawn by the wrong link", "Wrong link")
+    assert "Not certain yet" in told
     lost = [waits[0], criterion("v_B", "none", 0.0)]
     assert not page_of(one.model_copy(update={"criteria": lost})).actions[0].is_open
 
