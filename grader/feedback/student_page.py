@@ -190,10 +190,13 @@ class StudentPage:
 
     @property
     def remarks_of_people(self) -> list[tuple[str, str]]:
-        """What a person wrote: on the whole, then on criteria, each with the criterion's title."""
-        remarks = [("", self.report.comment)]
-        remarks += [(row.title, row.decided.comment) for row in self.report.criteria if row.decided]
-        return [(title, text) for title, text in remarks if text]
+        """What a person wrote: on the whole, then on criteria, each text once with the criteria's titles."""
+        titles: dict[str, list[str]] = {}
+        for row in self.report.criteria:
+            if row.decided and row.decided.comment:
+                titles.setdefault(row.decided.comment, []).append(row.title)
+        whole = [("", self.report.comment)] if self.report.comment else []
+        return [*whole, *((", ".join(about), text) for text, about in titles.items())]
 
     @property
     def not_required(self) -> list[Markup]:
@@ -211,8 +214,9 @@ class StudentPage:
         return self.shown(criterion.drawn) if is_needed else ""
 
     def sentence(self, criterion: CriterionDocument) -> str:
-        """What is said of a criterion; nothing where it is just right."""
-        return "" if criterion.feedback == self.speaker.gettext(HINTS["right"]) else criterion.feedback
+        """What is said of a criterion; nothing where its mark says it: just right, or checked by a person."""
+        needless = (self.speaker.gettext(HINTS[code]) for code in ("right", "decided"))
+        return "" if criterion.feedback in needless else criterion.feedback
 
     def measured(self, criterion: CriterionDocument) -> list[str]:
         """What was handed in, as lines of a cell."""

@@ -21,6 +21,8 @@ ROUNDING = 0.06
 OPPOSITE_DEG = 150.0
 DOUBTS = re.compile(r"cannot decide|too little certainty|a person must look")
 NOT_READ = re.compile(r"could not be read|Nothing was handed in|is not required")
+COUNTED = {"counted_for_you", "at_stake"}
+"""Reasons that say why more than the tolerance is right."""
 AGAINST_THE_DATA = "held against the data"
 """After it numbers are told that are not the row's: what was expected there follows from own values."""
 LENGTH = re.compile(r"too (long|short) by ([\d.]+)")
@@ -62,7 +64,8 @@ def _of_verdict(criterion: CriterionDocument) -> Iterator[str]:
     """Verdict against tolerance and points."""
     verdict, points = criterion.verdict, criterion.points
     beyond = _beyond(criterion)
-    if verdict == "full" and beyond and criterion.decided is None and "in_doubt" not in criterion.reasons:
+    is_lenient = criterion.decided is not None or COUNTED & set(criterion.reasons)
+    if verdict == "full" and beyond and not is_lenient:
         yield f"right, but {', '.join(beyond)} beyond the tolerance"
     if verdict == "follow_through" and beyond and "follows" not in criterion.reasons:
         yield f"follows, but {', '.join(beyond)} beyond the tolerance"

@@ -83,6 +83,17 @@ def test_what_a_person_decided_is_told_with_the_comment():
     assert "A. B." not in text
 
 
+def test_one_comment_on_several_criteria_is_told_once():
+    decided = DecidedDocument(by="x", at="2026-11-22T10:00:00+00:00", before=None, comment="It is here.")
+    rows = [
+        criterion(name, feedback="A person has decided this.").model_copy(update={"decided": decided})
+        for name in ("v_A", "v_B")
+    ]
+    page = page_of(report(criteria=rows, mistakes=[]))
+    assert page.remarks_of_people == [("Vector v_A, Vector v_B", "It is here.")]
+    assert page.sentence(rows[0]) == ""
+
+
 def test_what_waits_is_told_with_what_it_is_likely_to_be():
     rows = [
         criterion(name, "review", None).model_copy(update={"proposed": proposed, "probability": 0.9})
