@@ -162,11 +162,12 @@ def test_how_many_verdicts_may_be_wrong_is_told_where_it_is_known():
 def test_outdated_decisions_are_listed_with_line_and_reason():
     stale = StaleDecisionDocument(
         line=4, student_id="s07", criterion="v_B", verdict="full", by=HOSTILE, at="2026-11-22T10:00:00+00:00",
-        reason="the scan is another one",
+        reason="what was handed in has changed since",
     )  # fmt: skip
     made = results(report()).model_copy(update={"stale": [stale], "titles": {"v_B": "Velocity of B"}})
     text = Page(index_page(made, "en")).text
-    assert f"4 Velocity of B: right {HOSTILE}, 2026-11-22 the scan is another one" in text
+    assert f"4 Velocity of B: right {HOSTILE}, 2026-11-22 what was handed in has changed since" in text
+    assert "ceea ce s-a predat s-a schimbat" in index_page(made, "ro")
 
 
 def test_on_a_phone_every_table_with_more_than_two_columns_is_cards():
