@@ -72,13 +72,15 @@ def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
     except InputFileError as error:
         problem = Problem(error.code, error.message, ref.file)
         return ScannedPage(replace(ref, problem=problem), problems=(problem,), timing_ms=timing)
+    if ref.turn_deg is not None:
+        image = replace(image, turn_deg=ref.turn_deg, turn_is_sure=True)
     page = ScannedPage(ref, image, timing_ms=timing)
     # Rows that a decoder has filled with white are not blank.
     if not image.damage and is_blank(image):
         page = replace(page, ref=replace(ref, blank=True))
         return _refused(page, "page_blank", f"{ref.file}: page {ref.page} is blank")
     with _timed(timing, "sheet"):
-        sheet, identity = register(image)
+        sheet, identity = register(image, ref.corners_px)
         page = replace(page, ref=replace(ref, identity=identity))
         if isinstance(sheet, Sheet) and not image.damage:
             image, sheet = straighten(image, sheet)

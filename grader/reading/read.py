@@ -332,7 +332,7 @@ def _vectors(
             signs = replace(
                 signs, off_mm=off_mm, thin=bool(plan.lines.thin[row]), marked=marked, elsewhere=elsewhere
             )
-        vectors[edge.name] = _vector(span, cov, signs.confidence())
+        vectors[edge.name] = vector_of(span, cov, signs.confidence())
     return vectors, unread
 
 
@@ -345,7 +345,7 @@ def _difference_cov(fit: NodeFit, edge: Edge, span: complex, scale_se: float) ->
     return np.asarray(difference @ fit.cov @ difference.T + np.outer(scaled, scaled))
 
 
-def _vector(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
+def vector_of(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
     """Length and direction with their standard errors."""
     length = float(abs(span))
     along = np.array([span.real, span.imag]) / max(length, 1e-9)
