@@ -192,10 +192,9 @@ class Review:
         """A node put elsewhere; it snaps to the ink there."""
         since = self.session.version
         number, sheet = _whole(said.get("student")), _whole(said.get("sheet", 0))
-        x, y = self.session.snapped(number, sheet, _number(said.get("x")), _number(said.get("y")))
-        self.session.move(
-            number, _text(said, "node"), place_text(x, y), _text(said, "by"), _text(said, "window")
-        )
+        node, pointed = _text(said, "node"), (_number(said.get("x")), _number(said.get("y")))
+        at = self.session.snapped(number, sheet, node.partition(":")[0], pointed)
+        self.session.move(number, node, place_text(*at), _text(said, "by"), _text(said, "window"))
         return self._facts(since)
 
     def page(self, said: Mapping[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,8 @@ from grader.folder.batch import Batch, Graded, Job, graded, pages_read
 from grader.folder.workers import Pool
 from grader.inputs.decisions import FILE_NAME, ClashError, Decision, DecisionFile, Key
 from grader.overlay.scene import Scene, scene_of
-from grader.records import MECHANISM, Figure, PageRef, Reading, ReadNode, ReadVector, ScannedPage
+from grader.reading.corrected import snapped
+from grader.records import MECHANISM, Figure, Ink, PageRef, Reading, ReadNode, ReadVector, ScannedPage
 from grader.review.scans import Scans
 from reference.errors import CallError, PlanmarkError
 
@@ -48,6 +49,7 @@ class Student:
     name: str
     version: int = 0
     pages: list[ScannedPage] | None = None
+    inks: list[Ink | None] | None = None
 
     def criterion(self, name: str) -> CriterionDocument:
         """A criterion by its id. Raises CallError."""
@@ -288,9 +290,25 @@ class Session:
         """What the student is told of a criterion, if what is proposed is accepted."""
         return criterion.feedback
 
-    def snapped(self, number: int, sheet: int, x: float, y: float) -> tuple[float, float]:
-        """The point of the ink that is meant by a place, in sheet millimetres."""
-        return x, y
+    def snapped(self, number: int, sheet: int, figure: str, at: tuple[float, float]) -> tuple[float, float]:
+        """The point of the ink that is meant by a place on a page, both in sheet millimetres.
+
+        Raises CallError for a page that there is not.
+        """
+        student = self.student(number)
+        inks = self._inks_of(student)
+        if not 0 <= sheet < len(inks):
+            raise CallError("page_missing", "there is no such page")
+        node = snapped(inks[sheet], *at, figure)
+        return node.at.real, -node.at.imag
+
+    def _inks_of(self, student: Student) -> list[Ink | None]:
+        """The strokes of a student's pages; read from the cache once."""
+        with self._lock:
+            if student.inks is None and self.graded is not None:
+                refs = student.job.submission.pages
+                student.inks = [self.graded.cache.page(ref).ink for ref in refs]
+            return student.inks or []
 
     # Pages ----------------------------------------------------------------------------------------
 

@@ -132,7 +132,6 @@ class Viewer {
     const [x, y, w, h] = look.box;
     this.fit({ x, y, w, h });
     this.place(this.base, this.visible(1.0));
-    this.loading = this.place(this.fine, this.visible(1.0));
   }
 
   image() {
@@ -184,8 +183,9 @@ class Viewer {
   }
 
   place(image, part) {
-    if (!this.look.scan) return null;
-    const scale = (this.svg.getBoundingClientRect().width * (window.devicePixelRatio || 1)) / this.view.w;
+    const { width } = this.svg.getBoundingClientRect();
+    if (!this.look.scan || !width) return;
+    const scale = (width * (window.devicePixelRatio || 1)) / this.view.w;
     const query = new URLSearchParams({
       x: part.x.toFixed(2), y: part.y.toFixed(2), w: part.w.toFixed(2), h: part.h.toFixed(2), scale: Math.min(scale, 60).toFixed(2),
     });
@@ -196,7 +196,6 @@ class Viewer {
       this.svg.dataset.loaded = this.look.scan;
     };
     loader.src = `${this.look.scan}?${query}`;
-    return loader;
   }
 
   refine() {
