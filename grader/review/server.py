@@ -7,16 +7,16 @@ must come from the page itself (Origin, a header of its own, JSON).
 
 import getpass
 import hmac
-import json
 import threading
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import urlsplit
 
 from jinja2 import PackageLoader
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -163,69 +163,51 @@ class Review:
 
     # Decisions ------------------------------------------------------------------------------------
 
-    def decide(self, said: Mapping[str, Any]) -> dict[str, Any]:
+    def decide(self, said: "Answers") -> dict[str, Any]:
         """Verdicts on criteria, all of them or none."""
-        given = said.get("answers")
-        if not isinstance(given, list) or not given:
-            raise CallError("answer_refused", "there is no answer")
-        answers = [
-            Answer(
-                _whole(one.get("student")), _text(one, "criterion"), _text(one, "verdict"), _text(one, "comment"),
-                _text(one, "seen"),
-            )
-            for one in given
-        ]  # fmt: skip
         since = self.session.version
-        self.session.decide(answers, _text(said, "by"), _text(said, "window"))
+        answers = [Answer(**one.model_dump()) for one in said.answers]
+        self.session.decide(answers, said.by, said.window)
         return self._facts(since)
 
-    def whole(self, said: Mapping[str, Any]) -> dict[str, Any]:
+    def whole(self, said: "OnWhole") -> dict[str, Any]:
         """A comment on a whole submission, and points added."""
         since = self.session.version
-        self.session.decide_whole(
-            _whole(said.get("student")), _text(said, "comment"), _number(said.get("added", 0)),
-            _text(said, "by"), _text(said, "window"),
-        )  # fmt: skip
+        self.session.decide_whole(said.student, said.comment, said.added, said.by, said.window)
         return self._facts(since)
 
-    def node(self, said: Mapping[str, Any]) -> dict[str, Any]:
+    def node(self, said: "Moved") -> dict[str, Any]:
         """A node put elsewhere; it snaps to the ink there."""
         since = self.session.version
-        number, sheet = _whole(said.get("student")), _whole(said.get("sheet", 0))
-        node, pointed = _text(said, "node"), (_number(said.get("x")), _number(said.get("y")))
-        at = self.session.snapped(number, sheet, node.partition(":")[0], pointed)
-        self.session.move(number, node, place_text(*at), _text(said, "by"), _text(said, "window"))
+        figure = said.node.partition(":")[0]
+        at = self.session.snapped(said.student, said.sheet, figure, (said.x, said.y))
+        self.session.move(said.student, said.node, place_text(*at), said.by, said.window)
         return self._facts(since)
 
-    def page(self, said: Mapping[str, Any]) -> dict[str, Any]:
+    def page(self, said: "OnPage") -> dict[str, Any]:
         """Whose a page is, its turn, its corners."""
-        ref = page_of(self.session.pages, _text(said, "file"), _whole(said.get("page")))
+        ref = page_of(self.session.pages, said.file, said.page)
         if ref is None:
             raise CallError("page_missing", "there is no such page")
-        turn = said.get("turn")
-        corners = tuple((_number(x), _number(y)) for x, y in said.get("corners") or [])
-        owner = self.session.student(_whole(said["owner"])) if said.get("owner") else None
-        decision = PageDecision(
-            None if owner is None else owner.report.student_id,
-            None if turn is None else _whole(turn),
-            corners,
-        )
+        owner = None if said.owner is None else self.session.student(said.owner).report
+        student_id = None if owner is None else owner.student_id
+        decision = PageDecision(student_id, said.turn, tuple(said.corners))
         if not str(decision):
             raise CallError("answer_refused", "say whose the page is, or turn it, or give its corners")
-        position = None if owner is None else owner.report.position
-        self.session.decide_page(ref, str(decision), position, _text(said, "by"), _text(said, "window"))
+        position = None if owner is None else owner.position
+        self.session.decide_page(ref, str(decision), position, said.by, said.window)
         return self._facts(self.session.version)
 
-    def undo(self, said: Mapping[str, Any]) -> dict[str, Any]:
+    def undo(self, said: "Said") -> dict[str, Any]:
         """The last decision of a window taken back."""
         since = self.session.version
-        students, row = self.session.undo(_text(said, "window"))
+        students, row = self.session.undo(said.window)
         undone = "" if row is None else f"{students[0].number}/{row.criterion}" if students else row.criterion
         return {**self._facts(since), "undone": undone}
 
     # The end --------------------------------------------------------------------------------------
 
-    def finish(self, _said: Mapping[str, Any]) -> dict[str, Any]:
+    def finish(self, _said: "Said") -> dict[str, Any]:
         """Start to bring all pages up to date and to export."""
         if not self.run.running:
             self.run = Run(running=True)
@@ -281,12 +263,63 @@ def _quoted(path: Path) -> str:
 
 # What a request holds -----------------------------------------------------------------------------
 
+Number = Annotated[int, Field(ge=0, lt=100_000)]
+Place = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False)]
 
-def _text(said: Mapping[str, Any], name: str) -> str:
-    value = said.get(name, "")
-    if not isinstance(value, str):
-        raise CallError("answer_refused", f"{name} must be text")
-    return value
+
+class Said(BaseModel):
+    """What every post says: who decides, and in which window."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    by: str = ""
+    window: str = ""
+
+
+class Given(BaseModel):
+    """An answer to one question, see `Answer`."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    student: Number
+    criterion: str
+    verdict: str
+    comment: str = ""
+    seen: str = ""
+
+
+class Answers(Said):
+    """Answers that are written together."""
+
+    answers: Annotated[list[Given], Field(min_length=1)]
+
+
+class OnWhole(Said):
+    """A comment on a whole submission, and points added."""
+
+    student: Number
+    comment: str = ""
+    added: Place = 0.0
+
+
+class Moved(Said):
+    """A node, ``FIGURE:NODE``, and the place on a sheet that a person points at, mm."""
+
+    student: Number
+    sheet: Number
+    node: str
+    x: Place
+    y: Place
+
+
+class OnPage(Said):
+    """Whose a page is (a student's place in the class), its turn in degrees, its corners in stored pixels."""
+
+    file: str
+    page: Number
+    owner: Number | None = None
+    turn: int | None = None
+    corners: list[Annotated[tuple[Place, Place], Field(strict=False)]] = []
 
 
 def _whole(value: object) -> int:
@@ -324,13 +357,13 @@ def application(session: Session, lang: str = "en", token: str = "") -> Starlett
         "/review.js": _static("review.js", "text/javascript"),
         "/review.css": _static("review.css", "text/css"),
     }
-    posts = {
-        "/api/decide": review.decide,
-        "/api/whole": review.whole,
-        "/api/node": review.node,
-        "/api/page": review.page,
-        "/api/undo": review.undo,
-        "/api/finish": review.finish,
+    posts: dict[str, tuple[type[Said], Callable[[Any], dict[str, Any]]]] = {
+        "/api/decide": (Answers, review.decide),
+        "/api/whole": (OnWhole, review.whole),
+        "/api/node": (Moved, review.node),
+        "/api/page": (OnPage, review.page),
+        "/api/undo": (Said, review.undo),
+        "/api/finish": (Said, review.finish),
     }
     return Starlette(
         routes=[
@@ -339,8 +372,8 @@ def application(session: Session, lang: str = "en", token: str = "") -> Starlett
                 for path, act in gets.items()
             ),
             *(
-                Route(path, _guarded(review, _posted(review, act)), methods=["POST"])
-                for path, act in posts.items()
+                Route(path, _guarded(review, _posted(review, *one)), methods=["POST"])
+                for path, one in posts.items()
             ),
         ]
     )
@@ -358,7 +391,7 @@ def _read(review: Review, act: Callable[[Request], Response]) -> Handler:
     return handler
 
 
-def _posted(review: Review, act: Callable[[Mapping[str, Any]], dict[str, Any]]) -> Handler:
+def _posted(review: Review, model: type[Said], act: Callable[[Any], dict[str, Any]]) -> Handler:
     async def handler(request: Request) -> Response:
         body = bytearray()
         async for part in request.stream():
@@ -366,11 +399,11 @@ def _posted(review: Review, act: Callable[[Mapping[str, Any]], dict[str, Any]]) 
             if len(body) > MOST_BYTES:
                 return JSONResponse({"message": "too much is posted"}, 413)
         try:
-            said = json.loads(bytes(body))
-        except ValueError:
-            said = None
-        if not isinstance(said, dict):
-            return JSONResponse({"message": "JSON is expected"}, 400)
+            said = model.model_validate_json(bytes(body))
+        except ValidationError as error:
+            fault = error.errors(include_url=False, include_context=False, include_input=False)[0]
+            where = ".".join(map(str, fault["loc"]))
+            return JSONResponse({"message": f"{where}: {fault['msg']}".lstrip(": ")}, 400)
         return await run_in_threadpool(lambda: _told(review, lambda: JSONResponse(act(said))))
 
     return handler

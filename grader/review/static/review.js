@@ -597,7 +597,7 @@ function savePage() {
   return busy(async () => {
     const page = state.page;
     take(await call("/api/page", {
-      file: page.file, page: page.page, owner: $("owner").value, turn: pageViewer.turn === page.upright ? null : pageViewer.turn,
+      file: page.file, page: page.page, owner: $("owner").value === "" ? null : Number($("owner").value), turn: pageViewer.turn === page.upright ? null : pageViewer.turn,
       corners: $("corners").checked ? pageViewer.corners : [],
     }));
     await showPages();

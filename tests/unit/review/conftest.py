@@ -29,9 +29,16 @@ def scanned(tmp_path_factory):
     for name in ("s02_1.jpg", "s02_2.jpg"):
         shutil.copy(samples / name, folder)
     shutil.copy(samples / "s07_1.jpg", folder / "stranger.jpg")
-    entered = {"student_id": "s09", "n": 27, "scales": {"kL": "1:5"}, "segments_mm": {"v_A": 60.0, "v_B": 61.5}}
+    entered = {
+        "student_id": "s09",
+        "n": 27,
+        "scales": {"kL": "1:5"},
+        "segments_mm": {"v_A": 60.0, "v_B": 61.5},
+    }
     (folder / "s09.json").write_text(json.dumps(entered), encoding="utf-8")
-    roster = "student_id,name,n,kv,ka\ns02,Student 2,12,0.219911 (m/s)/mm,9.67221 (m/s^2)/mm\ns09,Student 9,27,,\n"
+    roster = (
+        "student_id,name,n,kv,ka\ns02,Student 2,12,0.219911 (m/s)/mm,9.67221 (m/s^2)/mm\ns09,Student 9,27,,\n"
+    )
     (folder / "roster.csv").write_text(roster, encoding="utf-8")
     out = folder.parent / "out"
     Session(Batch(PUMP, load_rubric("pump"), folder, out), Inline()).bring_up_to_date(silent)

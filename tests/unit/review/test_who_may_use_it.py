@@ -30,7 +30,9 @@ def test_this_machine_is_answered(page, host):
     assert page.get("/api/class", headers={"Host": host}).status_code == 200
 
 
-@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "192.168.0.7:8321", "", "localhost.evil"])
+@pytest.mark.parametrize(
+    "host", ["evil.example", "127.0.0.1.evil.example", "192.168.0.7:8321", "", "localhost.evil"]
+)
 @pytest.mark.parametrize("path", ["/", "/api/class", "/review.js", "/out/results.json", "/page"])
 def test_a_name_that_was_made_to_point_here_is_refused(page, host, path):
     assert page.get(path, headers={"Host": host}).status_code == 403
@@ -89,10 +91,14 @@ def test_nothing_is_loaded_from_elsewhere(page):
 
 @pytest.fixture
 def guarded(empty):
-    return TestClient(application(empty, token=TOKEN), base_url="http://10.0.0.5:8321", follow_redirects=False)
+    return TestClient(
+        application(empty, token=TOKEN), base_url="http://10.0.0.5:8321", follow_redirects=False
+    )
 
 
-@pytest.mark.parametrize("path", ["/", "/api/class", "/?token=wrong", "/api/class?token=long-enough", "/?token="])
+@pytest.mark.parametrize(
+    "path", ["/", "/api/class", "/?token=wrong", "/api/class?token=long-enough", "/?token="]
+)
 def test_without_the_token_nothing_is_told(guarded, path):
     answer = guarded.get(path)
     assert answer.status_code == 401
