@@ -31,6 +31,7 @@ hand_may_miss                                                                off
 readings_disagree     first, second, unit                                    scan and measurements differ
 follows               what, of                                               right from own earlier value
                       (what: nodes, scale, vector, value; of: its name)
+decided                                                                      a person decided otherwise
 scale_refused         text, why                                              declared, not understood
 scale_off             declared, expected, unit                               declared, contradicted
 scale_assumed         used, unit                                             not declared

@@ -84,6 +84,7 @@ class PageRef:
     digest : of the file's content, empty where any content will do
     problem : why the page cannot be used, or None; such a page is not opened again
     path : where the file is
+    content : digest of its pixels, empty before it is decoded: the same page may come in another file
     turn_deg : counter-clockwise turn that makes it upright, where a person said so
     corners_px : the sheet's corners, from the upright sheet's top left clockwise, stored pixels, where a
         person gave them; else empty
@@ -97,6 +98,7 @@ class PageRef:
     digest: str = ""
     problem: Problem | None = None
     path: Path = Path()
+    content: str = ""
     turn_deg: int | None = None
     corners_px: tuple[tuple[float, float], ...] = ()
 

@@ -29,6 +29,7 @@ STATES = {
 METHODS = {
     "markers": N_("placed by its markers"),
     "combined": N_("placed by frame, paper and resolution together"),
+    "corners": N_("placed by the corners that a person gave"),
 }
 SOURCES = {
     "roster": N_("from the roster"),

@@ -6,7 +6,7 @@ each submission's files and line of the roster. What differs from the note of th
 
 import contextlib
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -30,7 +30,7 @@ Key = tuple[str, int | None]
 CACHE_FOLDER = ".planmark"
 NOTE = "inputs.json"
 COMMON = ("assignment", "rubric", "program")
-OWN = ("submission", "roster")
+OWN = ("submission", "roster", "decision")
 
 
 class EarlierCriterion(BaseModel):
@@ -71,7 +71,7 @@ class Inputs(BaseModel):
     Attributes
     ----------
     common : by ``assignment``, ``rubric`` and ``program``
-    own : by the submission's folder, by ``submission`` and ``roster``
+    own : by the submission's folder, by ``submission``, ``roster`` and ``decision``
     """
 
     common: dict[str, str] = {}
@@ -83,6 +83,7 @@ def inputs_of(
     submissions: Sequence[StudentSubmission],
     folders: Sequence[str],
     digests: Mapping[str, str],
+    decided: Container[tuple[str, int]] = frozenset(),
 ) -> Inputs:
     """What a run's marks come from.
 
@@ -91,13 +92,19 @@ def inputs_of(
     authored : texts of the ``assignment``, the ``rubric`` and the version of the ``program``
     folders : of the submissions
     digests : of the files handed in, by their names
+    decided : pages, by file and number, of which a person decided something
     """
+
+    def pages_of(submission: StudentSubmission, *, by_person: bool) -> list[object]:
+        pages = [page for page in submission.pages if ((page.file, page.page) in decided) is by_person]
+        return [
+            (page.file, page.page, digests.get(page.file), page.turn_deg, page.corners_px) for page in pages
+        ]
+
     own = {
         folder: {
-            "submission": _digest(
-                [(page.file, page.page, digests.get(page.file)) for page in submission.pages],
-                submission.measured,
-            ),
+            "submission": _digest(pages_of(submission, by_person=False), submission.measured),
+            "decision": _digest(pages_of(submission, by_person=True), submission.decided),
             "roster": _digest(
                 submission.variant, sorted(submission.declared.items()), submission.lang, submission.name
             ),
@@ -152,6 +159,7 @@ class RunNote(BaseModel):
     folder: Path
     out: Path
     roster: Path | None = None
+    decisions: Path | None = None
     pages_per_student: int | None = None
     lang: str = "en"
     level: Literal["symbol", "hint", "full"] = "full"

@@ -111,8 +111,9 @@ def assign_pages(
     for index, page in enumerate(pages):
         row = decided.get((page.file, page.page))
         if row is not None:
-            n = page.identity.n if page.identity and page.identity.student_id == row.student_id else None
-            owned.append(Owned(page, row.student_id, row.n if n is None else n, row.position, (How.PERSON,)))
+            own = page.identity is not None and page.identity.student_id == row.student_id
+            n = page.identity.n if own and row.n is None and page.identity is not None else row.n
+            owned.append(Owned(page, row.student_id, n, row.position, (How.PERSON,)))
             continue
         if page.blank and page.identity is None:
             blank.append(page)

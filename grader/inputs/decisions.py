@@ -22,7 +22,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -87,7 +87,7 @@ class Decision:
     points : for `total` those added or taken away; None where the rubric's share counts
     by, at : who, and when (ISO 8601 with zone); free text in rows that people write
     basis : digest of what it was about; empty, and it applies as long as it stands
-    line : of the file, from 2; 0 where it was not read from one
+    line : of the file, from 2; 0 where it was not read from one. It does not count where rows are compared.
     """
 
     student_id: str
@@ -99,7 +99,7 @@ class Decision:
     by: str = ""
     at: str = ""
     basis: str = ""
-    line: int = 0
+    line: int = field(default=0, compare=False, repr=False)
 
     @property
     def kind(self) -> Kind:
