@@ -43,9 +43,9 @@ def review_class(
     shown = f"[{host}]" if ":" in host else host
     address = f"http://{shown}:{listener.getsockname()[1]}/"
     typer.echo(f"Review: {address}{f'?token={token}' if token else ''}")
-    typer.echo(f"Decisions go to {batch.folder / 'decisions.csv'}; Ctrl+C ends the review.")
+    typer.echo(f"Decisions go to {batch.decisions_path}; Ctrl+C ends the review.")
     _serve(listener, session, lang or batch.lang, token)
-    if session.decided:
+    if session.made:
         with progress() as tell:
             tell_class(session.bring_up_to_date(tell).results, batch.out)
 

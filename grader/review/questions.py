@@ -46,6 +46,7 @@ CLASH = N_("%(who)s has decided this in the meantime: %(verdict)s. Yours was not
 TAKEN_BACK = N_("Somebody has taken this decision back in the meantime. Yours was not written.")
 SOMEBODY = N_("somebody")
 CHECKED = N_("decided by %(who)s")
+STALE = N_("%(who)s decided: %(verdict)s; what that was about has changed since")
 PROPOSED = N_("proposed: %(verdict)s")
 ACCEPT = N_("Accept: %(verdict)s")
 NO_PROPOSAL = N_("No proposal: choose a verdict")
@@ -104,7 +105,7 @@ def _row(
         "proposed": criterion.proposed,
         "probability": criterion.probability,
         "stake": criterion.max_points if criterion.verdict == OPEN else 0.0,
-        "decided": row is not None,
+        "decided": criterion.decided is not None,
         "seen": mark_of(row),
     }
 
@@ -133,7 +134,7 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
     return {
         **row,
         "proposed": proposed,
-        "decided": decision.verdict if decision else "",
+        "decided": criterion.verdict if decision and criterion.decided else "",
         "comment": decision.comment if decision else "",
         "position": "",
         "numbers": list(_numbers(criterion, speaker)),
@@ -154,8 +155,12 @@ def _state(criterion: CriterionDocument, decision: Decision | None, said: str, s
     badge = Markup('<span class="badge v-{}" aria-hidden="true">{}</span> {}').format(
         criterion.verdict, MARKS[criterion.verdict], speaker.gettext(VERDICTS[criterion.verdict])
     )
-    if decision is not None:
-        said = speaker.gettext(CHECKED) % {"who": decision.by or speaker.gettext(SOMEBODY)}
+    if criterion.decided is not None:
+        said = speaker.gettext(CHECKED) % {"who": criterion.decided.by or speaker.gettext(SOMEBODY)}
+    elif decision is not None:
+        was = speaker.gettext(VERDICTS[decision.verdict])
+        who = decision.by or speaker.gettext(SOMEBODY)
+        said = speaker.gettext(STALE) % {"who": who, "verdict": was}
     return Markup('{} <span class="soft">{}</span>').format(badge, said) if said else badge
 
 

@@ -14,9 +14,11 @@ import numpy as np
 from grader.comparison.task import task_of
 from grader.documents import CriterionDocument, ProblemDocument, ReadingDocument, ReportDocument
 from grader.folder.batch import Batch, Graded, Job, graded, pages_read
+from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
-from grader.inputs.decisions import FILE_NAME, ClashError, Decision, DecisionFile, Key
+from grader.inputs.decisions import ClashError, Decision, DecisionFile, Key
 from grader.overlay.scene import Scene, scene_of
+from grader.pipeline import report_on
 from grader.reading.corrected import snapped
 from grader.records import MECHANISM, Figure, Ink, PageRef, Reading, ReadNode, ReadVector, ScannedPage
 from grader.review.scans import Scans
@@ -97,7 +99,7 @@ class Session:
     students: list[Student] = field(default_factory=list)
     pages: tuple[PageRef, ...] = ()
     version: int = 0
-    decided: int = 0
+    made: int = 0
     """How many decisions were made here since the pages were brought up to date."""
     scans: Scans = field(default_factory=Scans)
     graded: Graded | None = None
@@ -107,7 +109,7 @@ class Session:
     _lock: threading.RLock = field(default_factory=threading.RLock)
 
     def __post_init__(self) -> None:
-        self._file = DecisionFile(self.batch.folder / FILE_NAME)
+        self._file = DecisionFile(self.batch.decisions_path)
 
     # The class ------------------------------------------------------------------------------------
 
@@ -124,7 +126,7 @@ class Session:
                 Student(number, job, report, job.submission.name, self.version)
                 for number, (job, report) in enumerate(zip(run.jobs, run.results.reports, strict=True))
             ]
-            self.decided = 0
+            self.made = 0
             self._stamp = self._file_stamp()
         return run
 
@@ -203,8 +205,8 @@ class Session:
     def decide_page(self, ref: PageRef, verdict: str, position: int | None, by: str, window: str) -> None:
         """Write whose a page is, how it is turned, where its corners are; it counts from the next run on."""
         with self._lock:
-            at = _now()
-            row = Decision("", position, f"page:{ref.file}#{ref.page}", verdict, None, "", by, at)
+            name, basis = f"page:{ref.file}#{ref.page}", page_basis(ref)
+            row = Decision("", position, name, verdict, None, "", by, _now(), basis)
             standing = [one for one in self._file.all() if one.key == row.key]
             self._write([row], standing, window)
 
@@ -219,7 +221,7 @@ class Session:
                 self._file.remove(*change.written, restored=change.before)
             except ClashError as error:
                 raise ChangedError(error.rows[0] if error.rows else None) from error
-            self.decided -= 1
+            self.made -= 1
             keys = {(row.student_id, row.position) for row in change.written}
             numbers = {
                 student.number
@@ -250,7 +252,7 @@ class Session:
         except ClashError as error:
             raise ChangedError(error.rows[0] if error.rows else None) from error
         self._undo.setdefault(window, []).append(Change(tuple(rows), tuple(before)))
-        self.decided += 1
+        self.made += 1
 
     def _file_stamp(self) -> tuple[int, int]:
         try:
@@ -268,27 +270,28 @@ class Session:
         students = [self.student(number) for number in sorted(numbers)]
         self.version += 1
         for student in students:
-            key = (student.report.student_id, student.report.position)
-            own = [row for row in rows if (row.student_id, row.position) == key]
-            student.report = self._report(student, own)
+            student.report = self._report(student, rows)
             student.version = self.version
         return students
 
     def _report(self, student: Student, rows: Sequence[Decision]) -> ReportDocument:
-        """The report with what is decided."""
-        decided = {row.criterion: row for row in rows}
-        base = next(r for r in self.graded.results.reports if r.student_id == student.report.student_id)
-        criteria = [
-            c.model_copy(update={"verdict": decided[c.id].verdict, "points": c.max_points})
-            if c.id in decided
-            else c
-            for c in base.criteria
-        ]
-        return base.model_copy(update={"criteria": criteria})
+        """The report with what is decided in some rows of the file."""
+        batch, report = self.batch, student.report
+        own = [row for row in rows if row.kind == "page" or row.student_id == report.student_id]
+        submission = decided(student.job.submission, own, batch.assignment, batch.rubric)
+        pages = self.pages_of(student)
+        return report_on(submission, pages, batch.assignment, batch.rubric, batch.level)
 
     def sentence_if(self, student: Student, criterion: CriterionDocument) -> str:
         """What the student is told of a criterion, if what is proposed is accepted."""
-        return criterion.feedback
+        if criterion.verdict != OPEN or criterion.proposed is None:
+            return criterion.feedback
+        with self._lock:
+            report = student.report
+            accepted = Decision(report.student_id, report.position, criterion.id, criterion.proposed)
+            rows = [*self._file.all(), accepted]
+            after = {one.id: one for one in self._report(student, rows).criteria}
+        return after[criterion.id].feedback if criterion.id in after else criterion.feedback
 
     def snapped(self, number: int, sheet: int, figure: str, at: tuple[float, float]) -> tuple[float, float]:
         """The point of the ink that is meant by a place on a page, both in sheet millimetres.

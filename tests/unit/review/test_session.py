@@ -334,10 +334,10 @@ def finished(page):
 
 def test_finishing_brings_the_pages_up_to_date_and_exports(page, session):
     page.answer(ENTERED, "v_A", "none", comment="look again")
-    assert session.decided == 1
+    assert session.made == 1
     told = finished(page)
     assert told["message"] == ""
-    assert session.decided == 0
+    assert session.made == 0
     assert (session.batch.out / "export-csv.csv").is_file() or any(
         "csv" in one["path"] for one in told["files"]
     )
