@@ -206,7 +206,8 @@ def grade(
 @app.command()
 def review(
     results: Annotated[
-        Path, typer.Argument(metavar="OUT", help="The folder that `planmark grade` wrote, or the submissions'.")
+        Path,
+        typer.Argument(metavar="OUT", help="The folder that `planmark grade` wrote, or the submissions'."),
     ],
     host: Annotated[
         str, typer.Option("--host", help="Address to listen on; other machines need the --token, too.")

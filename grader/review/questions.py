@@ -187,7 +187,7 @@ def _points(criterion: CriterionDocument, speaker: Tongue) -> str:
 
 
 def _look(session: Session, student: Student, criterion: CriterionDocument) -> Facts | None:
-    """The part of a scan that a question is about, with what was read there; None where nothing was scanned."""
+    """The part of a scan that a question is about, with what was read there; None without a scan."""
     names = session.batch.assignment.file.names
     pages = session.pages_of(student)
     first: Facts | None = None

@@ -39,8 +39,8 @@ MOST_BYTES = 1_000_000
 """Of what is posted: a thousand answers have a tenth of it."""
 LONGEST_PX = 2000.0
 HEADERS = {
-    "Content-Security-Policy": "default-src 'none'; img-src 'self' data:; style-src 'self'; script-src 'self';"
-    " connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'",
+    "Content-Security-Policy": "default-src 'none'; img-src 'self' data:; style-src 'self';"
+    " script-src 'self'; connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
@@ -222,7 +222,7 @@ class Review:
 
         try:
             results = self.session.bring_up_to_date(progress).results
-            options = Options(to="csv", out=out, lang=self.lang)
+            options = Options(to="csv", what="grades", out=out, lang=self.lang)
             table = out / usual_name(options)
             export(results, table, options)
             run.files = [

@@ -1,7 +1,7 @@
 """A class under review: its questions, the decisions on them, and what follows from these at once.
 
-The file of decisions is the only thing that is kept. Reports in memory are of the decisions in it; results and
-pages on the disk are of the last run, and `bring_up_to_date` makes them anew.
+The file of decisions is the only thing that is kept. Reports in memory are of the decisions in it; results
+and pages on the disk are of the last run, and `bring_up_to_date` makes them anew.
 """
 
 import threading
@@ -243,8 +243,10 @@ class Session:
                 self._marked_anew({student.number for student in self.students})
 
     def _row(self, student: Student, criterion: str, verdict: str, comment: str, by: str) -> Decision:
-        report = student.report
-        return Decision(report.student_id, report.position, criterion, verdict, None, comment, by, _now(), "")
+        batch, report = self.batch, student.report
+        basis = basis_of(student.job.submission, batch.assignment, batch.rubric, criterion)
+        who = (report.student_id, report.position)
+        return Decision(*who, criterion, verdict, None, comment, by, _now(), basis)
 
     def _write(self, rows: Sequence[Decision], expected: Sequence[Decision], window: str) -> None:
         try:

@@ -4,15 +4,20 @@ import json
 import os
 import re
 import shutil
+import socket
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
+import uvicorn
 
 from grader.files import samples_folder
 from grader.folder.batch import Batch, grade
 from grader.inputs.decisions import read_decisions
+from grader.review.server import application
+from grader.review.session import Session
 from grader.rubric import load_rubric
 from grader.solution.document import plan_document
 from reference.authored.assignment import Variant, load_assignment
@@ -60,7 +65,33 @@ def class_of_30(tmp_path_factory):
     return top
 
 
+def decisions_in(top):
+    return {(row.student_id, row.criterion): row for row in read_decisions(top / "in" / "decisions.csv")}
+
+
 class Server:
+    """The review in a thread of the test."""
+
+    def __init__(self, top):
+        self.top = top
+        session = Session(Batch(PUMP, load_rubric("pump"), top / "in", top / "out"), Inline())
+        session.bring_up_to_date(lambda *_: None)
+        listener = socket.create_server(("127.0.0.1", 0))
+        self.address = f"http://127.0.0.1:{listener.getsockname()[1]}/"
+        config = uvicorn.Config(application(session), log_level="warning", lifespan="off", ws="none")
+        self.uvicorn = uvicorn.Server(config)
+        self.thread = threading.Thread(target=self.uvicorn.run, args=([listener],))
+        self.thread.start()
+
+    def stop(self):
+        self.uvicorn.should_exit = True
+        self.thread.join()
+
+    def decisions(self):
+        return decisions_in(self.top)
+
+
+class Process:
     """`planmark review` in a process of its own."""
 
     def __init__(self, top):
@@ -68,18 +99,7 @@ class Server:
 
     def start(self):
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-        command = [
-            sys.executable,
-            "-u",
-            "-m",
-            "grader",
-            "review",
-            str(self.top / "out"),
-            "--port",
-            "0",
-            "--jobs",
-            "1",
-        ]
+        command = [sys.executable, "-u", "-m", "grader", "review", "out", "--port", "0", "--jobs", "1"]
         self.process = subprocess.Popen(  # noqa: S603 - our own program
             command, env=environment, stdout=subprocess.PIPE, text=True, encoding="utf-8", cwd=self.top
         )
@@ -93,19 +113,30 @@ class Server:
         self.process.stdout.close()
 
     def decisions(self):
-        return {
-            (row.student_id, row.criterion): row for row in read_decisions(self.top / "in" / "decisions.csv")
-        }
+        return decisions_in(self.top)
 
 
 @pytest.fixture
-def server(class_of_30, tmp_path):
+def own_class(class_of_30, tmp_path):
+    """The class, each test with a copy of its own."""
     top = tmp_path / "class"
     shutil.copytree(class_of_30, top)
     note = top / "out" / ".planmark" / "run.json"
     said = {**json.loads(note.read_text(encoding="utf-8")), "folder": str(top / "in")}
     note.write_text(json.dumps(said), encoding="utf-8")
-    running = Server(top)
+    return top
+
+
+@pytest.fixture
+def server(own_class):
+    running = Server(own_class)
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def process(own_class):
+    running = Process(own_class)
     running.start()
     yield running
     running.kill()
@@ -137,7 +168,7 @@ class Window:
 
     def ready(self):
         """Wait until a question is there to be answered, or there is none."""
-        self.page.wait_for_function("document.body.dataset.shown && !document.body.dataset.busy")
+        self.page.wait_for_function("() => document.body.dataset.shown && !document.body.dataset.busy")
         self.screens.add(self.shown)
 
     @property
@@ -166,11 +197,11 @@ class Window:
 
 
 @pytest.fixture
-def open_window(chromium, server):
-    """Opens windows: each of a person's own, of a size in pixels."""
+def open_window(chromium):
+    """Opens windows on a server: each of a person's own, of a size in pixels."""
     contexts, windows = [], []
 
-    def opened(width=1280, height=800, **settings):
+    def opened(server, width=1280, height=800, **settings):
         context = chromium.new_context(viewport={"width": width, "height": height}, **settings)
         contexts.append(context)
         windows.append(Window(context.new_page(), server.address))

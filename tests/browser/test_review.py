@@ -6,7 +6,7 @@ SHEETS = 30
 
 
 def test_a_class_is_settled_by_keys_alone(open_window, server):
-    window = open_window()
+    window = open_window(server)
     was_open = window.open
     assert was_open > SHEETS
     while not window.is_done:
@@ -20,11 +20,11 @@ def test_a_class_is_settled_by_keys_alone(open_window, server):
     window.page.click("#finish")
     window.page.wait_for_selector("#finished:visible")
     assert "planmark export" in window.page.inner_text("#commands")
-    assert "needs review" not in (server.top / "out" / "export-csv.csv").read_text(encoding="utf-8")
+    assert "needs review" not in (server.top / "out" / "export-csv-grades.csv").read_text(encoding="utf-8")
 
 
 def test_every_key_does_what_the_page_says(open_window, server):
-    window = open_window()
+    window = open_window(server)
     page, first = window.page, window.shown
     window.press("3")
     student, criterion = first.split("/")
@@ -51,7 +51,7 @@ def test_every_key_does_what_the_page_says(open_window, server):
 
 
 def test_a_class_is_settled_by_mouse_on_a_phone(open_window, server):
-    window = open_window(390, 844)
+    window = open_window(server, 390, 844)
     page, clicks = window.page, 0
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     while not window.is_done:
@@ -73,7 +73,7 @@ def test_a_class_is_settled_by_mouse_on_a_phone(open_window, server):
 
 
 def test_a_touch_settles_and_takes_back(open_window, server):
-    window = open_window(390, 844, has_touch=True, is_mobile=True)
+    window = open_window(server, 390, 844, has_touch=True, is_mobile=True)
     first = window.shown
     window.page.tap(".verdicts [data-verdict=none]")
     window.page.wait_for_function("first => !document.body.dataset.shown.startsWith(first + ' ')", arg=first)
@@ -83,8 +83,8 @@ def test_a_touch_settles_and_takes_back(open_window, server):
     assert not server.decisions()
 
 
-def test_a_killed_server_has_kept_every_key(open_window, server):
-    window = open_window()
+def test_a_killed_server_has_kept_every_key(open_window, process):
+    server, window = process, open_window(process)
     was_open = window.open
     for key in ("1", "3", "2"):
         window.press(key)
@@ -93,13 +93,13 @@ def test_a_killed_server_has_kept_every_key(open_window, server):
     window.page.wait_for_selector("#note:visible")
     assert sorted(row.verdict for row in server.decisions().values()) == ["full", "none", "partial"]
     server.start()
-    again = open_window()
+    again = open_window(process)
     assert again.open <= was_open - 3
     assert len(server.decisions()) == 3
 
 
 def test_two_windows_lose_nothing_and_show_the_clash(open_window, server):
-    ana, ion = open_window(), open_window()
+    ana, ion = open_window(server), open_window(server)
     assert ana.shown == ion.shown
     student, criterion = ana.shown.split("/")
     for window, name in ((ana, "Ana"), (ion, "Ion")):
@@ -111,14 +111,17 @@ def test_two_windows_lose_nothing_and_show_the_clash(open_window, server):
     (row,) = server.decisions().values()
     assert (row.criterion, row.verdict, row.by) == (criterion, "full", "Ana")
     ion.page.click("#note button")
-    ion.page.wait_for_selector("#note", state="hidden")
+    ion.ready()
+    assert ion.page.is_hidden("#note")
+    assert "Ana" in ion.page.inner_text("#state")
+    ion.press("Enter")
     ion.press("3")
     assert sorted(row.by for row in server.decisions().values()) == ["Ana", "Ion"]
     assert student == "0"
 
 
 def test_a_dragged_node_snaps_and_the_marks_follow(open_window, server):
-    window = open_window()
+    window = open_window(server)
     page = window.page
     page.wait_for_selector("#view[data-loaded]")
     node = page.locator(".node").first
@@ -129,14 +132,14 @@ def test_a_dragged_node_snaps_and_the_marks_follow(open_window, server):
     page.mouse.down()
     page.mouse.move(x + 60, y + 45, steps=4)
     page.mouse.up()
-    page.wait_for_function("document.body.dataset.nodeMs")
+    page.wait_for_function("() => document.body.dataset.nodeMs")
     rows = [row for row in server.decisions().values() if row.kind == "node"]
     assert len(rows) == 1
     assert page.inner_text("#numbers") != before
 
 
-def test_wheel_and_buttons_zoom_into_the_scan(open_window):
-    window = open_window()
+def test_wheel_and_buttons_zoom_into_the_scan(open_window, server):
+    window = open_window(server)
     page = window.page
     page.wait_for_selector("#view[data-loaded]")
 
@@ -157,24 +160,24 @@ def test_wheel_and_buttons_zoom_into_the_scan(open_window):
 
 
 def test_eight_to_a_screen(open_window, server):
-    window = open_window()
+    window = open_window(server)
     page = window.page
     page.click("[data-mode=eight]")
     page.wait_for_selector(".tile.now")
     assert page.locator(".tile").count() == 8
     page.keyboard.press("ArrowRight")
     page.keyboard.press("1")
-    page.wait_for_function("document.querySelectorAll('.tile.settled').length === 1")
+    page.wait_for_function("() => document.querySelectorAll('.tile.settled').length === 1")
     assert len(server.decisions()) == 1
     page.keyboard.press("u")
     page.wait_for_function(
-        "document.querySelectorAll('.tile.settled').length === 0 && !document.body.dataset.busy"
+        "() => document.querySelectorAll('.tile.settled').length === 0 && !document.body.dataset.busy"
     )
     assert not server.decisions()
 
 
-def test_names_are_hidden_where_that_is_asked_for(open_window):
-    window = open_window()
+def test_names_are_hidden_where_that_is_asked_for(open_window, server):
+    window = open_window(server)
     page = window.page
     assert "s02" in page.inner_text("#who")
     page.click("#settings summary")
@@ -184,8 +187,8 @@ def test_names_are_hidden_where_that_is_asked_for(open_window):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_focus_is_seen(open_window, scheme):
-    window = open_window(color_scheme=scheme)
+def test_the_focus_is_seen(open_window, server, scheme):
+    window = open_window(server, color_scheme=scheme)
     page = window.page
     page.keyboard.press("Tab")
     style = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")

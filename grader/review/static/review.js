@@ -351,7 +351,7 @@ function failed(error) {
   if (error instanceof Error) throw error;
   if (error.clash) {
     const again = async () => { tell(""); state.fetched.clear(); take(await call("/api/class")); await refreshScreen(); };
-    tell(error.message, [[texts.look_again, () => again().catch(failed)]]);
+    tell(error.message, [[texts.look_again, () => busy(again)]]);
   } else tell(error.message, [[texts.close, () => tell("")]]);
 }
 

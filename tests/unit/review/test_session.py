@@ -1,15 +1,17 @@
 """A class under review: what is asked, what is decided, and what follows at once."""
 
 import io
+import json
 import threading
 import time
 
 import pytest
 from PIL import Image
 
+from grader.folder.decisions import basis_of
 from grader.inputs.decisions import Decision, DecisionFile
 from grader.review.server import application
-from tests.unit.review.conftest import Page, silent
+from tests.unit.review.conftest import PUMP, Page, silent
 
 SCANNED, ENTERED = 0, 1
 """The two students' places in the class."""
@@ -104,6 +106,8 @@ def test_a_verdict_is_written_and_counts_at_once(page, session, verdict):
     assert answer.status_code == 200
     row = decided(session)["s02", "v_D"]
     assert (row.verdict, row.by, row.comment) == (verdict, "Ana", "seen")
+    student = session.students[SCANNED].job.submission
+    assert row.basis == basis_of(student, PUMP, session.batch.rubric, "v_D")
     after = {one["criterion"]: one for one in answer.json()["students"][0]["rows"]}["v_D"]
     assert (after["verdict"], after["decided"], after["stake"]) == (verdict, True, 0.0)
     assert "Ana" in page.get("/api/question", params={"student": SCANNED, "criterion": "v_D"}).json()["state"]
@@ -338,11 +342,13 @@ def test_finishing_brings_the_pages_up_to_date_and_exports(page, session):
     told = finished(page)
     assert told["message"] == ""
     assert session.made == 0
-    assert (session.batch.out / "export-csv.csv").is_file() or any(
-        "csv" in one["path"] for one in told["files"]
-    )
+    assert [one["href"] for one in told["files"]] == ["/out/index.html", "/out/export-csv-grades.csv"]
+    assert all(page.get(one["href"]).status_code == 200 for one in told["files"])
     assert any("--to moodle" in line for line in told["commands"])
-    assert "look again" in (session.batch.out / "s09" / "feedback.html").read_text(encoding="utf-8")
+    report = json.loads((session.batch.out / "s09" / "report.json").read_text(encoding="utf-8"))
+    written = next(one for one in report["criteria"] if one["id"] == "v_A")
+    assert (written["verdict"], written["decided"]["by"]) == ("none", "Ana")
+    assert written["decided"]["comment"] == "look again"
     assert page.rows()[ENTERED, "v_A"]["verdict"] == "none"
 
 
