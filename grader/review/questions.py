@@ -74,8 +74,8 @@ def student_facts(student: Student, standing: Mapping[Key, Decision], speaker: T
     if report.position is not None:
         label = f"{label} · {speaker.gettext('position')} {report.position}"
     return {
+        "key": student.key,
         "number": student.number,
-        "folder": student.job.folder,
         "label": label,
         "score": f"{score_text(report, speaker)} / {speaker.trimmed(report.max_score, 2)}",
         "remark": report.comment,
@@ -97,7 +97,7 @@ def _row(
     del speaker
     row = standing.get((student.report.student_id, student.report.position, criterion.id))
     return {
-        "student": student.number,
+        "student": student.key,
         "criterion": criterion.id,
         "order": order,
         "title": _title(criterion),
@@ -201,7 +201,7 @@ def _look(session: Session, student: Student, criterion: CriterionDocument) -> F
         box = seen[0] if seen else _box_of(read.get(figure), scene.page_mm)  # type: ignore[call-overload]
         facts = {
             "sheet": sheet,
-            "scan": f"/scan/{student.number}/{sheet}",
+            "scan": "/scan?" + urlencode({"student": student.key, "sheet": sheet}),
             "page_mm": scene.page_mm,
             "box": box,
             "marks": seen[1] if seen else "",
@@ -254,7 +254,7 @@ def pages_facts(session: Session, speaker: Tongue) -> Facts:
                 "label": str(ref),
                 "why": problem_sentence(problem, speaker).text,
                 "said": row.verdict if row else "",
-                "owner": "" if owner is None else str(owner.number),
+                "owner": "" if owner is None else owner.key,
                 "turn": said.turn if said and said.turn is not None else turn,
                 "upright": turn,
                 "corners": list(said.corners) if said else [],
@@ -264,7 +264,7 @@ def pages_facts(session: Session, speaker: Tongue) -> Facts:
             }
         )
     owners = [
-        {"key": str(student.number), "label": student_facts(student, {}, speaker)["label"]}
+        {"key": student.key, "label": student_facts(student, {}, speaker)["label"]}
         for student in session.students
     ]
     return {"pages": pages, "owners": owners}

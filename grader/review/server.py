@@ -106,6 +106,7 @@ class Review:
         changed = [student for student in session.students if student.version > since]
         return {
             "version": session.version,
+            "keys": [student.key for student in session.students],
             "students": [questions.student_facts(one, standing, self.speaker) for one in changed],
             "comments": session.comments(),
             "pages": len(session.waiting_pages()),
@@ -114,7 +115,7 @@ class Review:
     def question(self, request: Request) -> Response:
         """One question."""
         asked = request.query_params
-        student = self.session.student(_whole(asked.get("student", "")))
+        student = self.session.student(asked.get("student", ""))
         return JSONResponse(
             questions.question_facts(self.session, student, asked.get("criterion", ""), self.speaker)
         )
@@ -127,13 +128,12 @@ class Review:
 
     def scan(self, request: Request) -> Response:
         """A part of a registered page."""
-        student = self.session.student(request.path_params["student"])
-        pages, sheet = self.session.pages_of(student), request.path_params["sheet"]
+        asked = request.query_params
+        student, sheet = self.session.student(asked.get("student", "")), _whole(asked.get("sheet", ""))
+        pages = self.session.pages_of(student)
         if not 0 <= sheet < len(pages):
             raise CallError("page_missing", "there is no such page")
-        x, y, w, h, scale = (
-            _number(request.query_params.get(name, "")) for name in ("x", "y", "w", "h", "scale")
-        )
+        x, y, w, h, scale = (_number(asked.get(name, "")) for name in ("x", "y", "w", "h", "scale"))
         if not (0.5 <= w <= 2000.0 and 0.5 <= h <= 2000.0 and 0.1 <= scale <= 100.0):
             raise CallError("part_refused", "this part of the page cannot be shown")
         scale = min(scale, 4000.0 / max(w, h))
@@ -202,7 +202,7 @@ class Review:
         """The last decision of a window taken back."""
         since = self.session.version
         students, row = self.session.undo(said.window)
-        undone = "" if row is None else f"{students[0].number}/{row.criterion}" if students else row.criterion
+        undone = "" if row is None else f"{students[0].key}/{row.criterion}" if students else row.criterion
         return {**self._facts(since), "undone": undone}
 
     # The end --------------------------------------------------------------------------------------
@@ -281,7 +281,7 @@ class Given(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
-    student: Number
+    student: str
     criterion: str
     verdict: str
     comment: str = ""
@@ -297,7 +297,7 @@ class Answers(Said):
 class OnWhole(Said):
     """A comment on a whole submission, and points added."""
 
-    student: Number
+    student: str
     comment: str = ""
     added: Place = 0.0
 
@@ -305,7 +305,7 @@ class OnWhole(Said):
 class Moved(Said):
     """A node, ``FIGURE:NODE``, and the place on a sheet that a person points at, mm."""
 
-    student: Number
+    student: str
     sheet: Number
     node: str
     x: Place
@@ -313,11 +313,11 @@ class Moved(Said):
 
 
 class OnPage(Said):
-    """Whose a page is (a student's place in the class), its turn in degrees, its corners in stored pixels."""
+    """Whose a page is (a student's key), its turn in degrees, its corners in stored pixels."""
 
     file: str
     page: Number
-    owner: Number | None = None
+    owner: str | None = None
     turn: int | None = None
     corners: list[Annotated[tuple[Place, Place], Field(strict=False)]] = []
 
@@ -351,7 +351,7 @@ def application(session: Session, lang: str = "en", token: str = "") -> Starlett
         "/api/question": review.question,
         "/api/pages": review.pages,
         "/api/finish": review.finished,
-        "/scan/{student:int}/{sheet:int}": review.scan,
+        "/scan": review.scan,
         "/page": review.page_picture,
         "/out/{path:path}": review.out,
         "/review.js": _static("review.js", "text/javascript"),

@@ -5,7 +5,7 @@ and pages on the disk are of the last run, and `bring_up_to_date` makes them ane
 """
 
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 
@@ -17,6 +17,7 @@ from grader.folder.batch import Batch, Graded, Job, graded, pages_read
 from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
 from grader.inputs.decisions import ClashError, Decision, DecisionFile, Key
+from grader.inputs.measurements import StudentSubmission
 from grader.overlay.scene import Scene, scene_of
 from grader.pipeline import report_on
 from grader.reading.corrected import snapped
@@ -53,6 +54,11 @@ class Student:
     pages: list[ScannedPage] | None = None
     inks: list[Ink | None] | None = None
 
+    @property
+    def key(self) -> str:
+        """What it is called between page and server; it stays when others come to the class."""
+        return self.job.folder
+
     def criterion(self, name: str) -> CriterionDocument:
         """A criterion by its id. Raises CallError."""
         for criterion in self.report.criteria:
@@ -67,10 +73,11 @@ class Answer:
 
     Attributes
     ----------
+    student : the key
     seen : `mark_of` what stood decided when the question was shown
     """
 
-    student: int
+    student: str
     criterion: str
     verdict: str
     comment: str = ""
@@ -118,6 +125,7 @@ class Session:
 
         Raises as `grader.folder.batch.graded`.
         """
+        stamp, made = self._file_stamp(), self.made
         run = graded(self.batch, progress, self.workers)
         with self._lock:
             self.graded, self.pages = run, run.pages
@@ -126,15 +134,20 @@ class Session:
                 Student(number, job, report, job.submission.name, self.version)
                 for number, (job, report) in enumerate(zip(run.jobs, run.results.reports, strict=True))
             ]
-            self.made = 0
-            self._stamp = self._file_stamp()
+            for student in self.students:
+                if student.report.status == "unreadable":
+                    student.report = self._with_questions(student, student.job.submission)
+            # What was decided meanwhile is taken in by the next `refresh`.
+            self.made -= made
+            self._stamp = stamp
         return run
 
-    def student(self, number: int) -> Student:
-        """A student by the place in the class. Raises CallError."""
-        if not 0 <= number < len(self.students):
-            raise CallError("student_unknown", f"there is no student {number}")
-        return self.students[number]
+    def student(self, key: str) -> Student:
+        """A student by the key. Raises CallError."""
+        for student in self.students:
+            if student.key == key:
+                return student
+        raise CallError("student_unknown", f"there is no student '{key}' in this class any more")
 
     def pages_of(self, student: Student) -> list[ScannedPage]:
         """The pages as the last run read them."""
@@ -175,11 +188,11 @@ class Session:
             return self._marked_anew({answer.student for answer in answers})
 
     def decide_whole(
-        self, number: int, comment: str, added: float | None, by: str, window: str
+        self, key: str, comment: str, added: float | None, by: str, window: str
     ) -> list[Student]:
         """Write a comment on a whole submission and points added to it; an empty one takes it back."""
         with self._lock:
-            student = self.student(number)
+            student = self.student(key)
             wanted = {
                 "comment": self._row(student, "comment", "", comment, by) if comment else None,
                 "total": replace(self._row(student, "total", "", "", by), points=added) if added else None,
@@ -191,16 +204,16 @@ class Session:
             rows = [row for row in wanted.values() if row is not None]
             if rows:
                 self._write(rows, [row for row in standing.values() if row is not None], window)
-            return self._marked_anew({number})
+            return self._marked_anew({key})
 
-    def move(self, number: int, node: str, verdict: str, by: str, window: str) -> list[Student]:
+    def move(self, key: str, node: str, verdict: str, by: str, window: str) -> list[Student]:
         """Write where a node lies: `node` as ``FIGURE:NODE``, `verdict` as ``x,y`` in sheet millimetres."""
         with self._lock:
-            student = self.student(number)
+            student = self.student(key)
             row = self._row(student, f"node:{node}", verdict, "", by)
             standing = self._standing(student, row.criterion)
             self._write([row], [] if standing is None else [standing], window)
-            return self._marked_anew({number})
+            return self._marked_anew({key})
 
     def decide_page(self, ref: PageRef, verdict: str, position: int | None, by: str, window: str) -> None:
         """Write whose a page is, how it is turned, where its corners are; it counts from the next run on."""
@@ -223,12 +236,12 @@ class Session:
                 raise ChangedError(error.rows[0] if error.rows else None) from error
             self.made -= 1
             keys = {(row.student_id, row.position) for row in change.written}
-            numbers = {
-                student.number
+            changed = {
+                student.key
                 for student in self.students
                 if (student.report.student_id, student.report.position) in keys
             }
-            return self._marked_anew(numbers), change.written[0]
+            return self._marked_anew(changed), change.written[0]
 
     def comments(self) -> list[str]:
         """The comments written so far, the commonest first."""
@@ -240,7 +253,7 @@ class Session:
         with self._lock:
             if self._file_stamp() != self._stamp:
                 self._stamp = self._file_stamp()
-                self._marked_anew({student.number for student in self.students})
+                self._marked_anew({student.key for student in self.students})
 
     def _row(self, student: Student, criterion: str, verdict: str, comment: str, by: str) -> Decision:
         batch, report = self.batch, student.report
@@ -265,11 +278,11 @@ class Session:
 
     # Marks ----------------------------------------------------------------------------------------
 
-    def _marked_anew(self, numbers: Iterable[int]) -> list[Student]:
+    def _marked_anew(self, keys: Collection[str]) -> list[Student]:
         """The students, marked anew with what is decided now."""
         rows = self._file.all()
         self._stamp = self._file_stamp()
-        students = [self.student(number) for number in sorted(numbers)]
+        students = [student for student in self.students if student.key in keys]
         self.version += 1
         for student in students:
             student.report = self._report(student, rows)
@@ -281,8 +294,25 @@ class Session:
         batch, report = self.batch, student.report
         own = [row for row in rows if row.kind == "page" or row.student_id == report.student_id]
         submission = decided(student.job.submission, own, batch.assignment, batch.rubric)
-        pages = self.pages_of(student)
-        return report_on(submission, pages, batch.assignment, batch.rubric, batch.level)
+        return self._with_questions(student, submission)
+
+    def _with_questions(self, student: Student, submission: StudentSubmission) -> ReportDocument:
+        """The report; of a submission of which nothing could be read, as if a person began to settle it."""
+        batch, pages = self.batch, self.pages_of(student)
+        report = report_on(submission, pages, batch.assignment, batch.rubric, batch.level)
+        if report.status != "unreadable" or report.criteria or submission.variant is None:
+            return report
+        first = batch.rubric.criterion[0].id
+        begun = Decision(submission.student_id, submission.position, first, "not_judged")
+        opened = report_on(
+            replace(submission, decided=(*submission.decided, begun)),
+            pages, batch.assignment, batch.rubric, batch.level,
+        )  # fmt: skip
+        asked = {"verdict": OPEN, "points": None, "decided": None, "probability": None}
+        criteria = [
+            one.model_copy(update=asked) if one.id == first and one.drawn else one for one in opened.criteria
+        ]
+        return opened.model_copy(update={"criteria": criteria})
 
     def sentence_if(self, student: Student, criterion: CriterionDocument) -> str:
         """What the student is told of a criterion, if what is proposed is accepted."""
@@ -295,12 +325,12 @@ class Session:
             after = {one.id: one for one in self._report(student, rows).criteria}
         return after[criterion.id].feedback if criterion.id in after else criterion.feedback
 
-    def snapped(self, number: int, sheet: int, figure: str, at: tuple[float, float]) -> tuple[float, float]:
+    def snapped(self, key: str, sheet: int, figure: str, at: tuple[float, float]) -> tuple[float, float]:
         """The point of the ink that is meant by a place on a page, both in sheet millimetres.
 
         Raises CallError for a page that there is not.
         """
-        student = self.student(number)
+        student = self.student(key)
         inks = self._inks_of(student)
         if not 0 <= sheet < len(inks):
             raise CallError("page_missing", "there is no such page")

@@ -10,7 +10,7 @@ const FIRST_GUESS_S = 6, LONGEST_LOOK_S = 60, LOOKS_COUNTED = 20, POLL_MS = 2500
 const EIGHT = 8;
 
 const state = {
-  students: [], rows: new Map(), version: -1, mode: "student", list: [], at: 0, question: null, busy: false,
+  students: new Map(), rows: new Map(), version: -1, mode: "student", list: [], at: 0, question: null, busy: false,
   comments: [], looks: [], shown: performance.now(), tiles: [], tile: 0, fetched: new Map(), page: null,
 };
 const stored = {
@@ -59,11 +59,13 @@ const current = () => state.rows.get(state.list[state.at]);
 const nameOf = (student) => ($("anonymous").checked ? `${texts.sheet} ${student.number + 1}` : student.label);
 
 function take(data) {
+  const changed = new Set(data.students.map((student) => student.key)), there = new Set(data.keys);
+  for (const [key, row] of state.rows) {
+    if (changed.has(row.student) || !there.has(row.student)) { state.rows.delete(key); state.fetched.delete(key); }
+  }
   for (const student of data.students) {
-    for (const [key, row] of state.rows) if (row.student === student.number) state.rows.delete(key);
-    state.students[student.number] = student;
+    state.students.set(student.key, student);
     for (const row of student.rows) state.rows.set(keyOf(row), row);
-    for (const key of state.fetched.keys()) if (key.startsWith(`${student.number}/`)) state.fetched.delete(key);
   }
   if (data.comments) state.comments = data.comments;
   state.version = data.version;
@@ -78,7 +80,7 @@ function ordered() {
   for (const row of rows) sums.set(group(row), (sums.get(group(row)) || 0) + (isOpen(row) ? row.stake : 0));
   const inside = state.mode === "student" ? (row) => row.order : (row) => row.probability ?? 0;
   const place = new Map([...sums.keys()].sort((a, b) => sums.get(b) - sums.get(a)).map((name, index) => [name, index]));
-  return rows.sort((a, b) => place.get(group(a)) - place.get(group(b)) || inside(a) - inside(b) || a.student - b.student);
+  return rows.sort((a, b) => place.get(group(a)) - place.get(group(b)) || inside(a) - inside(b) || state.students.get(a.student).number - state.students.get(b.student).number);
 }
 
 function relist(keep) {
@@ -195,7 +197,7 @@ class Viewer {
       image.setAttribute("href", loader.src);
       this.svg.dataset.loaded = this.look.scan;
     };
-    loader.src = `${this.look.scan}?${query}`;
+    loader.src = `${this.look.scan}&${query}`;
   }
 
   refine() {
@@ -279,7 +281,7 @@ async function showQuestion(keepView = false) {
   if (current() !== row && keyOf(current() || {}) !== keyOf(row)) return;
   const same = state.question && keyOf(state.question) === keyOf(question);
   state.question = question;
-  const student = state.students[question.student];
+  const student = state.students.get(question.student);
   $("who").textContent = nameOf(student);
   $("place").textContent = [question.position, `${state.at + 1} / ${state.list.length}`].filter(Boolean).join(" · ");
   $("what").innerHTML = question.title;
@@ -428,7 +430,7 @@ function showEight(keep) {
 function tileOf(key, index) {
   const row = state.rows.get(key), tile = element("div", { class: "tile", tabindex: "-1", "data-key": key });
   const svg = document.createElementNS(SVG, "svg"), about = element("p"), buttons = element("div", { class: "row" });
-  about.append(element("b", {}, nameOf(state.students[row.student])));
+  about.append(element("b", {}, nameOf(state.students.get(row.student))));
   const said = element("span", { class: "soft" });
   about.append(" ", said);
   Object.values(VERDICT_KEYS).filter((verdict) => verdict !== "not_judged").forEach((verdict) => {
@@ -491,7 +493,7 @@ function showSure() {
   $("sure-list").replaceChildren(...rows.map((row) => {
     const item = element("li"), what = element("span");
     what.innerHTML = row.title;
-    item.append(element("span", { class: `badge v-${row.proposed}` }, texts.marks[row.proposed]), ` ${nameOf(state.students[row.student])}: `, what, ` – ${texts.verdicts[row.proposed]}, ${Math.floor(100 * row.probability)} %`);
+    item.append(element("span", { class: `badge v-${row.proposed}` }, texts.marks[row.proposed]), ` ${nameOf(state.students.get(row.student))}: `, what, ` – ${texts.verdicts[row.proposed]}, ${Math.floor(100 * row.probability)} %`);
     return item;
   }));
   $("sure-accept").textContent = texts.accept_all.replace("{count}", rows.length);
@@ -597,7 +599,7 @@ function savePage() {
   return busy(async () => {
     const page = state.page;
     take(await call("/api/page", {
-      file: page.file, page: page.page, owner: $("owner").value === "" ? null : Number($("owner").value), turn: pageViewer.turn === page.upright ? null : pageViewer.turn,
+      file: page.file, page: page.page, owner: $("owner").value || null, turn: pageViewer.turn === page.upright ? null : pageViewer.turn,
       corners: $("corners").checked ? pageViewer.corners : [],
     }));
     await showPages();
@@ -626,7 +628,7 @@ function finish() {
         $("finish-progress").textContent = data.progress;
       } while (data.running);
       if (data.message) throw data;
-      state.fetched.clear(); state.rows.clear(); state.students = [];
+      state.fetched.clear(); state.rows.clear(); state.students.clear();
       take(await call("/api/class"));
       $("finish-progress").textContent = data.summary;
       $("results").replaceChildren(...data.files.map((file) => {
@@ -677,7 +679,7 @@ function hideMarks() {
 }
 
 function jumps() {
-  $("jump").replaceChildren(element("option", { value: "" }, "–"), ...state.students.map((student) => element("option", { value: student.number }, `${nameOf(student)} ${student.score}`)));
+  $("jump").replaceChildren(element("option", { value: "" }, "–"), ...[...state.students.values()].map((student) => element("option", { value: student.key }, `${nameOf(student)} ${student.score}`)));
 }
 
 // Keys ---------------------------------------------------------------------------------------------
@@ -743,10 +745,10 @@ $("anonymous").onchange = () => { stored.set("anonymous", $("anonymous").checked
 $("all").onchange = () => refreshScreen().catch(failed);
 $("settings").ontoggle = () => { if ($("settings").open) jumps(); };
 $("jump").onchange = () => {
-  const number = Number($("jump").value);
-  if ($("jump").value === "") return;
+  const wanted = $("jump").value;
+  if (!wanted) return;
   $("all").checked = true; state.mode = "student"; $("settings").open = false;
-  relist([...state.rows.values()].filter((row) => row.student === number).map(keyOf)[0]);
+  relist([...state.rows.values()].filter((row) => row.student === wanted).map(keyOf)[0]);
   showSection("question");
   showQuestion().catch(failed);
 };
@@ -767,8 +769,9 @@ async function poll() {
 (async () => {
   take(await call("/api/class"));
   const wanted = new URLSearchParams(location.search).get("student");
-  const number = state.students.findIndex((student) => student.folder === wanted);
-  if (number >= 0) { relist(); const first = state.list.findIndex((key) => state.rows.get(key).student === number); if (first >= 0) state.question = state.rows.get(state.list[first]); }
+  relist();
+  const first = state.list.find((key) => state.rows.get(key).student === wanted);
+  if (first) state.question = state.rows.get(first);
   showMode("student");
   setTimeout(poll, POLL_MS);
 })().catch(failed);

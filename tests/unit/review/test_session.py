@@ -13,8 +13,7 @@ from grader.inputs.decisions import Decision, DecisionFile
 from grader.review.server import application
 from tests.unit.review.conftest import PUMP, Page, silent
 
-SCANNED, ENTERED = 0, 1
-"""The two students' places in the class."""
+SCANNED, ENTERED = "s02", "s09"
 
 
 def decided(session):
@@ -34,9 +33,7 @@ def test_the_page_is_there_in_every_language(session):
 def test_every_criterion_of_every_student_is_a_row(page, session):
     rows = page.rows()
     wanted = {
-        (number, criterion.id)
-        for number, student in enumerate(session.students)
-        for criterion in student.report.criteria
+        (student.key, criterion.id) for student in session.students for criterion in student.report.criteria
     }
     assert set(rows) == wanted
     assert all(row["stake"] > 0.0 for row in rows.values() if row["verdict"] == "review")
@@ -58,8 +55,8 @@ def test_without_a_scan_there_is_nothing_to_look_at(page):
 
 
 def test_a_part_of_a_scan_is_cut_as_large_as_asked(page):
-    asked = {"x": 20, "y": 30, "w": 40, "h": 20, "scale": 5}
-    answer = page.get("/scan/0/0", params=asked)
+    asked = {"student": SCANNED, "sheet": 0, "x": 20, "y": 30, "w": 40, "h": 20, "scale": 5}
+    answer = page.get("/scan", params=asked)
     assert answer.headers["content-type"] == "image/jpeg"
     assert Image.open(io.BytesIO(answer.content)).size == (200, 100)
 
@@ -67,15 +64,15 @@ def test_a_part_of_a_scan_is_cut_as_large_as_asked(page):
 @pytest.mark.parametrize(
     ("path", "asked"),
     [
-        ("/scan/0/7", {"x": 0, "y": 0, "w": 9, "h": 9, "scale": 1}),
-        ("/scan/7/0", {"x": 0, "y": 0, "w": 9, "h": 9, "scale": 1}),
-        ("/scan/0/0", {"x": 0, "y": 0, "w": 0, "h": 9, "scale": 1}),
-        ("/scan/0/0", {"x": 0, "y": 0, "w": 9e5, "h": 9e5, "scale": 99}),
-        ("/scan/0/0", {"x": "nan", "y": 0, "w": 9, "h": 9, "scale": 1}),
-        ("/scan/0/0", {}),
+        ("/scan", {"student": "s02", "sheet": 7, "x": 0, "y": 0, "w": 9, "h": 9, "scale": 1}),
+        ("/scan", {"student": "s70", "sheet": 0, "x": 0, "y": 0, "w": 9, "h": 9, "scale": 1}),
+        ("/scan", {"student": "s02", "sheet": 0, "x": 0, "y": 0, "w": 0, "h": 9, "scale": 1}),
+        ("/scan", {"student": "s02", "sheet": 0, "x": 0, "y": 0, "w": 9e5, "h": 9e5, "scale": 99}),
+        ("/scan", {"student": "s02", "sheet": 0, "x": "nan", "y": 0, "w": 9, "h": 9, "scale": 1}),
+        ("/scan", {"student": "s02", "sheet": 0}),
         ("/page", {"file": "../roster.csv", "page": 1}),
         ("/page", {"file": "/etc/passwd", "page": 1}),
-        ("/api/question", {"student": 0, "criterion": "nothing"}),
+        ("/api/question", {"student": "s02", "criterion": "nothing"}),
         ("/api/question", {"student": "x", "criterion": "v_B"}),
         ("/api/question", {}),
     ],
@@ -106,7 +103,7 @@ def test_a_verdict_is_written_and_counts_at_once(page, session, verdict):
     assert answer.status_code == 200
     row = decided(session)["s02", "v_D"]
     assert (row.verdict, row.by, row.comment) == (verdict, "Ana", "seen")
-    student = session.students[SCANNED].job.submission
+    student = session.student(SCANNED).job.submission
     assert row.basis == basis_of(student, PUMP, session.batch.rubric, "v_D")
     after = {one["criterion"]: one for one in answer.json()["students"][0]["rows"]}["v_D"]
     assert (after["verdict"], after["decided"], after["stake"]) == (verdict, True, 0.0)
@@ -125,7 +122,7 @@ def test_undo_brings_back_what_stood_there_before(page, session):
     page.answer(SCANNED, "v_D", "full", comment="first")
     page.answer(SCANNED, "v_D", "none")
     undone = page.said("/api/undo").json()
-    assert undone["undone"] == "0/v_D"
+    assert undone["undone"] == "s02/v_D"
     assert (decided(session)["s02", "v_D"].verdict, decided(session)["s02", "v_D"].comment) == (
         "full",
         "first",
@@ -195,15 +192,15 @@ def test_many_at_once_lose_nothing(page, session):
 @pytest.mark.parametrize(
     "answer",
     [
-        {"student": 0, "criterion": "v_D", "verdict": "perfect", "seen": ""},
-        {"student": 0, "criterion": "nothing", "verdict": "full", "seen": ""},
-        {"student": 9, "criterion": "v_D", "verdict": "full", "seen": ""},
-        {"student": "s02", "criterion": "v_D", "verdict": "full", "seen": ""},
+        {"student": "s02", "criterion": "v_D", "verdict": "perfect", "seen": ""},
+        {"student": "s02", "criterion": "nothing", "verdict": "full", "seen": ""},
+        {"student": "s90", "criterion": "v_D", "verdict": "full", "seen": ""},
+        {"student": 0, "criterion": "v_D", "verdict": "full", "seen": ""},
         {"student": 0.5, "criterion": "v_D", "verdict": "full", "seen": ""},
-        {"student": 0, "criterion": ["v_D"], "verdict": "full", "seen": ""},
-        {"student": 0, "criterion": "v_D", "verdict": "full", "comment": 7, "seen": ""},
-        {"student": 0, "criterion": "v_D", "verdict": "full", "comment": "c" * 5000, "seen": ""},
-        {"student": 0, "criterion": "total", "verdict": "full", "seen": ""},
+        {"student": "s02", "criterion": ["v_D"], "verdict": "full", "seen": ""},
+        {"student": "s02", "criterion": "v_D", "verdict": "full", "comment": 7, "seen": ""},
+        {"student": "s02", "criterion": "v_D", "verdict": "full", "comment": "c" * 5000, "seen": ""},
+        {"student": "s02", "criterion": "total", "verdict": "full", "seen": ""},
     ],
 )
 def test_an_answer_that_cannot_be_used_is_refused_and_nothing_written(page, session, answer):
@@ -239,7 +236,7 @@ def test_what_others_write_into_the_file_is_taken_in(page, session):
     path = session.batch.folder / "decisions.csv"
     DecisionFile(path).add(Decision("s02", None, "v_D", "partial", by="by hand"))
     told = page.get("/api/class", params={"since": version}).json()
-    assert {one["number"] for one in told["students"]} >= {SCANNED}
+    assert {one["key"] for one in told["students"]} >= {SCANNED}
     assert page.rows()[SCANNED, "v_D"]["verdict"] == "partial"
 
 
@@ -291,13 +288,13 @@ def test_a_page_that_is_nobodys_is_offered_and_assigned(page, session):
     assert (stranger["file"], stranger["owner"]) == ("stranger.jpg", "")
     assert page.get(stranger["picture"]).headers["content-type"] == "image/jpeg"
     corners = [[10, 10], [900, 12], [905, 600], [8, 610]]
-    said = {"file": "stranger.jpg", "page": 1, "owner": 1, "turn": 90, "corners": corners}
+    said = {"file": "stranger.jpg", "page": 1, "owner": "s09", "turn": 90, "corners": corners}
     assert page.said("/api/page", **said).status_code == 200
     row = next(row for row in decided(session).values() if row.kind == "page")
     assert (row.page.owner, row.page.turn, len(row.page.corners)) == ("s09", 90, 4)
     again = page.get("/api/pages").json()["pages"][0]
     assert (again["owner"], again["turn"], again["corners"]) == (
-        "1",
+        "s09",
         90,
         [list(map(float, one)) for one in corners],
     )
@@ -312,7 +309,7 @@ def test_a_page_that_is_nobodys_is_offered_and_assigned(page, session):
         {"file": "nothing.jpg", "page": 1, "turn": 90},
         {"file": "stranger.jpg", "page": 2, "turn": 90},
         {"file": "stranger.jpg", "page": 1, "turn": 45},
-        {"file": "stranger.jpg", "page": 1, "owner": 9},
+        {"file": "stranger.jpg", "page": 1, "owner": "s90"},
         {"file": "stranger.jpg", "page": 1, "corners": [[0, 0], [1]]},
         {"file": "stranger.jpg", "page": 1, "corners": 7},
         {"file": "stranger.jpg", "page": 1, "corners": [[0, 0], [1, 1], [2, 2], [3, 3]]},
@@ -361,6 +358,19 @@ def test_a_second_session_has_every_decision(page, session):
     page.answer(SCANNED, "v_D", "partial")
     again = type(session)(session.batch, session.workers)
     again.bring_up_to_date(silent)
-    assert (
-        next(one for one in again.students[SCANNED].report.criteria if one.id == "v_D").verdict == "partial"
-    )
+    assert next(one for one in again.student(SCANNED).report.criteria if one.id == "v_D").verdict == "partial"
+
+
+def test_what_could_not_be_read_is_settled_by_hand(session):
+    """The only student's only page is not a drawing of this assignment."""
+    folder = session.batch.folder
+    for name in ("s02_1.jpg", "s02_2.jpg"):
+        (folder / name).unlink()
+    Image.new("L", (1600, 1100), 255).save(folder / "s02.png")
+    session.bring_up_to_date(silent)
+    page = Page(application(session), base_url="http://127.0.0.1:8321")
+    before = {name: row for (student, name), row in page.rows().items() if student == SCANNED}
+    assert {"v_A", "v_D", "a_D"} <= {name for name, row in before.items() if row["verdict"] == "review"}
+    page.answer(SCANNED, "v_D", "full")
+    after = {name: row for (student, name), row in page.rows().items() if student == SCANNED}
+    assert (after["v_D"]["verdict"], after["a_D"]["verdict"]) == ("full", "review")
