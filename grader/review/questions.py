@@ -33,7 +33,7 @@ TEXTS = {
     "saved": N_("Saved."),
     "changed": N_("Somebody else has decided this in the meantime."),
     "nothing_to_undo": N_("Nothing was decided in this window."),
-    "settles": N_("This settles {count}:"),
+    "settles": N_("This settles {count}"),
     "accept_all": N_("Accept {count}"),
     "page_saved": N_("Saved. The page counts when the class is brought up to date."),
     "still_open": N_("Still open: {open}"),

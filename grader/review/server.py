@@ -52,7 +52,7 @@ PAGE_HEADERS = {
 }
 """Of the pages that `planmark grade` wrote, which have their styles in them."""
 EXPORTS = ("moodle", "canvas", "gradescope")
-WORKING = N_("Bringing the pages up to date: %(what)s %(done)d of %(total)d")
+WORKING = N_("Bringing the pages up to date: %(done)d of %(total)d")
 UP_TO_DATE = N_("The pages are up to date.")
 CLASS_PAGE, TABLE = N_("the class's page"), N_("the table of grades")
 FORBIDDEN = "this address is not allowed here: open the address that planmark review printed"
@@ -217,8 +217,8 @@ class Review:
     def _finish(self, run: Run) -> None:
         speaker, out = self.speaker, self.session.batch.out
 
-        def progress(what: str, done: int, total: int) -> None:
-            run.progress = speaker.gettext(WORKING) % {"what": what, "done": done, "total": total}
+        def progress(_what: str, done: int, total: int) -> None:
+            run.progress = speaker.gettext(WORKING) % {"done": done, "total": total}
 
         try:
             results = self.session.bring_up_to_date(progress).results
