@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -64,7 +65,9 @@ def demo(out: Path, lang: str, jobs: int | None) -> None:
     classes = {}
     for name in ("pump", "press"):
         typer.echo(f"Grading the {name} class of the samples")
-        folder = samples_folder() / name
+        # A copy: what is decided on it lies beside it.
+        folder = out / "handed-in" / name
+        shutil.copytree(samples_folder() / name, folder, dirs_exist_ok=True)
         grade_folder(folder, name, out / name, roster=None, pages_per_student=None, jobs=jobs, lang=lang)
         title = load_assignment(name).file.title.in_language(lang)
         results = ResultsDocument.model_validate_json((out / name / "results.json").read_bytes())

@@ -169,7 +169,7 @@ def _graded(
     )
     _write_results(batch, results, students)
     note_inputs(notes, inputs)
-    note_run(_note_of(batch), notes, batch.folder)
+    note_run(_note_of(batch), notes)
     pages = tuple(page for content in contents for page in content.pages)
     return Graded(results, tuple(jobs), pages, cache)
 
