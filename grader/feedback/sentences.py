@@ -144,14 +144,14 @@ def criterion_feedback(
 
 def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     """The reasons without those that say nothing beside the others, or too much."""
+    if outcome.verdict == "not_judged" and not outcome.reasons:
+        return [Reason(UNCHECKED)]
     codes = {reason.code for reason in outcome.reasons}
     by_scale = any(one.code == "follows" and one.params.get("what") == "scale" for one in outcome.reasons)
     if outcome.verdict == "review" and "scale_assumed" in codes and by_scale:
         return [Reason(UNDECIDED)]
     if outcome.verdict == "follow_through" and "follows" in codes:
         return [reason for reason in outcome.reasons if reason.code == "follows"]
-    if not codes and outcome.verdict == "not_judged":
-        return [Reason(UNCHECKED)]
     needless = {"right"} if codes - {"right"} else set()
     if outcome.verdict != "review":
         needless |= OPEN_ONLY
