@@ -52,7 +52,7 @@ EXAMPLES: Mapping[str, str] = {
     "tolerance": "@1.0 mm", "used": "@0.036 (m/s)/mm", "vector": "a_BA_n", "why": "no unit", "wrong": "0.4",
     "written": "@45.0 mm", "x": "@60.0 mm", "x_direction": "@0°", "y": "@20.0 mm", "y_direction": "@90°",
     "cause": "normal component reversed", "done": "12", "minutes": "4", "open": "38", "total": "30",
-    "verdict": "right", "who": "A. B.",
+    "verdict": "right", "who": "A. B.", "beyond": "@0.2 mm", "good_to": "@0.3 mm", "whose": "7",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""
 OTHERWISE: Mapping[str, Mapping[str, str]] = {

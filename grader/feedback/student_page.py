@@ -61,6 +61,7 @@ GROUPS: Mapping[GroupName, tuple[str, ...]] = {
 }
 """Verdicts of the groups of rows, after the titles of those that are not folded."""
 WAITING: dict[str, str] = {
+    "other_variant": N_("drawn with another student's data"),
     "entry_refused": N_("an entry that it rests on cannot be used"),
     "doubtful": N_("read with too little certainty"),
     "near_limit": N_("so near the limit of the tolerance that the scan cannot decide"),
