@@ -46,6 +46,8 @@ from grader.overlay.scene import MARKS
 _NO_NAMES: Mapping[str, str] = {}
 SHOWN = 12
 """Students named at once; the others unfold."""
+FEW = 3
+"""Changed criteria of a student that are shown at once; more unfold together."""
 SIGNS: Mapping[Sign, str] = {
     "hand_errors": N_("the same small errors of the hand"),
     "same_place": N_("figures lie in the same places on the sheet"),
@@ -132,6 +134,7 @@ def index_page(
         score_text=lambda report: score_text(report, speaker),
         title_of=lambda criterion: title_of(results, criterion),
         shown=SHOWN,
+        few=FEW,
     )  # fmt: skip
 
 

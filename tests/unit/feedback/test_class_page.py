@@ -121,6 +121,15 @@ def test_what_moved_tells_standing_criteria_and_why():
     assert "s777 5–7,5 – nu mai există" in text
 
 
+def test_many_changed_criteria_of_a_student_unfold():
+    standing = StandingDocument(status="graded", score=7.5, score_range=(7.5, 7.5))
+    change = CriterionMovedDocument(id="v_D", title="Vector v_D", before="review", after="full")
+    for count in (3, 4):
+        move = MovedDocument(student_id="s001", before=standing, after=standing, criteria=[change] * count)
+        text = index_page(results(*in_class(1)).model_copy(update={"moved": [move]}), "en")
+        assert (f"<summary>{count} criteria</summary>" in text) == (count == 4)
+
+
 def test_students_who_made_a_common_mistake_are_named_and_the_many_unfold():
     text = index_page(results(*in_class(30)), "en")
     before = text.split("Students</h2>")[0]
