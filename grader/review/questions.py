@@ -15,6 +15,7 @@ from grader.overlay.closeup import look
 from grader.overlay.scene import MARKS
 from grader.records import MECHANISM, Box
 from grader.review.session import OPEN, Session, Student, mark_of
+from grader.rubric import RubricFile
 
 Facts = dict[str, Any]
 """An object of JSON."""
@@ -67,21 +68,30 @@ def texts(speaker: Tongue) -> Facts:
 # Rows ---------------------------------------------------------------------------------------------
 
 
-def student_facts(student: Student, standing: Mapping[Key, Decision], speaker: Tongue) -> Facts:
-    """A student and the rows of the criteria, to be ordered by the script."""
+def label_of(student: Student, speaker: Tongue) -> str:
+    """What a student is called: id, name, position."""
     report = student.report
     label = " ".join(part for part in (report.student_id, student.name) if part)
-    if report.position is not None:
-        label = f"{label} · {speaker.gettext('position')} {report.position}"
+    if report.position is None:
+        return label
+    return f"{label} · {speaker.gettext('position')} {report.position}"
+
+
+def student_facts(
+    student: Student, standing: Mapping[Key, Decision], rubric: RubricFile, speaker: Tongue
+) -> Facts:
+    """A student and the rows of the criteria, to be ordered by the script."""
+    report = student.report
+    titles = {one.id: one.title.in_language(speaker.lang) for one in rubric.criterion}
     return {
         "key": student.key,
         "number": student.number,
-        "label": label,
+        "label": label_of(student, speaker),
         "score": f"{score_text(report, speaker)} / {speaker.trimmed(report.max_score, 2)}",
         "remark": report.comment,
         "added": report.added,
         "rows": [
-            _row(student, order, criterion, standing, speaker)
+            _row(student, criterion, standing, titles[criterion.id], order)
             for order, criterion in enumerate(report.criteria)
         ],
     }
@@ -89,18 +99,18 @@ def student_facts(student: Student, standing: Mapping[Key, Decision], speaker: T
 
 def _row(
     student: Student,
-    order: int,
     criterion: CriterionDocument,
     standing: Mapping[Key, Decision],
-    speaker: Tongue,
+    title: str,
+    order: int = 0,
 ) -> Facts:
-    del speaker
     row = standing.get((student.report.student_id, student.report.position, criterion.id))
+    drawn = "" if criterion.drawn in title else criterion.drawn
     return {
         "student": student.key,
         "criterion": criterion.id,
         "order": order,
-        "title": _title(criterion),
+        "title": Markup("{} {}").format(symbols(title), symbols(drawn)) if drawn else symbols(title),
         "verdict": criterion.verdict,
         "proposed": criterion.proposed,
         "probability": criterion.probability,
@@ -110,20 +120,14 @@ def _row(
     }
 
 
-def _title(criterion: CriterionDocument) -> Markup:
-    drawn = criterion.drawn
-    if drawn and drawn not in criterion.title:
-        return Markup("{} {}").format(symbols(criterion.title), symbols(drawn))
-    return symbols(criterion.title)
-
-
 # One question -------------------------------------------------------------------------------------
 
 
 def question_facts(session: Session, student: Student, name: str, speaker: Tongue) -> Facts:
     """One criterion of a student: what was handed in, what is right, what is proposed, where to look."""
     criterion, standing = student.criterion(name), session.standing()
-    row = _row(student, 0, criterion, standing, speaker)
+    title = next(one.title for one in session.batch.rubric.criterion if one.id == name)
+    row = _row(student, criterion, standing, title.in_language(speaker.lang))
     decision = standing.get((student.report.student_id, student.report.position, name))
     proposed = criterion.proposed if criterion.verdict == OPEN else None
     what = speaker.gettext(VERDICTS[proposed]) if proposed else ""
@@ -263,8 +267,5 @@ def pages_facts(session: Session, speaker: Tongue) -> Facts:
                 "picture": "/page?" + urlencode({"file": ref.file, "page": ref.page}),
             }
         )
-    owners = [
-        {"key": student.key, "label": student_facts(student, {}, speaker)["label"]}
-        for student in session.students
-    ]
+    owners = [{"key": student.key, "label": label_of(student, speaker)} for student in session.students]
     return {"pages": pages, "owners": owners}

@@ -107,7 +107,9 @@ class Review:
         return {
             "version": session.version,
             "keys": [student.key for student in session.students],
-            "students": [questions.student_facts(one, standing, self.speaker) for one in changed],
+            "students": [
+                questions.student_facts(one, standing, session.batch.rubric, self.speaker) for one in changed
+            ],
             "comments": session.comments(),
             "pages": len(session.waiting_pages()),
         }
