@@ -227,9 +227,7 @@ class ClassDecisions:
     def _submission(self, row: Decision, students: Sequence[StudentSubmission]) -> int | None:
         """The submission that a row is about; None with a fault where there is none."""
         own = [(index, one) for index, one in enumerate(students) if one.student_id == row.student_id]
-        fitting = [
-            index for index, one in own if row.position is None or one.position in (None, row.position)
-        ]
+        fitting = [index for index, one in own if row.position in (None, one.position) or one.variant is None]
         if len(fitting) == 1:
             return fitting[0]
         if own:
