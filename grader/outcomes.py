@@ -22,15 +22,21 @@ value_reversed        measured, expected, unit                               its
 not_measured                                                                 nothing was handed in
 optional                                                                     not handed in, not asked
 unread                reason                                                 asked for, not read
+not_drawn                                                                    no ink where it must be
 entry_refused         reason                                                 an entry cannot be used
 doubtful              confidence                                             read without confidence
-near_limit            se, off, tolerance, what                               the error straddles a limit
+near_limit            se, good_to, off, tolerance, what                      the error straddles a limit
+counted_for_you       beyond, good_to, what                                  beyond a limit by less than the
+                                                                             reading's error: counted
+not_certainly_within  beyond, good_to, what                                  within it by less: not counted
+at_stake                                                                     too little is left open
+other_variant         whose                                                  another student's data
 hand_may_miss                                                                off by no more than a careful
                                                                              hand may miss what is
                                                                              ill-conditioned, or a mistake
 readings_disagree     first, second, unit                                    scan and measurements differ
 follows               what, of                                               right from own earlier value
-                      (what: nodes, scale, vector, value; of: its name)
+                      (what: nodes, small_errors, scale, vector, value; of: its name)
 decided                                                                      a person decided otherwise
 scale_refused         text, why                                              declared, not understood
 scale_off             declared, expected, unit                               declared, contradicted
@@ -103,6 +109,8 @@ class Outcome:
     mistake : code of the mistake that explains a loss, or None
     cause : that mistake, where diagnosis found it
     shares : of the points, that `possible` gives; empty where the verdicts alone say it
+    probability : that the verdict is right; under review, that the proposed share is
+    proposed : the share of the points as read
     """
 
     criterion: str
@@ -117,6 +125,15 @@ class Outcome:
     mistake: str | None = None
     cause: "NamedMistake | None" = None
     shares: tuple[float, ...] = ()
+    probability: float = 1.0
+    proposed: float = 0.0
+
+    @property
+    def proposed_verdict(self) -> Verdict:
+        """The verdict that the proposed share gives."""
+        if self.proposed == 1.0:
+            return "follow_through" if "follow_through" in self.possible else "full"
+        return "none" if self.proposed == 0.0 else "partial"
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,6 +215,7 @@ class Score:
     Attributes
     ----------
     points : by criterion; None where under review or not judged
+    expected : the mean of the total over what the verdicts may be; None where nothing was judged
     maximum : the rubric's total; `total`, `low` and `high` are scaled to it where criteria were
         not judged
     """
@@ -207,6 +225,7 @@ class Score:
     low: float
     high: float
     maximum: float
+    expected: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

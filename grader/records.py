@@ -242,6 +242,22 @@ class InkMap:
     ink: GreyImage
     px_per_mm: float
 
+    def share_inked(self, first: complex, last: complex) -> float:
+        """The share of the middle of a segment (complex mm) that has ink on it or beside it, 0..1."""
+        along = np.linspace(0.25, 0.75, max(int(abs(last - first)), 4))
+        at = (first + along * (last - first)) * self.px_per_mm
+        beside = 1j * np.exp(1j * np.angle(last - first)) * np.arange(-BESIDE_PX, BESIDE_PX + 1)
+        places = at[:, None] + beside
+        rows = np.clip(np.rint(-places.imag).astype(int), 0, self.ink.shape[0] - 1)
+        columns = np.clip(np.rint(places.real).astype(int), 0, self.ink.shape[1] - 1)
+        return float(np.mean(self.ink[rows, columns].max(axis=1) > FAINT))
+
+
+FAINT = 25
+"""Of 255: ink map values up to this are paper."""
+BESIDE_PX = 3
+"""Half a millimetre beside a segment still belongs to it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Letters:
@@ -367,10 +383,14 @@ class Written:
 
 @dataclass(frozen=True, slots=True)
 class Unread:
-    """A node or vector that was asked for and not read, and why. False in a condition."""
+    """A node or vector that was asked for and not read, and why. False in a condition.
+
+    `is_blank`: there is no ink where it must be, in a figure that was read.
+    """
 
     name: str
     reason: str
+    is_blank: bool = False
 
     def __bool__(self) -> bool:
         return False

@@ -115,6 +115,23 @@ class HandTable(Authored):
     at_most: Annotated[float, Field(ge=1.0, allow_inf_nan=False)] = 2.5
 
 
+class DoubtTable(Authored):
+    """When a verdict stands without a person.
+
+    A verdict whose probability is at least `settle` is settled. `in_doubt` decides what lies within
+    `certain_errors` standard errors of the reading of a limit: for the `student` (it counts), by a
+    `person`, or `strict` (only what is within the limit for certain counts); these are the decision
+    rules of ISO 14253-1 and JCGM 106. Where no more than `stake` of the maximum is left open, it is
+    settled in the student's favour. `other_variant`: another student's data are left to a `person`,
+    earn `none`, or are marked as any mistake (`follow`).
+    """
+
+    settle: Annotated[float, Field(ge=0.5, le=1.0)] = 0.97
+    in_doubt: Literal["student", "person", "strict"] = "student"
+    stake: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
+    other_variant: Literal["person", "none", "follow"] = "person"
+
+
 Section = Literal["mechanism", "scales", "velocity_plan", "acceleration_plan", "angular"]
 
 
@@ -178,11 +195,12 @@ class RubricFile(Authored):
     title: Text
     tolerance: ToleranceTable = ToleranceTable()
     hand: HandTable = HandTable()
+    doubt: DoubtTable = DoubtTable()
     weights: WeightsTable = WeightsTable()
-    missing: Literal["review", "none", "not_judged"] = "review"
-    """The verdict on a criterion that is asked for and was not handed in."""
+    missing: Literal["review", "none", "not_judged"] = "none"
+    """The verdict on what is asked for and was not handed in; a blank in a table is never `review`."""
     least_confidence: Annotated[float, Field(ge=0.0, le=1.0)] = 0.9
-    """A reading less certain than this goes to a person."""
+    """What is read with less is no evidence of what follows from it."""
     follow_through: bool = True
     least_followed_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
     """No credit for what follows from an earlier answer that makes it shorter than this share of the

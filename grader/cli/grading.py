@@ -1,6 +1,7 @@
 """``planmark grade``, ``planmark demo`` and ``planmark read``."""
 
 import json
+import math
 import os
 import shutil
 from collections import Counter
@@ -156,6 +157,7 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     states = Counter(report.status for report in results.reports)
     told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
     typer.echo(f"{len(results.reports)} submissions: {told or 'none'}")
+    typer.echo(_left(results))
     page = out / "index.html"
     changes = [_change_line(change) for change in results.moved]
     _list(f"Moved since the last run: {len(results.moved)}", changes, page)
@@ -168,6 +170,24 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     _list("Decisions that are out of date, and were not applied; decide again or remove them:", stale, page)
     _list("A person must look at:", list(_waiting(results)), page)
     typer.echo(f"Look at {page}; for programs there is {out / 'results.json'}")
+
+
+SECONDS_A_LOOK = 6.0
+"""Of a person at the review's screen, for a criterion."""
+LOOKS_A_PAGE = 3
+"""A page that is nobody's, or that was not read at all, takes as long as so many criteria."""
+
+
+def _left(results: ResultsDocument) -> str:
+    """What is finished, what waits, and how long a person will look at it."""
+    finished = sum(report.status == "graded" for report in results.reports)
+    waits = waiting(results)
+    looks = sum(len(wait.criteria) or LOOKS_A_PAGE for wait in waits) + LOOKS_A_PAGE * len(results.unmatched)
+    minutes = math.ceil(looks * SECONDS_A_LOOK / 60.0)
+    left = f"{len(waits) + len(results.unmatched)}, about {minutes} min of looking" if looks else "nothing"
+    wrong = results.expected_wrong
+    sure = "" if wrong is None else f"; settled verdicts expected to be wrong: {wrong:.1f}"
+    return f"Finished: {finished}; waiting: {left}{sure}"
 
 
 def _list(title: str, lines: Sequence[str], page: Path) -> None:

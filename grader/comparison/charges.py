@@ -9,7 +9,7 @@ from grader.comparison.follow_through import NO_SPREAD, Expectation, Explain, Fo
 from grader.comparison.own import known
 from grader.comparison.scales import Scale, followed_scales, used_scales
 from grader.comparison.task import Task, TaskSegment
-from grader.comparison.verdicts import FULL, NONE, MarkRange, the_better
+from grader.comparison.verdicts import EVEN, FULL, NONE, MarkRange, the_better
 from grader.outcomes import Reason
 from grader.records import MECHANISM
 from reference.construction.steps import Given
@@ -27,12 +27,16 @@ class Against(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ComparedMark:
-    """A mark with the expectation that gave it."""
+    """A mark with the expectation that gave it.
+
+    `adds_up`: it follows from small errors, each within its tolerance, and from nothing charged.
+    """
 
     mark: MarkRange
     expected: complex
     uncertainty: EndSpread = NO_SPREAD
     is_followed: bool = False
+    adds_up: bool = False
 
 
 def new_charges(task: Task, evidence: Evidence, settled: Mapping[str, Scale], explain: Explain) -> "Charges":
@@ -93,7 +97,7 @@ class Charges:
         self.remember(segment.head, marked.mark)
         if self.is_by_length(segment):
             self.by_length.add(segment.head)
-        if marked.is_followed and marked.mark.is_full:
+        if marked.is_followed and marked.mark.is_full and not marked.adds_up:
             self.inherited.add(segment.head)
         return marked
 
@@ -132,8 +136,15 @@ class Charges:
         mark = against(expectation.vector, expectation.uncertainty, expectation.se)
         if not mark.is_better(marked.mark):
             return marked
-        reasons = () if mark.is_full else original.mark.reasons
-        return replace(original, mark=MarkRange(mark.share, mark.worst, mark.best, reasons))
+        if not mark.is_full:
+            return replace(original, mark=replace(mark, reasons=original.mark.reasons))
+        return ComparedMark(
+            the_better(mark, original.mark, Reason("follows", {"what": "small_errors", "of": ""})),
+            expectation.vector,
+            expectation.uncertainty,
+            is_followed=True,
+            adds_up=True,
+        )
 
     def the_better(self, marked: ComparedMark, expectation: Expectation, against: Against) -> ComparedMark:
         """The mark so far, or the one against an expectation where that is better."""
@@ -157,7 +168,8 @@ class Charges:
         self.charged.discard(segment.head)
         self.doubtful.add(segment.head)
         why = f"{', '.join(unknown)}, on which it hangs, was not read for certain"
-        return MarkRange(mark.share, mark.worst, FULL, (*mark.reasons, Reason("unread", {"reason": why})))
+        unread = Reason("unread", {"reason": why})
+        return replace(mark, best=FULL, reasons=(*mark.reasons, unread), sure=min(mark.sure, EVEN))
 
     def unknown_upstream(self, segment: TaskSegment) -> tuple[str, ...]:
         """The nodes that a vector's head is made from and that were not read, of figures that were."""
@@ -215,10 +227,10 @@ class Charges:
         if not wrong or (wrong & (self.charged | self.inherited) and not has_doubtful_scale):
             return mark
         if wrong & self.doubtful:
-            return MarkRange(NONE, NONE, mark.best, mark.reasons)
+            return MarkRange(NONE, NONE, mark.best, mark.reasons, min(mark.sure, EVEN))
         if mark.is_full:
             self.shown.update(wrong)
-        return MarkRange(NONE, NONE, NONE, mark.reasons)
+        return MarkRange(NONE, NONE, NONE, mark.reasons, mark.sure)
 
     def remember(self, name: str, mark: MarkRange) -> None:
         """Record whether a node or scale has cost something, is in doubt, or is right."""

@@ -11,7 +11,7 @@ import cmath
 import math
 import statistics
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from grader.comparison import verdicts
 from grader.comparison.charges import Against, Charges, ComparedMark, new_charges
@@ -22,12 +22,11 @@ from grader.comparison.task import Task, TaskSegment, unit_of
 from grader.comparison.verdicts import (
     ALL_RIGHT,
     FULL,
-    NONE,
     MarkRange,
+    by_rule,
     left_open,
     mark_value,
     mark_vector,
-    open_between,
     the_better,
     the_worse,
     tolerances,
@@ -178,10 +177,11 @@ def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> 
 def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> Against:
     """A function that marks a drawn vector against an expectation, by the rubric and the sheet's cells."""
     rubric = charges.task.rubric
-    table, least = rubric.tolerance_of(criterion), rubric.least_confidence
+    table, least, rule = rubric.tolerance_of(criterion), rubric.least_confidence, rubric.doubt.in_doubt
     with_direction = criterion.direction and drawn.direction_rad is not None
     is_read = drawn is charges.evidence.drawn.get(criterion.name)
     written = charges.evidence.written.get(criterion.name) if is_read else None
+    confidence, remarks = held_against_cells(drawn, written, table, least)
 
     def against(
         expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
@@ -189,16 +189,17 @@ def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
         size = abs(expected)
         plain = tolerances(table, size, with_direction=with_direction)
         if uncertainty is NO_SPREAD:
-            mark = mark_vector(drawn, expected, plain, table, se)
+            mark = by_rule(mark_vector(drawn, expected, plain, table, se), rule)
         else:
-            mark = mark_vector(
-                drawn, expected, widened(plain, size, uncertainty, rubric.hand.at_most), table, se
-            )
+            allowed = widened(plain, size, uncertainty, rubric.hand.at_most)
+            mark = by_rule(mark_vector(drawn, expected, allowed, table, se), rule)
             if not mark.is_full:
-                by_hand = mark_vector(drawn, expected, widened(plain, size, uncertainty), table, se)
+                by_hand = by_rule(
+                    mark_vector(drawn, expected, widened(plain, size, uncertainty), table, se), rule
+                )
                 mark = left_open(mark, ALL_RIGHT if _is_boundless(uncertainty, size) else by_hand)
-        mark = compared_with_cells(mark, drawn, written, table, least)
-        return verdicts.with_confidence(mark, drawn.confidence, least)
+        mark = verdicts.with_confidence(mark, confidence, rubric.doubt.settle)
+        return mark if mark.is_full else replace(mark, reasons=(*remarks, *mark.reasons))
 
     return against
 
@@ -224,29 +225,31 @@ def _full_tolerance(
     return widened(plain, size, marked.uncertainty, charges.task.rubric.hand.at_most)
 
 
-def compared_with_cells(
-    mark: MarkRange,
-    drawn: DrawnVector,
-    written: tuple[float, float] | None,
-    tolerance: ToleranceTable,
-    least: float,
-) -> MarkRange:
-    """The mark, open where the drawn length and the one written into the sheet's cells contradict.
+MISWRITTEN, BY_CHANCE = 0.1, 0.05
+"""Probabilities that a length in the cells is not that of the vector drawn (misread, measured to another
+node), and that it agrees with what was read although that is another stroke."""
 
-    Either of them may be misread, or the student has measured something else. A ruler's error is no
-    more than the tolerance of a length.
+
+def held_against_cells(
+    drawn: DrawnVector, written: tuple[float, float] | None, tolerance: ToleranceTable, least: float
+) -> tuple[float, tuple[Reason, ...]]:
+    """The confidence in a drawn vector beside the length written into the sheet's cells, and what to say.
+
+    A ruler's error is no more than the tolerance of a length.
 
     Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
     `least` the probability from which it counts.
     """
     if written is None or written[1] < least:
-        return mark
+        return drawn.confidence, ()
     length_mm = written[0]
     allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
-    if abs(drawn.length_mm - length_mm) <= allowed:
-        return mark
+    agrees = abs(drawn.length_mm - length_mm) <= allowed
+    if_right, if_misread = (1.0 - MISWRITTEN, BY_CHANCE) if agrees else (MISWRITTEN, 1.0 - BY_CHANCE)
+    right = drawn.confidence * if_right
+    confidence = right / (right + (1.0 - drawn.confidence) * if_misread)
     params: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
-    return open_between(NONE, FULL, mark, Reason("written_disagrees", params))
+    return confidence, () if agrees else (Reason("written_disagrees", params),)
 
 
 # Computed values -----------------------------------------------------------------------------------
@@ -380,16 +383,23 @@ def _is_charged(charges: Charges, scale: str) -> bool:
 # What was not handed in, or not read ---------------------------------------------------------------
 
 
+LEAST_BLANK_MM = 5.0
+"""A shorter vector may be hidden by the marks of its ends."""
+NOT_DRAWN = 0.98
+"""That a vector was not drawn, where both its ends were read for certain and no ink lies between them."""
+
+
 def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> Outcome:
     """The outcome of a criterion for which nothing was handed in or read."""
+    rubric, evidence = charges.task.rubric, charges.evidence
     unread = _why_unread(charges, criterion)
     reason = Reason("not_measured") if unread is None else Reason("unread", {"reason": unread})
     if criterion.optional:
         return verdicts.unjudged(criterion, "not_judged", (Reason("optional"), reason), expected=expected)
-    if criterion.link is not None and not charges.evidence.has_sketch:
+    if criterion.link is not None and not evidence.has_sketch:
         # Links are drawn, not measured: without a sketch that was read nothing is asked of them.
         return verdicts.unjudged(criterion, "not_judged", (reason,), expected=expected)
-    least, length = charges.task.rubric.tolerance_of(criterion).least_mm, expected.length_mm
+    least, length = rubric.tolerance_of(criterion).least_mm, expected.length_mm
     if length is not None and length < least:
         short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
         return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
@@ -397,8 +407,22 @@ def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> O
     if segment is not None:
         # Later criteria may depend on what was not read.
         charges.doubtful.add(segment.head)
-    verdict = charges.task.rubric.missing if unread is None else "review"
-    return verdicts.unjudged(criterion, verdict, (reason,), expected=expected)
+    if not evidence.has_sheets:
+        blank = "none" if rubric.missing == "review" else rubric.missing
+        return verdicts.unjudged(criterion, blank, (reason,), expected=expected)
+    if is_not_drawn(charges.task, evidence, criterion.name, length or 0.0):
+        return verdicts.unjudged(
+            criterion, rubric.missing, (Reason("not_drawn"),), expected=expected, sure=NOT_DRAWN
+        )
+    return verdicts.unjudged(criterion, "review", (reason,), expected=expected)
+
+
+def is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -> bool:
+    """Whether a vector of this expected length is not on the sheet, though both its ends were read."""
+    vector = task.construction.vectors.get(name)
+    if vector is None or name not in evidence.blank or length_mm < LEAST_BLANK_MM:
+        return False
+    return {vector.tail, vector.head} <= {*evidence.nodes, *task.construction.poles.values()}
 
 
 def _why_unread(charges: Charges, criterion: CriterionTable) -> str | None:

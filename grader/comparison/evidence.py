@@ -61,6 +61,7 @@ class Evidence:
     sketches : by plan, the mechanism's nodes as drawn beside it
     yardstick_mm : drawn length of the task's yardstick (the crank) and its standard error, or None
     unread : why something asked for was not read, by name
+    blank : vectors without ink where they must be
     has_sheets : whether any sheet was handed in
     has_sketch : whether the mechanism was read on any
     refused : what was entered by hand for a vector, angular quantity or scale and cannot be used, by name
@@ -79,6 +80,7 @@ class Evidence:
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
     has_sketch: bool = False
     refused: Mapping[str, str] = field(default_factory=dict)
+    blank: frozenset[str] = frozenset()
 
     def vector(self, name: str) -> DrawnVector | None:
         """The vector as read, else as measured."""
@@ -105,6 +107,9 @@ def gather(task: Task, submission: Submission) -> Evidence:
         sketches=sheets.sketches,
         has_sketch=any(MECHANISM in reading.figures for reading in submission.readings),
         refused=_refused(submission.measured),
+        blank=frozenset(
+            gap.name for reading in submission.readings for gap in reading.unread if gap.is_blank
+        ),
     )
 
 
@@ -122,7 +127,9 @@ class _Sheets:
     def take(self, reading: Reading) -> None:
         """Add one sheet."""
         sketch = reading.figures.get(MECHANISM)
-        turn, se_turn = turn_of(self.task, sketch) if sketch else (0.0, 0.0)
+        turn, se_turn = turn_of(self.task, sketch) if sketch else NOT_TURNED
+        if not _agrees_with_plans(self.task, reading, turn):
+            turn, se_turn = NOT_TURNED
         joints: dict[str, complex] = {}
         if sketch:
             self.lengths.extend(_yardstick(self.task, sketch))
@@ -175,7 +182,8 @@ def _links(task: Task, sketch: Figure, turn: float, se_turn: float) -> dict[str,
         length, along = abs(other.at - one.at), cmath.phase(other.at - one.at)
         se_mm = math.hypot(one.se_mm, other.se_mm)
         se_deg = math.degrees(math.hypot(se_mm / length, se_turn)) if length > se_mm else 180.0
-        confidence = min(one.confidence, other.confidence)
+        # Half of the doubt in a joint is about its place, and that is in its standard error.
+        confidence = 0.5 + min(one.confidence, other.confidence) / 2.0
         found[name] = DrawnVector(length, se_mm, along - turn, se_deg, confidence, turn)
     return found
 
@@ -252,6 +260,9 @@ def _nodes_from(task: Task, measured: Mapping[str, DrawnVector]) -> dict[str, co
 # The turn of a sketch on its sheet ---------------------------------------------------------------
 
 
+NOT_TURNED = (0.0, math.radians(1.0))
+"""Where no sketch tells the turn: people draw along the frame, to about a degree."""
+FAR_TURNED_RAD = math.radians(10.0)
 FIT_MM = 1.0
 """Root mean square misfit up to which the drawn mechanism is the right one, turned and scaled."""
 LEAST_GROUND_MM = 20.0
@@ -266,7 +277,7 @@ def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
     """How far the mechanism is turned on its sheet, radians counter-clockwise, and its standard error.
 
     It is fitted to the whole mechanism where that is right, else to what is right without one joint and
-    those drawn from it, else to the pivots alone, which no mistake moves; zero where there are none.
+    those drawn from it, else to the pivots alone, which no mistake moves; `NOT_TURNED` without any.
     """
     exact = task.nodes({"kL": 1.0, "kv": 1.0, "ka": 1.0})
     sure = {
@@ -277,9 +288,32 @@ def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
     for nodes in _subsets(task, sure):
         fit = _fit(nodes, exact)
         if fit is not None and fit[2] <= FIT_MM:
-            return (0.0, fit[1]) if _is_drafting_error(task, nodes, fit[0]) else (fit[0], fit[1])
+            # A turn that drafting errors may have made may as well be one.
+            is_error = _is_drafting_error(task, nodes, fit[0])
+            return (0.0, math.hypot(fit[1], fit[0])) if is_error else (fit[0], fit[1])
     ground = _fit({name: node for name, node in sure.items() if name in task.ground}, exact)
-    return (ground[0], ground[1]) if ground is not None else (0.0, 0.0)
+    return (ground[0], ground[1]) if ground is not None else NOT_TURNED
+
+
+def _agrees_with_plans(task: Task, reading: Reading, turn: float) -> bool:
+    """Whether as many vectors of the sheet's plans fit the sketch's turn as fit none.
+
+    People draw plans beside the sketch as it lies. One that looks turned among plans that are not has
+    been misread.
+    """
+    if abs(turn) <= FAR_TURNED_RAD:
+        return True
+    off = [
+        cmath.rect(1.0, math.radians(drawn.direction_deg) - cmath.phase(task.real[name]))
+        for figure in reading.figures.values()
+        for name, drawn in figure.vectors.items()
+        if drawn.direction_deg is not None and task.real.get(name)
+    ]
+    turned, upright = (
+        sum(abs(cmath.phase(one * cmath.rect(1.0, -by))) < abs(turn) / 4.0 for one in off)
+        for by in (turn, 0.0)
+    )
+    return turned >= upright
 
 
 def _is_drafting_error(task: Task, nodes: Iterable[str], turn: float) -> bool:

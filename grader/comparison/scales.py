@@ -8,7 +8,7 @@ from typing import Literal, cast
 
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
 from grader.comparison.task import Task, Yardstick, unit_of
-from grader.comparison.verdicts import FULL, NONE, Limit, MarkRange, mark
+from grader.comparison.verdicts import EVEN, FULL, NONE, Limit, MarkRange, by_rule, mark, with_confidence
 from grader.inputs.scale_text import (
     EXAMPLES,
     SURE,
@@ -75,7 +75,7 @@ def _settled_scale(
     if isinstance(parsed, Refused):
         used = UsedScale(text, None, rule, assumed=True, refused=parsed.why)
         reason = Reason("scale_refused", {"text": text or "", "why": parsed.why})
-        open_mark = MarkRange(NONE, NONE, FULL, (reason,))
+        open_mark = MarkRange(NONE, NONE, FULL, (reason,), EVEN)
         return Scale(used, _contradiction(task, evidence, name, rule), open_mark)
     if isinstance(parsed, ByRule):
         value = parsed.per_mm({"omega": task.omega or 0.0, **followed_scales(before)})
@@ -190,9 +190,14 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
     is_rule = abs(scale.used - rule) <= tolerance.scale_relative * rule
     shown = _evidence_of(task, evidence, name)
     if shown is None:
+        doubtful = _evidence_of(task, evidence, name, however_doubtful=True)
+        if doubtful is not None and _is_confirmed(task, evidence, name, scale.used, doubtful):
+            drawn = evidence.drawn[f"{name[1]}_{task.pin}"]
+            return Scale(scale, None, with_confidence(mark([]), drawn.confidence, task.rubric.doubt.settle))
         if _is_unseen(task, evidence, name, scale.used):
             why = f"{name[1]}_{task.pin}, which tells it, was not read for certain"
-            return Scale(scale, None, MarkRange(NONE, NONE, FULL, (Reason("unread", {"reason": why}),)))
+            unread = Reason("unread", {"reason": why})
+            return Scale(scale, None, MarkRange(NONE, NONE, FULL, (unread,), EVEN))
         return Scale(scale, None, mark([]) if is_rule else None)
     other = _followed_instead(task, evidence, name, scale.used, None if is_rule else rule)
     if other is None:
@@ -208,7 +213,7 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
         table=tolerance,
         reason=Reason("scale_off", params),
     )
-    return Scale(scale, other, mark([limit]))
+    return Scale(scale, other, by_rule(mark([limit]), task.rubric.doubt.in_doubt))
 
 
 def _is_unseen(task: Task, evidence: Evidence, name: str, scale: float) -> bool:

@@ -40,6 +40,11 @@ HINTS: dict[str, str] = {
     "entry_refused": N_("An entry that it rests on cannot be used: a person must look."),
     "doubtful": N_("It was read with too little certainty."),
     "near_limit": N_("It lies so near the limit of the tolerance that the scan cannot decide."),
+    "counted_for_you": N_("It is beyond the limit by no more than the scan can tell: counted for you."),
+    "not_certainly_within": N_("It is not certainly within the limit, as far as the scan can tell."),
+    "at_stake": N_("What is open here is worth very little: counted for you."),
+    "other_variant": N_("The drawing follows another student's data."),
+    "not_drawn": N_("It is not drawn."),
     "hand_may_miss": N_(
         "Its lines meet at so small an angle that a careful hand may be off by as much: a person must look."
     ),
@@ -80,6 +85,14 @@ FULL: dict[str, str] = {
     "near_limit": N_(
         "It lies so near the limit of the tolerance that the scan cannot decide (standard error %(se)s)."
     ),
+    "counted_for_you": N_(
+        "It is %(beyond)s beyond the limit; the scan is good to %(good_to)s: counted for you."
+    ),
+    "not_certainly_within": N_(
+        "It is %(beyond)s within the limit; the scan is good to %(good_to)s:"
+        " only what is certainly within counts."
+    ),
+    "other_variant": N_("The drawing follows another student's data (%(whose)s)."),
     "readings_disagree": N_("The drawing gives %(first)s, the entered measurement %(second)s."),
     "written_disagrees": N_("Drawn are %(drawn)s, written on the sheet %(written)s: a person must look."),
     "scale_refused": N_("The declared scale “%(text)s” could not be understood: %(why)s."),
@@ -91,6 +104,10 @@ FULL: dict[str, str] = {
 FOLLOWS: dict[str, str] = {
     "nodes": N_(
         "It follows rightly from your own earlier points; the earlier mistake is charged once, there."
+    ),
+    "small_errors": N_(
+        "It follows rightly from your own earlier points: their small errors, each within its tolerance,"
+        " add up here."
     ),
     "scale": N_("It is right at the scale that you used; the scale is charged once, there."),
     "vector": N_("It follows rightly from your own %(of)s; that mistake is charged once, there."),
@@ -139,7 +156,7 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     if outcome.verdict == "review" and "scale_assumed" in codes and by_scale:
         return [Reason(UNDECIDED)]
     if outcome.verdict == "follow_through" and "follows" in codes:
-        return [reason for reason in outcome.reasons if reason.code == "follows"]
+        return [one for one in outcome.reasons if one.code in {"follows", "counted_for_you", "at_stake"}]
     needless = {"right"} if codes - {"right"} else set()
     if level != "full" and codes & {"not_measured", "unread"}:
         # How short it should be is an answer, where nothing was drawn.
@@ -303,6 +320,10 @@ REASONS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (
             r"(?P<nodes>.+), on which it hangs, was not read for certain",
             N_("%(nodes)s, on which it hangs, was not read for certain"),
+        ),
+        (
+            r"nothing is drawn between (?P<start>\S+) and (?P<end>\S+)",
+            N_("nothing is drawn between %(start)s and %(end)s"),
         ),
         (r"(?P<name>\S+) was not found on the sheets", N_("%(name)s was not found on the sheets")),
         (r"no mechanism sketch was found on the sheets", N_("no mechanism sketch was found on the sheets")),

@@ -51,6 +51,7 @@ PRINTED = "feedback.pdf"
 """Earlier versions wrote it; an old one is removed, it may show more than the page does now."""
 
 WAITING: dict[str, str] = {
+    "other_variant": N_("drawn with another student's data"),
     "entry_refused": N_("an entry that it rests on cannot be used"),
     "doubtful": N_("read with too little certainty"),
     "near_limit": N_("so near the limit of the tolerance that the scan cannot decide"),

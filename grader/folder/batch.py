@@ -165,6 +165,7 @@ def _graded(
         moved=changes_since(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
         alike=similar_of_run(batch.assignment, jobs, reports, notes / "readings"),
         stale=sorted(decisions.stale, key=lambda decision: decision.line),
+        expected_wrong=_expected_wrong(reports),
     )
     _write_results(batch, results, students)
     note_inputs(notes, inputs)
@@ -198,6 +199,12 @@ def noted_batch(folder: Path) -> Batch:
         assignment, rubric_of(assignment), note.folder, note.out, note.roster, note.pages_per_student,
         lang=note.lang, level=note.level, with_ghosts=note.with_ghosts, decisions=note.decisions,
     )  # fmt: skip
+
+
+def _expected_wrong(reports: Sequence[ReportDocument]) -> float:
+    """How many of all settled verdicts are wrong in the mean, by their probabilities."""
+    settled = [one for report in reports for one in report.criteria if one.verdict != "review"]
+    return round(sum(1.0 - one.probability for one in settled if one.probability is not None), 3)
 
 
 def _nothing(batch: Batch) -> CallError:

@@ -268,7 +268,8 @@ def named(explanations: Sequence[Replay], construction: Construction, lost: Lost
         rivals = shares.rivals(key, {_key(one) for one in best.made})
         together = share + sum(shares.instead(key, _key(one)) for one in rivals)
         is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
-        if explains[mistake] and is_sure and not _is_slight(mistake, best):
+        is_shown = explains[mistake] or mistake.code == "other_variant"
+        if is_shown and is_sure and not _is_slight(mistake, best):
             others = tuple(_record(one, construction, (), shares.instead(key, _key(one))) for one in rivals)
             mistakes.append(_record(mistake, construction, tuple(explains[mistake]), share, others))
     return tuple(mistakes)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.comparison.criteria import Comparison, compare
+from grader.comparison.criteria import NOT_DRAWN, Comparison, compare
 from grader.comparison.evidence import Evidence, Submission
 from grader.comparison.follow_through import ReplayResult
 from grader.comparison.own import PlanBasis
@@ -14,22 +14,21 @@ from grader.comparison.scales import Scale
 from grader.comparison.task import Task
 from grader.documents import Verdict
 from grader.marking.diagnosis import LEAST_CONFIDENCE, Case, Lost, drawn_instead, explained, named
+from grader.marking.settling import at_stake, charged_where_made, of_another
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
 from grader.rubric import CriterionTable, RubricFile
+from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Coriolis, Normal, Parameters
 from reference.construction.mistakes import Drawing, Mistake
 from reference.construction.steps import Given
 from reference.construction.uncertainty import trace
 from reference.geometry import ComplexArray
+from reference.plan import exact_plan
 from reference.replay.explanations import Covariance, Observation, Observations
 
 CHARGED = frozenset({"none", "partial"})
 LOST = CHARGED | {"follow_through", "review"}
 """Verdicts for which the diagnosis seeks a cause, also where a person has still to decide."""
-LEAST_LEFT_OUT_MM = 5.0
-"""A shorter vector may be hidden by the marks of its ends."""
-LEFT_OUT = 0.9
-"""Confidence that it was not drawn: of 368 vectors between two ends read for certain, none was missed."""
 
 
 def judge(task: Task, submission: Submission) -> Judgement:
@@ -37,7 +36,9 @@ def judge(task: Task, submission: Submission) -> Judgement:
     comparison = compare(task, submission, explain)
     mistakes = _named(task, comparison)
     mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes), *_not_drawn(task, comparison))
-    outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in comparison.outcomes)
+    outcomes = charged_where_made(task, comparison.outcomes, mistakes)
+    outcomes = at_stake(task.rubric, of_another(task.rubric, outcomes, mistakes))
+    outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
 
 
@@ -48,10 +49,43 @@ def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
     by_vector = {one.name: one.criterion for one in lost if one.name in vectors}
     by_scale = {one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED}
     is_other_scale = any(scale.other and not scale.used.assumed for scale in scales.values())
-    if not by_vector and not is_other_scale:
+    if not by_vector and not is_other_scale and not _is_nearer_to_another(task, comparison):
         return ()
     explanation = comparison.explanation or explain(task, comparison.evidence, scales)
     return named(explanation.explanations, task.construction, Lost(by_vector, by_scale))
+
+
+CLEARLY_NEARER = 6.0
+"""By so much the squared residuals, in halves of a tolerance, must fall with another student's data before
+the whole drawing is searched for them."""
+
+
+def _is_nearer_to_another(task: Task, comparison: Comparison) -> bool:
+    """Whether the drawing fits another variant's exact vectors better than its own, however little is off.
+
+    Neighbouring variants may differ by less than the tolerances.
+    """
+    evidence, vectors = comparison.evidence, task.construction.vectors
+    own = {name: drawn for name in vectors if (drawn := evidence.vector(name)) is not None}
+    if not own or len(task.assignment.variants()) < 2:
+        return False
+    variants = task.assignment.variants()
+    exact = task.cached(("everybody",), lambda: _everybody(task))
+    misfits = np.zeros(len(variants))
+    for name, drawn in own.items():
+        scale, at = comparison.scales[vectors[name].scale], drawn.as_complex
+        right = exact[name] / (exact[vectors[name].scale] if scale.assumed else scale.used)
+        residual = np.abs(right) - drawn.length_mm if at is None else right - at
+        misfits += np.abs(2.0 * residual / task.rubric.tolerance_of(name).length_at(drawn.length_mm)) ** 2
+    return bool(misfits[variants.index(task.variant)] - misfits.min() > CLEARLY_NEARER)
+
+
+def _everybody(task: Task) -> Mapping[str, ComplexArray]:
+    """The exact vectors (SI) and the rule's scales of all variants, an array each."""
+    accelerations = task.rubric.needs_accelerations
+    plan = exact_plan(task.assignment, task.assignment.variants(), accelerations=accelerations)
+    scales = {name: np.asarray(getattr(plan.scales, name), np.complex128) for name in SCALE_NAMES}
+    return {**plan.vectors_si, **scales}
 
 
 def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:
@@ -75,21 +109,15 @@ def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMi
 
 
 def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
-    """Vectors that are asked for, long enough, and not on the sheet although both their ends were read.
-
-    Missing measurements are no evidence: nobody need measure everything.
-    """
-    evidence, construction = comparison.evidence, task.construction
-    known = {*evidence.nodes, *construction.poles.values()} if evidence.has_sheets else set()
+    """Vectors that are asked for and not on the sheet, or left blank in a table of measurements."""
+    evidence, vectors = comparison.evidence, task.construction.vectors
     found = []
     for one in comparison.outcomes:
-        vector = construction.vectors.get(one.name)
-        if vector is None or one.verdict not in {"none", "review"} or evidence.vector(one.name) is not None:
-            continue
-        is_left_out = {vector.tail, vector.head} <= known
-        if is_left_out and (one.expected.length_mm or 0.0) >= LEAST_LEFT_OUT_MM:
-            mistake = Mistake("vector_missing", one.name)
-            found.append(NamedMistake(mistake, (one.criterion,), LEFT_OUT))
+        codes = {reason.code for reason in one.reasons}
+        is_left_blank = "not_measured" in codes and not evidence.has_sheets and one.verdict == "none"
+        if one.name in vectors and ("not_drawn" in codes or is_left_blank):
+            sure = NOT_DRAWN if evidence.has_sheets else 1.0
+            found.append(NamedMistake(Mistake("vector_missing", one.name), (one.criterion,), sure))
     return found
 
 
@@ -128,18 +156,19 @@ def score(rubric: RubricFile, outcomes: Sequence[Outcome]) -> Score:
         total.whole += worth[criterion.id]
         points[criterion.id] = None
         if outcome.verdict != "not_judged":
-            given = total.add(worth[criterion.id], *_shares(rubric, criterion, outcome))
+            worst, best = _shares(rubric, criterion, outcome)
+            given = total.add(worth[criterion.id], worst, best, _expected_share(outcome, worst, best))
             points[criterion.id] = None if outcome.verdict == "review" else given
     maximum = rubric.max_score
     judged = sum(total.in_full for total in totals.values())
     if judged == 0.0:
         return Score(points, None, 0.0, maximum, maximum)
-    low, high = (
+    low, high, expected = (
         round(sum(ends) * maximum / judged, DECIMALS)
         for ends in zip(*(total.ends for total in totals.values()), strict=True)
     )
     is_open = any(outcome.verdict == "review" for outcome in outcomes)
-    return Score(points, None if is_open else low, low, high, maximum)
+    return Score(points, None if is_open else low, low, high, maximum, expected)
 
 
 def share_of(rubric: RubricFile, criterion: CriterionTable, verdict: Verdict) -> float:
@@ -162,19 +191,30 @@ def _shares(rubric: RubricFile, criterion: CriterionTable, outcome: Outcome) -> 
     return worst, best
 
 
+def _expected_share(outcome: Outcome, worst: float, best: float) -> float:
+    """The mean share of the points over what the verdict may be."""
+    is_open = outcome.verdict == "review"
+    proposed = outcome.proposed if is_open else worst
+    low, high = (worst, best) if is_open else (0.0, 1.0)
+    otherwise = min(max(low + high - proposed, 0.0), 1.0)
+    return outcome.probability * proposed + (1.0 - outcome.probability) * otherwise
+
+
 @dataclass(slots=True)
 class _Total:
     """The points of a section with a weight of its own, or of all that have none."""
 
     low: float = 0.0
     high: float = 0.0
+    expected: float = 0.0
     judged: float = 0.0
     whole: float = 0.0
     is_weighted: bool = False
 
-    def add(self, worth: float, worst: float, best: float) -> float:
+    def add(self, worth: float, worst: float, best: float, expected: float) -> float:
         """Count one criterion; returns its points at worst."""
         self.low, self.high = self.low + worst * worth, self.high + best * worth
+        self.expected += expected * worth
         self.judged += worth
         return round(worst * worth, DECIMALS)
 
@@ -189,9 +229,9 @@ class _Total:
         return self.judged * self.scale
 
     @property
-    def ends(self) -> tuple[float, float]:
-        """The points it gives at worst and at best."""
-        return self.low * self.scale, self.high * self.scale
+    def ends(self) -> tuple[float, float, float]:
+        """The points it gives at worst, at best, and in the mean."""
+        return self.low * self.scale, self.high * self.scale, self.expected * self.scale
 
 
 # What was drawn, for the diagnosis -----------------------------------------------------------------

@@ -82,6 +82,7 @@ def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
             "score": judgement.score.total,
             "score_range": (judgement.score.low, judgement.score.high),
             "max_score": judgement.score.maximum,
+            "expected_score": judgement.score.expected,
             "criteria": [
                 {
                     **_criterion(outcome),
@@ -156,6 +157,8 @@ def _criterion(outcome: Outcome) -> dict[str, object]:
         "expected": outcome.expected,
         "tolerance": outcome.tolerance,
         "confidence": outcome.confidence,
+        "probability": None if outcome.verdict == "not_judged" else outcome.probability,
+        "proposed": outcome.proposed_verdict if outcome.verdict == "review" else None,
         "mistake": outcome.mistake,
         "reasons": [reason.code for reason in outcome.reasons],
     }

@@ -46,8 +46,8 @@ def checked_values(judgement: Judgement, level: Level) -> tuple[Checked, ...]:
 
 
 def likely_mistakes(judgement: Judgement, level: Level) -> tuple[NamedMistake, ...]:
-    """The mistakes that explain what is off, at level `full`."""
-    return judgement.mistakes if level == "full" else ()
+    """The mistakes that explain what is off, at level `full`; what was left out is no mistake of a check."""
+    return tuple(one for one in judgement.mistakes if level == "full" and one.code != "vector_missing")
 
 
 def is_all_right(checked: tuple[Checked, ...]) -> bool:

@@ -21,6 +21,7 @@ from grader.records import (
     Figure,
     FloatArray,
     Ink,
+    InkMap,
     Reading,
     ReadNode,
     ReadVector,
@@ -225,7 +226,7 @@ def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collectio
         if page.sketch is not None:
             figures[MECHANISM] = figure_of_sketch(page.sketch)
         for figure, plan in page.plans.items():
-            figures[figure], missing = figure_of_plan(plan, page.sheet.scale_se)
+            figures[figure], missing = figure_of_plan(plan, page.sheet.scale_se, page.ink.where)
             unread.extend(gap for gap in missing if not wanted or gap.name in wanted)
         readings.append(Reading(figures, tuple(unread)))
     named = {gap.name for reading in readings for gap in reading.unread}
@@ -249,6 +250,8 @@ def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
 
 # Named nodes and vectors with their errors ---------------------------------------------------------
 
+BLANK = 0.25
+"""Share of a vector's length that other lines may ink where the vector itself is not drawn."""
 LEAST_VECTOR_MM = 2.0
 """A shorter vector is read from its nodes, with or without a stroke."""
 
@@ -261,10 +264,10 @@ def figure_of_sketch(sketch: SketchReading) -> Figure:
     return Figure(nodes, {})
 
 
-def figure_of_plan(plan: PlanReading, scale_se: float) -> tuple[Figure, list[Unread]]:
+def figure_of_plan(plan: PlanReading, scale_se: float, where: InkMap) -> tuple[Figure, list[Unread]]:
     """Nodes and vectors of a plan; what is not drawn, with the reason.
 
-    Arguments: `scale_se` is the sheet's relative standard error of lengths.
+    Arguments: `scale_se` is the sheet's relative standard error of lengths, `where` its ink.
     """
     fit, names = plan.fit(), plan.assignment.expected.names
     named = _named(plan, fit)
@@ -274,7 +277,7 @@ def figure_of_plan(plan: PlanReading, scale_se: float) -> tuple[Figure, list[Unr
         for row, name in enumerate(names)
         if name not in absent and np.isfinite(fit.at[row])
     }
-    vectors, unread = _vectors(plan, fit, named, scale_se)
+    vectors, unread = _vectors(plan, fit, named, scale_se, where)
     unread.extend(Unread(name, reason) for name, reason in absent.items())
     construction = plan.hypothesis.drawing.construction
     for vector in construction.vectors_of(construction.figure_of(names[0])):
@@ -307,7 +310,7 @@ def _node(fit: NodeFit, index: int, confidence: float) -> ReadNode:
 
 
 def _vectors(
-    plan: PlanReading, fit: NodeFit, named: FloatArray, scale_se: float
+    plan: PlanReading, fit: NodeFit, named: FloatArray, scale_se: float, where: InkMap
 ) -> tuple[dict[str, ReadVector], list[Unread]]:
     expected = plan.assignment.expected
     vectors: dict[str, ReadVector] = {}
@@ -317,7 +320,11 @@ def _vectors(
         row = int(plan.assignment.stroke[index])
         if row < 0 and abs(span) > LEAST_VECTOR_MM:
             ends = f"{expected.names[edge.tail]} and {expected.names[edge.head]}"
-            unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
+            inked = where.share_inked(complex(fit.at[edge.tail]), complex(fit.at[edge.head]))
+            if inked <= BLANK:
+                unread.append(Unread(edge.name, f"nothing is drawn between {ends}", is_blank=True))
+            else:
+                unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
             continue
         cov = _difference_cov(fit, edge, span, scale_se)
         signs = Signs(

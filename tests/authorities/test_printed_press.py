@@ -6,6 +6,7 @@ from grader.comparison.evidence import Submission
 from grader.marking.mark import judge
 from grader.records import Figure, Reading, ReadVector
 from tests.hands import task_for
+from tests.unit.comparison.rubrics import with_rubric
 
 DECLARED = {"kL": "0.3 m / 45 mm", "kv": "0.036 (m/s)/mm", "ka": "0.108 (m/s2)/mm"}
 SEGMENTS = {
@@ -36,7 +37,9 @@ def entered(position, **changed):
 @pytest.mark.parametrize("declared", [DECLARED, {}], ids=["declared", "not declared"])
 def test_the_printed_table_has_full_marks(position, declared):
     submission = Submission(measured=entered(position), values=VALUES[position], declared=declared)
-    judgement = judge(task_for("press", position=position), submission)
+    # The table has none of the tangential components, and no more of the plan than it prints.
+    task = with_rubric(task_for("press", position=position), missing="not_judged")
+    judgement = judge(task, submission)
     asked = {one.name for one in judgement.outcomes} & SEGMENTS[position].keys()
     marked = {one.name: one.verdict for one in judgement.outcomes if one.name in asked}
     assert set(marked.values()) == {"full"}

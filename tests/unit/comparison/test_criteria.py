@@ -13,7 +13,7 @@ from grader.comparison.follow_through import ReplayResult
 from grader.comparison.own import PlanBasis
 from grader.comparison.task import task_of
 from grader.records import Figure, Reading, ReadNode, ReadVector, Unread
-from grader.rubric import Band, CriterionTable, ToleranceTable, load_rubric
+from grader.rubric import Band, CriterionTable, DoubtTable, ToleranceTable, load_rubric
 from reference.authored.assignment import load_assignment
 from reference.construction.mistakes import Mistake
 from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
@@ -180,13 +180,29 @@ def test_what_a_careful_hand_may_miss_beyond_that_goes_to_a_person():
 # What standard errors leave open ------------------------------------------------------------------
 
 
-def test_an_error_that_straddles_the_limit_goes_to_a_person():
-    reading = measured(BARE)
-    longer = changed(reading, "v_A", length_mm=61.1, se_mm=0.1)
-    outcome = outcome_of(compare(BARE, Submission(measured=longer)), "v_A")
-    assert outcome.verdict == "review"
-    assert outcome.possible == ("partial", "full")
-    assert "near_limit" in codes(outcome)
+BEYOND, WITHIN = 0.06, -0.06
+"""Of a limit, by less than 1.645 standard errors of 0.1 mm."""
+
+
+@pytest.mark.parametrize(
+    ("in_doubt", "off_mm", "verdict", "said"),
+    [
+        ("student", BEYOND, "full", "counted_for_you"),
+        ("student", WITHIN, "full", None),
+        ("person", BEYOND, "review", "near_limit"),
+        ("person", WITHIN, "review", "near_limit"),
+        ("strict", BEYOND, "partial", None),
+        ("strict", WITHIN, "partial", "not_certainly_within"),
+    ],
+)
+def test_what_straddles_a_limit_is_decided_by_the_rule_of_the_rubric(in_doubt, off_mm, verdict, said):
+    task = with_rubric(BARE, doubt=DoubtTable(in_doubt=in_doubt))
+    limit_mm = 60.0 + task.rubric.tolerance_of("v_A").length_at(60.0)
+    longer = changed(measured(task), "v_A", length_mm=limit_mm + off_mm, se_mm=0.1)
+    outcome = outcome_of(compare(task, Submission(measured=longer)), "v_A")
+    assert outcome.verdict == verdict
+    rules = {"counted_for_you", "not_certainly_within", "near_limit"}
+    assert rules & set(codes(outcome)) == ({said} if said else set())
 
 
 def test_an_error_that_cannot_change_the_verdict_does_not():
@@ -194,8 +210,16 @@ def test_an_error_that_cannot_change_the_verdict_does_not():
     assert outcome_of(compare(PUMP, Submission(measured=longer)), "v_A").verdict == "full"
 
 
-def test_a_reading_without_confidence_goes_to_a_person():
-    doubtful = changed(measured(PUMP), "v_A", confidence=0.8)
+@pytest.mark.parametrize("confidence", [0.3, 0.8])
+def test_a_doubtful_reading_that_lies_where_it_must_is_right(confidence):
+    doubtful = changed(measured(PUMP), "v_A", confidence=confidence)
+    outcome = outcome_of(compare(PUMP, Submission(measured=doubtful)), "v_A")
+    assert outcome.verdict == "full"
+    assert PUMP.rubric.doubt.settle <= outcome.probability < 1.0
+
+
+def test_a_doubtful_reading_that_is_off_goes_to_a_person():
+    doubtful = changed(measured(PUMP), "v_A", confidence=0.8, length_mm=50.0)
     outcome = outcome_of(compare(PUMP, Submission(measured=doubtful)), "v_A")
     assert outcome.verdict == "review"
     assert outcome.possible == ("none", "full")
@@ -209,7 +233,8 @@ def test_a_reading_without_confidence_goes_to_a_person():
 def test_what_was_not_handed_in_is_as_the_rubric_says(missing):
     task = with_rubric(PUMP, missing=missing)
     outcome = outcome_of(compare(task, Submission(measured=without(measured(task), "v_D"))), "v_D")
-    assert outcome.verdict == missing
+    # A blank in a table leaves nothing to look at.
+    assert outcome.verdict == ("none" if missing == "review" else missing)
     assert codes(outcome) == ["not_measured"]
 
 
@@ -221,7 +246,8 @@ def test_what_is_optional_is_not_judged_where_it_is_not_there():
 
 def test_a_scale_that_is_asked_for_and_not_declared_is_missing():
     task = with_criterion(PUMP, "kv", optional=False)
-    assert outcome_of(compare(task, Submission(measured=measured(task))), "kv").verdict == "review"
+    assert outcome_of(compare(task, Submission(measured=measured(task))), "kv").verdict == "none"
+    assert outcome_of(compare(task, Submission(readings=(sheet(task),))), "kv").verdict == "review"
 
 
 def test_a_vector_too_short_to_draw_is_not_asked_for():
@@ -720,7 +746,7 @@ def test_a_scale_with_a_tolerance_of_its_own_is_held_against_the_drawing_by_it()
 
 def test_a_direction_without_a_length_is_no_measurement():
     reading = changed(measured(PUMP), "v_D", length_mm=None)
-    assert outcome_of(compare(PUMP, Submission(measured=reading)), "v_D").verdict == "review"
+    assert outcome_of(compare(PUMP, Submission(measured=reading)), "v_D").verdict == "none"
     drawn = changed(sheet(PUMP), "v_D", length_mm=None)
     assert outcome_of(compare(PUMP, Submission(readings=(drawn,))), "v_D").verdict == "review"
 

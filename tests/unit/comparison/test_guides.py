@@ -11,10 +11,12 @@ from grader.comparison.evidence import Submission
 from grader.inputs.measurements import names_of
 from grader.marking.mark import judge
 from grader.records import Figure, Reading
+from grader.rubric import DoubtTable
 from reference.authored.assignment import load_assignment
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Mistake
 from tests.hands import changed, drawn_nodes, measured, sheet, task_for
+from tests.unit.comparison.rubrics import with_rubric
 
 SHAPER = task_for("shaper", 7)
 PISTON = task_for("piston", 5)
@@ -170,7 +172,8 @@ def test_what_follows_from_a_wrong_sketch_with_its_own_distances_is_charged_once
     astray = right["O1"] + (right["A"] - right["O1"]) * cmath.rect(1.0, ASTRAY_RAD)
     found = evaluate(SHAPER.construction, SHAPER.parameters, given={"A": np.asarray(astray)})
     moved = {name: complex(at) - right[name] for name, at in found.items()}
-    judgement = judge(SHAPER, Submission(readings=(sheet(SHAPER, moved=moved),)))
+    task = with_rubric(SHAPER, doubt=DoubtTable(other_variant="follow"))
+    judgement = judge(task, Submission(readings=(sheet(task, moved=moved),)))
     found_verdicts = verdicts(judgement)
     assert {name for name, verdict in found_verdicts.items() if verdict in {"none", "partial"}} == {"v_A"}
     assert {found_verdicts["a_A3A_c"], found_verdicts["a_A3_n"]} <= {"full", "follow_through"}

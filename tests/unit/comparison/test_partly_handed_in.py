@@ -2,6 +2,7 @@
 
 import cmath
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -9,7 +10,7 @@ from grader.comparison.criteria import compare
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
 from grader.marking.mark import judge
-from grader.records import Figure, ReadVector
+from grader.records import Figure, ReadVector, Unread
 from grader.rubric import CriterionTable
 from reference.authored.toml_file import Text
 from reference.construction.mistakes import Mistake
@@ -44,8 +45,13 @@ def test_a_link_is_not_judged_without_a_sketch():
 
 def test_a_vector_between_two_nodes_that_were_read_is_known_to_be_left_out():
     whole = judge(PUMP, Submission(readings=(sheet(PUMP),)))
-    part = judge(PUMP, Submission(readings=(without(sheet(PUMP), "v_DC"),)))
-    assert whole.mistakes == ()
+    blank = (Unread("v_DC", "nothing is drawn between c and d", is_blank=True),)
+    part = judge(PUMP, Submission(readings=(replace(without(sheet(PUMP), "v_DC"), unread=blank),)))
+    unread = judge(PUMP, Submission(readings=(without(sheet(PUMP), "v_DC"),)))
+    assert whole.mistakes == unread.mistakes == ()
+    found = {one.name: one for one in part.outcomes}["v_DC"]
+    assert (found.verdict, [reason.code for reason in found.reasons]) == ("none", ["not_drawn"])
+    assert {one.name: one for one in unread.outcomes}["v_DC"].verdict == "review"
     assert [(one.code, one.at, one.explains) for one in part.mistakes] == [
         ("vector_missing", "v_DC", ("v_DC",))
     ]

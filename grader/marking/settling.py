@@ -1,0 +1,112 @@
+"""What is settled once all verdicts and mistakes are known together.
+
+A verdict that waits is settled where a mistake that is nearly certain was made just there, and where so
+little is left open that no verdict changes the score by more than the rubric's `stake`. Another student's
+data are never marked without saying so.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from grader.comparison.task import Task
+from grader.comparison.verdicts import EVEN, FULL, NONE, verdict_of
+from grader.outcomes import NamedMistake, Outcome, Reason
+from grader.rubric import RubricFile
+
+NEARLY_CERTAIN = 0.95
+"""A mistake named with this confidence is charged where it was made."""
+
+
+def charged_where_made(
+    task: Task, outcomes: Sequence[Outcome], mistakes: Sequence[NamedMistake]
+) -> tuple[Outcome, ...]:
+    """The outcomes, settled where a mistake that is nearly certain explains what was read."""
+    certain = [one for one in mistakes if one.confidence >= NEARLY_CERTAIN and not one.rivals]
+    return tuple(_charged(task, outcome, certain) for outcome in outcomes)
+
+
+def _charged(task: Task, outcome: Outcome, certain: Sequence[NamedMistake]) -> Outcome:
+    segment = task.segments.get(outcome.name)
+    if outcome.verdict != "review" or segment is None:
+        return outcome
+    for mistake in certain:
+        if mistake.at != segment.head or outcome.criterion not in mistake.explains:
+            continue
+        is_left_out = mistake.code == "normal_missing"
+        if outcome.proposed < FULL and (is_left_out or outcome.measured.length_mm is not None):
+            return settled(outcome, outcome.proposed, max(outcome.probability, mistake.confidence))
+    return outcome
+
+
+def settled(outcome: Outcome, share: float, sure: float, *reasons: Reason) -> Outcome:
+    """An outcome that is open, with the verdict of a share of its points."""
+    followed = outcome.possible[1] == "follow_through" and share == FULL
+    verdict = verdict_of(share, followed=followed)
+    kept = outcome.reasons if share != FULL else ()
+    return replace(
+        outcome,
+        verdict=verdict,
+        possible=(verdict, verdict),
+        shares=(share, share),
+        proposed=share,
+        probability=sure,
+        reasons=(*reasons, *(one for one in kept if one.code not in OPENING)),
+    )
+
+
+OPENING = frozenset({"doubtful", "near_limit", "unread", "hand_may_miss", "readings_disagree"})
+"""Reasons why a verdict is open."""
+
+
+# Another student's data ----------------------------------------------------------------------------
+
+
+def of_another(
+    rubric: RubricFile, outcomes: Sequence[Outcome], mistakes: Sequence[NamedMistake]
+) -> tuple[Outcome, ...]:
+    """The outcomes of a drawing by another student's data, as the rubric's `other_variant` has it."""
+    named = next((one for one in mistakes if one.code == "other_variant"), None)
+    if named is None or rubric.doubt.other_variant == "follow":
+        return tuple(outcomes)
+    whose = ", ".join(f"{key} = {value}" for key, value in named.detail.items())
+    reason = Reason("other_variant", {"whose": whose})
+    return tuple(_of_another(rubric, outcome, reason, named) for outcome in outcomes)
+
+
+def _of_another(rubric: RubricFile, outcome: Outcome, whose: Reason, named: NamedMistake) -> Outcome:
+    if outcome.verdict == "not_judged":
+        return outcome
+    if rubric.doubt.other_variant == "none":
+        lost = settled(outcome, NONE, named.confidence, whose)
+        return replace(lost, mistake=named.code, cause=named)
+    best = outcome.shares[-1] if outcome.shares else FULL
+    return replace(
+        outcome,
+        verdict="review",
+        possible=("none", outcome.possible[1]),
+        shares=(NONE, best),
+        proposed=outcome.shares[0] if outcome.verdict != "review" else outcome.proposed,
+        probability=EVEN,
+        reasons=(whose, *outcome.reasons),
+    )
+
+
+# What is left --------------------------------------------------------------------------------------
+
+
+def at_stake(rubric: RubricFile, outcomes: Sequence[Outcome]) -> tuple[Outcome, ...]:
+    """The outcomes, settled in the student's favour where all that is open is worth less than the stake."""
+    points: Mapping[str, float] = rubric.points
+    waiting = [one for one in outcomes if one.verdict == "review"]
+    open_points = {one.criterion: (one.shares[-1] - one.shares[0]) * points[one.criterion] for one in waiting}
+    if not waiting or sum(open_points.values()) > rubric.doubt.stake * rubric.max_score:
+        return tuple(outcomes)
+    return tuple(
+        settled(one, one.shares[-1], _probability_of_best(one), Reason("at_stake")) if one in waiting else one
+        for one in outcomes
+    )
+
+
+def _probability_of_best(outcome: Outcome) -> float:
+    is_proposed = outcome.proposed == outcome.shares[-1]
+    return outcome.probability if is_proposed else 1.0 - outcome.probability

@@ -1,0 +1,81 @@
+"""What is settled once verdicts and mistakes are known together."""
+
+from dataclasses import replace
+
+import pytest
+
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.marking.mark import judge
+from grader.marking.settling import charged_where_made
+from grader.outcomes import NamedMistake
+from grader.rubric import DoubtTable
+from reference.authored.assignment import Variant
+from reference.construction.mistakes import Mistake
+from tests.hands import changed, measured, sheet, task_for
+from tests.unit.comparison.rubrics import with_rubric
+
+PUMP = task_for("pump", 7)
+OTHER = task_of(PUMP.assignment, PUMP.rubric, Variant(n=PUMP.variant.n + 1))
+
+
+def by_name(judgement):
+    return {one.name: one for one in judgement.outcomes}
+
+
+def with_doubt(**change):
+    return with_rubric(PUMP, doubt=DoubtTable(**change))
+
+
+@pytest.mark.parametrize(("rule", "verdicts"), [("person", {"review"}), ("none", {"none"})])
+def test_another_students_drawing_earns_nothing_without_a_person(rule, verdicts):
+    judgement = judge(with_doubt(other_variant=rule), Submission(measured=measured(OTHER)))
+    assert "other_variant" in [one.code for one in judgement.mistakes]
+    judged = [one for one in judgement.outcomes if one.verdict != "not_judged"]
+    assert {one.verdict for one in judged} <= verdicts | {"none"}
+    assert judgement.score.low == 0.0
+    assert any(reason.code == "other_variant" for one in judged for reason in one.reasons)
+
+
+def test_another_students_drawing_is_marked_as_any_mistake_where_the_rubric_says_so():
+    judgement = judge(with_doubt(other_variant="follow"), Submission(measured=measured(OTHER)))
+    assert judgement.score.total > 0.5 * judgement.score.maximum
+
+
+def one_open(stake):
+    """A drawing of which the last vector is 1.5 times too long and was read without confidence."""
+    task = with_doubt(stake=stake)
+    expected = abs(task.drawn("a_D", task.rule_scales))
+    reading = changed(sheet(task), "a_D", length_mm=1.5 * expected, confidence=0.5)
+    return task, judge(task, Submission(readings=(reading,)))
+
+
+def test_what_is_worth_less_than_the_stake_is_settled_for_the_student():
+    task, judgement = one_open(stake=0.0)
+    assert by_name(judgement)["a_D"].verdict == "review"
+    share = task.rubric.points["a_D"] / task.rubric.max_score
+    _, settled = one_open(stake=1.01 * share)
+    outcome = by_name(settled)["a_D"]
+    assert (outcome.verdict, outcome.reasons[0].code) == ("full", "at_stake")
+    assert settled.score.total == pytest.approx(settled.score.maximum)
+    assert outcome.probability < 1.0
+
+
+def test_the_expected_score_counts_what_is_likely():
+    _, judgement = one_open(stake=0.0)
+    assert judgement.score.low - 0.1 < judgement.score.expected < judgement.score.high
+    sure = judge(PUMP, Submission(readings=(sheet(PUMP),))).score
+    assert sure.expected == pytest.approx(sure.total, rel=0.01)
+
+
+def test_a_mistake_that_is_nearly_certain_is_charged_where_it_was_made():
+    """The vector that shows it was read with little confidence, and is charged all the same."""
+    drawn = sheet(PUMP, mistakes=(Mistake("sense_reversed", "a'", slot=0),))
+    certain = NamedMistake(Mistake("sense_reversed", "a'"), ("a_A",), 0.99)
+    doubtful = changed(drawn, "a_A", confidence=0.6)
+    outcomes = judge(PUMP, Submission(readings=(doubtful,))).outcomes
+    waiting = replace({one.name: one for one in outcomes}["a_A"], verdict="review", mistake=None, cause=None)
+    (settled,) = charged_where_made(PUMP, [waiting], [certain])
+    assert (settled.verdict, settled.probability >= 0.99) == ("none", True)
+    for other in (replace(certain, confidence=0.9), replace(certain, rivals=(certain,))):
+        assert charged_where_made(PUMP, [waiting], [other]) == (waiting,)
