@@ -1,6 +1,6 @@
 """What the page is told: a student's criteria as rows, and one question with all that is to be seen of it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 from urllib.parse import urlencode
 
@@ -9,12 +9,13 @@ from markupsafe import Markup
 from grader.documents import CriterionDocument, QuantityDocument
 from grader.feedback.numbers import quantity_cells, score_text, tolerance_cells
 from grader.feedback.words import VERDICTS, problem_sentence, symbols
-from grader.inputs.decisions import Decision, Key
+from grader.inputs.decisions import Decision
 from grader.language import N_, Tongue
 from grader.overlay.closeup import look
 from grader.overlay.scene import MARKS
 from grader.records import MECHANISM, Box
-from grader.review.session import OPEN, Session, Student, mark_of
+from grader.review.session import OPEN, Session, Standing, Student, mark_of, page_criterion
+from grader.rubric import RubricFile
 
 Facts = dict[str, Any]
 """An object of JSON."""
@@ -67,21 +68,29 @@ def texts(speaker: Tongue) -> Facts:
 # Rows ---------------------------------------------------------------------------------------------
 
 
-def student_facts(student: Student, standing: Mapping[Key, Decision], speaker: Tongue) -> Facts:
-    """A student and the rows of the criteria, to be ordered by the script."""
+def label_of(student: Student, speaker: Tongue) -> str:
+    """What a student is called: id, name, position."""
     report = student.report
     label = " ".join(part for part in (report.student_id, student.name) if part)
-    if report.position is not None:
-        label = f"{label} · {speaker.gettext('position')} {report.position}"
+    if report.position is None:
+        return label
+    return f"{label} · {speaker.gettext('position')} {report.position}"
+
+
+def student_facts(student: Student, standing: Standing, rubric: RubricFile, speaker: Tongue) -> Facts:
+    """A student and the rows of the criteria, to be ordered by the script."""
+    report = student.report
+    titles = {one.id: one.title.in_language(speaker.lang) for one in rubric.criterion}
     return {
         "key": student.key,
         "number": student.number,
-        "label": label,
+        "label": label_of(student, speaker),
         "score": f"{score_text(report, speaker)} / {speaker.trimmed(report.max_score, 2)}",
         "remark": report.comment,
         "added": report.added,
+        "seen": [mark_of(standing.of(student, name)) for name in ("comment", "total")],
         "rows": [
-            _row(student, order, criterion, standing, speaker)
+            _row(student, criterion, standing, titles[criterion.id], order)
             for order, criterion in enumerate(report.criteria)
         ],
     }
@@ -89,18 +98,18 @@ def student_facts(student: Student, standing: Mapping[Key, Decision], speaker: T
 
 def _row(
     student: Student,
-    order: int,
     criterion: CriterionDocument,
-    standing: Mapping[Key, Decision],
-    speaker: Tongue,
+    standing: Standing,
+    title: str,
+    order: int = 0,
 ) -> Facts:
-    del speaker
-    row = standing.get((student.report.student_id, student.report.position, criterion.id))
+    row = standing.of(student, criterion.id)
+    drawn = "" if criterion.drawn in title else criterion.drawn
     return {
         "student": student.key,
         "criterion": criterion.id,
         "order": order,
-        "title": _title(criterion),
+        "title": Markup("{} {}").format(symbols(title), symbols(drawn)) if drawn else symbols(title),
         "verdict": criterion.verdict,
         "proposed": criterion.proposed,
         "probability": criterion.probability,
@@ -110,21 +119,15 @@ def _row(
     }
 
 
-def _title(criterion: CriterionDocument) -> Markup:
-    drawn = criterion.drawn
-    if drawn and drawn not in criterion.title:
-        return Markup("{} {}").format(symbols(criterion.title), symbols(drawn))
-    return symbols(criterion.title)
-
-
 # One question -------------------------------------------------------------------------------------
 
 
 def question_facts(session: Session, student: Student, name: str, speaker: Tongue) -> Facts:
     """One criterion of a student: what was handed in, what is right, what is proposed, where to look."""
     criterion, standing = student.criterion(name), session.standing()
-    row = _row(student, 0, criterion, standing, speaker)
-    decision = standing.get((student.report.student_id, student.report.position, name))
+    title = next(one.title for one in session.batch.rubric.criterion if one.id == name)
+    row = _row(student, criterion, standing, title.in_language(speaker.lang))
+    decision = standing.of(student, name)
     proposed = criterion.proposed if criterion.verdict == OPEN else None
     what = speaker.gettext(VERDICTS[proposed]) if proposed else ""
     if proposed and criterion.probability is not None:
@@ -189,24 +192,29 @@ def _points(criterion: CriterionDocument, speaker: Tongue) -> str:
 def _look(session: Session, student: Student, criterion: CriterionDocument) -> Facts | None:
     """The part of a scan that a question is about, with what was read there; None without a scan."""
     names = session.batch.assignment.file.names
-    pages = session.pages_of(student)
+    pages, standing = session.pages_of(student), session.standing()
+
+    def seen_of(figure: str, node: str) -> str:
+        return mark_of(standing.of(student, f"node:{figure}:{node}"))
+
     first: Facts | None = None
     for sheet, page in enumerate(pages):
         scene = session.scene(student, sheet)
         if scene is None or page.sheet is None:
             continue
-        seen = look(scene, criterion.drawn, names) if criterion.drawn else None
+        ghost = session.ghost(student, sheet, criterion)
+        seen = look(scene, criterion.drawn, ghost, names) if criterion.drawn else None
         figure = session.figure_of(student, criterion)
         read = student.report.reading.sheets[sheet].figures
         box = seen[0] if seen else _box_of(read.get(figure), scene.page_mm)  # type: ignore[call-overload]
         facts = {
             "sheet": sheet,
-            "scan": "/scan?" + urlencode({"student": student.key, "sheet": sheet}),
+            "scan": "/scan?" + urlencode({"student": student.key, "sheet": sheet, "run": session.runs}),
             "page_mm": scene.page_mm,
             "box": box,
             "marks": seen[1] if seen else "",
             "nodes": [
-                {"figure": kind, "name": name, "x": node.x_mm, "y": node.y_mm}
+                {"figure": kind, "name": name, "x": node.x_mm, "y": node.y_mm, "seen": seen_of(kind, name)}
                 for kind, one in read.items()
                 if kind == figure or (figure == "" and kind != MECHANISM)
                 for name, node in one.nodes.items()
@@ -236,11 +244,10 @@ def _box_of(figure: Any, page_mm: tuple[float, float]) -> Box:  # noqa: ANN401 -
 
 def pages_facts(session: Session, speaker: Tongue) -> Facts:
     """The pages that are nobody's or were refused, and those whom they may be given to."""
-    decided = {row.criterion: row for row in session.standing().values() if row.kind == "page"}
+    standing = session.standing()
     pages = []
     for ref, problem in session.waiting_pages():
-        name = f"page:{ref.file}#{ref.page}"
-        row = decided.get(name)
+        row = standing.rows.get(("", None, page_criterion(ref)))
         said = None if row is None else row.page
         try:
             (width, height), turn = session.scans.size(ref), session.scans.turn(ref)
@@ -254,6 +261,7 @@ def pages_facts(session: Session, speaker: Tongue) -> Facts:
                 "label": str(ref),
                 "why": problem_sentence(problem, speaker).text,
                 "said": row.verdict if row else "",
+                "seen": mark_of(row),
                 "owner": "" if owner is None else owner.key,
                 "turn": said.turn if said and said.turn is not None else turn,
                 "upright": turn,
@@ -263,8 +271,5 @@ def pages_facts(session: Session, speaker: Tongue) -> Facts:
                 "picture": "/page?" + urlencode({"file": ref.file, "page": ref.page}),
             }
         )
-    owners = [
-        {"key": student.key, "label": student_facts(student, {}, speaker)["label"]}
-        for student in session.students
-    ]
+    owners = [{"key": student.key, "label": label_of(student, speaker)} for student in session.students]
     return {"pages": pages, "owners": owners}

@@ -25,12 +25,13 @@ from starlette.routing import Route
 
 from grader.feedback.words import VERDICTS, environment
 from grader.inputs.decision_texts import PageDecision, place_text
+from grader.inputs.decisions import Decision
 from grader.language import N_, Tongue, tongue
 from grader.lms.export import export, usual_name
 from grader.lms.grades import Options
 from grader.review import questions
 from grader.review.scans import page_of
-from grader.review.session import Answer, ChangedError, Session
+from grader.review.session import Answer, ChangedError, OnWhole, Session, page_criterion
 from reference.errors import CallError, PlanmarkError
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
@@ -107,7 +108,9 @@ class Review:
         return {
             "version": session.version,
             "keys": [student.key for student in session.students],
-            "students": [questions.student_facts(one, standing, self.speaker) for one in changed],
+            "students": [
+                questions.student_facts(one, standing, session.batch.rubric, self.speaker) for one in changed
+            ],
             "comments": session.comments(),
             "pages": len(session.waiting_pages()),
         }
@@ -170,10 +173,11 @@ class Review:
         self.session.decide(answers, said.by, said.window)
         return self._facts(since)
 
-    def whole(self, said: "OnWhole") -> dict[str, Any]:
+    def whole(self, said: "Whole") -> dict[str, Any]:
         """A comment on a whole submission, and points added."""
         since = self.session.version
-        self.session.decide_whole(said.student, said.comment, said.added, said.by, said.window)
+        whole = OnWhole(said.student, said.comment, said.added, said.seen)
+        self.session.decide_whole(whole, said.by, said.window)
         return self._facts(since)
 
     def node(self, said: "Moved") -> dict[str, Any]:
@@ -181,7 +185,8 @@ class Review:
         since = self.session.version
         figure = said.node.partition(":")[0]
         at = self.session.snapped(said.student, said.sheet, figure, (said.x, said.y))
-        self.session.move(said.student, said.node, place_text(*at), said.by, said.window)
+        answer = Answer(said.student, f"node:{said.node}", place_text(*at), seen=said.seen)
+        self.session.move(answer, said.by, said.window)
         return self._facts(since)
 
     def page(self, said: "OnPage") -> dict[str, Any]:
@@ -195,7 +200,8 @@ class Review:
         if not str(decision):
             raise CallError("answer_refused", "say whose the page is, or turn it, or give its corners")
         position = None if owner is None else owner.position
-        self.session.decide_page(ref, str(decision), position, said.by, said.window)
+        row = Decision("", position, page_criterion(ref), str(decision), by=said.by)
+        self.session.decide_page(ref, row, said.seen, said.window)
         return self._facts(self.session.version)
 
     def undo(self, said: "Said") -> dict[str, Any]:
@@ -294,12 +300,13 @@ class Answers(Said):
     answers: Annotated[list[Given], Field(min_length=1)]
 
 
-class OnWhole(Said):
+class Whole(Said):
     """A comment on a whole submission, and points added."""
 
     student: str
     comment: str = ""
     added: Place = 0.0
+    seen: Annotated[tuple[str, str], Field(strict=False)] = ("", "")
 
 
 class Moved(Said):
@@ -310,6 +317,7 @@ class Moved(Said):
     node: str
     x: Place
     y: Place
+    seen: str = ""
 
 
 class OnPage(Said):
@@ -319,6 +327,7 @@ class OnPage(Said):
     page: Number
     owner: str | None = None
     turn: int | None = None
+    seen: str = ""
     corners: list[Annotated[tuple[Place, Place], Field(strict=False)]] = []
 
 
@@ -359,7 +368,7 @@ def application(session: Session, lang: str = "en", token: str = "") -> Starlett
     }
     posts: dict[str, tuple[type[Said], Callable[[Any], dict[str, Any]]]] = {
         "/api/decide": (Answers, review.decide),
-        "/api/whole": (OnWhole, review.whole),
+        "/api/whole": (Whole, review.whole),
         "/api/node": (Moved, review.node),
         "/api/page": (OnPage, review.page),
         "/api/undo": (Said, review.undo),

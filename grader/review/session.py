@@ -18,11 +18,12 @@ from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
 from grader.inputs.decisions import ClashError, Decision, DecisionFile, Key
 from grader.inputs.measurements import StudentSubmission
-from grader.overlay.scene import Scene, scene_of
+from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, on_paper, scene_of
 from grader.pipeline import report_on
 from grader.reading.corrected import snapped
-from grader.records import MECHANISM, Figure, Ink, PageRef, Reading, ReadNode, ReadVector, ScannedPage
+from grader.records import MECHANISM, Figure, PageRef, Reading, ReadNode, ReadVector, ScannedPage
 from grader.review.scans import Scans
+from reference.construction.graph import Construction
 from reference.errors import CallError, PlanmarkError
 
 OPEN = "review"
@@ -52,7 +53,6 @@ class Student:
     name: str
     version: int = 0
     pages: list[ScannedPage] | None = None
-    inks: list[Ink | None] | None = None
 
     @property
     def key(self) -> str:
@@ -85,11 +85,38 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
+class OnWhole:
+    """What a person said of a whole submission: a comment, points added, the marks of what stood there."""
+
+    student: str
+    comment: str
+    added: float
+    seen: tuple[str, str] = ("", "")
+
+
+@dataclass(frozen=True, slots=True)
 class Change:
     """Rows that were written, and those that they stand in the place of."""
 
     written: tuple[Decision, ...]
     before: tuple[Decision, ...]
+
+
+class Standing:
+    """What stands decided: rows by what they are about."""
+
+    def __init__(self, rows: Sequence[Decision]) -> None:
+        self.rows = {row.key: row for row in rows}
+
+    def key(self, student: Student, criterion: str) -> Key:
+        """What a row on a student's criterion is about: people may leave the position blank."""
+        report = student.report
+        blank = (report.student_id, None, criterion)
+        return blank if blank in self.rows else (report.student_id, report.position, criterion)
+
+    def of(self, student: Student, criterion: str) -> Decision | None:
+        """The row on a student's criterion."""
+        return self.rows.get(self.key(student, criterion))
 
 
 @dataclass(slots=True)
@@ -106,12 +133,14 @@ class Session:
     students: list[Student] = field(default_factory=list)
     pages: tuple[PageRef, ...] = ()
     version: int = 0
+    runs: int = 0
     made: int = 0
     """How many decisions were made here since the pages were brought up to date."""
     scans: Scans = field(default_factory=Scans)
     graded: Graded | None = None
     _file: DecisionFile = field(init=False)
     _stamp: tuple[int, int] = (0, 0)
+    _rows: list[Decision] = field(default_factory=list)
     _undo: dict[str, list[Change]] = field(default_factory=dict)
     _lock: threading.RLock = field(default_factory=threading.RLock)
 
@@ -125,11 +154,11 @@ class Session:
 
         Raises as `grader.folder.batch.graded`.
         """
-        stamp, made = self._file_stamp(), self.made
+        stamp, made, rows = self._file_stamp(), self.made, self._file.all()
         run = graded(self.batch, progress, self.workers)
         with self._lock:
             self.graded, self.pages = run, run.pages
-            self.version += 1
+            self.version, self.runs = self.version + 1, self.runs + 1
             self.students = [
                 Student(number, job, report, job.submission.name, self.version)
                 for number, (job, report) in enumerate(zip(run.jobs, run.results.reports, strict=True))
@@ -139,7 +168,7 @@ class Session:
                     student.report = self._with_questions(student, student.job.submission)
             # What was decided meanwhile is taken in by the next `refresh`.
             self.made -= made
-            self._stamp = stamp
+            self._stamp, self._rows = stamp, rows
         return run
 
     def student(self, key: str) -> Student:
@@ -154,18 +183,15 @@ class Session:
         if self.graded is None:
             return []
         if student.pages is None:
-            student.pages = pages_read(self.batch, self.graded.cache, student.job)
+            pages = pages_read(self.batch, self.graded.cache, student.job)
+            student.pages = [replace(page, backdrop=None) for page in pages]
         return student.pages
 
     # Decisions ------------------------------------------------------------------------------------
 
-    def standing(self) -> dict[Key, Decision]:
-        """What stands decided, by what it is about."""
-        return {row.key: row for row in self._file.all()}
-
-    def _standing(self, student: Student, criterion: str) -> Decision | None:
-        key = (student.report.student_id, student.report.position, criterion)
-        return self.standing().get(key)
+    def standing(self) -> Standing:
+        """What stands decided now. Raises InputFileError for a file that people have broken."""
+        return Standing(self._file.all())
 
     def decide(self, answers: Sequence[Answer], by: str, window: str) -> list[Student]:
         """Write what a person decided, all of it or nothing; the students whom it concerns, marked anew.
@@ -173,58 +199,57 @@ class Session:
         Raises ChangedError where somebody else was quicker, CallError for an answer that cannot be used.
         """
         with self._lock:
+            wanted: list[tuple[Decision, str]] = []
             there = self.standing()
-            rows, expected = [], []
             for answer in answers:
                 student = self.student(answer.student)
                 student.criterion(answer.criterion)
-                row = self._row(student, answer.criterion, answer.verdict, answer.comment, by)
-                standing = there.get(row.key)
-                if mark_of(standing) != answer.seen:
-                    raise ChangedError(standing)
-                rows.append(row)
-                expected += [] if standing is None else [standing]
-            self._write(rows, expected, window)
+                row = self._row(student, answer.criterion, answer.verdict, by, there)
+                wanted.append((replace(row, comment=answer.comment), answer.seen))
+            self._write(wanted, there, window)
             return self._marked_anew({answer.student for answer in answers})
 
-    def decide_whole(
-        self, key: str, comment: str, added: float | None, by: str, window: str
-    ) -> list[Student]:
-        """Write a comment on a whole submission and points added to it; an empty one takes it back."""
-        with self._lock:
-            student = self.student(key)
-            wanted = {
-                "comment": self._row(student, "comment", "", comment, by) if comment else None,
-                "total": replace(self._row(student, "total", "", "", by), points=added) if added else None,
-            }
-            standing = {name: self._standing(student, name) for name in wanted}
-            gone = [row for name, row in standing.items() if row is not None and wanted[name] is None]
-            if gone:
-                self._file.remove(*gone)
-            rows = [row for row in wanted.values() if row is not None]
-            if rows:
-                self._write(rows, [row for row in standing.values() if row is not None], window)
-            return self._marked_anew({key})
+    def decide_whole(self, answer: OnWhole, by: str, window: str) -> list[Student]:
+        """Write a comment on a whole submission and points added to it; an empty one takes it back.
 
-    def move(self, key: str, node: str, verdict: str, by: str, window: str) -> list[Student]:
-        """Write where a node lies: `node` as ``FIGURE:NODE``, `verdict` as ``x,y`` in sheet millimetres."""
+        Raises as `decide`.
+        """
         with self._lock:
-            student = self.student(key)
-            row = self._row(student, f"node:{node}", verdict, "", by)
-            standing = self._standing(student, row.criterion)
-            self._write([row], [] if standing is None else [standing], window)
-            return self._marked_anew({key})
+            student, there = self.student(answer.student), self.standing()
+            comment = replace(self._row(student, "comment", "", by, there), comment=answer.comment)
+            total = replace(self._row(student, "total", "", by, there), points=answer.added)
+            wanted = ((comment, answer.seen[0], answer.comment), (total, answer.seen[1], answer.added))
+            gone = [
+                (row, seen) for row, seen, said in wanted if not said and there.rows.get(row.key) is not None
+            ]
+            self._write([(row, seen) for row, seen, said in wanted if said], there, window, gone)
+            return self._marked_anew({answer.student})
 
-    def decide_page(self, ref: PageRef, verdict: str, position: int | None, by: str, window: str) -> None:
-        """Write whose a page is, how it is turned, where its corners are; it counts from the next run on."""
+    def move(self, answer: Answer, by: str, window: str) -> list[Student]:
+        """Write where a node lies: ``node:FIGURE:NODE`` as the criterion, ``x,y`` in sheet mm as the verdict.
+
+        Raises as `decide`.
+        """
         with self._lock:
-            name, basis = f"page:{ref.file}#{ref.page}", page_basis(ref)
-            row = Decision("", position, name, verdict, None, "", by, _now(), basis)
-            standing = [one for one in self._file.all() if one.key == row.key]
-            self._write([row], standing, window)
+            student, there = self.student(answer.student), self.standing()
+            row = self._row(student, answer.criterion, answer.verdict, by, there)
+            self._write([(row, answer.seen)], there, window)
+            return self._marked_anew({answer.student})
+
+    def decide_page(self, ref: PageRef, row: Decision, seen: str, window: str) -> None:
+        """Write whose a page is, how it is turned, where its corners are; it counts from the next run on.
+
+        Raises as `decide`.
+        """
+        with self._lock:
+            dated = replace(row, at=_now(), basis=page_basis(ref))
+            self._write([(dated, seen)], self.standing(), window)
 
     def undo(self, window: str) -> tuple[list[Student], Decision | None]:
-        """Take back the last thing decided in a window: the students concerned, and a row of it."""
+        """Take back the last thing decided in a window: the students concerned, and a row of it.
+
+        Raises ChangedError where somebody has changed it since.
+        """
         with self._lock:
             changes = self._undo.get(window, [])
             if not changes:
@@ -235,13 +260,11 @@ class Session:
             except ClashError as error:
                 raise ChangedError(error.rows[0] if error.rows else None) from error
             self.made -= 1
-            keys = {(row.student_id, row.position) for row in change.written}
-            changed = {
-                student.key
-                for student in self.students
-                if (student.report.student_id, student.report.position) in keys
-            }
-            return self._marked_anew(changed), change.written[0]
+            row = (*change.written, *change.before)[0]
+            own = [one for one in self.students if one.report.student_id == row.student_id]
+            fitting = [one for one in own if row.position in {None, one.report.position}]
+            self._marked_anew(set())
+            return fitting, row
 
     def comments(self) -> list[str]:
         """The comments written so far, the commonest first."""
@@ -252,21 +275,35 @@ class Session:
         """Take in what others wrote into the file in the meantime."""
         with self._lock:
             if self._file_stamp() != self._stamp:
-                self._stamp = self._file_stamp()
-                self._marked_anew({student.key for student in self.students})
+                self._marked_anew(set())
 
-    def _row(self, student: Student, criterion: str, verdict: str, comment: str, by: str) -> Decision:
-        batch, report = self.batch, student.report
+    def _row(self, student: Student, criterion: str, verdict: str, by: str, there: Standing) -> Decision:
+        batch = self.batch
         basis = basis_of(student.job.submission, batch.assignment, batch.rubric, criterion)
-        who = (report.student_id, report.position)
-        return Decision(*who, criterion, verdict, None, comment, by, _now(), basis)
+        return Decision(*there.key(student, criterion), verdict, None, "", by, _now(), basis)
 
-    def _write(self, rows: Sequence[Decision], expected: Sequence[Decision], window: str) -> None:
+    def _write(
+        self,
+        wanted: Sequence[tuple[Decision, str]],
+        there: Standing,
+        window: str,
+        gone: Sequence[tuple[Decision, str]] = (),
+    ) -> None:
+        """Write rows, and take others out, each with the mark of what the person saw in its place."""
+        for row, seen in (*wanted, *gone):
+            standing = there.rows.get(row.key)
+            if mark_of(standing) != seen:
+                raise ChangedError(standing)
+        rows, out = [row for row, _ in wanted], [there.rows[row.key] for row, _ in gone]
+        if not rows and not out:
+            return
         try:
-            before = self._file.add(*rows, expected=expected)
+            before = self._file.add(*rows, expected=there.rows.values()) if rows else []
+            if out:
+                self._file.remove(*out)
         except ClashError as error:
             raise ChangedError(error.rows[0] if error.rows else None) from error
-        self._undo.setdefault(window, []).append(Change(tuple(rows), tuple(before)))
+        self._undo.setdefault(window, []).append(Change(tuple(rows), (*before, *out)))
         self.made += 1
 
     def _file_stamp(self) -> tuple[int, int]:
@@ -279,10 +316,12 @@ class Session:
     # Marks ----------------------------------------------------------------------------------------
 
     def _marked_anew(self, keys: Collection[str]) -> list[Student]:
-        """The students, marked anew with what is decided now."""
-        rows = self._file.all()
+        """These students, and those of whom rows of the file changed, marked with what is decided now."""
         self._stamp = self._file_stamp()
-        students = [student for student in self.students if student.key in keys]
+        rows = self._file.all()
+        changed = {row.student_id for row in {*rows} ^ {*self._rows}}
+        self._rows = rows
+        students = [one for one in self.students if one.key in keys or one.report.student_id in changed]
         self.version += 1
         for student in students:
             student.report = self._report(student, rows)
@@ -330,20 +369,11 @@ class Session:
 
         Raises CallError for a page that there is not.
         """
-        student = self.student(key)
-        inks = self._inks_of(student)
-        if not 0 <= sheet < len(inks):
+        pages = self.pages_of(self.student(key))
+        if not 0 <= sheet < len(pages):
             raise CallError("page_missing", "there is no such page")
-        node = snapped(inks[sheet], *at, figure)
+        node = snapped(pages[sheet].ink, *at, figure)
         return node.at.real, -node.at.imag
-
-    def _inks_of(self, student: Student) -> list[Ink | None]:
-        """The strokes of a student's pages; read from the cache once."""
-        with self._lock:
-            if student.inks is None and self.graded is not None:
-                refs = student.job.submission.pages
-                student.inks = [self.graded.cache.page(ref).ink for ref in refs]
-            return student.inks or []
 
     # Pages ----------------------------------------------------------------------------------------
 
@@ -378,24 +408,44 @@ class Session:
     # What is seen ---------------------------------------------------------------------------------
 
     def scene(self, student: Student, sheet: int) -> Scene | None:
-        """What was read on one of a student's pages, with expected vectors; None of a refused one."""
-        reading, variant = student.report.reading.sheets[sheet], student.job.submission.variant
+        """What was read on one of a student's pages; None of a refused one."""
+        construction = self._construction(student)
         page = self.pages_of(student)[sheet]
-        if page.sheet is None or variant is None:
+        if page.sheet is None or construction is None:
             return None
-        construction = task_of(self.batch.assignment, self.batch.rubric, variant).construction
+        reading = reading_of(student.report.reading.sheets[sheet])
         judged = {criterion.drawn: criterion for criterion in student.report.criteria if criterion.drawn}
         return scene_of(
-            page.sheet.page_mm, reading_of(reading), construction.vectors, judged,
-            show_expected=True, links=construction.links,
+            page.sheet.page_mm, reading, construction.vectors, judged,
+            show_expected=False, links=construction.links,
         )  # fmt: skip
+
+    def ghost(self, student: Student, sheet: int, criterion: CriterionDocument) -> Ghost | None:
+        """The vector or link expected, laid off from where the drawn one starts; None if that is unread."""
+        construction, figure = self._construction(student), self.figure_of(student, criterion)
+        read = reading_of(student.report.reading.sheets[sheet]).figures.get(figure)
+        expected = expected_vector(criterion)
+        if construction is None or read is None or expected is None:
+            return None
+        vector = construction.vectors.get(criterion.drawn)
+        tail = construction.links[criterion.drawn][0] if vector is None else vector.tail
+        node = read.nodes.get(tail)
+        if node is None:
+            return None
+        at = on_paper(node.at)
+        return ghost_of(Arrow(criterion.drawn, figure, at, at, criterion.verdict, doubtful=False), expected)
+
+    def _construction(self, student: Student) -> Construction | None:
+        variant = student.job.submission.variant
+        if variant is None:
+            return None
+        return task_of(self.batch.assignment, self.batch.rubric, variant).construction
 
     def figure_of(self, student: Student, criterion: CriterionDocument) -> str:
         """The figure that a criterion's vector or link is in; empty for a scale or an angular quantity."""
-        variant = student.job.submission.variant
-        if criterion.link or variant is None:
+        construction = self._construction(student)
+        if criterion.link or construction is None:
             return MECHANISM if criterion.link else ""
-        construction = task_of(self.batch.assignment, self.batch.rubric, variant).construction
         figures = (
             figure
             for figure in construction.poles
@@ -420,9 +470,14 @@ def reading_of(document: ReadingDocument) -> Reading:
     return Reading(figures)
 
 
+def page_criterion(ref: PageRef) -> str:
+    """How decisions name a page."""
+    return f"page:{ref.file}#{ref.page}"
+
+
 def mark_of(row: Decision | None) -> str:
     """A mark of what stands decided; empty where nothing is."""
-    return "" if row is None else f"{row.at} {row.by} {row.verdict} {row.comment}"
+    return "" if row is None else f"{row.at} {row.by} {row.verdict} {row.points} {row.comment}"
 
 
 def _now() -> str:

@@ -61,6 +61,7 @@ def class_of_30(tmp_path_factory):
     for student in SCANNED:
         for path in samples.glob(f"{student}_*"):
             shutil.copy(path, folder)
+    shutil.copy(samples / "s01_1.jpg", folder / "nobody.jpg")
     grade(Batch(PUMP, load_rubric("pump"), folder, top / "out"), lambda *_: None, Inline())
     return top
 
@@ -74,11 +75,11 @@ class Server:
 
     def __init__(self, top):
         self.top = top
-        session = Session(Batch(PUMP, load_rubric("pump"), top / "in", top / "out"), Inline())
-        session.bring_up_to_date(lambda *_: None)
+        self.session = Session(Batch(PUMP, load_rubric("pump"), top / "in", top / "out"), Inline())
+        self.session.bring_up_to_date(lambda *_: None)
         listener = socket.create_server(("127.0.0.1", 0))
         self.address = f"http://127.0.0.1:{listener.getsockname()[1]}/"
-        config = uvicorn.Config(application(session), log_level="warning", lifespan="off", ws="none")
+        config = uvicorn.Config(application(self.session), log_level="warning", lifespan="off", ws="none")
         self.uvicorn = uvicorn.Server(config)
         self.thread = threading.Thread(target=self.uvicorn.run, args=([listener],))
         self.thread.start()

@@ -195,3 +195,70 @@ def test_the_focus_is_seen(open_window, server, scheme):
     assert style == "solid"
     grounds = page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert (sum(int(part) for part in grounds[4:-1].split(",")) < 200) == (scheme == "dark")
+
+
+def test_a_page_that_is_nobodys_is_given_an_owner_and_corners(open_window, server):
+    window = open_window(server)
+    page = window.page
+    page.click("[data-mode=pages]")
+    page.wait_for_selector("#page-view image")
+    assert "nobody.jpg" in page.inner_text("#page-list")
+    page.select_option("#owner", label="m05 Student")
+    page.click("#turn-left")
+    page.check("#corners")
+    handle = page.locator(".handle").first.bounding_box()
+    x, y = handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 30, y + 20, steps=3)
+    page.mouse.up()
+    page.click("#save-page")
+    page.wait_for_function("() => document.getElementById('page-list').textContent.includes('owner=m05')")
+    (row,) = server.decisions().values()
+    assert (row.criterion, row.page.owner, row.page.turn) == ("page:nobody.jpg#1", "m05", 90)
+    assert len(row.page.corners) == 4
+    page.click("#read-again")
+    page.wait_for_function("() => document.body.dataset.finished")
+    assert "nobody.jpg" not in [page.file for page in server.session.graded.results.unmatched]
+
+
+def test_sure_proposals_are_listed_before_they_are_accepted(open_window, server):
+    chances = {"m03": 0.97, "m06": 0.95, "m09": 0.5}
+    for student in server.session.students:
+        if student.key in chances:
+            said = {"proposed": "full", "probability": chances[student.key]}
+            criteria = [
+                one.model_copy(update=said) if one.id == "v_D" else one for one in student.report.criteria
+            ]
+            student.report = student.report.model_copy(update={"criteria": criteria})
+    window = open_window(server)
+    page = window.page
+
+    def listed():
+        return [item.split(":")[0].split()[-2] for item in page.locator("#sure-list li").all_inner_texts()]
+
+    page.click("#settings summary")
+    page.click("#proposals")
+    assert listed() == ["m03", "m06"]
+    assert not server.decisions()
+    page.fill("#least", "96")
+    assert listed() == ["m03"]
+    page.fill("#least", "90")
+    page.click("#sure-accept")
+    page.wait_for_selector("#sure", state="hidden")
+    window.ready()
+    assert sorted(server.decisions()) == [("m03", "v_D"), ("m06", "v_D")]
+    window.press("u")
+    assert not server.decisions()
+
+
+def test_a_comment_on_the_whole_is_kept(open_window, server):
+    window = open_window(server)
+    page = window.page
+    page.click("#whole-student summary")
+    page.fill("#remark", "drawn with care")
+    page.fill("#added", "1.5")
+    page.click("#save-whole")
+    page.wait_for_selector("#note:visible")
+    rows = {row.criterion: row for row in server.decisions().values()}
+    assert (rows["comment"].comment, rows["total"].points) == ("drawn with care", 1.5)

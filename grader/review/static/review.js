@@ -408,7 +408,7 @@ function moveNode(node, x, y) {
   return busy(async () => {
     const question = state.question, started = performance.now();
     try {
-      take(await call("/api/node", { student: question.student, sheet: question.look.sheet, node, x, y }));
+      take(await call("/api/node", { student: question.student, sheet: question.look.sheet, node, x, y, seen: question.look.nodes.find((one) => `${one.figure}:${one.name}` === node).seen }));
     } finally { await showQuestion(true); }
     document.body.dataset.nodeMs = Math.round(performance.now() - started);
   });
@@ -599,7 +599,7 @@ function savePage() {
   return busy(async () => {
     const page = state.page;
     take(await call("/api/page", {
-      file: page.file, page: page.page, owner: $("owner").value || null, turn: pageViewer.turn === page.upright ? null : pageViewer.turn,
+      file: page.file, page: page.page, seen: page.seen, owner: $("owner").value || null, turn: pageViewer.turn === page.upright ? null : pageViewer.turn,
       corners: $("corners").checked ? pageViewer.corners : [],
     }));
     await showPages();
@@ -734,7 +734,7 @@ $("read-again").onclick = () => { showMode("done"); finish(); };
 $("finish").onclick = finish;
 $("save-whole").onclick = () => busy(async () => {
   const student = state.question.student;
-  take(await call("/api/whole", { student, comment: $("remark").value.trim(), added: Number($("added").value) || 0 }));
+  take(await call("/api/whole", { student, comment: $("remark").value.trim(), added: Number($("added").value) || 0, seen: state.students.get(student).seen }));
   tell(texts.saved, [[texts.close, () => tell("")]]);
   await showQuestion(true);
 });

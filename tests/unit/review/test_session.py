@@ -11,6 +11,7 @@ from PIL import Image
 from grader.folder.decisions import basis_of
 from grader.inputs.decisions import Decision, DecisionFile
 from grader.review.server import application
+from grader.review.session import mark_of
 from tests.unit.review.conftest import PUMP, Page, silent
 
 SCANNED, ENTERED = "s02", "s09"
@@ -227,8 +228,38 @@ def test_a_comment_on_the_whole_and_points_added(page, session):
     rows = decided(session)
     assert rows["s09", "comment"].comment == "well drawn"
     assert rows["s09", "total"].points == 1.5
-    page.said("/api/whole", student=ENTERED, comment="", added=0)
+    seen = page.get("/api/class").json()["students"][1]["seen"]
+    assert page.said("/api/whole", student=ENTERED, comment="", added=0).status_code == 409
+    page.said("/api/whole", student=ENTERED, comment="", added=0, seen=seen)
     assert not decided(session)
+    page.said("/api/undo")
+    assert set(decided(session)) == {("s09", "comment"), ("s09", "total")}
+
+
+def test_a_row_that_people_wrote_without_a_position_is_replaced(page, session):
+    """A second row on the same would make both of them faults."""
+    path = session.batch.folder / "decisions.csv"
+    DecisionFile(path).add(Decision("s02", None, "v_D", "partial", by="by hand"))
+    page.answer(SCANNED, "v_D", "none")
+    assert [row.verdict for row in DecisionFile(path).all()] == ["none"]
+
+
+def test_only_those_of_whom_something_changed_are_marked_anew(page, session):
+    version = page.get("/api/class").json()["version"]
+    path = session.batch.folder / "decisions.csv"
+    DecisionFile(path).add(Decision("s09", None, "v_A", "partial", by="by hand"))
+    told = page.get("/api/class", params={"since": version}).json()
+    assert [one["key"] for one in told["students"]] == [ENTERED]
+
+
+def test_a_file_that_people_broke_is_told_and_left_alone(page, session):
+    path = session.batch.folder / "decisions.csv"
+    path.write_text("who,what\n1,2\n", encoding="utf-8")
+    answer = {"student": SCANNED, "criterion": "v_D", "verdict": "full", "seen": ""}
+    told = page.said("/api/decide", answers=[answer])
+    assert told.status_code == 400
+    assert "decisions.csv" in told.json()["message"]
+    assert path.read_text(encoding="utf-8") == "who,what\n1,2\n"
 
 
 def test_what_others_write_into_the_file_is_taken_in(page, session):
@@ -256,25 +287,23 @@ def test_a_node_snaps_to_the_ink_and_marks_follow(page, session):
     assert answer.status_code == 200
     x, y = decided(session)["s02", "node:velocity_plan:b"].place
     assert abs(complex(x - node["x"], y - node["y"])) < 0.4
-    moved = page.said("/api/node", **said, x=node["x"] + 25.0, y=node["y"])
+    assert page.said("/api/node", **said, x=node["x"], y=node["y"]).status_code == 409
+    look = page.get("/api/question", params={"student": SCANNED, "criterion": "v_B"}).json()["look"]
+    seen = next(one["seen"] for one in look["nodes"] if one["name"] == "b")
+    moved = page.said("/api/node", **said, x=node["x"] + 25.0, y=node["y"], seen=seen)
     after = {one["criterion"]: one for one in moved.json()["students"][0]["rows"]}
     assert after["v_B"]["verdict"] != "full"
 
 
-def test_marks_change_within_200_ms_of_a_moved_node(page):
+def test_marks_change_within_200_ms_of_a_moved_node(page, session):
     look = page.get("/api/question", params={"student": SCANNED, "criterion": "v_B"}).json()["look"]
     node = next(one for one in look["nodes"] if one["name"] == "b")
+    said = {"student": SCANNED, "sheet": look["sheet"], "node": "velocity_plan:b", "y": node["y"]}
     spent = []
     for step in range(5):
+        seen = mark_of(decided(session).get(("s02", "node:velocity_plan:b")))
         started = time.process_time()
-        page.said(
-            "/api/node",
-            student=SCANNED,
-            sheet=look["sheet"],
-            node="velocity_plan:b",
-            x=node["x"] + step,
-            y=node["y"],
-        )
+        assert page.said("/api/node", **said, x=node["x"] + step, seen=seen).status_code == 200
         spent.append(time.process_time() - started)
     assert min(spent) < 0.2
 
