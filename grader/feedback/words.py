@@ -175,8 +175,6 @@ PROBLEMS: dict[str, str] = {
     "owner_ambiguous": N_("The student has several positions, and nothing says which one this is."),
     "owner_other_assignment": N_("The page belongs to another assignment."),
     "order_refused": N_("The roster's order cannot be used for these pages."),
-    "decision_fault": N_("A row of the decisions cannot be applied."),
-    "decision_not_applied": N_("A decision does not fit what was handed in; it was not applied."),
     "scan_missing": N_("A scan that the roster names is not there."),
     "decision_fault": N_("A line of the decisions cannot be used."),
     "decision_not_applied": N_("A person's decision could not be applied."),
