@@ -2,6 +2,7 @@
 
 import cmath
 import math
+import statistics
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -128,8 +129,8 @@ class _Sheets:
         """Add one sheet."""
         sketch = reading.figures.get(MECHANISM)
         turn, se_turn = turn_of(self.task, sketch) if sketch else NOT_TURNED
-        if not _agrees_with_plans(self.task, reading, turn):
-            turn, se_turn = NOT_TURNED
+        if (turn, se_turn) == NOT_TURNED or not _agrees_with_plans(self.task, reading, turn):
+            turn, se_turn = _common_turn(self.task, reading)
         joints: dict[str, complex] = {}
         if sketch:
             self.lengths.extend(_yardstick(self.task, sketch))
@@ -263,6 +264,8 @@ def _nodes_from(task: Task, measured: Mapping[str, DrawnVector]) -> dict[str, co
 NOT_TURNED = (0.0, math.radians(1.0))
 """Where no sketch tells the turn: people draw along the frame, to about a degree."""
 FAR_TURNED_RAD = math.radians(10.0)
+LEAST_TURNED, MOST_AGREE, LEAST_TURNED_MM = 3, 0.75, 10.0
+"""So many vectors of this length, and this share of them, tell the turn of a sheet that is askew."""
 FIT_MM = 1.0
 """Root mean square misfit up to which the drawn mechanism is the right one, turned and scaled."""
 LEAST_GROUND_MM = 20.0
@@ -303,17 +306,36 @@ def _agrees_with_plans(task: Task, reading: Reading, turn: float) -> bool:
     """
     if abs(turn) <= FAR_TURNED_RAD:
         return True
-    off = [
-        cmath.rect(1.0, math.radians(drawn.direction_deg) - cmath.phase(task.real[name]))
-        for figure in reading.figures.values()
-        for name, drawn in figure.vectors.items()
-        if drawn.direction_deg is not None and task.real.get(name)
-    ]
+    off = _turns(task, reading)
     turned, upright = (
-        sum(abs(cmath.phase(one * cmath.rect(1.0, -by))) < abs(turn) / 4.0 for one in off)
-        for by in (turn, 0.0)
+        sum(abs(math.remainder(one - by, math.tau)) < abs(turn) / 4.0 for one in off) for by in (turn, 0.0)
     )
     return turned >= upright
+
+
+def _common_turn(task: Task, reading: Reading) -> tuple[float, float]:
+    """The small turn that nearly all vectors of a sheet's plans have in common; else `NOT_TURNED`.
+
+    A sheet that was drawn askew as a whole is not wrong, and without a sketch nothing else tells it.
+    """
+    off = [one for one in _turns(task, reading) if abs(one) < FAR_TURNED_RAD]
+    if len(off) < LEAST_TURNED:
+        return NOT_TURNED
+    turn = statistics.median(off)
+    agreeing = sum(abs(one - turn) < NOT_TURNED[1] for one in off)
+    return (turn, NOT_TURNED[1]) if agreeing > MOST_AGREE * len(off) else NOT_TURNED
+
+
+def _turns(task: Task, reading: Reading) -> list[float]:
+    """How far each vector of a sheet's plans is turned from the exact one, radians, -pi to pi."""
+    return [
+        math.remainder(math.radians(drawn.direction_deg) - cmath.phase(task.real[name]), math.tau)
+        for figure in reading.figures.values()
+        for name, drawn in figure.vectors.items()
+        if drawn.direction_deg is not None
+        and (drawn.length_mm or 0.0) > LEAST_TURNED_MM
+        and task.real.get(name)
+    ]
 
 
 def _is_drafting_error(task: Task, nodes: Iterable[str], turn: float) -> bool:

@@ -49,17 +49,24 @@ def basis_of(
 
     Titles, points, tolerances and the student's name are no part of it.
     """
-    asked = [one.name for one in rubric.criterion if one.id == criterion]
-    placed = [(page.turn_deg, page.corners_px) for page in submission.pages] if ":" in criterion else []
+    return _basis([*_handed_in(submission, assignment), _asked(submission, rubric, criterion)])
+
+
+def _handed_in(submission: StudentSubmission, assignment: Assignment) -> list[object]:
+    """What is the same for all decisions on a submission: files, pixels, the task."""
     entered = submission.measured
     by_hand = None if entered is None else (entered.numbers, entered.scales, entered.further_scales)
-    parts = [
+    return [
         (sorted((page.digest, page.page) for page in submission.pages), by_hand),
         (sorted(page.content for page in submission.pages), by_hand),
         (_task(assignment, submission.variant), submission.declared),
-        (asked, placed),
     ]
-    return _basis(parts)
+
+
+def _asked(submission: StudentSubmission, rubric: RubricFile, criterion: str) -> object:
+    """What a criterion asks for; of a node, how its page was placed."""
+    placed = [(page.turn_deg, page.corners_px) for page in submission.pages] if ":" in criterion else []
+    return [one.name for one in rubric.criterion if one.id == criterion], placed
 
 
 def page_basis(page: PageRef) -> str:
@@ -198,6 +205,8 @@ class ClassDecisions:
                 found.append((index, row))
         twice = Counter((index, row.criterion) for index, row in found)
         given: dict[int, list[Decision]] = {}
+        with_basis = {index for index, row in found if row.basis}
+        about = {index: _handed_in(students[index], assignment) for index in with_basis}
         for index, row in found:
             fault = check.fault_of(row)
             if twice[index, row.criterion] > 1:
@@ -208,8 +217,8 @@ class ClassDecisions:
             if fault is not None:
                 self._fault(row, *fault)
                 continue
-            basis = basis_of(students[index], assignment, rubric, row.criterion) if row.basis else ""
-            why = _why_stale(row.basis, basis)
+            asked = _asked(students[index], rubric, row.criterion)
+            why = _why_stale(row.basis, _basis([*about[index], asked])) if row.basis else None
             if why is not None:
                 self._out_of_date(row, why)
             else:

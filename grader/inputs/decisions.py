@@ -290,19 +290,18 @@ def _line(
         key = None
         faults["position"] = f"'{short(text['position'])}' is no whole number"
     told = [(f", {column}", why) for column, why in faults.items()]
-    surplus = surplus_of(header, cells, delimiter) or _nameless(header, cells)
+    strangers, surplus = _strangers(header, cells), surplus_of(header, cells, delimiter)
+    if strangers and surplus is None:
+        surplus = f"'{short(strangers[0].strip())}' stands in a column without a name; move it to comment"
     if surplus is not None:
         key, told = None, [("", surplus)]
-    as_it_stands = (*(given.get(name, "") for name in COLUMNS), *cells[len(header) :])
+    as_it_stands = (*(given.get(name, "") for name in COLUMNS), *strangers, *cells[len(header) :])
     return Line(row, key, as_it_stands if told else ()), told
 
 
-def _nameless(header: Sequence[str], cells: Sequence[str]) -> str | None:
-    """What is wrong with a cell in a column without a name; None where there is none."""
-    strangers = [cell.strip() for name, cell in zip(header, cells, strict=False) if not name and cell.strip()]
-    if not strangers:
-        return None
-    return f"'{short(strangers[0])}' stands in a column without a name; move it to comment"
+def _strangers(header: Sequence[str], cells: Sequence[str]) -> list[str]:
+    """What stands in columns without a name."""
+    return [cell for name, cell in zip(header, cells, strict=False) if not name and cell.strip()]
 
 
 def _without_repeated(lines: Sequence[Line], delimiter: str) -> tuple[list[Line], list[tuple[int, Finding]]]:

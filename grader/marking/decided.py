@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import cast
 
+from grader.comparison.verdicts import EVEN
 from grader.documents import (
     AppliedDecisionDocument,
     CriterionDocument,
@@ -16,7 +17,8 @@ from grader.documents import (
 )
 from grader.inputs.decisions import Decision
 from grader.inputs.measurements import StudentSubmission
-from grader.marking.mark import DECIMALS, score
+from grader.marking.mark import CHARGED, DECIMALS, score, with_mistake
+from grader.marking.settling import OPENING, at_stake
 from grader.outcomes import Judgement, NamedMistake, Outcome, Quantity, Reason, Tolerance
 from grader.reading.corrected import corrected
 from grader.records import Problem, ScannedPage
@@ -25,7 +27,6 @@ from reference.authored.assignment import Assignment
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction
 
-CHARGED = frozenset({"none", "partial"})
 NOT_APPLIED = "decision_not_applied"
 """The problem of a decision that does not fit what was read; its message begins with the criterion."""
 
@@ -54,7 +55,7 @@ def decide(judgement: Judgement, rubric: RubricFile, rows: Sequence[Decision]) -
     by_criterion = {row.criterion: row for row in rows if row.kind == "verdict"}
     if not by_criterion:
         return judgement
-    outcomes = tuple(
+    outcomes: tuple[Outcome, ...] = tuple(
         _decided(outcome, by_criterion[outcome.criterion], rubric)
         if outcome.criterion in by_criterion
         else outcome
@@ -64,6 +65,7 @@ def decide(judgement: Judgement, rubric: RubricFile, rows: Sequence[Decision]) -
         one.criterion for one in outcomes if one.criterion in by_criterion and one.verdict not in CHARGED
     }
     mistakes = tuple(_left(judgement.mistakes, acquitted))
+    outcomes = tuple(with_mistake(outcome, mistakes) for outcome in at_stake(rubric, outcomes))
     return replace(judgement, outcomes=outcomes, mistakes=mistakes, score=score(rubric, outcomes))
 
 
@@ -77,11 +79,36 @@ def _decided(outcome: Outcome, row: Decision, rubric: RubricFile) -> Outcome:
         possible=(verdict, verdict),
         shares=() if share is None else (share, share),
         confidence=1.0,
-        # What the program has to say against a person's verdict would contradict it.
-        reasons=outcome.reasons if keeps else (Reason("decided"),),
+        probability=1.0,
+        reasons=outcome.reasons if keeps else tuple(_reasons(outcome.reasons, verdict)),
         mistake=outcome.mistake if verdict in CHARGED else None,
         cause=outcome.cause if verdict in CHARGED else None,
     )
+
+
+FOR_THE_STUDENT = frozenset({"counted_for_you", "not_certainly_within", "at_stake", "other_variant"})
+"""Reasons of rules that hold where nobody decides."""
+REMARKS = frozenset({"right", "too_short_to_judge", "scale_assumed"})
+"""Reasons that tell of no loss."""
+FOLLOWED = "follows"
+
+
+def _reasons(reasons: Sequence[Reason], verdict: Verdict) -> Sequence[Reason]:
+    """What was read, as far as it says why a person's verdict is what it is; else that a person decided.
+
+    What would contradict the verdict, and why the program was in doubt, is not told.
+    """
+    said = [one for one in reasons if one.code not in OPENING | FOR_THE_STUDENT | {FOLLOWED}]
+    losses = [one for one in said if one.code not in REMARKS]
+    followed = [one for one in reasons if one.code == FOLLOWED]
+    match verdict:
+        case "full" if not losses:
+            return said or [Reason("right")]
+        case "none" | "partial" if losses:
+            return said
+        case "follow_through" if followed:
+            return followed
+    return [Reason("decided")]
 
 
 def _left(mistakes: Sequence[NamedMistake], acquitted: set[str]) -> Iterator[NamedMistake]:
@@ -91,10 +118,26 @@ def _left(mistakes: Sequence[NamedMistake], acquitted: set[str]) -> Iterator[Nam
             yield replace(mistake, explains=explains)
 
 
+NOTHING_READ = Outcome(
+    "",
+    "",
+    "review",
+    Quantity(),
+    Quantity(),
+    Tolerance(),
+    0.0,
+    (),
+    ("none", "full"),
+    shares=(0.0, 1.0),
+    probability=EVEN,
+)
+"""What nothing at all is known of."""
+
+
 def open_again(judgement: Judgement, rubric: RubricFile, submission: StudentSubmission) -> Judgement:
     """The judgement of a submission of which nothing could be read: what is asked for waits for a person."""
     why = Reason("unread" if submission.pages or submission.has_unusable else "not_measured")
-    waiting = Outcome("", "", "review", Quantity(), Quantity(), Tolerance(), 0.0, (why,), ("none", "full"))
+    waiting = replace(NOTHING_READ, reasons=(why,))
     outcomes = tuple(
         one
         if one.verdict == "not_judged"
@@ -154,6 +197,11 @@ def with_decisions(
         else _with_node(one, moved, construction)
         for one in report.criteria
     ]
+    if before is not None and all(
+        one.confidence == 0.0 or one.verdict == "not_judged" for one in before.outcomes
+    ):
+        nothing = {"probability": None, "proposed": None}
+        criteria = [one if one.verdict != "review" else one.model_copy(update=nothing) for one in criteria]
     comment = "\n".join(row.comment for row in (*kinds["total"], *kinds["comment"]) if row.comment)
     applied = [AppliedDecisionDocument.model_validate(row) for row in rows if row.criterion not in astray]
     report = report.model_copy(update={"criteria": criteria, "comment": comment, "decisions": applied})

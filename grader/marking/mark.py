@@ -38,7 +38,7 @@ def judge(task: Task, submission: Submission) -> Judgement:
     mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes), *_not_drawn(task, comparison))
     outcomes = charged_where_made(task, comparison.outcomes, mistakes)
     outcomes = at_stake(task.rubric, of_another(task.rubric, outcomes, mistakes))
-    outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in outcomes)
+    outcomes = tuple(with_mistake(outcome, mistakes) for outcome in outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
 
 
@@ -121,7 +121,7 @@ def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
     return found
 
 
-def _with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
+def with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
     """The outcome with the mistake that explains its loss."""
     if outcome.verdict not in {"none", "partial"}:
         return outcome
