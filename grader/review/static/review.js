@@ -518,6 +518,8 @@ async function showPages() {
   $("no-pages").hidden = data.pages.length > 0;
   $("read-again").hidden = !data.pages.length;
   $("page-form").hidden = true;
+  $("idle").hidden = !data.idle.length;
+  $("idle-list").replaceChildren(...data.idle.map((text) => element("li", {}, text)));
   $("page-list").replaceChildren(...data.pages.map((page) => {
     const item = element("li"), button = element("button", { type: "button" }, page.label + (page.said ? ` – ${page.said}` : ""));
     button.onclick = () => showPage(page, button);

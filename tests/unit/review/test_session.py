@@ -332,6 +332,20 @@ def test_a_page_that_is_nobodys_is_offered_and_assigned(page, session):
     assert not decided(session)
 
 
+def test_decisions_that_were_not_applied_are_told(session):
+    path = session.batch.folder / "decisions.csv"
+    DecisionFile(path).add(
+        Decision("s02", None, "v_D", "full", basis="b0.1.2.3"), Decision("nobody", None, "v_D", "full")
+    )
+    session.bring_up_to_date(silent)
+    page = Page(application(session), base_url="http://127.0.0.1:8321")
+    stale, fault = page.get("/api/pages").json()["idle"]
+    assert "s02 v_D: right" in stale
+    assert "nobody" in fault
+    said = page.get("/api/question", params={"student": SCANNED, "criterion": "v_D"}).json()
+    assert "has changed since" in said["state"]
+
+
 @pytest.mark.parametrize(
     "said",
     [
