@@ -145,7 +145,8 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
         "state": _state(criterion, decision, said, speaker),
         "brief": said or speaker.gettext(VERDICTS[criterion.verdict]),
         "accept": Markup("<kbd>Enter</kbd> {}").format(speaker.gettext(accept) % {"verdict": what}),
-        "sentence": symbols(session.sentence_if(student, criterion)),
+        "why": symbols(criterion.feedback) if criterion.verdict == OPEN else "",
+        "sentence": symbols(session.sentence_if(student, criterion)) if accept != NO_PROPOSAL else "",
         "look": _look(session, student, criterion),
     }
 

@@ -50,6 +50,18 @@ def test_a_question_says_what_was_measured_and_shows_where(page):
     assert look["marks"].startswith("<")
 
 
+def test_a_question_says_why_it_waits_and_what_the_student_will_read(page):
+    waiting = [row for row in page.rows().values() if row["verdict"] == "review" and row["proposed"]]
+    assert waiting
+    asked = {"student": waiting[0]["student"], "criterion": waiting[0]["criterion"]}
+    question = page.get("/api/question", params=asked).json()
+    assert question["why"]
+    assert question["sentence"] != question["why"]
+    page.answer(**asked, verdict=question["proposed"])
+    settled = page.get("/api/question", params=asked).json()
+    assert (settled["sentence"], settled["why"]) == (question["sentence"], "")
+
+
 def test_without_a_scan_there_is_nothing_to_look_at(page):
     question = page.get("/api/question", params={"student": ENTERED, "criterion": "v_B"}).json()
     assert question["look"] is None
