@@ -226,6 +226,8 @@ def _elements(view: PageView) -> Iterator[Markup]:
 
 LOOK_MARGIN_MM = 14.0
 LEAST_LOOK_MM = 45.0
+LOOK_SIZE_PER_MM = 0.0095
+"""A look fills a screen: its marks are smaller than those of details that stand three in a row."""
 
 
 def look(
@@ -243,5 +245,5 @@ def look(
     box = _box([*arrows, *ghosts], scene, LOOK_MARGIN_MM, LEAST_LOOK_MM)
     part = replace(scene, arrows=arrows, ghosts=ghosts, dots=())
     others = [one for one in _arrows_of(scene, figure) if one not in arrows]
-    layers = _marks(part, box, DETAIL_SIZE_PER_MM, arrows, names, others)
+    layers = _marks(part, box, LOOK_SIZE_PER_MM, arrows, names, others)
     return box, Markup("").join(_elements(PageView("detail", 0, box, layers, (name,))))

@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from grader.documents import CriterionDocument, QuantityDocument
 from grader.feedback.numbers import quantity_cells, score_text, tolerance_cells
-from grader.feedback.words import VERDICTS, problem_sentence, symbols
+from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
 from grader.inputs.decisions import Decision
 from grader.language import N_, Tongue
 from grader.overlay.closeup import look
@@ -52,6 +52,7 @@ PROPOSED = N_("proposed: %(verdict)s")
 ACCEPT = N_("Accept: %(verdict)s")
 NO_PROPOSAL = N_("No proposal: choose a verdict")
 GO_ON = N_("Go on")
+FAULT = "decision_fault"
 WHOLE_MARGIN = 0.03
 """Of a figure's size, where nothing else says what to look at."""
 
@@ -144,7 +145,8 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
         "state": _state(criterion, decision, said, speaker),
         "brief": said or speaker.gettext(VERDICTS[criterion.verdict]),
         "accept": Markup("<kbd>Enter</kbd> {}").format(speaker.gettext(accept) % {"verdict": what}),
-        "sentence": symbols(session.sentence_if(student, criterion)),
+        "why": symbols(criterion.feedback) if criterion.verdict == OPEN else "",
+        "sentence": symbols(session.sentence_if(student, criterion)) if accept != NO_PROPOSAL else "",
         "look": _look(session, student, criterion),
     }
 
@@ -272,4 +274,15 @@ def pages_facts(session: Session, speaker: Tongue) -> Facts:
             }
         )
     owners = [{"key": student.key, "label": label_of(student, speaker)} for student in session.students]
-    return {"pages": pages, "owners": owners}
+    return {"pages": pages, "owners": owners, "idle": list(_idle(session, speaker))}
+
+
+def _idle(session: Session, speaker: Tongue) -> Iterator[str]:
+    """The decisions that the last run could not apply, each with the reason."""
+    results = None if session.graded is None else session.graded.results
+    for one in [] if results is None else results.stale:
+        what = speaker.gettext(VERDICTS[one.verdict]) if one.verdict in VERDICTS else one.verdict
+        yield f"{one.student_id} {one.criterion}: {what}. {speaker.gettext(one.reason)}".strip()
+    for fault in [] if results is None else results.unmatched:
+        if fault.code == FAULT:
+            yield unmatched_sentence(fault, speaker).text

@@ -38,9 +38,9 @@ def entered_class():
     for number in range(1, ENTERED + 1):
         plan = plan_document(PUMP, exact_plan(PUMP, [Variant(n=number)]))
         drawn = {name: str(round(one.drawn_mm, 1)) for name, one in plan.vectors.items()}
-        drawn["v_D"] = "?"
+        drawn["v_DC"] = "?"
         if number % 3 == 0:
-            drawn["a_D"] = "12 or 13"
+            drawn["a_DC_t"] = "12 or 13"
         names = names or list(drawn)
         lines.append(",".join([f"m{number:02}", str(number), *(drawn[name] for name in names)]))
     return "\n".join([",".join(["student_id", "n", *names]), *lines]) + "\n"

@@ -124,7 +124,7 @@ def test_a_dragged_node_snaps_and_the_marks_follow(open_window, server):
     window = open_window(server)
     page = window.page
     page.wait_for_selector("#view[data-loaded]")
-    node = page.locator(".node").first
+    node = page.locator(""".node[data-node="acceleration_plan:a'"]""")
     before = page.inner_text("#numbers")
     box = node.bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -228,7 +228,7 @@ def test_sure_proposals_are_listed_before_they_are_accepted(open_window, server)
         if student.key in chances:
             said = {"proposed": "full", "probability": chances[student.key]}
             criteria = [
-                one.model_copy(update=said) if one.id == "v_D" else one for one in student.report.criteria
+                one.model_copy(update=said) if one.id == "v_DC" else one for one in student.report.criteria
             ]
             student.report = student.report.model_copy(update={"criteria": criteria})
     window = open_window(server)
@@ -247,7 +247,7 @@ def test_sure_proposals_are_listed_before_they_are_accepted(open_window, server)
     page.click("#sure-accept")
     page.wait_for_selector("#sure", state="hidden")
     window.ready()
-    assert sorted(server.decisions()) == [("m03", "v_D"), ("m06", "v_D")]
+    assert sorted(server.decisions()) == [("m03", "v_DC"), ("m06", "v_DC")]
     window.press("u")
     assert not server.decisions()
 

@@ -287,7 +287,9 @@ async function showQuestion(keepView = false) {
   $("what").innerHTML = question.title;
   $("state").innerHTML = question.state;
   $("sentence").innerHTML = question.sentence;
-  $("sentence").hidden = !question.sentence;
+  $("sentence").parentElement.hidden = !question.sentence;
+  $("why").innerHTML = question.why;
+  $("why").hidden = !question.why;
   $("numbers").replaceChildren(...question.numbers.flatMap(([name, value]) => {
     const cell = element("dd");
     cell.innerHTML = value;
@@ -518,6 +520,8 @@ async function showPages() {
   $("no-pages").hidden = data.pages.length > 0;
   $("read-again").hidden = !data.pages.length;
   $("page-form").hidden = true;
+  $("idle").hidden = !data.idle.length;
+  $("idle-list").replaceChildren(...data.idle.map((text) => element("li", {}, text)));
   $("page-list").replaceChildren(...data.pages.map((page) => {
     const item = element("li"), button = element("button", { type: "button" }, page.label + (page.said ? ` – ${page.said}` : ""));
     button.onclick = () => showPage(page, button);

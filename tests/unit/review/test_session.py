@@ -50,6 +50,18 @@ def test_a_question_says_what_was_measured_and_shows_where(page):
     assert look["marks"].startswith("<")
 
 
+def test_a_question_says_why_it_waits_and_what_the_student_will_read(page):
+    waiting = [row for row in page.rows().values() if row["verdict"] == "review" and row["proposed"]]
+    assert waiting
+    asked = {"student": waiting[0]["student"], "criterion": waiting[0]["criterion"]}
+    question = page.get("/api/question", params=asked).json()
+    assert question["why"]
+    assert question["sentence"] != question["why"]
+    page.answer(**asked, verdict=question["proposed"])
+    settled = page.get("/api/question", params=asked).json()
+    assert (settled["sentence"], settled["why"]) == (question["sentence"], "")
+
+
 def test_without_a_scan_there_is_nothing_to_look_at(page):
     question = page.get("/api/question", params={"student": ENTERED, "criterion": "v_B"}).json()
     assert question["look"] is None
@@ -120,6 +132,7 @@ def test_a_settled_verdict_is_overridden(page, session):
 
 
 def test_undo_brings_back_what_stood_there_before(page, session):
+    own = page.rows()[SCANNED, "v_D"]["verdict"]
     page.answer(SCANNED, "v_D", "full", comment="first")
     page.answer(SCANNED, "v_D", "none")
     undone = page.said("/api/undo").json()
@@ -130,7 +143,7 @@ def test_undo_brings_back_what_stood_there_before(page, session):
     )
     page.said("/api/undo")
     assert not decided(session)
-    assert page.rows()[SCANNED, "v_D"]["verdict"] == "review"
+    assert page.rows()[SCANNED, "v_D"]["verdict"] == own
     assert page.said("/api/undo").json()["undone"] == ""
 
 
@@ -329,6 +342,20 @@ def test_a_page_that_is_nobodys_is_offered_and_assigned(page, session):
     )
     page.said("/api/undo")
     assert not decided(session)
+
+
+def test_decisions_that_were_not_applied_are_told(session):
+    path = session.batch.folder / "decisions.csv"
+    DecisionFile(path).add(
+        Decision("s02", None, "v_D", "full", basis="b0.1.2.3"), Decision("nobody", None, "v_D", "full")
+    )
+    session.bring_up_to_date(silent)
+    page = Page(application(session), base_url="http://127.0.0.1:8321")
+    stale, fault = page.get("/api/pages").json()["idle"]
+    assert "s02 v_D: right" in stale
+    assert "nobody" in fault
+    said = page.get("/api/question", params={"student": SCANNED, "criterion": "v_D"}).json()
+    assert "has changed since" in said["state"]
 
 
 @pytest.mark.parametrize(
