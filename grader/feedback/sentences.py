@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Literal
 
-from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, words_of
+from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, question_of, words_of
 from grader.language import N_, Tongue, tongue
 from grader.outcomes import NamedMistake, Outcome, Param, Quantity, Reason
 
@@ -210,14 +210,50 @@ def mistake_feedback(
     if level == "symbol" or mistake.code not in MISTAKES:
         return ""
     speaker = tongue(lang)
-    told = mistake_sentence(mistake, speaker, level, names)
-    others = [mistake_sentence(one, speaker, level, names) for one in mistake.rivals if one.code in MISTAKES]
-    others = [one for one in dict.fromkeys(others) if one != told]
-    if not others:
+    told, *others = mistake_sentences(mistake, speaker, level, names)
+    if not any(others):
         return told
-    return " ".join(
-        (told, speaker.gettext(RIVALS), *(f"{speaker.gettext(BETWEEN_RIVALS)} {one}" for one in others))
-    )
+    either = speaker.gettext(BETWEEN_RIVALS)
+    return " ".join((told, speaker.gettext(RIVALS), *(f"{either} {one}" for one in others if one)))
+
+
+ODDS = N_("How likely that is: %(share)s.")
+"""Stands after a mistake that has rivals, and after each of these."""
+
+
+def mistake_sentences(
+    mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
+) -> list[str]:
+    """What was done and what to redo, and the same of each rival, with its odds.
+
+    After the last one stands the question that tells them apart. A rival that is told in the same words as
+    one before it is empty.
+    """
+    told = mistake_sentence(mistake, speaker, level, names)
+    found = {told: mistake.confidence}
+    sentences = [told]
+    for one in mistake.rivals:
+        other = mistake_sentence(one, speaker, level, names) if one.code in MISTAKES else ""
+        sentences.append("" if other in found else other)
+        found.setdefault(other, one.confidence)
+    last = max((index for index, text in enumerate(sentences) if text), default=0)
+    if last == 0:
+        return sentences
+    sentences = [f"{text} {_odds(found[text], speaker)}" if text else "" for text in sentences]
+    sentences[last] = f"{sentences[last]} {question(mistake, speaker, names)}".strip()
+    return sentences
+
+
+def _odds(share: float, speaker: Tongue) -> str:
+    percent = f"{speaker.number(100.0 * share, 0)}\N{NO-BREAK SPACE}%"
+    return speaker.gettext(ODDS) % {"share": percent}
+
+
+def question(mistake: NamedMistake, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
+    """The one question that tells a mistake from its rivals."""
+    where = {"at": place(mistake.at, speaker, names)}
+    known = {**where, **_known(mistake, speaker, "hint", names)}
+    return speaker.gettext(question_of(mistake.code, known)) % known
 
 
 def mistake_sentence(
