@@ -46,6 +46,8 @@ def test_a_mistake_of_which_everything_waits_is_not_called_certain():
     told = Page(feedback_page(one, [], "en")).text
     assert "What may be wrong Wrong link" in told.replace("Line drawn by the wrong link", "Wrong link")
     assert "Not certain yet" in told
+    beside = [waits[0], criterion("v_B")]
+    assert page_of(one.model_copy(update={"criteria": beside})).actions[0].is_open
     lost = [waits[0], criterion("v_B", "none", 0.0)]
     assert not page_of(one.model_copy(update={"criteria": lost})).actions[0].is_open
 
