@@ -49,6 +49,8 @@ WHY_WIDENED = N_(
 UNITS = N_(
     "Lengths are millimetres on paper; directions count counter-clockwise from the horizontal to the right."
 )
+MOST_TITLES = 2
+"""Mistakes in one heading, the likeliest ones; the text below it tells them all."""
 PRINTED = "feedback.pdf"
 """Earlier versions wrote it; an old one is removed, it may show more than the page does now."""
 
@@ -372,7 +374,7 @@ class StudentPage:
         off = {one.drawn for one in explained if one.verdict in {"none", "partial", "review"}}
         causes: list[MistakeDocument | RivalDocument] = [mistake, *mistake.rivals]
         titles = dict.fromkeys(_title(cause, self.speaker) for cause in causes)
-        joined = f" {self.speaker.gettext(OR)} ".join(titles)
+        joined = f" {self.speaker.gettext(OR)} ".join(list(titles)[:MOST_TITLES])
         return Action(
             title=joined[:1].upper() + joined[1:],
             at=place(mistake.at, self.speaker, self.about.names),
