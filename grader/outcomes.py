@@ -110,7 +110,7 @@ class Outcome:
     cause : that mistake, where diagnosis found it
     shares : of the points, that `possible` gives; empty where the verdicts alone say it
     probability : that the verdict is right; under review, that the proposed share is
-    proposed : the share of the points as read
+    proposed : the likeliest share of the points
     """
 
     criterion: str
