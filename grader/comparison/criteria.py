@@ -22,6 +22,7 @@ from grader.comparison.task import Task, TaskSegment, unit_of
 from grader.comparison.verdicts import (
     ALL_RIGHT,
     FULL,
+    SHORT_MM,
     MarkRange,
     by_rule,
     left_open,
@@ -198,7 +199,7 @@ def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
                     mark_vector(drawn, expected, widened(plain, size, uncertainty), table, se), rule
                 )
                 mark = left_open(mark, ALL_RIGHT if _is_boundless(uncertainty, size) else by_hand)
-        mark = verdicts.with_confidence(mark, confidence, rubric.doubt.settle)
+        mark = verdicts.with_confidence(mark, confidence, rubric.doubt.settle, size)
         return mark if mark.is_full else replace(mark, reasons=(*remarks, *mark.reasons))
 
     return against
@@ -383,8 +384,6 @@ def _is_charged(charges: Charges, scale: str) -> bool:
 # What was not handed in, or not read ---------------------------------------------------------------
 
 
-LEAST_BLANK_MM = 5.0
-"""A shorter vector may be hidden by the marks of its ends."""
 NOT_DRAWN = 0.98
 """That a vector was not drawn, where both its ends were read for certain and no ink lies between them."""
 
@@ -420,7 +419,7 @@ def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> O
 def is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -> bool:
     """Whether a vector of this expected length is not on the sheet, though both its ends were read."""
     vector = task.construction.vectors.get(name)
-    if vector is None or name not in evidence.blank or length_mm < LEAST_BLANK_MM:
+    if vector is None or name not in evidence.blank or length_mm < SHORT_MM:
         return False
     return {vector.tail, vector.head} <= {*evidence.nodes, *task.construction.poles.values()}
 
