@@ -2,8 +2,7 @@
 
 import cmath
 import math
-import statistics
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -90,7 +89,7 @@ class Evidence:
 
 def gather(task: Task, submission: Submission) -> Evidence:
     """All readings of a submission in the assignment's frame."""
-    sheets = _Sheets(task)
+    sheets = _Sheets(task, turn=_turn_of_sketches(task, submission.readings))
     for reading in submission.readings:
         sheets.take(reading)
     measured = _measured(submission.measured)
@@ -119,6 +118,7 @@ class _Sheets:
     """The readings of the sheets so far; of a figure on two sheets the nodes of the first one count."""
 
     task: Task
+    turn: tuple[float, float]
     drawn: dict[str, DrawnVector] = field(default_factory=dict)
     nodes: dict[str, complex] = field(default_factory=dict)
     se_mm: dict[str, float] = field(default_factory=dict)
@@ -128,9 +128,10 @@ class _Sheets:
     def take(self, reading: Reading) -> None:
         """Add one sheet."""
         sketch = reading.figures.get(MECHANISM)
-        turn, se_turn = turn_of(self.task, sketch) if sketch else NOT_TURNED
-        if (turn, se_turn) == NOT_TURNED or not _agrees_with_plans(self.task, reading, turn):
-            turn, se_turn = _common_turn(self.task, reading)
+        turn, se_turn = turn_of(self.task, sketch) if sketch else self.turn
+        is_likely = sketch is not None and abs(turn) < FAR_TURNED_RAD
+        if not is_likely and not _agrees_with_plans(self.task, reading, turn):
+            turn, se_turn = NOT_TURNED
         joints: dict[str, complex] = {}
         if sketch:
             self.lengths.extend(_yardstick(self.task, sketch))
@@ -263,9 +264,10 @@ def _nodes_from(task: Task, measured: Mapping[str, DrawnVector]) -> dict[str, co
 
 NOT_TURNED = (0.0, math.radians(1.0))
 """Where no sketch tells the turn: people draw along the frame, to about a degree."""
-FAR_TURNED_RAD = math.radians(10.0)
-LEAST_TURNED, MOST_AGREE, LEAST_TURNED_MM = 3, 0.75, 10.0
-"""So many vectors of this length, and this share of them, tell the turn of a sheet that is askew."""
+FAR_TURNED_RAD = math.radians(90.0)
+"""Nobody turns a sketch by more than this on its sheet."""
+LEAST_TURNED_MM = 10.0
+"""A shorter vector tells a sheet's turn too vaguely."""
 FIT_MM = 1.0
 """Root mean square misfit up to which the drawn mechanism is the right one, turned and scaled."""
 LEAST_GROUND_MM = 20.0
@@ -299,13 +301,11 @@ def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
 
 
 def _agrees_with_plans(task: Task, reading: Reading, turn: float) -> bool:
-    """Whether as many vectors of the sheet's plans fit the sketch's turn as fit none.
+    """Whether as many vectors of the sheet's plans fit a sketch's turn as fit none.
 
-    People draw plans beside the sketch as it lies. One that looks turned among plans that are not has
-    been misread.
+    People draw plans beside the sketch as it lies. One that looks upside down among plans that are not
+    has been misread.
     """
-    if abs(turn) <= FAR_TURNED_RAD:
-        return True
     off = _turns(task, reading)
     turned, upright = (
         sum(abs(math.remainder(one - by, math.tau)) < abs(turn) / 4.0 for one in off) for by in (turn, 0.0)
@@ -313,17 +313,11 @@ def _agrees_with_plans(task: Task, reading: Reading, turn: float) -> bool:
     return turned >= upright
 
 
-def _common_turn(task: Task, reading: Reading) -> tuple[float, float]:
-    """The small turn that nearly all vectors of a sheet's plans have in common; else `NOT_TURNED`.
-
-    A sheet that was drawn askew as a whole is not wrong, and without a sketch nothing else tells it.
-    """
-    off = [one for one in _turns(task, reading) if abs(one) < FAR_TURNED_RAD]
-    if len(off) < LEAST_TURNED:
-        return NOT_TURNED
-    turn = statistics.median(off)
-    agreeing = sum(abs(one - turn) < NOT_TURNED[1] for one in off)
-    return (turn, NOT_TURNED[1]) if agreeing > MOST_AGREE * len(off) else NOT_TURNED
+def _turn_of_sketches(task: Task, readings: Sequence[Reading]) -> tuple[float, float]:
+    """The turn of a student's first sketch, for sheets that have none: people lay each sheet alike."""
+    sketch = next((one.figures[MECHANISM] for one in readings if MECHANISM in one.figures), None)
+    turn, se = NOT_TURNED if sketch is None else turn_of(task, sketch)
+    return turn, math.hypot(se, NOT_TURNED[1])
 
 
 def _turns(task: Task, reading: Reading) -> list[float]:
