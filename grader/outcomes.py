@@ -146,7 +146,7 @@ class NamedMistake:
     explains : the criteria that lost by it
     confidence : the probability that it was made
     line : where a line was drawn wrongly: ``from`` a node, the ``link`` that gives its direction, and
-        ``line = guide`` where it follows a guide
+        ``line = guide`` where it follows a guide, ``driven across`` or ``driven along`` of the driven link
     rivals : mistakes that explain it nearly as well: what was handed in (lengths alone, say) does not tell
         them apart
     """
@@ -177,6 +177,8 @@ def _detail(mistake: Mistake) -> dict[str, Param]:
     match mistake:
         case Mistake(code="scale_wrong" | "rpm_not_converted" | "arithmetic", factor=factor):
             return {} if factor == 1.0 else {"factor": factor}
+        case Mistake(code="wrong_intersection", other=(name,)) if name[:2] in {"v_", "a_"}:
+            return {"instead": name}
         case Mistake(code="labels_swapped", other=(first, second)):
             return {"first": first, "second": second}
         case Mistake(code="other_variant", n=n, position=position):

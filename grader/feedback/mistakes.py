@@ -12,6 +12,8 @@ from grader.language import N_
 
 ALONG_GUIDE = "guide"
 """The detail `line` of a mistake in a line that runs along a moving guide."""
+DRIVEN_ACROSS, DRIVEN_ALONG = "driven across", "driven along"
+"""The same of the driven link's vectors: one is perpendicular to the link, one points along it."""
 CORIOLIS_END, NORMAL_END = "k_", "n_"
 """First letters of the nodes in which Coriolis and normal components end."""
 _NAMED = re.compile(r"%\((\w+)\)s")
@@ -148,6 +150,23 @@ _ALONG_GUIDE: dict[str, Words] = {
         N_("The block slides along its own guide: redraw the line by it."),
     ),
 }  # fmt: skip
+_DRIVEN_ACROSS: dict[str, Words] = {
+    "parallel_for_perpendicular": Words(
+        N_("vector along the link instead of perpendicular to it"),
+        N_("At %(at)s, the driven link's vector was drawn along the link instead of perpendicular to it."),
+        N_("A point that turns about a pivot moves perpendicular to the line from the pivot: lay its vector"
+           " off so, in the sense of rotation, then redo the plan."),
+    ),
+}  # fmt: skip
+_DRIVEN_ALONG: dict[str, Words] = {
+    "parallel_for_perpendicular": Words(
+        N_("vector perpendicular to the link instead of along it"),
+        N_("At %(at)s, the driven link's vector was drawn perpendicular to the link instead of along it."),
+        N_("A normal acceleration points along the link, from the moving point to the pivot: lay it off so,"
+           " then redo the plan."),
+    ),
+}  # fmt: skip
+_BY_LINE = {ALONG_GUIDE: _ALONG_GUIDE, DRIVEN_ACROSS: _DRIVEN_ACROSS, DRIVEN_ALONG: _DRIVEN_ALONG}
 
 
 PRECISE: dict[str, tuple[str, ...]] = {
@@ -160,6 +179,7 @@ PRECISE: dict[str, tuple[str, ...]] = {
     "wrong_intersection": (
         N_("The line to %(at)s was drawn from %(other)s instead of from %(from)s, and so meets the other one"
            " in the wrong place."),
+        N_("%(at)s was taken on the line of %(instead)s instead of on its own line from %(from)s."),
     ),
     "sense_reversed": (N_("The vector %(vector)s was laid off the wrong way round."),),
     "normal_reversed": (
@@ -211,4 +231,37 @@ def words_of(code: str, at: str = "", line: str = "") -> Words:
     usual = MISTAKES[code]
     if at.startswith(CORIOLIS_END):
         return _CORIOLIS.get(code, usual)
-    return _ALONG_GUIDE.get(code, usual) if line == ALONG_GUIDE else usual
+    return _BY_LINE.get(line, {}).get(code, usual)
+
+
+QUESTIONS: dict[str, str] = {
+    "parallel_for_perpendicular": N_("Along which direction did you draw the line to %(at)s?"),
+    "wrong_link": N_("To which link did you draw the line to %(at)s perpendicular?"),
+    "sense_reversed": N_("Which way did you lay off the vector that ends in %(at)s?"),
+    "rpm_not_converted": N_("With which value of ω did you compute?"),
+    "scale_wrong": N_("With which scale %(at)s did you compute the lengths that you drew?"),
+    "normal_reversed": N_("Which way did you lay off the component that ends in %(at)s?"),
+    "normal_missing": N_("Did you lay off the component that ends in %(at)s?"),
+    "normal_from_absolute": N_("From which velocity did you compute the component that ends in %(at)s?"),
+    "other_variant": N_("Whose number and data did you draw with?"),
+    "other_assembly": N_("On which side does %(at)s lie on your sketch of the mechanism?"),
+    "image_mirrored": N_(
+        "Going round the triangle with %(at)s, do the letters follow in the same sense as on the plate?"
+    ),
+    "wrong_intersection": N_("From which point did you draw each of the two lines that meet in %(at)s?"),
+    "vector_missing": N_("Did you draw %(at)s?"),
+    "labels_swapped": N_("At which points of your plan do the letters %(first)s and %(second)s stand?"),
+    "figure_rotated": N_("Is all of %(at)s turned against the mechanism, or only its first vector?"),
+    "arithmetic": N_("What length did you compute for the component that ends in %(at)s, and from what?"),
+}
+"""What tells a mistake from others that explain the same: a question that the student can answer."""
+LEAST_KNOWN: dict[str, str] = {
+    "labels_swapped": N_("At which points of your plan do the letters stand?"),
+}
+"""In place of a question that names what is not known."""
+
+
+def question_of(code: str, known: Collection[str]) -> str:
+    """The question that tells a mistake from its rivals; empty for a code without one."""
+    text = QUESTIONS.get(code, "")
+    return text if set(_NAMED.findall(text)) <= set(known) else LEAST_KNOWN.get(code, "")

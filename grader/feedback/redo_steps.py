@@ -5,13 +5,13 @@ them with their indices. Without numbers the sentences say which line goes where
 length is found, but give no answer away.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from grader.documents import MistakeDocument, ReportDocument, RivalDocument
-from grader.feedback.sentences import Level, mistake_sentence
+from grader.documents import MistakeDocument, ReportDocument
+from grader.feedback.sentences import Level, mistake_sentences
 from grader.language import N_, Tongue, tongue
 from grader.outcomes import Judgement, NamedMistake
 from grader.solution import sentences
@@ -139,8 +139,7 @@ def with_mistakes_explained(
     told = [
         document.model_copy(
             update={
-                "feedback": mistake_sentence(mistake, speaker, level, names),
-                "rivals": _rivals(document, mistake, speaker, level, names),
+                **_told(document, mistake_sentences(mistake, speaker, level, names)),
                 "redo": _redo(subject, mistake, speaker, level),
             }
         )
@@ -149,13 +148,13 @@ def with_mistakes_explained(
     return report.model_copy(update={"mistakes": told})
 
 
-def _rivals(
-    document: MistakeDocument, mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str]
-) -> list[RivalDocument]:
-    return [
-        rival.model_copy(update={"feedback": mistake_sentence(one, speaker, level, names)})
-        for rival, one in zip(document.rivals, mistake.rivals, strict=True)
+def _told(document: MistakeDocument, sentences: Sequence[str]) -> dict[str, object]:
+    """A mistake and its rivals in words."""
+    rivals = [
+        rival.model_copy(update={"feedback": text})
+        for rival, text in zip(document.rivals, sentences[1:], strict=True)
     ]
+    return {"feedback": sentences[0], "rivals": rivals}
 
 
 def _subject(judgement: Judgement, assignment: Assignment, variant: Variant, speaker: Tongue) -> Subject:
@@ -168,5 +167,8 @@ def _subject(judgement: Judgement, assignment: Assignment, variant: Variant, spe
 def _redo(subject: Subject, mistake: NamedMistake, speaker: Tongue, level: Level) -> list[str]:
     """The steps from the mistake on; none where there is no single step that it was made at."""
     vectors = subject.plan.construction.vectors
+    if mistake.code == "arithmetic" and mistake.at in vectors:
+        # Its value is wrong, the drawing can stay.
+        return []
     node = vectors[mistake.at].head if mistake.at in vectors else mistake.at
     return redo(subject, speaker, node, with_numbers=level == "full")

@@ -160,6 +160,7 @@ def _graded(
     decisions.note_failures(reports)
     results = ResultsDocument(
         assignment=batch.assignment.id,
+        titles={one.id: one.title.in_language(batch.lang) for one in batch.rubric.criterion},
         reports=reports,
         unmatched=[*unmatched, *decisions.problems()],
         moved=changes_since(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),

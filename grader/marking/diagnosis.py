@@ -18,12 +18,12 @@ import numpy as np
 from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.construction.elements import Along, Line
-from reference.construction.graph import Construction, parameters_of
+from reference.construction.elements import Along, Line, Nodes, Parameters, Scaled
+from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
-from reference.construction.steps import Step, TwoLines
+from reference.construction.steps import Given, Step, TwoLines
 from reference.construction.uncertainty import Skill
-from reference.replay.explanations import RARITY, Observations
+from reference.replay.explanations import RARITY, SLIP, Observations
 from reference.replay.replay import Replay, Root, replay
 
 OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
@@ -33,8 +33,8 @@ OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
 
 FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
-BEYOND_DOUBT = 20.0
-"""A mistake is named only where the drawing made rightly by any hand costs this much more: 1 in 20,000."""
+BEYOND_DOUBT = 8.0
+"""A mistake is named only where the drawing made rightly by any hand costs this much more: 50 to 1."""
 LEAST_WRONG = 0.06
 """Of a scale's logarithm: a smaller error is no mistake to be named, drafting errors reach it."""
 USUAL = 1.0
@@ -54,6 +54,7 @@ class Case:
     skill : usual drafting errors
     followed : scales that the drawing follows although others were declared
     assumed : scales that nobody declared
+    otherwise : the drawing without a measurement that contradicts others, each a possible reading of it
     """
 
     drawing: Drawing
@@ -63,12 +64,17 @@ class Case:
     skill: Skill
     followed: Mapping[str, float] = field(default_factory=dict)
     assumed: frozenset[str] = frozenset()
+    otherwise: tuple[Observations, ...] = ()
 
 
 def explained(case: Case) -> tuple[Replay, ...]:
     """The explanations of a drawing, the likeliest first; none where it may well be right."""
     roots = [Root(), *_other_scales(case)]
     explanations = replay(case.drawing, case.observations, roots, case.skill, cares=CARES)
+    for observations in case.otherwise:
+        others = replay(case.drawing, observations, roots, case.skill, cares=CARES)
+        if others and (not explanations or others[0].cost < explanations[0].cost):
+            case, explanations = replace(case, observations=observations), others
     innocent = _cost_if_right(explanations)
     if explanations and not _is_clear(explanations, case):
         explanations = _searched_further(case, roots, explanations)
@@ -77,23 +83,88 @@ def explained(case: Case) -> tuple[Replay, ...]:
     return tuple(explanations)
 
 
-def _searched_further(case: Case, roots: Sequence[Root], explanations: Sequence[Replay]) -> list[Replay]:
+def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence[Replay]) -> list[Replay]:
     """The explanations with mistakes of the whole drawing, and at steps without an observation.
 
     Large drafting errors are also tried as usual ones with some mistake. Where one mistake explains all, and
-    directions were observed, mistakes of the whole drawing are not tried.
+    directions were observed, mistakes of the whole drawing are not tried. `scales` are the roots without
+    other mistakes than in the scales.
     """
-    best = explanations[0]
+    best, whole = explanations[0], [Root()]
     if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
-        roots = [*roots, *_of_the_whole(case)]
+        whole = [Root(), *_of_the_whole(case)]
+    roots = [_both(scale, one) for one in whole for scale in scales]
     cares = sorted({best.care, min(best.care, USUAL)})
-    found = replay(case.drawing, case.observations, roots, case.skill, cares=cares, blind=True) or [
-        *explanations
-    ]
-    for swap in _swaps(case.drawing, found[0]):
-        root, observations = Root((swap,), cost=RARITY[swap.code]), _renamed(case.observations, swap.other)
-        found += replay(case.drawing, observations, [root], case.skill, cares=cares)
-    return sorted(found, key=lambda explanation: explanation.cost)
+    found = _replayed(case, roots, cares) or [*explanations]
+    swaps = [*_swaps(case, found[0])]
+    found = _by_cost(found, *(_replayed(case, scales, cares, swap) for swap in swaps))
+    scale = _scale_of_slips(case, found[0])
+    if scale is not None:
+        further = [_both(scale, one) for one in roots]
+        found = _by_cost(found, *(_replayed(case, further, cares, swap) for swap in (None, *swaps)))
+    return _by_cost(found, _with_another_guess(case, roots, found[0], cares))
+
+
+def _replayed(
+    case: Case, roots: Sequence[Root], cares: Sequence[float], swap: Mistake | None = None
+) -> list[Replay]:
+    """The explanations with mistakes at steps without an observation, or with two letters swapped."""
+    if swap is None:
+        return replay(case.drawing, case.observations, roots, case.skill, cares=cares, blind=True)
+    swapped = Root((swap,), cost=RARITY[swap.code])
+    observations = _renamed(case.observations, swap.other)
+    return replay(case.drawing, observations, [_both(one, swapped) for one in roots], case.skill, cares=cares)
+
+
+def _by_cost(*found: Sequence[Replay]) -> list[Replay]:
+    """All explanations, the likeliest first."""
+    return sorted((one for some in found for one in some), key=lambda explanation: explanation.cost)
+
+
+ONE_FACTOR = 0.08
+"""Of a logarithm: slips by factors as near as this to each other are one wrong scale."""
+
+
+def _scale_of_slips(case: Case, best: Replay) -> Root | None:
+    """The scale ka that computed components follow, where several are off by one factor; else None."""
+    logs = [math.log(one.factor) for one in best.made if one.code == SLIP]
+    if len(logs) < 2 or max(logs) - min(logs) > ONE_FACTOR:
+        return None
+    factor = math.exp(sum(logs) / len(logs))
+    made = () if "ka" in case.assumed else (Mistake("scale_wrong", "ka", factor=factor),)
+    parameters = {"ka": np.asarray(case.drawing.parameters["ka"] / factor)}
+    return Root(made, parameters, cost=RARITY["scale_wrong"])
+
+
+def _with_another_guess(
+    case: Case, roots: Sequence[Root], best: Replay, cares: Sequence[float]
+) -> list[Replay]:
+    """The explanations with a second mistake at a step without an observation, on top of the first one.
+
+    Nothing where the best explanation has no such mistake, or leaves nothing to explain.
+    """
+    seen = {one.node for one in case.observations.entries}
+    steps = {step.node for step in case.drawing.construction.steps}
+    first = [one for one in best.made if one.at in steps - seen]
+    if not first or (len(best.made) == 1 and not best.unexplained):
+        return []
+    drawing = case.drawing
+    for one in first:
+        drawing = commit(one, drawing)
+    of_the_whole = {_key(one) for one in best.made} & {_key(one) for root in roots for one in root.made}
+    start = next(root for root in roots if {_key(one) for one in root.made} == of_the_whole)
+    guessed = Root(tuple(first), cost=sum(RARITY[one.code] for one in first))
+    return replay(drawing, case.observations, [_both(start, guessed)], case.skill, cares=cares, blind=True)
+
+
+def _both(one: Root, other: Root) -> Root:
+    """Two roots at once; of what both change, as the second does."""
+    return Root(
+        (*one.made, *other.made),
+        {**one.parameters, **other.parameters},
+        {**one.turned, **other.turned},
+        one.cost + other.cost,
+    )
 
 
 def _is_explained(explanation: Replay) -> bool:
@@ -176,23 +247,84 @@ def _other_variants(case: Case) -> Iterator[Root]:
     for index, variant in enumerate(variants):
         if variant != case.variant and table:
             parameters = {name: np.asarray(value[index]) for name, value in table.items()}
+            parameters |= _scales_of_the_drawn_driver(case, parameters)
             other = Mistake(
                 "other_variant", "mechanism", n=variant.n, position=variant.position, parameters=parameters
             )
             yield Root((other,), parameters, cost=RARITY["other_variant"])
 
 
-def _swaps(drawing: Drawing, explanation: Replay) -> Iterator[Mistake]:
-    """Pairs of images in one plan that may have each other's letters: both are wrong in the explanation."""
-    construction = drawing.construction
+def _scales_of_the_drawn_driver(case: Case, parameters: Parameters) -> Parameters:
+    """The scales that nobody declared, as they follow from the driven link's vectors with another's data."""
+    construction, own, scales = case.drawing.construction, case.drawing.parameters, {}
+    for plan, scale in (("velocity_plan", "kv"), ("acceleration_plan", "ka")):
+        pole = construction.poles.get(plan)
+        if pole is None or scale not in case.assumed:
+            continue
+        names = [name for name in own if name.startswith(f"{scale[1]}_")]
+        size = math.hypot(*(float(parameters.get(name, own[name])) for name in names))
+        head = next(
+            one.node
+            for one in reversed(construction.figures[plan])
+            if isinstance(one, Given) and isinstance(one.length, Scaled)
+        )
+        drawn = (
+            abs(one.value)
+            for one in case.observations.entries
+            if one.node == head and one.tail in {None, pole}
+        )
+        length = next(drawn, 0.0)
+        if length > 0.0 and size > 0.0:
+            scales[scale] = np.asarray(size / length)
+    return scales
+
+
+def _swaps(case: Case, explanation: Replay) -> Iterator[Mistake]:
+    """Pairs of images in one plan that may have each other's letters.
+
+    Both are wrong in the explanation, or the right plan has the lengths observed with the letters swapped.
+    """
+    construction = case.drawing.construction
     off = {*explanation.unexplained, *(mistake.at for mistake in explanation.made)}
+    nodes = evaluate(construction, case.drawing.parameters)
     for figure, pole in construction.poles.items():
         images = sorted(
             v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
         )
         for pair in combinations(images, 2):
-            if off >= set(pair):
+            if off >= set(pair) or (off and _has_lengths_swapped(case, figure, pair, nodes)):
                 yield Mistake("labels_swapped", pair[0], other=pair)
+
+
+MOST_FIT, FIT_MM, FIT_SHARE = 0.9, 1.5, 0.03
+"""So many of the lengths must fit, within so many millimetres or such a share, at whatever scale."""
+LEAST_LENGTHS = 4
+
+
+def _has_lengths_swapped(case: Case, figure: str, pair: tuple[str, str], nodes: Nodes) -> bool:
+    """Whether a right plan with two letters swapped has the lengths observed."""
+    steps = {step.node for step in case.drawing.construction.figures[figure]}
+    observed = [one for one in case.observations.entries if one.node in steps and not one.has_direction]
+    if len(observed) < LEAST_LENGTHS:
+        return False
+    other = {pair[0]: pair[1], pair[1]: pair[0]}
+    right = np.array(
+        [
+            abs(
+                complex(
+                    nodes[other.get(one.node, one.node)] - nodes[other.get(one.tail or "", one.tail or "")]
+                )
+            )
+            for one in observed
+        ]
+    )
+    drawn = np.array([abs(one.value) for one in observed])
+    is_long = right > FIT_MM
+    if not is_long.any():
+        return False
+    right *= np.median(drawn[is_long] / right[is_long])
+    fits = np.abs(drawn - right) <= np.maximum(FIT_MM, FIT_SHARE * right)
+    return bool(np.mean(fits) >= MOST_FIT)
 
 
 def _renamed(observations: Observations, pair: tuple[str, ...]) -> Observations:
@@ -243,7 +375,9 @@ SURE_TOGETHER = 0.8
 LEAST_RIVAL = 0.1
 """A rival less likely than this is not named."""
 MOST_RIVALS = 3
-SUSPICIOUS, GROSS = 2.0, 5.0
+MOST_SLIPS = 2
+"""Where more computed lengths do not fit, it is no slip in each, but something else."""
+SUSPICIOUS, GROSS = 2.0, 3.0
 """RMS misfits of a step in standard deviations of this drawing's errors: between the two a mistake is too
 slight to be named. (Below the first the mistake shows elsewhere.)"""
 Key = tuple[str, str]
@@ -251,7 +385,7 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """The criteria that lost points, or may lose some, by the vector and by the scale they ask for."""
+    """The criteria that lost points, or may lose some, by vector, link and scale."""
 
     vectors: Mapping[str, str]
     scales: Mapping[str, str]
@@ -262,6 +396,7 @@ def named(explanations: Sequence[Replay], construction: Construction, lost: Lost
     if not explanations:
         return ()
     best, shares = explanations[0], _Shares(explanations)
+    slips = sum(one.code == SLIP for one in best.made)
     explains, mistakes = _losses_explained(best, construction, lost), []
     for mistake in _in_order(best.made, construction):
         key, share = _key(mistake), shares.of(_key(mistake))
@@ -269,6 +404,7 @@ def named(explanations: Sequence[Replay], construction: Construction, lost: Lost
         together = share + sum(shares.instead(key, _key(one)) for one in rivals)
         is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
         is_shown = explains[mistake] or mistake.code == "other_variant"
+        is_shown = is_shown and (mistake.code != SLIP or slips <= MOST_SLIPS)
         if is_shown and is_sure and not _is_slight(mistake, best):
             others = tuple(_record(one, construction, (), shares.instead(key, _key(one))) for one in rivals)
             mistakes.append(_record(mistake, construction, tuple(explains[mistake]), share, others))
@@ -335,24 +471,36 @@ def _in_order(made: Sequence[Mistake], construction: Construction) -> list[Mista
 def _losses_explained(
     explanation: Replay, construction: Construction, lost: Lost
 ) -> dict[Mistake, list[str]]:
-    """The lost criteria that each mistake explains: each is given to the last mistake upstream."""
+    """The lost criteria that each mistake explains: each is given to the last mistake upstream.
+
+    A mistake for which that leaves nothing has all that it touches, together with later ones.
+    """
     made = _in_order(explanation.made, construction)
     explains: dict[Mistake, list[str]] = {
         mistake: [name for scale, name in lost.scales.items() if _is_about(mistake, scale)]
         for mistake in made
     }
     reach = {mistake: affected(mistake, construction) for mistake in made}
+    touched: dict[Mistake, list[str]] = {mistake: [] for mistake in made}
     for name, criterion in lost.vectors.items():
-        vector = construction.vectors[name]
-        if vector.head in explanation.unexplained:
+        scale, tail, head = _ends_of(name, construction)
+        if head in explanation.unexplained:
             continue
-        touching = [
-            one for one in made if _touches(one, vector.scale, {vector.tail, vector.head}, reach[one])
-        ]
-        own = [one for one in touching if one.at == vector.head]
+        touching = [one for one in made if _touches(one, scale, {tail, head}, reach[one])]
+        own = [one for one in touching if one.at == head]
         for mistake in (own or touching)[-1:]:
             explains[mistake].append(criterion)
-    return explains
+        for mistake in touching:
+            touched[mistake].append(criterion)
+    return {mistake: explains[mistake] or touched[mistake] for mistake in made}
+
+
+def _ends_of(name: str, construction: Construction) -> tuple[str, str, str]:
+    """The scale of a vector or link, its tail and its head."""
+    if name in construction.vectors:
+        vector = construction.vectors[name]
+        return vector.scale, vector.tail, vector.head
+    return ("kL", *construction.links[name])
 
 
 def _touches(mistake: Mistake, scale: str, ends: set[str], reach: frozenset[str]) -> bool:
@@ -367,8 +515,10 @@ def _is_about(mistake: Mistake, scale: str) -> bool:
     return mistake.at == scale or mistake.code == "other_variant"
 
 
+SPEED_FACTORS = (RPM_FACTOR, 60.0, 0.5 / math.pi)
+"""omega = n; 2 pi n, the minute's seconds forgotten; n / 60, the full turn's 2 pi forgotten."""
 RPM_WITHIN = 0.03
-"""Relative: a scale wrong by 30/pi (squared for accelerations) this nearly was computed from rev/min."""
+"""Relative: a scale wrong by such a factor (squared for accelerations) this nearly was computed from it."""
 LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
 
 
@@ -387,7 +537,10 @@ def _record(
 
 
 def _line_of(step: Step, slot: int) -> dict[str, str]:
-    """The parameters that describe a step's line: ``from`` a node, its ``link``, ``line`` of a guide."""
+    """The parameters that describe a step's line: ``from`` a node, its ``link``, ``line`` of which kind."""
+    if isinstance(step, Given) and isinstance(step.along, Along):
+        across = step.along.quarters % 2
+        return {"line": "driven across" if across else "driven along"}
     line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None
     if not isinstance(line, Line):
         return {}
@@ -401,6 +554,8 @@ def _line_of(step: Step, slot: int) -> dict[str, str]:
 
 
 def _code_of_scale(name: str, factor: float) -> str:
-    powers = {"kv": 1, "ka": 2}
-    rpm = RPM_FACTOR ** powers.get(name, 0)
-    return "rpm_not_converted" if name in powers and abs(factor / rpm - 1.0) <= RPM_WITHIN else "scale_wrong"
+    power = {"kv": 1, "ka": 2}.get(name)
+    if power is None:
+        return "scale_wrong"
+    is_speed = any(abs(factor / one**power - 1.0) <= RPM_WITHIN for one in SPEED_FACTORS)
+    return "rpm_not_converted" if is_speed else "scale_wrong"

@@ -1,30 +1,24 @@
 """Judging one submission: comparison, diagnosis and points, in their order."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from grader.comparison.criteria import NOT_DRAWN, Comparison, compare
-from grader.comparison.evidence import Evidence, Submission
-from grader.comparison.follow_through import ReplayResult
-from grader.comparison.own import PlanBasis
-from grader.comparison.scales import Scale
+from grader.comparison.evidence import Submission
 from grader.comparison.task import Task
 from grader.documents import Verdict
-from grader.marking.diagnosis import LEAST_CONFIDENCE, Case, Lost, drawn_instead, explained, named
+from grader.marking.confirming import confirmed
+from grader.marking.diagnosis import LEAST_CONFIDENCE, Lost, named
+from grader.marking.drawn import explain
 from grader.marking.settling import at_stake, charged_where_made, of_another
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
 from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
-from reference.construction.elements import Coriolis, Normal, Parameters
-from reference.construction.mistakes import Drawing, Mistake
-from reference.construction.steps import Given
-from reference.construction.uncertainty import trace
+from reference.construction.mistakes import Mistake
 from reference.geometry import ComplexArray
 from reference.plan import exact_plan
-from reference.replay.explanations import Covariance, Observation, Observations
 
 CHARGED = frozenset({"none", "partial"})
 LOST = CHARGED | {"follow_through", "review"}
@@ -34,8 +28,16 @@ LOST = CHARGED | {"follow_through", "review"}
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission, explain)
+    surer = confirmed(task, submission, comparison)
+    if surer is not None:
+        submission, comparison = surer, compare(task, surer, explain)
     mistakes = _named(task, comparison)
-    mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes), *_not_drawn(task, comparison))
+    mistakes = (
+        *mistakes,
+        *_swapped_letters(task, submission, mistakes),
+        *_not_drawn(task, comparison),
+        *_slips(task, comparison),
+    )
     outcomes = charged_where_made(task, comparison.outcomes, mistakes)
     outcomes = at_stake(task.rubric, of_another(task.rubric, outcomes, mistakes))
     outcomes = tuple(with_mistake(outcome, mistakes) for outcome in outcomes)
@@ -46,7 +48,8 @@ def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
     """The mistakes that explain lost points, or points that may be lost."""
     scales, vectors = comparison.settled, task.construction.vectors
     lost = [one for one in comparison.outcomes if one.verdict in LOST]
-    by_vector = {one.name: one.criterion for one in lost if one.name in vectors}
+    links = task.construction.links
+    by_vector = {one.name: one.criterion for one in lost if one.name in vectors or one.name in links}
     by_scale = {one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED}
     is_other_scale = any(scale.other and not scale.used.assumed for scale in scales.values())
     if not by_vector and not is_other_scale and not _is_nearer_to_another(task, comparison):
@@ -114,10 +117,41 @@ def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
     found = []
     for one in comparison.outcomes:
         codes = {reason.code for reason in one.reasons}
-        is_left_blank = "not_measured" in codes and not evidence.has_sheets and one.verdict == "none"
+        is_table = bool(evidence.measured) and not evidence.has_sheets
+        is_left_blank = "not_measured" in codes and is_table and one.verdict == "none"
         if one.name in vectors and ("not_drawn" in codes or is_left_blank):
             sure = NOT_DRAWN if evidence.has_sheets else 1.0
             found.append(NamedMistake(Mistake("vector_missing", one.name), (one.criterion,), sure))
+    return found
+
+
+VALUE_OFF = frozenset({"value_too_large", "value_too_small", "value_reversed"})
+LEAST_SLIPPED_MM = 10.0
+"""A value from a shorter vector may be off because it was read badly."""
+LEAST_SLIP = 0.2
+"""An angular quantity that is wrong by a smaller share may come from lengths measured badly."""
+SLIPPED = 0.95
+"""Confidence in a slip: the drawing that the value comes from is right, or follows rightly."""
+
+
+def _slips(task: Task, comparison: Comparison) -> list[NamedMistake]:
+    """Values that were computed wrongly from a vector that is right, or follows rightly."""
+    sure = {
+        one.name
+        for one in comparison.outcomes
+        if one.verdict in {"full", "follow_through"} and (one.measured.length_mm or 0.0) >= LEAST_SLIPPED_MM
+    }
+    found = []
+    for one in comparison.outcomes:
+        rate = task.construction.rates.get(one.name)
+        is_value_off = one.verdict in CHARGED and VALUE_OFF & {reason.code for reason in one.reasons}
+        is_of_right_vector = rate is not None and rate.vector in sure
+        value, right = one.measured.value, one.expected.value
+        factor = value / right if value and right else 1.0
+        is_slip = is_value_off and is_of_right_vector and abs(factor - 1.0) >= LEAST_SLIP
+        if one.mistake == "arithmetic" or is_slip:
+            slip = Mistake("arithmetic", one.name, factor=factor)
+            found.append(NamedMistake(slip, (one.criterion,), SLIPPED))
     return found
 
 
@@ -232,118 +266,3 @@ class _Total:
     def ends(self) -> tuple[float, float, float]:
         """The points it gives at worst, at best, and in the mean."""
         return self.low * self.scale, self.high * self.scale, self.expected * self.scale
-
-
-# What was drawn, for the diagnosis -----------------------------------------------------------------
-
-LEAST_ERROR_MM = 0.15
-"""Least standard error of a node, however well it is drawn and read."""
-NO_ERRORS: ComplexArray = np.zeros(0, np.complex128)
-
-
-def explain(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> ReplayResult:
-    """The explanations of a drawing, and the basis of its plans where that is certain."""
-    case = case_of(task, evidence, settled)
-    explanations = explained(case)
-    drawn, wrong = drawn_instead(explanations, case)
-    # Where a sheet shows the drawn mechanism and no plan is turned, the own nodes are enough.
-    is_needed = wrong and (wrong & task.construction.poles.keys() or not evidence.has_sheets)
-    basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong) if is_needed else None
-    return ReplayResult(explanations, basis)
-
-
-def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Case:
-    """The drawing to explain at the scales used, with the scales that the drawing follows instead."""
-    assumed = frozenset(name for name, scale in settled.items() if scale.used.assumed)
-    others = {name: scale.other for name, scale in settled.items() if scale.other}
-    used = {
-        name: np.asarray(others.get(name, scale.used.used) if name in assumed else scale.used.used)
-        for name, scale in settled.items()
-    }
-    parameters = {**task.parameters, **used}
-    return Case(
-        drawing=Drawing(task.construction, parameters),
-        observations=Observations(tuple(_observations(task, evidence, parameters)), evidence.sketches),
-        assignment=task.assignment,
-        variant=task.variant,
-        skill=task.skill,
-        followed={
-            name: other
-            for name, other in others.items()
-            if name not in assumed and other != settled[name].used.used
-        },
-        assumed=assumed,
-    )
-
-
-def _observations(task: Task, evidence: Evidence, parameters: Parameters) -> list[Observation]:
-    """The student's own nodes, and the vectors that lead to none of them."""
-    construction = task.construction
-    given = {*construction.poles.values(), *task.ground}
-    entries = [
-        Observation(name, None, place, _reading_covariance(task, evidence, name))
-        for name, place in evidence.nodes.items()
-        if name not in given
-    ]
-    traced = None
-    for name, vector in construction.vectors.items():
-        drawn = evidence.vector(name)
-        if drawn is None or drawn.confidence < task.rubric.least_confidence or vector.head in evidence.nodes:
-            continue
-        value, read_mm = drawn.as_complex, math.hypot(LEAST_ERROR_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
-        if value is not None:
-            entries.append(Observation(vector.head, vector.tail, value, _covariance(NO_ERRORS, read_mm)))
-            continue
-        # The nodes before a length are not known: it contains all earlier errors.
-        traced = traced or trace(construction, parameters, task.skill)
-        spread = _covariance(traced.shifts(vector.tail, vector.head), read_mm)
-        entries.append(Observation(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
-    return entries
-
-
-def _reading_covariance(task: Task, evidence: Evidence, node: str) -> Covariance:
-    """The covariance (mm^2) of a node by reading, or by the measurements that give it."""
-    vectors = [one for one in task.construction.vectors.values() if one.head == node]
-    hand = task.rubric.hand
-    rows: list[ComplexArray] = [NO_ERRORS]
-    each_mm = LEAST_ERROR_MM if evidence.has_sheets else hand.ruler_mm
-    for vector in vectors[:1]:
-        drawn = evidence.vector(vector.name)
-        along = None if drawn is None else drawn.as_complex
-        if along and not evidence.has_sheets:
-            # Both ends of a step are measured.
-            turned = 1j * along * math.radians(hand.protractor_deg)
-            rows.append(
-                math.sqrt(2.0) * np.array([hand.ruler_mm * along / abs(along), turned], np.complex128)
-            )
-        if along:
-            share = _computed_within(task, evidence, node, math.sqrt(2.0) * each_mm)
-            rows.append(np.array([along * share], np.complex128))
-    return _covariance(np.concatenate(rows), LEAST_ERROR_MM)
-
-
-def _computed_within(task: Task, evidence: Evidence, node: str, each_mm: float) -> float:
-    """The relative error of a component that is computed from read or measured velocities."""
-    sources: tuple[tuple[str, str, float], ...]
-    match task.construction.step(node):
-        case Given(length=Normal(tail=tail, head=head)):
-            sources = ((tail, head, 2.0),)
-        case Given(length=Coriolis(slide=slide, turn=turn)):
-            sources = ((*slide, 1.0), (*turn, 1.0))
-        case _:
-            return 0.0
-    ends = {
-        name: place for one in sources for name in one[:2] if (place := evidence.nodes.get(name)) is not None
-    }
-    errors = [
-        power * each_mm / max(abs(ends[head] - ends[tail]), each_mm)
-        for tail, head, power in sources
-        if tail in ends and head in ends
-    ]
-    return math.hypot(*errors)
-
-
-def _covariance(shifts: ComplexArray, least_mm: float) -> Covariance:
-    """The covariance (mm^2) of an end from independent errors, and a least error along both axes."""
-    x, y = shifts.real, shifts.imag
-    return float(x @ x) + least_mm**2, float(x @ y), float(y @ y) + least_mm**2

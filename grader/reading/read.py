@@ -252,6 +252,8 @@ def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
 
 BLANK = 0.25
 """Share of a vector's length that other lines may ink where the vector itself is not drawn."""
+INKED = 0.9
+"""Share from which it is drawn, though its stroke is another's too; it is read from its nodes."""
 LEAST_VECTOR_MM = 2.0
 """A shorter vector is read from its nodes, with or without a stroke."""
 
@@ -323,9 +325,10 @@ def _vectors(
             inked = where.share_inked(complex(fit.at[edge.tail]), complex(fit.at[edge.head]))
             if inked <= BLANK:
                 unread.append(Unread(edge.name, f"nothing is drawn between {ends}", is_blank=True))
-            else:
+                continue
+            if inked < INKED:
                 unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
-            continue
+                continue
         cov = _difference_cov(fit, edge, span, scale_se)
         signs = Signs(
             placed=within(cov),

@@ -7,8 +7,8 @@ from urllib.parse import urlencode
 from markupsafe import Markup
 
 from grader.documents import CriterionDocument, QuantityDocument
-from grader.feedback.student_page import quantity_cells, tolerance_cells
-from grader.feedback.words import VERDICTS, problem_sentence, score_text, symbols, unmatched_sentence
+from grader.feedback.numbers import quantity_cells, score_text, tolerance_cells
+from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
 from grader.inputs.decisions import Decision
 from grader.language import N_, Tongue
 from grader.overlay.closeup import look

@@ -11,9 +11,28 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from reference.construction.elements import Along, Coriolis, Direction, Fixed, Line, Normal, Parameters, View
+from reference.construction.elements import (
+    Along,
+    Coriolis,
+    Direction,
+    Fixed,
+    Line,
+    Normal,
+    Parameters,
+    Scaled,
+    View,
+)
 from reference.construction.graph import Construction, Vector
-from reference.construction.steps import ArcAndLine, Coincide, Given, Local, Similar, Step, TwoArcs, TwoLines
+from reference.construction.steps import (
+    ArcAndLine,
+    Coincide,
+    Given,
+    Local,
+    Similar,
+    Step,
+    TwoArcs,
+    TwoLines,
+)
 
 Code = Literal[
     "parallel_for_perpendicular",
@@ -55,9 +74,9 @@ class Mistake:
     code : one of `CODES`
     at : the node, vector, scale or figure that it is made at
     slot : which of the step's two lines (0 or 1)
-    other : what is taken instead: the two joints of a link, a node, the two nodes swapped
+    other : what is taken instead: two joints, a node, a vector (for its line), the two nodes swapped
     factor : of a length, speed or scale
-    quarters : quarter turns of a figure, counter-clockwise
+    quarters : quarter turns of a figure or of the driven link's vector, counter-clockwise
     n, position : the other student's variant
     parameters : that variant's parameters, or those that differ
     """
@@ -115,19 +134,35 @@ def changed_step(mistake: Mistake, construction: Construction) -> Step:
             return replace(step, factor=step.factor * factor.get(mistake.code, -1.0))
         case "normal_from_absolute", Given(length=Normal() as length):
             return replace(step, length=replace(length, tail=construction.poles["velocity_plan"]))
+        case "parallel_for_perpendicular", Given():
+            return replace(step, along=_quarter(step.along, mistake.quarters or 1))
         case "parallel_for_perpendicular", TwoLines():
             return _with_line(step, mistake.slot, lambda line: replace(line, along=_quarter(line.along, 1)))
         case "wrong_link", TwoLines():
             tail, head = mistake.other
             return _with_line(step, mistake.slot, lambda line: _by_link(line, tail, head))
         case "wrong_intersection", TwoLines():
-            (through,) = mistake.other
-            return _with_line(step, mistake.slot, lambda line: replace(line, through=through))
+            (instead,) = mistake.other
+            if instead in construction.vectors:
+                drawn = line_of(construction.vectors[instead], construction)
+                return _with_line(step, mistake.slot, lambda line: drawn or line)
+            return _with_line(step, mistake.slot, lambda line: replace(line, through=instead))
         case "image_mirrored", _ if mistake.at in construction.images:
             return replace(construction.images[mistake.at], mirrored=True)
         case "other_assembly", TwoArcs() | ArcAndLine():
             return replace(step, side=-step.side)
     raise ValueError(f"{mistake.code} cannot be made at the step of {mistake.at}")
+
+
+def line_of(vector: Vector, construction: Construction) -> Line | None:
+    """The line on which a vector is drawn from its tail; None where its head is made in another way."""
+    match construction.step(vector.head):
+        case TwoLines(first=first, second=second):
+            lines = (one for one in (first, second) if isinstance(one, Line) and one.through == vector.tail)
+            return next(lines, None)
+        case Given(start=start, along=along) if start == vector.tail:
+            return Line(start, along)
+    return None
 
 
 def _with_line(step: TwoLines, slot: int, change: Callable[[Line], Line]) -> TwoLines:
@@ -285,6 +320,49 @@ def _wrong_feet(
     for name in dict.fromkeys(feet):
         if name not in {line.through, other_foot}:
             yield Mistake("wrong_intersection", step.node, slot, other=(name,))
+
+
+def rarer_mistakes_of_step(step: Step, construction: Construction) -> Iterator[Mistake]:
+    """Further mistakes that could be made in one step of a plan, beside those of `mistakes_of_step`.
+
+    The driven link's vector along the link instead of across it, or across instead of along; a line by the
+    radius from a pivot that carries no link; a line through any earlier point, or any earlier line.
+    """
+    figure = construction.figure_of(step.node)
+    if figure == "mechanism":
+        return
+    if isinstance(step, Given) and isinstance(step.length, Scaled) and isinstance(step.along, Along):
+        yield from (Mistake("parallel_for_perpendicular", step.node, quarters=one) for one in (1, 3))
+    if not isinstance(step, TwoLines):
+        return
+    known = {(one.code, one.slot, frozenset(one.other)) for one in mistakes_of_step(step, construction)}
+    for slot, line in enumerate((step.first, step.second)):
+        if isinstance(line, Line) and isinstance(line.along, Along):
+            for mistake in _further_lines(step, slot, line, construction):
+                if (mistake.code, slot, frozenset(mistake.other)) not in known:
+                    yield mistake
+
+
+def _further_lines(step: TwoLines, slot: int, line: Line, construction: Construction) -> Iterator[Mistake]:
+    """A line by the radius to one of its joints from a pivot, through an earlier node, or an earlier line."""
+    given = [joint.node for joint in construction.figures["mechanism"] if not joint.needs]
+    for pivot in given:
+        for joint in line.along.needs:
+            if joint != pivot and {pivot, joint} != set(line.along.needs):
+                yield Mistake("wrong_link", step.node, slot, other=(pivot, joint))
+    other = step.second if slot == 0 else step.first
+    foot = other.through if isinstance(other, Line) else ""
+    earlier = [one.node for one in construction.figures[construction.figure_of(step.node)]]
+    earlier = earlier[: earlier.index(step.node)]
+    for node in earlier:
+        if node not in {line.through, foot}:
+            yield Mistake("wrong_intersection", step.node, slot, other=(node,))
+    for vector in construction.vectors.values():
+        # On a line through the other foot the two would meet there.
+        if vector.head in earlier and foot not in {vector.tail, vector.head}:
+            drawn = line_of(vector, construction)
+            if drawn is not None and drawn not in {line, other}:
+                yield Mistake("wrong_intersection", step.node, slot, other=(vector.name,))
 
 
 def affected(mistake: Mistake, construction: Construction) -> frozenset[str]:

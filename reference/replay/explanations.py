@@ -5,16 +5,16 @@ drawn node, with its covariance, and for each mistake how rare it is.
 """
 
 import math
-from collections import deque
+from collections import ChainMap, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from reference import geometry
-from reference.construction.elements import Coriolis, Errors, Normal, View
+from reference.construction.elements import Along, Coriolis, Direction, Errors, Line, Normal, View
 from reference.construction.graph import Construction
-from reference.construction.mistakes import Mistake, changed_step, mistakes_of_step
+from reference.construction.mistakes import Mistake, changed_step, mistakes_of_step, rarer_mistakes_of_step
 from reference.construction.steps import Given, Step, TwoLines
 from reference.construction.uncertainty import SMALL, Skill, step_errors
 from reference.geometry import ComplexArray, FloatArray
@@ -38,10 +38,18 @@ RARITY: Mapping[str, float] = {
 }
 """Cost of each mistake: one step in about a hundred goes wrong, in one of about ten ways; a slip in a
 computation may give any length."""
+KNOWN_SLIP = 11.0
+"""Of a slip by one of `SLIPS`: less rare than any other."""
+SLIPS = (0.1, 0.5, 2.0, 10.0)
+"""A decimal point, a half or a double: the commonest slips in computing a length."""
+RARER = 3.0
+"""What a mistake costs more that is seldom made."""
+AN_OTHER_LINE = 3.0
+"""And what it costs more to take a whole line that belongs to another vector: there are many."""
 SOMETHING_ELSE = 9.0
 """Cost of a step that went wrong in an unknown way, without the cost of its position."""
-ANYWHERE = 2.0 * math.log(100.0)
-"""Cost of each unknown coordinate or length: it may be anything within some 100 mm."""
+AREA_MM = 100.0
+"""An unknown coordinate or length may be anything within so many millimetres, or within its own size."""
 SUSPECT = 9.0
 """From this squared misfit on (three standard errors) mistakes are tried."""
 COST_WINDOW = 24.0
@@ -86,10 +94,15 @@ class Observations:
     ----------
     entries : its nodes and vectors
     sketches : by plan, the mechanism's joints as drawn beside it, where that is another sketch
+    cost : of taking it so: of measurements that contradict each other, or are left out
+    directions_rad : by pair of joints, the standard error of the direction between them on a sketch that was
+        not handed in
     """
 
     entries: tuple[Observation, ...]
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
+    cost: float = 0.0
+    directions_rad: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
 
 def by_node(construction: Construction, entries: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
@@ -154,7 +167,8 @@ class NodeObservations:
     @property
     def anywhere(self) -> float:
         """The cost of any position, made in an unknown way."""
-        return SOMETHING_ELSE + ANYWHERE * min(self.freedom, 2)
+        size_mm = max(AREA_MM, *(abs(one.value) for one in self.entries))
+        return SOMETHING_ELSE + 2.0 * math.log(size_mm) * min(self.freedom, 2)
 
     def misfit_and_cost(
         self, place: ComplexArray, shifts: ComplexArray | None, nodes: Mapping[str, ComplexArray]
@@ -248,7 +262,8 @@ class Repertoire:
         self.construction = construction
         self.skill = skill
         self._wrong: dict[str, WrongSteps] = {}
-        self._errors: dict[str, Errors] = {}
+        self._rarer: dict[str, WrongSteps] = {}
+        self._errors: dict[tuple[str, int], Errors] = {}
 
     def wrong(self, step: Step) -> WrongSteps:
         """The mistakes that can be made in a step, with the step as each makes it."""
@@ -257,11 +272,35 @@ class Repertoire:
             self._wrong[step.node] = tuple((one, changed_step(one, self.construction)) for one in mistakes)
         return self._wrong[step.node]
 
-    def errors(self, step: Step) -> Errors:
-        """The errors of a step's acts."""
-        if step.node not in self._errors:
-            self._errors[step.node] = step_errors(step, self.skill)
-        return self._errors[step.node]
+    def rarer(self, step: Step) -> WrongSteps:
+        """The same of mistakes that are seldom made."""
+        if step.node not in self._rarer:
+            mistakes = (*rarer_mistakes_of_step(step, self.construction), *_known_slips(step))
+            self._rarer[step.node] = tuple((one, changed_step(one, self.construction)) for one in mistakes)
+        return self._rarer[step.node]
+
+    def errors(self, step: Step, further: int) -> Errors:
+        """The errors of a step's acts, with so many rows left free for further errors at the end."""
+        key = (step.node, further)
+        if key not in self._errors:
+            free = np.zeros((further, 1))
+            own = step_errors(step, self.skill)
+            self._errors[key] = {act: np.concatenate((row, free)) for act, row in own.items()}
+        return self._errors[key]
+
+
+def _known_slips(step: Step) -> Iterator[Mistake]:
+    """The commonest slips in a length that is computed."""
+    if isinstance(step, Given) and isinstance(step.length, Normal | Coriolis):
+        yield from (Mistake(SLIP, step.node, factor=factor) for factor in SLIPS)
+
+
+def _rarity(mistake: Mistake) -> float:
+    """The cost of a mistake."""
+    if mistake.code == SLIP and mistake.factor in SLIPS:
+        return KNOWN_SLIP
+    is_line = mistake.code == "wrong_intersection" and mistake.other[0][:2] in {"v_", "a_"}
+    return RARITY[mistake.code] + (AN_OTHER_LINE if is_line else 0.0)
 
 
 CACHE_SIZE = 32
@@ -305,7 +344,7 @@ class StepAlternatives:
         mistake = self.mistakes[choice]
         if mistake is None:
             return ()
-        if mistake.code == SLIP and self.factors is not None:
+        if mistake.code == SLIP and mistake.factor == 1.0 and self.factors is not None:
             mistake = replace(mistake, factor=float(self.factors[branch]))
         return (mistake,)
 
@@ -326,12 +365,17 @@ class StepAlternatives:
 
 @dataclass(frozen=True, slots=True)
 class StepContext:
-    """What a step is compared with: the nodes so far in each branch, and the observations of the new one."""
+    """What a step is compared with: the nodes so far in each branch, and the observations of the new one.
+
+    `measured` are the nodes of its figure that were measured roughly, see `measured_nodes`.
+    """
 
     nodes: Mapping[str, ComplexArray]
     known: Mapping[str, FloatArray]
     observed: NodeObservations
     repertoire: Repertoire
+    measured: Mapping[str, ComplexArray] = field(default_factory=dict)
+    directions_rad: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -343,8 +387,13 @@ class StepContext:
         return self._alternatives(step, [(None, step)])
 
     def wrong(self, step: Step) -> StepAlternatives:
-        """The step with each mistake in it."""
+        """The step with each usual mistake in it."""
         return self._alternatives(step, self.repertoire.wrong(step))
+
+    def rarer(self, step: Step) -> StepAlternatives:
+        """The step with each mistake in it that is seldom made."""
+        found = self._alternatives(step, self.repertoire.rarer(step))
+        return replace(found, cost=found.cost + RARER)
 
     def slips(self, step: Given) -> StepAlternatives | None:
         """The right direction with a wrongly computed length, as drawn; None where none is computed."""
@@ -387,19 +436,84 @@ class StepContext:
             return StepAlternatives(empty.astype(np.complex128), empty, empty, ())
         place, shifts = self._placed(step, [changed for _, changed in steps])
         misfit, cost = self.observed.misfit_and_cost(place, shifts, self.nodes)
-        rarity = np.array([0.0 if one is None else RARITY[one.code] for one in mistakes])
+        rarity = np.array([0.0 if one is None else _rarity(one) for one in mistakes])
         return StepAlternatives(place, cost + rarity[:, None], misfit, mistakes)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:
-        """Where each step puts the node, and how each usual error moves it (steps, acts, branches)."""
-        errors = self.repertoire.errors(step) if self.observed.fixes_place else {}
-        view = View(self.nodes, self.known, errors)
-        if not errors:
+        """Where each step puts the node, and how each usual error moves it (steps, errors, branches)."""
+        if not self.observed.fixes_place:
+            view = View(self.nodes, self.known)
             return np.array([_shaped(one, (self.count,)) for one in _places(steps, view)]), None
+        groups = self._measured(step, steps)
+        rows = 2 * (max(groups.values()) + 1) if groups else 0
+        errors = self._with_sketch(step, self.repertoire.errors(step, rows))
+        if not errors and not rows:
+            view = View(self.nodes, self.known)
+            return np.array([_shaped(one, (self.count,)) for one in _places(steps, view)]), None
+        count = 1 + len(errors) + rows
+        moved = {name: self._moved(name, count - rows + 2 * group, count) for name, group in groups.items()}
+        view = View(ChainMap(moved, self.nodes) if moved else self.nodes, self.known, errors)  # type: ignore[arg-type]
         mark = view.error(step.node, 0, "x") + 1j * view.error(step.node, 0, "y")
-        shape = (len(mark) if np.ndim(mark) else 1, self.count)
+        shape = (count, self.count)
         place = np.array([_shaped(one, shape) for one in _places(steps, view)]) + mark
         return place[:, 0], (place[:, 1:] - place[:, :1]) / SMALL
+
+    def _with_sketch(self, step: Step, errors: Errors) -> Errors:
+        """The errors with those of the sketch's directions, where these are known no better."""
+        usual = self.repertoire.skill.deviation("angle")
+        if not self.directions_rad or not usual:
+            return errors
+        found = {**errors}
+        for slot, along in enumerate(_directions(step)):
+            act = (step.node, slot, "angle")
+            own = self.directions_rad.get((along.tail, along.head)) if isinstance(along, Along) else None
+            if own and act in found:
+                found[act] = found[act] * math.hypot(1.0, own / usual)
+        return found
+
+    def _measured(self, step: Step, steps: Sequence[Step]) -> dict[str, int]:
+        """The measured nodes from which the steps start, by the group whose rows their errors have.
+
+        The right step's first two nodes have rows of their own, all others share theirs: no step uses two.
+        """
+        groups: dict[str, int] = {}
+        for name in (*step.needs, *(name for one in steps for name in one.needs)):
+            if name in self.measured and name not in groups:
+                groups[name] = min(len(groups), 2)
+        return groups
+
+    def _moved(self, name: str, row: int, count: int) -> ComplexArray:
+        """A node, moved by its error along both axes of the covariance in two rows."""
+        shifts = np.zeros((count, 1), np.complex128)
+        shifts[row : row + 2, 0] = SMALL * self.measured[name]
+        return np.asarray(self.nodes[name] + shifts)
+
+
+def _directions(step: Step) -> tuple[Direction | None, ...]:
+    """The directions of a step's lines, in the order of their slots."""
+    match step:
+        case TwoLines(first=first, second=second):
+            return tuple(one.along if isinstance(one, Line) else None for one in (first, second))
+        case Given(along=along):
+            return (along,)
+    return ()
+
+
+LEAST_MEASURED_MM = 0.25
+"""Nodes that are known better than this are taken as exact where a step starts from them."""
+
+
+def measured_nodes(entries: Mapping[str, tuple[Observation, ...]]) -> dict[str, ComplexArray]:
+    """The nodes whose positions were measured roughly, and how two independent errors move each."""
+    found = {}
+    for node, observed in entries.items():
+        first = observed[0]
+        if first.tail is None and first.has_direction:
+            xx, xy, yy = first.spread
+            if max(xx, yy) > LEAST_MEASURED_MM**2:
+                along, across = math.sqrt(xx), max(yy - xy * xy / xx, 0.0)
+                found[node] = np.array([along + 1j * xy / along, 1j * math.sqrt(across)])
+    return found
 
 
 def _shaped(place: ComplexArray, shape: tuple[int, ...]) -> ComplexArray:

@@ -29,6 +29,7 @@ from reference.replay.explanations import (
     StepAlternatives,
     StepContext,
     by_node,
+    measured_nodes,
     needed_nodes,
     repertoire_of,
 )
@@ -103,18 +104,22 @@ def replay(
     blind : try mistakes also at steps whose node's position was not observed, one to an explanation
     """
     construction, by_name = drawing.construction, by_node(drawing.construction, observations.entries)
-    branches = _open(drawing, roots, cares)
+    branches = _open(drawing, roots, cares, observations.cost)
     needed = needed_nodes(construction, by_name)
-    repertoire = repertoire_of(construction, skill)
+    repertoire, rough = repertoire_of(construction, skill), measured_nodes(by_name)
     with np.errstate(all="ignore"):
         for figure, steps in construction.figures.items():
             sketch = {
                 name: np.asarray(place) for name, place in observations.sketches.get(figure, {}).items()
             }
+            measured = {step.node: rough[step.node] for step in steps if step.node in rough}
             for step in steps:
                 if step.node in needed:
                     here, nodes = by_name.get(step.node, ()), ChainMap(sketch, branches.nodes)
-                    context = StepContext(nodes, branches.known, branches.observed(here, figure), repertoire)
+                    observed = branches.observed(here, figure)
+                    context = StepContext(
+                        nodes, branches.known, observed, repertoire, measured, observations.directions_rad
+                    )
                     branches.go_on(
                         step, figure, here, _alternatives(step, context, branches.is_blind, blind=blind)
                     )
@@ -134,6 +139,11 @@ def _alternatives(
     if not is_guess and not is_suspect.any():
         return right
     wrong = context.wrong(step)
+    if is_suspect.any() or isinstance(step, Given):
+        rarer = context.rarer(step)
+        if not isinstance(step, Given):
+            rarer.cost[:, ~is_suspect] = np.inf
+        wrong += rarer
     if is_guess:
         wrong.cost[:, has_guessed & ~is_suspect] = np.inf
     alternatives = right + wrong
@@ -222,8 +232,8 @@ class _Branches:
         ]
 
 
-def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float]) -> _Branches:
-    """A branch for each root and care."""
+def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float], cost: float) -> _Branches:
+    """A branch for each root and care; `cost` is that of what is observed."""
     starts = [(root, care) for care in cares for root in roots]
     known = {name: np.asarray(value) for name, value in drawing.parameters.items()}
     for name in {name for root in roots for name in root.parameters}:
@@ -234,7 +244,7 @@ def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float]) -> _B
         nodes={},
         known=known,
         turned={plan: np.array([root.turned.get(plan, 1.0) for root, _ in starts]) for plan in plans},
-        cost=np.array([root.cost for root, _ in starts]),
+        cost=np.array([cost + root.cost for root, _ in starts]),
         care=np.array([care for _, care in starts]),
         is_blind=np.zeros(len(starts), np.bool_),
         made=[root.made for root, _ in starts],

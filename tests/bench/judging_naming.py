@@ -93,7 +93,7 @@ def _try(
     """The same; nothing where they cannot all be made."""
     try:
         return as_handed_in(work, source, mistakes)
-    except ValueError:
+    except (KeyError, ValueError):  # a plate's image by similarity has no normal components
         return {}
 
 

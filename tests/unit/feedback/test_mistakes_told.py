@@ -5,10 +5,10 @@ import re
 import pytest
 
 from grader.feedback.mistakes import PRECISE, PRECISE_ALONG_GUIDE
-from grader.feedback.sentences import mistake_feedback
-from grader.language import LANGUAGES
+from grader.feedback.sentences import mistake_feedback, question
+from grader.language import LANGUAGES, tongue
 from grader.outcomes import NamedMistake
-from reference.construction.mistakes import Mistake
+from reference.construction.mistakes import CODES, Mistake
 
 BY_O2B = Mistake("wrong_link", "d'", other=("O2", "B"))
 LINE = {"from": "n_DC", "link": "CD"}
@@ -31,7 +31,25 @@ def test_rivals_follow_after_an_or(lang, either):
     both = NamedMistake(BY_O2B, ("a_D",), 0.6, LINE, (RIVAL,))
     told = mistake_feedback(both, lang)
     assert told.count(either) == 1
-    assert told.endswith(mistake_feedback(RIVAL, lang))
+    assert either + mistake_feedback(RIVAL, lang) in told
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+def test_rivals_are_told_with_their_odds_and_the_question_that_tells_them_apart(lang):
+    both = NamedMistake(BY_O2B, ("a_D",), 0.6, LINE, (RIVAL,))
+    told = mistake_feedback(both, lang)
+    assert told.index("60\N{NO-BREAK SPACE}%") < told.index("30\N{NO-BREAK SPACE}%")
+    assert told.endswith(question(both, tongue(lang)))
+    assert told.endswith("?")
+    assert "%" not in mistake_feedback(WRONG_LINK, lang)
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+@pytest.mark.parametrize("code", CODES)
+def test_every_mistake_has_its_question(code, lang):
+    asked = question(named(code, "n_DC"), tongue(lang))
+    assert asked.endswith("?")
+    assert "%(" not in asked
 
 
 def test_two_rivals_that_are_told_alike_are_told_once():
@@ -64,6 +82,19 @@ def test_other_positions_and_numbers_are_told_apart():
 @pytest.mark.parametrize(("at", "vector"), [("a", "v_A"), ("a'", "a_A")])
 def test_a_reversed_vector_is_named(at, vector):
     assert f"The vector {vector} was" in mistake_feedback(named("sense_reversed", at), "en")
+
+
+@pytest.mark.parametrize(("at", "line", "words"), [
+    ("a", "driven across", "along the link instead of perpendicular"),
+    ("a'", "driven along", "perpendicular to the link instead of along"),
+])  # fmt: skip
+def test_the_driven_links_vector_is_told_as_it_should_lie(at, line, words):
+    assert words in mistake_feedback(named("parallel_for_perpendicular", at, {"line": line}), "en")
+
+
+def test_a_point_on_another_vectors_line_is_told_with_that_vector():
+    told = mistake_feedback(named("wrong_intersection", "d'", LINE, other=("a_BA_n",)), "en")
+    assert told.startswith("d' was taken on the line of a_BA_n instead of on its own line from n_DC.")
 
 
 @pytest.mark.parametrize("lang", LANGUAGES)

@@ -1,6 +1,7 @@
 """The mistake that explains what is off, and none for a hand that is only careless."""
 
 import random
+from dataclasses import replace
 
 import pytest
 
@@ -10,8 +11,8 @@ from grader.marking.mark import judge
 from grader.rubric import rubric_of
 from reference.authored.assignment import library, load_assignment
 from reference.construction.graph import evaluate
-from reference.construction.mistakes import Mistake
-from tests.hands import SOURCES, changed, handed_in, measured, rule_scales, sheet, task_for
+from reference.construction.mistakes import Drawing, Mistake, commit
+from tests.hands import SOURCES, changed, drawn_nodes, handed_in, measured, rule_scales, sheet, task_for
 
 PUMP = task_for("pump", 7)
 PRESS = task_for("press", position=1)
@@ -139,3 +140,97 @@ def test_a_plan_started_at_another_scale_than_declared_is_one_wrong_scale(task, 
     judgement = judge(task, handed_in(task, nodes, source))
     assert [(one.code, one.at) for one in judgement.mistakes] == [("scale_wrong", "kv")]
     assert {one.name for one in judgement.outcomes if one.verdict in {"none", "partial"}} == {"kv"}
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [
+        Mistake("parallel_for_perpendicular", "a", quarters=1),
+        Mistake("parallel_for_perpendicular", "a'", quarters=3),
+        Mistake("wrong_link", "b", 0, other=("O1", "B")),
+        Mistake("wrong_intersection", "c'", 1, other=("n_BA",)),
+        Mistake("wrong_intersection", "d", 0, other=("v_BA",)),
+    ],
+    ids=lambda mistake: f"{mistake.code} at {mistake.at} {' '.join(mistake.other)}",
+)
+@pytest.mark.parametrize("source", ["sheet", "directions"])
+def test_rarer_mistakes_are_found_where_they_were_made(mistake, source):
+    judgement = judge(PUMP, handed_in(PUMP, drawn_nodes(PUMP, mistakes=(mistake,)), source))
+    found = judgement.mistakes[0]
+    assert [(one.code, one.at) for one in judgement.mistakes] == [(mistake.code, mistake.at)]
+    assert found.mistake.other == mistake.other
+
+
+def test_an_entered_direction_that_contradicts_the_other_entries_accuses_of_nothing_else():
+    # The plan is right; only what was entered for v_A points the other way.
+    for task in (PUMP, PRESS):
+        reading = measured(task)
+        entered = reading.figures["velocity_plan"].vectors["v_A"]
+        turned = (entered.direction_deg + 180.0) % 360.0
+        judgement = judge(task, Submission(measured=changed(reading, "v_A", direction_deg=turned)))
+        assert {one.name for one in judgement.outcomes if one.verdict == "none"} == {"v_A"}
+        assert judgement.mistakes == ()
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_a_longer_crank_vector_and_a_reversed_component_are_both_named(source):
+    known = {**PRESS.parameters, "v_A": 1.15 * PRESS.parameters["v_A"]}
+    drawing = commit(Mistake("normal_reversed", "n_BA"), Drawing(PRESS.construction, known))
+    nodes = {name: complex(one) for name, one in evaluate(drawing.construction, known).items()}
+    named = [(one.code, one.at) for one in judge(PRESS, handed_in(PRESS, nodes, source)).mistakes]
+    assert named == [("scale_wrong", "kv"), ("normal_reversed", "n_BA")]
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_another_students_data_at_the_own_scales_are_recognised(source):
+    other = task_for("pump", 20)
+    nodes = drawn_nodes(other, rule_scales(PUMP))
+    submission = replace(handed_in(PUMP, nodes, source), declared={})
+    assert [(one.code, one.detail) for one in judge(PUMP, submission).mistakes] == [
+        ("other_variant", {"n": 20})
+    ]
+
+
+def test_letters_swapped_are_told_by_lengths_alone():
+    swapped = Mistake("labels_swapped", "b", other=("b", "c"))
+    nodes = drawn_nodes(PUMP, mistakes=(swapped,))
+    found = judge(PUMP, handed_in(PUMP, nodes, "lengths")).mistakes
+    assert [(one.code, set(one.mistake.other)) for one in found] == [("labels_swapped", {"b", "c"})]
+
+
+def test_one_factor_in_all_components_is_a_wrong_scale():
+    # a_A at the declared scale, turned the wrong way; all that is computed at another scale.
+    known = {**PUMP.parameters, "ka": PUMP.parameters["ka"] / 2.0}
+    wrong = Mistake("parallel_for_perpendicular", "a'", quarters=1)
+    drawing = commit(wrong, Drawing(PUMP.construction, known))
+    nodes = {name: complex(one) for name, one in evaluate(drawing.construction, known).items()}
+    named = {one.code for one in judge(PUMP, handed_in(PUMP, nodes, "sheet")).mistakes}
+    assert "scale_wrong" in named
+    assert "arithmetic" not in named
+
+
+def test_a_wrong_value_beside_a_right_drawing_is_told_as_a_slip():
+    nodes = drawn_nodes(PUMP)
+    right = abs(PUMP.real["v_D"])
+    submission = replace(handed_in(PUMP, nodes, "sheet"), values={"v_D": 10.0 * right})
+    slip = judge(PUMP, submission).mistakes[0]
+    assert (slip.code, slip.at, slip.explains) == ("arithmetic", "v_D", ("v_D",))
+    assert slip.detail["factor"] == pytest.approx(10.0, rel=0.02)
+
+
+def test_a_wrong_angular_velocity_from_a_right_vector_is_told_as_a_slip():
+    submission = replace(
+        handed_in(PUMP, drawn_nodes(PUMP), "sheet"), values={"omega_3": 2.0 * PUMP.rates["omega_3"]}
+    )
+    slips = [(one.code, one.at) for one in judge(PUMP, submission).mistakes]
+    assert slips == [("arithmetic", "omega_3")]
+
+
+def test_what_the_evidence_does_not_tell_apart_is_told_with_its_odds():
+    # A short component drawn a tenth as long may as well have been left out.
+    nodes = drawn_nodes(PRESS, mistakes=(Mistake("arithmetic", "n_DC", factor=0.1),))
+    (found,) = judge(PRESS, handed_in(PRESS, nodes, "lengths")).mistakes
+    (rival,) = found.rivals
+    assert {found.code, rival.code} == {"arithmetic", "normal_missing"}
+    assert 0.1 < rival.confidence < found.confidence
+    assert found.confidence + rival.confidence == pytest.approx(1.0, abs=0.02)

@@ -13,6 +13,8 @@ from reference.construction.mistakes import (
     affected,
     changed_step,
     commit,
+    line_of,
+    rarer_mistakes_of_step,
     single_mistakes,
 )
 from reference.plan import exact_plan
@@ -179,3 +181,44 @@ def test_an_arithmetic_slip_changes_the_length_that_was_computed():
     nodes = evaluate(drawing.construction, drawing.parameters)
     right = evaluate(plan.construction, plan.drawing.parameters)
     np.testing.assert_allclose(nodes["n_B"] - nodes["o'"], 1.3 * (right["n_B"] - right["o'"]), atol=1e-12)
+
+
+def rarer(plan):
+    return [
+        one for step in plan.construction.steps for one in rarer_mistakes_of_step(step, plan.construction)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "n", "position"), [("pump", 7, None), ("press", None, 1), ("shaper", 4, None)]
+)
+def test_rarer_mistakes_move_nothing_upstream_and_are_none_of_the_usual_ones(name, n, position):
+    plan = a_plan(name, n, position)
+    usual = [one for figure in FIGURES for one in single_mistakes(plan.drawing, figure)]
+    offered = rarer(plan)
+    assert offered
+    assert not [one for one in offered if one in usual]
+    for mistake in offered:
+        moved = {node for node, shift in shifts(plan, mistake).items() if not shift <= MOVED_MM}
+        assert moved <= affected(mistake, plan.construction), mistake
+
+
+def test_the_driven_links_vector_may_lie_along_the_link():
+    plan = a_plan()
+    mistake = Mistake("parallel_for_perpendicular", "a", quarters=1)
+    assert mistake in rarer(plan)
+    drawing = commit(mistake, plan.drawing)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    crank = nodes["A"] - nodes["O1"]
+    assert abs((crank.conjugate() * nodes["a"]).imag[0]) < MOVED_MM
+
+
+def test_a_point_may_be_taken_on_another_vectors_line():
+    plan = a_plan()
+    drawing = commit(Mistake("wrong_intersection", "c'", 1, other=("a_B_t",)), plan.drawing)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    along, across = nodes["c'"] - nodes["n_B"], nodes["B"] - nodes["O2"]
+    assert abs((along.conjugate() * across).real[0]) < MOVED_MM * abs(across)[0]
+    construction = plan.construction
+    assert line_of(construction.vectors["v_C"], construction) is None
+    assert line_of(construction.vectors["a_BA_n"], construction).through == "a'"

@@ -1,5 +1,7 @@
 """A drawing replayed: the account that costs least is how it was made."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -156,3 +158,35 @@ def test_a_second_sketch_is_what_its_plan_is_drawn_from():
     without = replay(right, Observations(seen), [Root()], USUAL)[0]
     assert beside.is_innocent
     assert beside.cost < without.cost - SURE_COST
+
+
+def test_errors_of_measured_nodes_are_passed_on_to_what_is_drawn_from_them():
+    right = pump()
+    places = drawn(right)
+    rough = {**places, "n_DC": places["n_DC"] + 1.5 + 1.0j}
+    seen = nodes_of(right, rough).entries
+    measured = tuple(replace(one, spread=(1.0, 0.0, 1.0)) if one.node == "n_DC" else one for one in seen)
+    exact, passed_on = (
+        replay(right, Observations(entries), [Root()], USUAL)[0].right["d'"] for entries in (seen, measured)
+    )
+    assert passed_on < 0.7 * exact
+
+
+def test_errors_of_a_sketch_that_was_not_handed_in_are_passed_on():
+    right = pump()
+    places = drawn(right)
+    moved = {**places, "b": places["b"] + 2.0}
+    plans = tuple(one for one in nodes_of(right, moved).entries if one.node[0].islower())
+    off_rad = {("A", "B"): 0.05, ("O2", "B"): 0.05}
+    known, unknown = (
+        replay(right, Observations(plans, directions_rad=one), [Root()], USUAL)[0].right["b"]
+        for one in ({}, off_rad)
+    )
+    assert unknown < 0.5 * known
+
+
+def test_what_an_observation_costs_is_added_to_every_explanation():
+    right = pump()
+    seen = nodes_of(right, drawn(right))
+    plain, dear = (replay(right, replace(seen, cost=cost), [Root()], USUAL)[0].cost for cost in (0.0, 7.0))
+    assert dear == pytest.approx(plain + 7.0)

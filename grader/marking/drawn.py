@@ -1,0 +1,271 @@
+"""What was drawn, as the diagnosis takes it: nodes and vectors with their errors, and what explains them."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from grader.comparison.evidence import Evidence
+from grader.comparison.follow_through import ReplayResult
+from grader.comparison.own import PlanBasis
+from grader.comparison.scales import Scale
+from grader.comparison.task import Task
+from grader.marking.diagnosis import Case, drawn_instead, explained
+from reference.construction.elements import Coriolis, Normal, Parameters
+from reference.construction.graph import Vector
+from reference.construction.mistakes import Drawing
+from reference.construction.steps import Given
+from reference.construction.uncertainty import trace
+from reference.geometry import ComplexArray, FloatArray
+from reference.replay.explanations import Covariance, Observation, Observations
+
+LEAST_ERROR_MM = 0.15
+"""Least standard error of a node, however well it is drawn and read."""
+NO_ERRORS: ComplexArray = np.zeros(0, np.complex128)
+
+
+def explain(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> ReplayResult:
+    """The explanations of a drawing, and the basis of its plans where that is certain."""
+    case = case_of(task, evidence, settled)
+    explanations = explained(case)
+    drawn, wrong = drawn_instead(explanations, case)
+    # Where a sheet shows the drawn mechanism and no plan is turned, the own nodes are enough.
+    is_needed = wrong and (wrong & task.construction.poles.keys() or not evidence.has_sheets)
+    basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong) if is_needed else None
+    return ReplayResult(explanations, basis)
+
+
+def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Case:
+    """The drawing to explain at the scales used, with the scales that the drawing follows instead."""
+    assumed = frozenset(name for name, scale in settled.items() if scale.used.assumed)
+    others = {name: scale.other for name, scale in settled.items() if scale.other}
+    used = {
+        name: np.asarray(others.get(name, scale.used.used) if name in assumed else scale.used.used)
+        for name, scale in settled.items()
+    }
+    parameters = {**task.parameters, **used}
+    entries = _lengths_observed(task, evidence, parameters)
+    directions = _directions_of_the_sketch(task, evidence, {name: float(one) for name, one in used.items()})
+    best, *otherwise = (
+        Observations(
+            (*_nodes_observed(task, evidence, nodes), *entries), evidence.sketches, nodes.cost, directions
+        )
+        for nodes in _adjusted_nodes(task, evidence)
+    )
+    return Case(
+        drawing=Drawing(task.construction, parameters),
+        observations=best,
+        otherwise=tuple(otherwise),
+        assignment=task.assignment,
+        variant=task.variant,
+        skill=task.skill,
+        followed={
+            name: other
+            for name, other in others.items()
+            if name not in assumed and other != settled[name].used.used
+        },
+        assumed=assumed,
+    )
+
+
+def _nodes_observed(task: Task, evidence: Evidence, nodes: "_Nodes") -> list[Observation]:
+    """The student's own nodes."""
+    return [
+        Observation(name, None, place, _with_computing(task, evidence, name, nodes.spreads.get(name)))
+        for name, place in nodes.places.items()
+        if name not in task.ground and name not in task.construction.poles.values()
+    ]
+
+
+def _lengths_observed(task: Task, evidence: Evidence, parameters: Parameters) -> list[Observation]:
+    """The vectors that lead to none of the nodes."""
+    construction, entries = task.construction, []
+    traced = None
+    for name, vector in construction.vectors.items():
+        drawn = evidence.vector(name)
+        if drawn is None or drawn.confidence < task.rubric.least_confidence or vector.head in evidence.nodes:
+            continue
+        value, read_mm = drawn.as_complex, math.hypot(LEAST_ERROR_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
+        if value is not None:
+            entries.append(Observation(vector.head, vector.tail, value, _covariance(NO_ERRORS, read_mm)))
+            continue
+        # The nodes before a length are not known: it contains all earlier errors.
+        traced = traced or trace(construction, parameters, task.skill)
+        spread = _covariance(traced.shifts(vector.tail, vector.head), read_mm)
+        entries.append(Observation(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
+    return entries
+
+
+def _directions_of_the_sketch(
+    task: Task, evidence: Evidence, scales: Mapping[str, float]
+) -> dict[tuple[str, str], float]:
+    """The standard error (rad) of each direction on a sketch that was not handed in, by pair of joints."""
+    if evidence.has_sketch:
+        return {}
+    traced = task.traced(scales)
+    found = {}
+    links = {vector.link for vector in task.construction.vectors.values() if vector.link is not None}
+    for link in links:
+        for tail, head in (link, link[::-1]):
+            along = traced.made[head].at - traced.made[tail].at
+            if abs(along) > LEAST_LINK_MM:
+                across = ((traced.made[head].shifts - traced.made[tail].shifts) / along).imag
+                found[tail, head] = float(np.sqrt(across @ across))
+    return found
+
+
+LEAST_LINK_MM = 1.0
+"""Two joints nearer than this have no direction between them."""
+
+
+def _with_computing(task: Task, evidence: Evidence, node: str, read: Covariance | None) -> Covariance:
+    """The covariance (mm^2) of a node by reading, and of what is computed from readings."""
+    vector = next((one for one in task.construction.vectors.values() if one.head == node), None)
+    drawn = None if vector is None else evidence.vector(vector.name)
+    along = None if drawn is None else drawn.as_complex
+    rows = NO_ERRORS
+    if along:
+        each_mm = LEAST_ERROR_MM if evidence.has_sheets else task.rubric.hand.ruler_mm
+        rows = np.array([along * _computed_within(task, evidence, node, math.sqrt(2.0) * each_mm)])
+    xx, xy, yy = _covariance(rows, LEAST_ERROR_MM)
+    return (xx, xy, yy) if read is None else (xx + read[0], xy + read[1], yy + read[2])
+
+
+# Measured vectors that close polygons --------------------------------------------------------------
+
+CLOSES = 5.0
+"""Standard deviations by which a polygon of measured vectors may fail to close."""
+WRONG_ENTRY = 30.0
+"""Cost of a vector that was entered wrongly: rare, and it may be any (as in `reference.replay`)."""
+ENTRY_WINDOW = 40.0
+"""Entries left out at a higher cost than the cheapest by this much are not tried."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Nodes:
+    """The own nodes of both plans, and their covariances by measuring, as far as they are measured.
+
+    `cost` is that of the residuals, and of an entry that was left out.
+    """
+
+    places: Mapping[str, complex]
+    spreads: Mapping[str, Covariance] = field(default_factory=dict)
+    cost: float = 0.0
+
+
+def _adjusted_nodes(task: Task, evidence: Evidence) -> list[_Nodes]:
+    """The own nodes; measured vectors adjusted by least squares, where they close polygons.
+
+    Where these do not close, the cheapest first: the nodes by all entries, and without one of them.
+    """
+    if evidence.has_sheets:
+        read = {name: (se_mm**2, 0.0, se_mm**2) for name, se_mm in evidence.se_mm.items()}
+        return [_Nodes(evidence.nodes, read)]
+    found = [_Nodes({}, {}, 0.0)]
+    for figure in task.construction.poles:
+        plans = _adjusted_plan(task, evidence, figure)
+        found = [
+            _Nodes({**one.places, **plan.places}, {**one.spreads, **plan.spreads}, one.cost + plan.cost)
+            for one in found
+            for plan in plans
+        ]
+    least = min(one.cost for one in found)
+    return sorted((one for one in found if one.cost <= least + ENTRY_WINDOW), key=lambda one: one.cost)
+
+
+def _adjusted_plan(task: Task, evidence: Evidence, figure: str) -> list[_Nodes]:
+    """The nodes of one plan, by all entries and, where its polygons do not close, without one of them."""
+    known = [step.node for step in task.construction.figures[figure] if step.node in evidence.nodes]
+    entries = {
+        vector: along
+        for vector in task.construction.vectors_of(figure)
+        if {vector.tail, vector.head} <= set(known)
+        and (drawn := evidence.measured.get(vector.name)) is not None
+        and (along := drawn.as_complex)
+    }
+    nodes = [node for node in known if node != task.construction.poles[figure]]
+    if not entries:
+        return [_Nodes({})]
+    rows, values = _equations(task, entries, nodes)
+    whole, sigmas = _least_squares(rows, values, nodes)
+    if sigmas <= CLOSES:
+        return [replace(whole, cost=0.0)]
+    kept = [np.delete(np.arange(len(values)), (2 * index, 2 * index + 1)) for index in range(len(entries))]
+    others = [
+        _least_squares(rows[keep], values[keep], nodes)[0]
+        for keep in kept
+        if np.linalg.matrix_rank(rows[keep]) == 2 * len(nodes)
+    ]
+    return [whole, *(replace(one, cost=one.cost + WRONG_ENTRY) for one in others)]
+
+
+def _equations(
+    task: Task, entries: Mapping[Vector, complex], nodes: Sequence[str]
+) -> tuple[FloatArray, FloatArray]:
+    """Of each vector two rows, along it and across it, in standard deviations; and what was measured."""
+    hand = task.rubric.hand
+    rows, drawn = np.zeros((2 * len(entries), 2 * len(nodes))), np.zeros(2 * len(entries))
+    for index, (vector, along) in enumerate(entries.items()):
+        # Both ends of a vector are measured.
+        sigmas = (
+            math.sqrt(2.0) * math.hypot(hand.ruler_mm, LEAST_ERROR_MM),
+            math.sqrt(2.0) * math.hypot(abs(along) * math.radians(hand.protractor_deg), LEAST_ERROR_MM),
+        )
+        unit = along / abs(along)
+        for row, (axis, sigma) in enumerate(zip((unit, 1j * unit), sigmas, strict=True)):
+            for end, sign in ((vector.head, 1.0), (vector.tail, -1.0)):
+                if end in nodes:
+                    column = 2 * nodes.index(end)
+                    rows[2 * index + row, column : column + 2] = (
+                        sign * np.array([axis.real, axis.imag]) / sigma
+                    )
+        drawn[2 * index] = abs(along) / sigmas[0]
+    return rows, drawn
+
+
+def _least_squares(rows: FloatArray, drawn: FloatArray, nodes: Sequence[str]) -> tuple[_Nodes, float]:
+    """Nodes by least squares, their squared residuals as cost; and the largest residual."""
+    normal = np.linalg.inv(rows.T @ rows)
+    places = normal @ (rows.T @ drawn)
+    residuals = rows @ places - drawn
+    found = {name: complex(*places[2 * i : 2 * i + 2]) for i, name in enumerate(nodes)}
+    spreads = {
+        name: (
+            float(normal[2 * i, 2 * i]),
+            float(normal[2 * i, 2 * i + 1]),
+            float(normal[2 * i + 1, 2 * i + 1]),
+        )
+        for i, name in enumerate(nodes)
+    }
+    return _Nodes(found, spreads, float(residuals @ residuals)), float(np.abs(residuals).max())
+
+
+# Errors -------------------------------------------------------------------------------------------
+
+
+def _computed_within(task: Task, evidence: Evidence, node: str, each_mm: float) -> float:
+    """The relative error of a component that is computed from read or measured velocities."""
+    sources: tuple[tuple[str, str, float], ...]
+    match task.construction.step(node):
+        case Given(length=Normal(tail=tail, head=head)):
+            sources = ((tail, head, 2.0),)
+        case Given(length=Coriolis(slide=slide, turn=turn)):
+            sources = ((*slide, 1.0), (*turn, 1.0))
+        case _:
+            return 0.0
+    ends = {
+        name: place for one in sources for name in one[:2] if (place := evidence.nodes.get(name)) is not None
+    }
+    errors = [
+        power * each_mm / max(abs(ends[head] - ends[tail]), each_mm)
+        for tail, head, power in sources
+        if tail in ends and head in ends
+    ]
+    return math.hypot(*errors)
+
+
+def _covariance(shifts: ComplexArray, least_mm: float) -> Covariance:
+    """The covariance (mm^2) of an end from independent errors, and a least error along both axes."""
+    x, y = shifts.real, shifts.imag
+    return float(x @ x) + least_mm**2, float(x @ y), float(y @ y) + least_mm**2
