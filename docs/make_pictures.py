@@ -60,7 +60,11 @@ def review_pictures() -> None:
     with tempfile.TemporaryDirectory() as work:
         folder = Path(work) / "in"
         shutil.copytree(HERE.parent / "samples" / "pump", folder)
-        session = Session(Batch(pump, load_rubric("pump"), folder, Path(work) / "out"))
+        rubric = load_rubric("pump")
+        # A teacher who wants to see what is near a limit has more to look at.
+        doubt = rubric.doubt.model_copy(update={"in_doubt": "person", "stake": 0.0})
+        rubric = rubric.model_copy(update={"doubt": doubt})
+        session = Session(Batch(pump, rubric, folder, Path(work) / "out"))
         session.bring_up_to_date(lambda *_: None)
         listener = socket.create_server(("127.0.0.1", 0))
         config = uvicorn.Config(application(session), log_level="warning", lifespan="off", ws="none")

@@ -115,7 +115,7 @@ def _row(
         "proposed": criterion.proposed,
         "probability": criterion.probability,
         "stake": criterion.max_points if criterion.verdict == OPEN else 0.0,
-        "decided": criterion.decided is not None,
+        "decided": row is not None and criterion.decided is not None,
         "seen": mark_of(row),
     }
 
@@ -160,9 +160,9 @@ def _state(criterion: CriterionDocument, decision: Decision | None, said: str, s
     badge = Markup('<span class="badge v-{}" aria-hidden="true">{}</span> {}').format(
         criterion.verdict, MARKS[criterion.verdict], speaker.gettext(VERDICTS[criterion.verdict])
     )
-    if criterion.decided is not None:
+    if criterion.decided is not None and criterion.verdict != OPEN:
         said = speaker.gettext(CHECKED) % {"who": criterion.decided.by or speaker.gettext(SOMEBODY)}
-    elif decision is not None:
+    elif criterion.decided is None and decision is not None:
         was = speaker.gettext(VERDICTS[decision.verdict])
         who = decision.by or speaker.gettext(SOMEBODY)
         said = speaker.gettext(STALE) % {"who": who, "verdict": was}

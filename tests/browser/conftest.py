@@ -26,10 +26,14 @@ from tests.inline import Inline
 
 ROOT = Path(__file__).resolve().parents[2]
 PUMP = load_assignment("pump")
-ENTERED = 28
+ENTERED = 29
 """Students with entered measurements, each with one or two entries that only a person can settle."""
-SCANNED = ("s02", "s07")
+SCANNED = ("s02",)
 PATIENCE_MS = 20_000
+AS_MARKED = load_rubric("pump")
+DOUBT = AS_MARKED.doubt.model_copy(update={"settle": 0.9999, "stake": 0.0})
+RUBRIC = AS_MARKED.model_copy(update={"doubt": DOUBT})
+"""So strict that the scanned student has a dozen open questions, and the most points at stake."""
 
 
 def entered_class():
@@ -62,7 +66,7 @@ def class_of_30(tmp_path_factory):
         for path in samples.glob(f"{student}_*"):
             shutil.copy(path, folder)
     shutil.copy(samples / "s01_1.jpg", folder / "nobody.jpg")
-    grade(Batch(PUMP, load_rubric("pump"), folder, top / "out"), lambda *_: None, Inline())
+    grade(Batch(PUMP, RUBRIC, folder, top / "out"), lambda *_: None, Inline())
     return top
 
 
@@ -75,7 +79,7 @@ class Server:
 
     def __init__(self, top):
         self.top = top
-        self.session = Session(Batch(PUMP, load_rubric("pump"), top / "in", top / "out"), Inline())
+        self.session = Session(Batch(PUMP, RUBRIC, top / "in", top / "out"), Inline())
         self.session.bring_up_to_date(lambda *_: None)
         listener = socket.create_server(("127.0.0.1", 0))
         self.address = f"http://127.0.0.1:{listener.getsockname()[1]}/"

@@ -106,8 +106,7 @@ def test_two_windows_lose_nothing_and_show_the_clash(open_window, server):
         window.page.evaluate("name => { document.getElementById('by').value = name; }", name)
     ana.press("1")
     ion.page.keyboard.press("3")
-    ion.page.wait_for_selector("#note:visible")
-    assert "Ana" in ion.page.inner_text("#note")
+    ion.page.wait_for_function("() => document.getElementById('note').textContent.includes('Ana')")
     (row,) = server.decisions().values()
     assert (row.criterion, row.verdict, row.by) == (criterion, "full", "Ana")
     ion.page.click("#note button")
@@ -124,7 +123,7 @@ def test_a_dragged_node_snaps_and_the_marks_follow(open_window, server):
     window = open_window(server)
     page = window.page
     page.wait_for_selector("#view[data-loaded]")
-    node = page.locator(""".node[data-node="acceleration_plan:a'"]""")
+    node = page.locator(".node[data-node='velocity_plan:b']")
     before = page.inner_text("#numbers")
     box = node.bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -235,7 +234,8 @@ def test_sure_proposals_are_listed_before_they_are_accepted(open_window, server)
     page = window.page
 
     def listed():
-        return [item.split(":")[0].split()[-2] for item in page.locator("#sure-list li").all_inner_texts()]
+        items = page.locator("#sure-list li").all_inner_texts()
+        return [item.split(":")[0].split()[1] for item in items if " m" in item]
 
     page.click("#settings summary")
     page.click("#proposals")
@@ -247,7 +247,8 @@ def test_sure_proposals_are_listed_before_they_are_accepted(open_window, server)
     page.click("#sure-accept")
     page.wait_for_selector("#sure", state="hidden")
     window.ready()
-    assert sorted(server.decisions()) == [("m03", "v_DC"), ("m06", "v_DC")]
+    decided = {key for key in server.decisions() if key[0].startswith("m")}
+    assert decided == {("m03", "v_DC"), ("m06", "v_DC")}
     window.press("u")
     assert not server.decisions()
 

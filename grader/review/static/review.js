@@ -764,7 +764,7 @@ async function poll() {
       const shown = state.question && keyOf(state.question), before = shown && state.rows.get(shown);
       take(data);
       const after = shown && state.rows.get(shown);
-      if (before && after && before.seen !== after.seen && !$("question").hidden) tell(texts.changed, [[texts.look_again, () => { tell(""); showQuestion().catch(failed); }]]);
+      if (before && after && before.seen !== after.seen && !$("question").hidden && $("note").hidden) tell(texts.changed, [[texts.look_again, () => { tell(""); showQuestion().catch(failed); }]]);
     }
   } catch { /* told when something is decided */ }
   setTimeout(poll, POLL_MS);
