@@ -28,12 +28,9 @@ def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission, explain)
     mistakes = _named(task, comparison)
-    mistakes = (
-        *mistakes,
-        *_swapped_letters(task, submission, mistakes),
-        *_not_drawn(task, comparison),
-        *_slips(task, comparison),
-    )
+    mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes))
+    mistakes = (*mistakes, *_not_drawn(task, comparison, mistakes))
+    mistakes = (*mistakes, *_slips(task, comparison, mistakes))
     outcomes = charged_where_made(task, comparison.outcomes, mistakes)
     outcomes = at_stake(task.rubric, of_another(task.rubric, outcomes, mistakes))
     outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in outcomes)
@@ -107,15 +104,21 @@ def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMi
     return found
 
 
-def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
-    """Vectors that are asked for and not on the sheet, or left blank in a table of measurements."""
+def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) -> list[NamedMistake]:
+    """Vectors that are asked for and not on the sheet, or left blank in a table of measurements.
+
+    None of a component that is known to have been left out.
+    """
+    left_out = {one.at for one in known if one.code == "normal_missing"}
     evidence, vectors = comparison.evidence, task.construction.vectors
     found = []
     for one in comparison.outcomes:
         codes = {reason.code for reason in one.reasons}
         is_table = bool(evidence.measured) and not evidence.has_sheets
         is_left_blank = "not_measured" in codes and is_table and one.verdict == "none"
-        if one.name in vectors and ("not_drawn" in codes or is_left_blank):
+        if one.name not in vectors or vectors[one.name].head in left_out:
+            continue
+        if "not_drawn" in codes or is_left_blank:
             sure = NOT_DRAWN if evidence.has_sheets else 1.0
             found.append(NamedMistake(Mistake("vector_missing", one.name), (one.criterion,), sure))
     return found
@@ -127,15 +130,18 @@ LEAST_SLIPPED_MM = 10.0
 LEAST_SLIP = 0.2
 """An angular quantity that is wrong by a smaller share may come from lengths measured badly."""
 SLIPPED = 0.95
-"""Confidence in a slip: the drawing that the value comes from is right, or follows rightly."""
+"""Confidence in a slip: the drawing that the value comes from is right."""
 
 
-def _slips(task: Task, comparison: Comparison) -> list[NamedMistake]:
-    """Values that were computed wrongly from a vector that is right, or follows rightly."""
+def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) -> list[NamedMistake]:
+    """Values that were computed wrongly from a right vector.
+
+    Of angular quantities only where no mistake is known: they depend on links and senses, too.
+    """
     sure = {
         one.name
         for one in comparison.outcomes
-        if one.verdict in {"full", "follow_through"} and (one.measured.length_mm or 0.0) >= LEAST_SLIPPED_MM
+        if one.verdict == "full" and (one.measured.length_mm or 0.0) >= LEAST_SLIPPED_MM and not known
     }
     found = []
     for one in comparison.outcomes:
