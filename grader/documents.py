@@ -17,7 +17,7 @@ Version = Literal[1]
 Verdict = Literal["full", "partial", "none", "follow_through", "review", "not_judged"]
 Status = Literal["graded", "needs_review", "unreadable", "missing"]
 ScaleName = Literal["kL", "kv", "ka"]
-Cause = Literal["assignment", "rubric", "submission", "roster", "program", "new", "gone"]
+Cause = Literal["assignment", "rubric", "submission", "roster", "decision", "program", "new", "gone"]
 """Why a mark moved."""
 Sign = Literal["hand_errors", "same_place", "same_numbers", "same_picture", "other_number"]
 """Why sheets look alike."""
@@ -168,6 +168,17 @@ class DecidedDocument(Document):
     comment: str = ""
 
 
+class AppliedDecisionDocument(Document):
+    """A row of the decisions as it was applied; `criterion` may be a node, a page, `total` or `comment`."""
+
+    criterion: str
+    verdict: str
+    points: float | None
+    comment: str
+    by: str
+    at: str
+
+
 class CriterionDocument(Document):
     """The verdict on one criterion of the rubric."""
 
@@ -270,6 +281,8 @@ class ReportDocument(Document):
     """Points that a person added to the score, or took away."""
     comment: str = ""
     """A person's, on the whole submission."""
+    decisions: list[AppliedDecisionDocument] = []
+    """All that people decided of it and that was applied."""
     criteria: list[CriterionDocument] = []
     mistakes: list[MistakeDocument] = []
     scales: dict[ScaleName, ScaleDocument] = {}

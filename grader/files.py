@@ -70,6 +70,17 @@ def _write_new(path: Path, data: bytes | str) -> None:
         os.fsync(file.fileno())
 
 
+def sync_folder(path: Path) -> None:
+    """Make sure that files renamed in a folder stay so after a power cut, where the system can say so."""
+    if os.name == "posix":
+        with contextlib.suppress(OSError):
+            folder = os.open(path, os.O_RDONLY)
+            try:
+                os.fsync(folder)
+            finally:
+                os.close(folder)
+
+
 def _remove(path: Path) -> None:
     with contextlib.suppress(OSError):
         path.unlink()

@@ -37,6 +37,7 @@ hand_may_miss                                                                off
 readings_disagree     first, second, unit                                    scan and measurements differ
 follows               what, of                                               right from own earlier value
                       (what: nodes, small_errors, scale, vector, value; of: its name)
+decided                                                                      a person decided otherwise
 scale_refused         text, why                                              declared, not understood
 scale_off             declared, expected, unit                               declared, contradicted
 scale_assumed         used, unit                                             not declared
@@ -109,7 +110,7 @@ class Outcome:
     cause : that mistake, where diagnosis found it
     shares : of the points, that `possible` gives; empty where the verdicts alone say it
     probability : that the verdict is right; under review, that the proposed share is
-    proposed : the share of the points as read
+    proposed : the likeliest share of the points
     """
 
     criterion: str

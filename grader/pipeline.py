@@ -13,6 +13,7 @@ import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from hashlib import blake2b
 
 from grader.comparison.evidence import Submission
 from grader.comparison.scales import Declarations, Source, declarations
@@ -22,6 +23,7 @@ from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import Level, criterion_feedback
 from grader.inputs.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
 from grader.inputs.scale_text import declared_scales, sure_texts
+from grader.marking.decided import decide, open_again, with_decisions, with_nodes
 from grader.marking.mark import judge
 from grader.marking.report import reading_document, report_of, unjudged_report
 from grader.outcomes import Judgement
@@ -72,13 +74,16 @@ def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
     except InputFileError as error:
         problem = Problem(error.code, error.message, ref.file)
         return ScannedPage(replace(ref, problem=problem), problems=(problem,), timing_ms=timing)
+    if ref.turn_deg is not None:
+        image = replace(image, turn_deg=ref.turn_deg, turn_is_sure=True)
+    ref = replace(ref, content=blake2b(image.grey.tobytes(), digest_size=8).hexdigest())
     page = ScannedPage(ref, image, timing_ms=timing)
     # Rows that a decoder has filled with white are not blank.
     if not image.damage and is_blank(image):
         page = replace(page, ref=replace(ref, blank=True))
         return _refused(page, "page_blank", f"{ref.file}: page {ref.page} is blank")
     with _timed(timing, "sheet"):
-        sheet, identity = register(image)
+        sheet, identity = register(image, ref.corners_px)
         page = replace(page, ref=replace(ref, identity=identity))
         if isinstance(sheet, Sheet) and not image.damage:
             image, sheet = straighten(image, sheet)
@@ -165,8 +170,9 @@ def mark(
     Arguments: pictures show expected vectors beside wrong ones at level `full`, unless without `with_ghosts`.
     """
     pages = [page.asked_only(rubric.vectors) for page in pages]
+    pages, astray = with_nodes(pages, submission, assignment)
     sheets = [reading_document(page, submission.student_id) for page in pages]
-    problems = (*submission.problems, *(problem for page in pages for problem in page.problems))
+    problems = (*submission.problems, *(problem for page in pages for problem in page.problems), *astray)
     ghosts = with_ghosts and level == "full"
     judged = _judged(submission, assignment, rubric, [page.reading for page in pages])
     if isinstance(judged, Problem):
@@ -175,8 +181,10 @@ def mark(
             assignment, rubric, submission.variant or Variant(), submission.student_id,
             "unreadable" if is_there else "missing", problems=(*problems, judged), sheets=sheets,
         )  # fmt: skip
+        report = with_decisions(report, submission)
         return report, tuple(overlay(page.backdrop, page.reading, {}, {}) for page in pages if page.backdrop)
-    task, judgement, declared = judged
+    task, own, declared = judged
+    judgement = decide(own, rubric, submission.decided)
     names, lang, measured = assignment.file.names, submission.lang, submission.measured or NOTHING_MEASURED
     report = report_of(
         task, judgement, submission.student_id,
@@ -187,6 +195,7 @@ def mark(
         sources=declared.sources,
     )  # fmt: skip
     report = with_mistakes_explained(report, judgement, assignment, task.variant, lang, level)
+    report = with_decisions(report, submission, own, task.construction)
     return report, _pictures(pages, measured, task.construction, judgement, show_expected=ghosts)
 
 
@@ -195,11 +204,12 @@ def _judged(
 ) -> tuple[Task, Judgement, Declarations] | Problem:
     """The judgement and the scales that counted as declared, or why there is none."""
     drawn = tuple(reading for reading in readings if reading.figures)
+    is_empty = not drawn and submission.measured is None
     if submission.variant is None:
         return Problem(
             "variant_unknown", "nothing says this student's number or position: add it to the roster"
         )
-    if not drawn and submission.measured is None:
+    if is_empty and not any(row.kind == "verdict" for row in submission.decided):
         if submission.has_unusable:
             return Problem("nothing_usable", "nothing that was handed in can be used")
         if not submission.pages:
@@ -215,7 +225,8 @@ def _judged(
     declared = declarations(task, entered, readings, measured.further_scales)
     by_hand = replace(measured.reading, unread=(*measured.reading.unread, *declared.unread))
     evidence = Submission(drawn, by_hand, measured.values, declared.texts)
-    return task, judge(task, evidence), declared
+    judgement = judge(task, evidence)
+    return task, open_again(judgement, rubric, submission) if is_empty else judgement, declared
 
 
 def _pictures(

@@ -47,6 +47,7 @@ class Page:
     turn_deg : counter-clockwise turn that the file asks viewers to apply (EXIF, PDF), 0/90/180/270
     paper_mm : width and height of the stored image on paper where the file states it (PDF), or None
     damage : which rows are not as they were stored, where the file shows it; empty for a whole page
+    turn_is_sure : a person said the turn: the page is read no other way up
     """
 
     source: str
@@ -56,6 +57,7 @@ class Page:
     turn_deg: int = 0
     paper_mm: tuple[float, float] | None = None
     damage: str = ""
+    turn_is_sure: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +84,10 @@ class PageRef:
     digest : of the file's content, empty where any content will do
     problem : why the page cannot be used, or None; such a page is not opened again
     path : where the file is
+    content : digest of its pixels, empty before it is decoded: the same page may come in another file
+    turn_deg : counter-clockwise turn that makes it upright, where a person said so
+    corners_px : the sheet's corners, from the upright sheet's top left clockwise, stored pixels, where a
+        person gave them; else empty
     """
 
     file: str
@@ -92,6 +98,9 @@ class PageRef:
     digest: str = ""
     problem: Problem | None = None
     path: Path = Path()
+    content: str = ""
+    turn_deg: int | None = None
+    corners_px: tuple[tuple[float, float], ...] = ()
 
     def __str__(self) -> str:
         return self.file if self.pages == 1 else f"{self.file}#{self.page}"

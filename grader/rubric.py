@@ -338,7 +338,7 @@ def load_rubric(name: str | Path, *, beside: Path | None = None) -> RubricFile:
 @cache
 def _load(path: Path, _changed_ns: int) -> RubricFile:
     rubric = load(RubricFile, path)
-    faults = [*_twice(rubric), *_idle_weights(rubric)]
+    faults = [*_twice(rubric), *_reserved(rubric), *_idle_weights(rubric)]
     if faults:
         raise AuthoredFileError(str(path), tuple(faults))
     return rubric
@@ -349,6 +349,13 @@ def _twice(rubric: RubricFile) -> Iterator[Finding]:
     for index, name in enumerate(ids):
         if name in ids[:index]:
             yield Finding(f"$.criterion[{index}].id", f"{name} is there already")
+
+
+def _reserved(rubric: RubricFile) -> Iterator[Finding]:
+    """Ids that mean something else where people decide."""
+    for index, criterion in enumerate(rubric.criterion):
+        if criterion.id in {"total", "comment"}:
+            yield Finding(f"$.criterion[{index}].id", f"{criterion.id} has a meaning in decisions.csv")
 
 
 def _idle_weights(rubric: RubricFile) -> Iterator[Finding]:

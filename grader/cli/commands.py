@@ -180,6 +180,10 @@ def grade(
     ghosts: Annotated[
         bool, typer.Option("--ghosts/--no-ghosts", help="With --level full: draw expected vectors, dotted.")
     ] = True,
+    decisions: Annotated[
+        Path | None,
+        typer.Option("--decisions", help="What people decided; decisions.csv in the folder if absent."),
+    ] = None,
     time_limit: Annotated[
         float, typer.Option("--time-limit", min=1.0, help="Seconds that a file or a sheet may take.")
     ] = 60.0,
@@ -194,6 +198,7 @@ def grade(
     open_ends = grade_folder(
         folder, assignment, out, roster=roster, pages_per_student=pages_per_student, jobs=jobs, lang=lang,
         limits=Limits(time_limit, memory_limit), level=level, with_ghosts=ghosts,
+        decisions=decisions,
     )  # fmt: skip
     raise typer.Exit(1 if open_ends else 0)
 

@@ -38,17 +38,20 @@ def grade_folder(
     limits: Limits | None = None,
     level: str = "full",
     with_ghosts: bool = True,
+    decisions: Path | None = None,
 ) -> bool:
     """Grade a folder and print the outcome; whether anything is left for a person."""
     check_language(lang)
     wanted = checked_level(level)
     if pages_per_student is not None and pages_per_student < 1:
         raise CallError("pages_per_student", "--pages-per-student must be 1 or more")
+    if decisions is not None and not decisions.is_file():
+        raise CallError("file_missing", f"{decisions}: there is no such file of decisions")
     assignment = load_assignment(name)
     rubric = rubric_of(assignment)
     batch = Batch(
         assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1,
-        limits or Limits(), lang, wanted, with_ghosts,
+        limits or Limits(), lang, wanted, with_ghosts, decisions,
     )  # fmt: skip
     with progress() as tell:
         results = grade(batch, tell)
@@ -157,6 +160,11 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     _list(f"Moved since the last run: {len(results.moved)}", changes, page)
     pairs = [_similar_line(pair) for pair in results.alike]
     _list("Look alike (no accusation; hold both beside each other):", pairs, page)
+    stale = [
+        f"line {one.line}, {_who(one.student_id, one.position)}, {one.criterion} {one.verdict}: {one.reason}"
+        for one in results.stale
+    ]
+    _list("Decisions that are out of date, and were not applied; decide again or remove them:", stale, page)
     _list("A person must look at:", list(_waiting(results)), page)
     typer.echo(f"Look at {page}; for programs there is {out / 'results.json'}")
 

@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -89,7 +89,7 @@ class Evidence:
 
 def gather(task: Task, submission: Submission) -> Evidence:
     """All readings of a submission in the assignment's frame."""
-    sheets = _Sheets(task)
+    sheets = _Sheets(task, turn=_turn_of_sketches(task, submission.readings))
     for reading in submission.readings:
         sheets.take(reading)
     measured = _measured(submission.measured)
@@ -118,6 +118,7 @@ class _Sheets:
     """The readings of the sheets so far; of a figure on two sheets the nodes of the first one count."""
 
     task: Task
+    turn: tuple[float, float]
     drawn: dict[str, DrawnVector] = field(default_factory=dict)
     nodes: dict[str, complex] = field(default_factory=dict)
     se_mm: dict[str, float] = field(default_factory=dict)
@@ -127,8 +128,9 @@ class _Sheets:
     def take(self, reading: Reading) -> None:
         """Add one sheet."""
         sketch = reading.figures.get(MECHANISM)
-        turn, se_turn = turn_of(self.task, sketch) if sketch else NOT_TURNED
-        if not _agrees_with_plans(self.task, reading, turn):
+        turn, se_turn = turn_of(self.task, sketch) if sketch else self.turn
+        is_likely = sketch is not None and abs(turn) < FAR_TURNED_RAD
+        if not is_likely and not _agrees_with_plans(self.task, reading, turn):
             turn, se_turn = NOT_TURNED
         joints: dict[str, complex] = {}
         if sketch:
@@ -262,7 +264,10 @@ def _nodes_from(task: Task, measured: Mapping[str, DrawnVector]) -> dict[str, co
 
 NOT_TURNED = (0.0, math.radians(1.0))
 """Where no sketch tells the turn: people draw along the frame, to about a degree."""
-FAR_TURNED_RAD = math.radians(10.0)
+FAR_TURNED_RAD = math.radians(90.0)
+"""Nobody turns a sketch by more than this on its sheet."""
+LEAST_TURNED_MM = 10.0
+"""A shorter vector tells a sheet's turn too vaguely."""
 FIT_MM = 1.0
 """Root mean square misfit up to which the drawn mechanism is the right one, turned and scaled."""
 LEAST_GROUND_MM = 20.0
@@ -296,24 +301,35 @@ def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
 
 
 def _agrees_with_plans(task: Task, reading: Reading, turn: float) -> bool:
-    """Whether as many vectors of the sheet's plans fit the sketch's turn as fit none.
+    """Whether as many vectors of the sheet's plans fit a sketch's turn as fit none.
 
-    People draw plans beside the sketch as it lies. One that looks turned among plans that are not has
-    been misread.
+    People draw plans beside the sketch as it lies. One that looks upside down among plans that are not
+    has been misread.
     """
-    if abs(turn) <= FAR_TURNED_RAD:
-        return True
-    off = [
-        cmath.rect(1.0, math.radians(drawn.direction_deg) - cmath.phase(task.real[name]))
-        for figure in reading.figures.values()
-        for name, drawn in figure.vectors.items()
-        if drawn.direction_deg is not None and task.real.get(name)
-    ]
+    off = _turns(task, reading)
     turned, upright = (
-        sum(abs(cmath.phase(one * cmath.rect(1.0, -by))) < abs(turn) / 4.0 for one in off)
-        for by in (turn, 0.0)
+        sum(abs(math.remainder(one - by, math.tau)) < abs(turn) / 4.0 for one in off) for by in (turn, 0.0)
     )
     return turned >= upright
+
+
+def _turn_of_sketches(task: Task, readings: Sequence[Reading]) -> tuple[float, float]:
+    """The turn of a student's first sketch, for sheets that have none: people lay each sheet alike."""
+    sketch = next((one.figures[MECHANISM] for one in readings if MECHANISM in one.figures), None)
+    turn, se = NOT_TURNED if sketch is None else turn_of(task, sketch)
+    return turn, math.hypot(se, NOT_TURNED[1])
+
+
+def _turns(task: Task, reading: Reading) -> list[float]:
+    """How far each vector of a sheet's plans is turned from the exact one, radians, -pi to pi."""
+    return [
+        math.remainder(math.radians(drawn.direction_deg) - cmath.phase(task.real[name]), math.tau)
+        for figure in reading.figures.values()
+        for name, drawn in figure.vectors.items()
+        if drawn.direction_deg is not None
+        and (drawn.length_mm or 0.0) > LEAST_TURNED_MM
+        and task.real.get(name)
+    ]
 
 
 def _is_drafting_error(task: Task, nodes: Iterable[str], turn: float) -> bool:

@@ -207,12 +207,16 @@ def the_worse(first: MarkRange, other: MarkRange) -> MarkRange:
     )
 
 
-WRONG_CREDIT, WRONG_COUNTED, WRONG_CHARGE = 0.05, 0.15, 0.5
+WRONG_CREDIT, WRONG_COUNTED, WRONG_CHARGE = 0.05, 0.15, 1.0
 """How often a reading without any confidence makes the verdict wrong. What is taken for a vector lies seldom
 within the tolerance of the right one unless that is there: of simulated vectors credited with a confidence
 below 0.2 one in 20 was wrong, of 900 from 0.2 to 0.9 none (other students than those of the docs). What is
 within the tolerance by the reading's error alone is less surely so. A misreading makes a right vector wrong
 much more often."""
+
+
+SURELY_READ, MOSTLY_MISREAD = 0.03, 0.7
+"""Of vectors read with more doubt than the first that are off as read, up to this share is not."""
 
 
 def with_confidence(mark: MarkRange, confidence: float, settle: float) -> MarkRange:
@@ -225,7 +229,7 @@ def with_confidence(mark: MarkRange, confidence: float, settle: float) -> MarkRa
         return mark if confidence == 1.0 else replace(mark, sure=min(mark.sure, confidence))
     misread = 1.0 - confidence
     if mark.share != FULL:
-        wrong = WRONG_CHARGE * misread
+        wrong = WRONG_CHARGE * misread if misread <= SURELY_READ else min(6.0 * misread, MOSTLY_MISREAD)
     elif any(one.code == COUNTED["student"] for one in mark.reasons):
         wrong = WRONG_COUNTED * misread
     else:
@@ -393,6 +397,9 @@ def outcome(  # noqa: PLR0913 - one argument per field of the record
 ) -> Outcome:
     """The outcome of a marked criterion: under review where its mark is not certain."""
     lost = mark.share != FULL or not mark.is_certain or followed
+    likely, probability = mark.share, mark.sure
+    if not mark.is_certain and probability < EVEN:
+        likely, probability = (mark.best if likely == mark.worst else mark.worst), 1.0 - probability
     return Outcome(
         criterion=criterion.id,
         name=criterion.name,
@@ -405,8 +412,8 @@ def outcome(  # noqa: PLR0913 - one argument per field of the record
         possible=(verdict_of(mark.worst, followed=followed), verdict_of(mark.best, followed=followed)),
         shares=(mark.worst, mark.best),
         mistake=mistake,
-        probability=mark.sure,
-        proposed=mark.share,
+        probability=probability,
+        proposed=likely,
     )
 
 

@@ -220,6 +220,7 @@ CAUSES: Mapping[Cause, str] = {
     "rubric": N_("the rubric was changed"),
     "submission": N_("other files were handed in"),
     "roster": N_("the roster was changed"),
+    "decision": N_("a person decided"),
     "program": N_("another version of the program"),
     "new": N_("new"),
     "gone": N_("no longer there"),

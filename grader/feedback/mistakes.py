@@ -242,9 +242,7 @@ QUESTIONS: dict[str, str] = {
     "scale_wrong": N_("With which scale %(at)s did you compute the lengths that you drew?"),
     "normal_reversed": N_("Which way did you lay off the component that ends in %(at)s?"),
     "normal_missing": N_("Did you lay off the component that ends in %(at)s?"),
-    "normal_from_absolute": N_(
-        "From which velocity did you compute the component that ends in %(at)s?"
-    ),
+    "normal_from_absolute": N_("From which velocity did you compute the component that ends in %(at)s?"),
     "other_variant": N_("Whose number and data did you draw with?"),
     "other_assembly": N_("On which side does %(at)s lie on your sketch of the mechanism?"),
     "image_mirrored": N_(

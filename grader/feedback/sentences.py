@@ -53,6 +53,7 @@ HINTS: dict[str, str] = {
     "follows": N_(
         "It follows rightly from your own earlier work; the earlier mistake is charged once, there."
     ),
+    "decided": N_("A person has decided this."),
     "scale_refused": N_("The declared scale could not be understood."),
     "scale_off": N_("The declared scale does not fit the drawing and the data."),
     "scale_assumed": N_("The scale was not declared; the assignment's own rule was assumed."),

@@ -29,6 +29,7 @@ STATES = {
 METHODS = {
     "markers": N_("placed by its markers"),
     "combined": N_("placed by frame, paper and resolution together"),
+    "corners": N_("placed by the corners that a person gave"),
 }
 SOURCES = {
     "roster": N_("from the roster"),
@@ -172,6 +173,8 @@ PROBLEMS: dict[str, str] = {
     "owner_other_assignment": N_("The page belongs to another assignment."),
     "order_refused": N_("The roster's order cannot be used for these pages."),
     "scan_missing": N_("A scan that the roster names is not there."),
+    "decision_fault": N_("A line of the decisions cannot be used."),
+    "decision_not_applied": N_("A person's decision could not be applied."),
     "crashed": N_("The file ended the program that read it; scan or export it again."),
     "too_slow": N_("Reading the file took too long; scan or export it again."),
     "too_much_memory": N_("Reading the file took too much memory; scan or export it again."),

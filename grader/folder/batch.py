@@ -1,6 +1,6 @@
 """A folder of submissions: inventory, owners, marking in parallel, results. One bad file stops nothing."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -24,7 +24,19 @@ from grader.folder.cache import (
     stage_digest,
     store_reading,
 )
-from grader.folder.changes import Inputs, changes_since, earlier, inputs_of, note_inputs, noted_inputs
+from grader.folder.changes import (
+    CACHE_FOLDER,
+    Inputs,
+    RunNote,
+    changes_since,
+    earlier,
+    inputs_of,
+    note_inputs,
+    note_run,
+    noted_inputs,
+    noted_run,
+)
+from grader.folder.decisions import ClassDecisions, class_decisions, decisions_path
 from grader.folder.inventory import FileContent, Progress, submissions, take_inventory
 from grader.folder.owners import Unmatched, assign_pages
 from grader.folder.submissions import Unusable, submissions_of
@@ -34,14 +46,13 @@ from grader.inputs.roster import Roster, read_roster
 from grader.lms.table import write_summary
 from grader.marking.report import unjudged_report
 from grader.pipeline import mark, read_submission
-from grader.records import Problem, ScannedPage
-from grader.rubric import RubricFile, asked_of
+from grader.records import PageRef, Problem, ScannedPage
+from grader.rubric import RubricFile, asked_of, rubric_of
 from grader.similarity.groups import find_similar
 from grader.similarity.submission import compared_submission
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, PlanmarkError
 
-CACHE_FOLDER = ".planmark"
 _PASSING = "file_changed"
 """A problem that the next run need not have: nothing that has it is cached."""
 
@@ -60,6 +71,7 @@ class Batch:
     ----------
     folder, out : where the submissions are, and where results go
     roster : path of the roster, or None (a `roster.csv` in the folder is taken)
+    decisions : path of what people decided, or None (`decisions.csv` in the folder is taken)
     pages_per_student : pages of each student in one class file, blank ones not counted
     jobs, limits : worker processes, and what a file or a sheet may take in one
     lang, level : of feedback, where the roster does not say
@@ -77,51 +89,116 @@ class Batch:
     lang: str = "en"
     level: Level = "full"
     with_ghosts: bool = True
+    decisions: Path | None = None
+
+    @property
+    def decisions_path(self) -> Path:
+        """Where decisions are read, whether there is such a file or not."""
+        return self.decisions or decisions_path(self.folder)
+
+
+@dataclass(frozen=True, slots=True)
+class Graded:
+    """A class as a run left it.
+
+    Attributes
+    ----------
+    jobs : in the order of the results' reports
+    pages : every page handed in, whoever's it is
+    """
+
+    results: ResultsDocument
+    jobs: tuple["Job", ...]
+    pages: tuple[PageRef, ...]
+    cache: PageCache
 
 
 def grade(batch: Batch, progress: Progress, workers: Pool | None = None) -> ResultsDocument:
-    """Grade all that was handed in, and write the reports, pages and results.
+    """Grade all that was handed in, and write the reports, pages and results; arguments as of `graded`."""
+    return graded(batch, progress, workers).results
+
+
+def graded(batch: Batch, progress: Progress, workers: Pool | None = None) -> Graded:
+    """The class as `grade` leaves it, with what a review needs beside the results.
 
     Arguments: `workers` are made as the batch says where they are not given.
 
     Raises CallError for a folder that is not there or holds nothing, AuthoredFileError for a roster
-    with faults, OutputError where results cannot be written, InterruptedRunError for an interrupt.
+    with faults, InputFileError for a file of decisions that cannot be read, OutputError where results
+    cannot be written, InterruptedRunError for an interrupt.
     """
     roster = _roster(batch)
+    decisions = class_decisions(batch.decisions_path)
     files = _files(batch)
     if not files and roster is None:
         raise _nothing(batch)
     make_folder(batch.out)
     if workers is not None:
-        return _graded(batch, roster, files, progress, workers)
+        return _graded(batch, (roster, decisions), files, progress, workers)
     with Workers(batch.jobs, batch.limits, __name__) as pool:
-        return _graded(batch, roster, files, progress, pool)
+        return _graded(batch, (roster, decisions), files, progress, pool)
 
 
 def _graded(
-    batch: Batch, roster: Roster | None, files: Sequence[Path], progress: Progress, workers: Pool
-) -> ResultsDocument:
+    batch: Batch,
+    listed: tuple[Roster | None, ClassDecisions],
+    files: Sequence[Path],
+    progress: Progress,
+    workers: Pool,
+) -> Graded:
+    roster, decisions = listed
     notes = batch.out / CACHE_FOLDER
     names, cache = names_of(batch.assignment), _page_cache(batch)
-    contents = take_inventory(files, batch.folder, names, workers, progress, cache)
-    students, unmatched = _submissions(batch, roster, contents)
+    contents = take_inventory(files, batch.folder, names, workers, progress, cache, decisions.place)
+    students, unmatched = _submissions(batch, roster, contents, decisions)
     if not students and not unmatched:
         raise _nothing(batch)
     before = earlier(batch.out / "results.json", batch.assignment.id)
     jobs = _jobs(batch, cache, students)
     reports = _marked(batch, cache, jobs, progress, workers)
-    inputs = inputs_of_run(batch.assignment, batch.rubric, jobs, contents)
+    inputs = inputs_of_run(batch.assignment, batch.rubric, jobs, contents, decisions.pages)
+    decisions.note_failures(reports)
     results = ResultsDocument(
         assignment=batch.assignment.id,
         reports=reports,
-        unmatched=unmatched,
+        unmatched=[*unmatched, *decisions.problems()],
         moved=changes_since(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
         alike=similar_of_run(batch.assignment, jobs, reports, notes / "readings"),
+        stale=sorted(decisions.stale, key=lambda decision: decision.line),
         expected_wrong=_expected_wrong(reports),
     )
     _write_results(batch, results, students)
     note_inputs(notes, inputs)
-    return results
+    note_run(_note_of(batch), notes, batch.folder)
+    pages = tuple(page for content in contents for page in content.pages)
+    return Graded(results, tuple(jobs), pages, cache)
+
+
+def _note_of(batch: Batch) -> RunNote:
+    return RunNote(
+        assignment=str(batch.assignment.path),
+        folder=batch.folder.resolve(),
+        out=batch.out.resolve(),
+        roster=None if batch.roster is None else batch.roster.resolve(),
+        decisions=None if batch.decisions is None else batch.decisions.resolve(),
+        pages_per_student=batch.pages_per_student,
+        lang=batch.lang,
+        level=batch.level,
+        with_ghosts=batch.with_ghosts,
+    )
+
+
+def noted_batch(folder: Path) -> Batch:
+    """The last run whose folder of results, or of submissions, this is.
+
+    Raises CallError where nothing says so, AuthoredFileError for an assignment with faults.
+    """
+    note = noted_run(folder)
+    assignment = load_assignment(note.assignment)
+    return Batch(
+        assignment, rubric_of(assignment), note.folder, note.out, note.roster, note.pages_per_student,
+        lang=note.lang, level=note.level, with_ghosts=note.with_ghosts, decisions=note.decisions,
+    )  # fmt: skip
 
 
 def _expected_wrong(reports: Sequence[ReportDocument]) -> float:
@@ -136,7 +213,9 @@ def _nothing(batch: Batch) -> CallError:
 
 def needs_person(results: ResultsDocument) -> bool:
     """Whether anything is left for a person."""
-    return bool(results.unmatched) or any(report.status != "graded" for report in results.reports)
+    return bool(results.unmatched or results.stale) or any(
+        report.status != "graded" for report in results.reports
+    )
 
 
 # What there is ------------------------------------------------------------------------------------
@@ -150,11 +229,11 @@ def _roster(batch: Batch) -> Roster | None:
 def _files(batch: Batch) -> list[Path]:
     if not batch.folder.is_dir():
         raise CallError("folder_missing", f"{batch.folder}: there is no such folder")
-    return submissions(batch.folder, batch.roster, passed_over=(batch.out,))
+    return submissions(batch.folder, batch.roster, passed_over=(batch.out, batch.decisions_path))
 
 
 def _submissions(
-    batch: Batch, roster: Roster | None, contents: Sequence[FileContent]
+    batch: Batch, roster: Roster | None, contents: Sequence[FileContent], decisions: ClassDecisions
 ) -> tuple[list[StudentSubmission], list[UnmatchedDocument]]:
     """Every student's submission, and what is nobody's."""
     measured = [row for content in contents for row in content.measurements]
@@ -164,6 +243,7 @@ def _submissions(
         batch.assignment.id,
         pages_per_student=batch.pages_per_student,
         student_ids=[row.student_id for row in measured if row.student_id],
+        decided=decisions.owners(roster),
     )
     refused = [(content.refused, content.students) for content in contents if content.refused is not None]
     unusable = [Unusable((Problem(file.code, file.message, file.file),), who) for file, who in refused]
@@ -175,6 +255,7 @@ def _submissions(
         UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
         for problem in owners.problems
     ]
+    students = decisions.give(students, batch.assignment, batch.rubric)
     return students, [*(file for file, _ in refused), *unmatched, *strangers, *missing]
 
 
@@ -212,9 +293,16 @@ class Job:
 
 
 def inputs_of_run(
-    assignment: Assignment, rubric: RubricFile, jobs: Sequence[Job], contents: Sequence[FileContent]
+    assignment: Assignment,
+    rubric: RubricFile,
+    jobs: Sequence[Job],
+    contents: Sequence[FileContent],
+    decided: Container[tuple[str, int]] = frozenset(),
 ) -> Inputs:
-    """What this run's marks come from, for the next run to tell what has changed."""
+    """What this run's marks come from, for the next run to tell what has changed.
+
+    Arguments: `decided` are the pages of which a person decided something.
+    """
     files = (assignment.file.model_dump_json(), assignment.mechanism_file.model_dump_json())
     authored = {
         "assignment": repr(files),
@@ -222,7 +310,9 @@ def inputs_of_run(
         "program": stage_digest(MARK_STAGE),
     }
     digests = {page.file: page.digest for content in contents for page in content.pages}
-    return inputs_of(authored, [job.submission for job in jobs], [job.folder for job in jobs], digests)
+    return inputs_of(
+        authored, [job.submission for job in jobs], [job.folder for job in jobs], digests, decided
+    )
 
 
 def similar_of_run(
@@ -265,7 +355,10 @@ def _jobs(batch: Batch, cache: PageCache, students: Sequence[StudentSubmission])
 def _job(submission: StudentSubmission, folder: str, depends: tuple[str, str]) -> Job:
     """A submission's job; `depends` are digests of what all readings, and all marks, depend on."""
     read, marked = depends
-    pages = [(page.file, page.page, page.digest, page.problem) for page in submission.pages]
+    pages = [
+        (page.file, page.page, page.digest, page.problem, page.turn_deg, page.corners_px)
+        for page in submission.pages
+    ]
     reading_key = digest_of((read, submission.variant, sorted(submission.declared.items()), pages))
     key = digest_of((marked, reading_key, replace(submission, pages=())))
     return Job(submission, folder, reading_key, key)
@@ -336,7 +429,7 @@ def _read(batch: Batch, cache: PageCache, submission: StudentSubmission) -> list
 def _mark_one(batch: Batch, cache: PageCache, job: Job) -> ReportDocument:
     """Mark one submission and write its files; its key last, so that it stands for all of them."""
     submission, where = job.submission, batch.out / job.folder
-    pages = _pages_read(batch, cache, job)
+    pages = pages_read(batch, cache, job)
     report, pictures = mark(
         submission, pages, batch.assignment, batch.rubric, batch.level, with_ghosts=batch.with_ghosts
     )
@@ -347,7 +440,7 @@ def _mark_one(batch: Batch, cache: PageCache, job: Job) -> ReportDocument:
     return report
 
 
-def _pages_read(batch: Batch, cache: PageCache, job: Job) -> list[ScannedPage]:
+def pages_read(batch: Batch, cache: PageCache, job: Job) -> list[ScannedPage]:
     """The pages as read by an earlier run, else now."""
     folder = batch.out / CACHE_FOLDER / "readings"
     known = cached_reading(folder, job.name, job.reading_key, cache)

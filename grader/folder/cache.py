@@ -244,7 +244,8 @@ class PageCache:
 
     def path_of(self, ref: PageRef) -> Path:
         """Where a page's scan is; beside it, in a file that is quickly read, is what `identified` tells."""
-        return self.folder / f"{digest_of((self.key, ref.file, ref.page, ref.digest))}.page"
+        placed = (ref.turn_deg, ref.corners_px)
+        return self.folder / f"{digest_of((self.key, ref.file, ref.page, ref.digest, *placed))}.page"
 
     def identified(self, ref: PageRef) -> PageRef:
         """The page with what is on it: whether it is blank, and whose by its QR code. Scans it if need be."""
@@ -311,12 +312,18 @@ def store_reading(folder: Path, name: str, key: str, pages: Sequence[ScannedPage
 
 
 def cached_reading(folder: Path, name: str, key: str, cache: PageCache) -> list[ScannedPage] | None:
-    """A submission's pages as an earlier run read them; None where anything has changed since."""
+    """A submission's pages as an earlier run read them; None where anything has changed since.
+
+    Their ink is that of the page's scan, for nodes that people put in their places.
+    """
     try:
         pages = _pages_in(folder / f"{name}.reading", key, cache.printed_key)
     except (OSError, ValueError):
         return None
-    return [replace(page, backdrop=cache.page(page.ref).backdrop) for page in pages]
+    scans = [cache.page(page.ref) for page in pages]
+    return [
+        replace(page, backdrop=scan.backdrop, ink=scan.ink) for page, scan in zip(pages, scans, strict=True)
+    ]
 
 
 def cached_maps(folder: Path, name: str) -> list[NDArray[np.uint8]]:

@@ -4,10 +4,11 @@ Beside the results lies a note of what they came from: digests of assignment, ru
 each submission's files and line of the roster. What differs from the note of the run before is the why.
 """
 
+import contextlib
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 from pydantic import BaseModel, ValidationError, field_validator
 
@@ -20,14 +21,16 @@ from grader.documents import (
     Status,
     Verdict,
 )
-from grader.files import write_whole
+from grader.files import OutputError, write_whole
 from grader.inputs.measurements import StudentSubmission
+from reference.errors import CallError
 
 Key = tuple[str, int | None]
 """Student and position."""
+CACHE_FOLDER = ".planmark"
 NOTE = "inputs.json"
 COMMON = ("assignment", "rubric", "program")
-OWN = ("submission", "roster")
+OWN = ("submission", "roster", "decision")
 
 
 class EarlierCriterion(BaseModel):
@@ -68,7 +71,7 @@ class Inputs(BaseModel):
     Attributes
     ----------
     common : by ``assignment``, ``rubric`` and ``program``
-    own : by the submission's folder, by ``submission`` and ``roster``
+    own : by the submission's folder, by ``submission``, ``roster`` and ``decision``
     """
 
     common: dict[str, str] = {}
@@ -80,6 +83,7 @@ def inputs_of(
     submissions: Sequence[StudentSubmission],
     folders: Sequence[str],
     digests: Mapping[str, str],
+    decided: Container[tuple[str, int]] = frozenset(),
 ) -> Inputs:
     """What a run's marks come from.
 
@@ -88,13 +92,19 @@ def inputs_of(
     authored : texts of the ``assignment``, the ``rubric`` and the version of the ``program``
     folders : of the submissions
     digests : of the files handed in, by their names
+    decided : pages, by file and number, of which a person decided something
     """
+
+    def pages_of(submission: StudentSubmission, *, by_person: bool) -> list[object]:
+        pages = [page for page in submission.pages if ((page.file, page.page) in decided) is by_person]
+        return [
+            (page.file, page.page, digests.get(page.file), page.turn_deg, page.corners_px) for page in pages
+        ]
+
     own = {
         folder: {
-            "submission": _digest(
-                [(page.file, page.page, digests.get(page.file)) for page in submission.pages],
-                submission.measured,
-            ),
+            "submission": _digest(pages_of(submission, by_person=False), submission.measured),
+            "decision": _digest(pages_of(submission, by_person=True), submission.decided),
             "roster": _digest(
                 submission.variant, sorted(submission.declared.items()), submission.lang, submission.name
             ),
@@ -133,6 +143,58 @@ def noted_inputs(folder: Path) -> Inputs:
 def note_inputs(folder: Path, inputs: Inputs) -> None:
     """Leave a note for the next run."""
     write_whole(folder / NOTE, inputs.model_dump_json())
+
+
+# What was run -------------------------------------------------------------------------------------
+
+RUN_NOTE = "run.json"
+FOLDER_NOTE = ".planmark.json"
+"""The same note beside the submissions, so that they lead to the results, too."""
+
+
+class RunNote(BaseModel):
+    """What `planmark grade` was called with last; all paths absolute."""
+
+    assignment: str
+    folder: Path
+    out: Path
+    roster: Path | None = None
+    decisions: Path | None = None
+    pages_per_student: int | None = None
+    lang: str = "en"
+    level: Literal["symbol", "hint", "full"] = "full"
+    with_ghosts: bool = True
+
+
+def note_run(note: RunNote, notes: Path, folder: Path) -> None:
+    """Leave a note beside the results and, where that can be written, beside the submissions."""
+    text = note.model_dump_json(indent=1)
+    write_whole(notes / RUN_NOTE, text)
+    with contextlib.suppress(OutputError):
+        write_whole(folder / FOLDER_NOTE, text)
+
+
+def noted_run(folder: Path) -> RunNote:
+    """The last run whose folder of results, or of submissions, this is.
+
+    Raises CallError where none is noted, and where the submissions are no longer there.
+    """
+    if not folder.is_dir():
+        raise CallError("folder_missing", f"{folder}: there is no such folder")
+    for path in (folder / CACHE_FOLDER / RUN_NOTE, folder / FOLDER_NOTE):
+        try:
+            note = RunNote.model_validate_json(path.read_bytes())
+        except (OSError, ValidationError):
+            continue
+        # A folder may have been moved since.
+        moved = "out" if path.name == RUN_NOTE else "folder"
+        note = note.model_copy(update={moved: folder.resolve()})
+        if not note.folder.is_dir():
+            why = f"the submissions are not in {note.folder} any more; grade them again where they are now"
+            raise CallError("submissions_moved", f"{folder}: {why}")
+        return note
+    why = "nothing here says what was graded; run planmark grade first, and name its folder or its --out"
+    raise CallError("run_unknown", f"{folder}: {why}")
 
 
 # Changes ---------------------------------------------------------------------------------------

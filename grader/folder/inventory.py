@@ -24,7 +24,16 @@ from reference.errors import InputFileError
 # The files handed in ------------------------------------------------------------------------------
 
 _TOOL_NAMES = frozenset(
-    {"thumbs.db", "desktop.ini", "layout.json", "results.json", "summary.csv", "index.html", "truth.jsonl"}
+    {
+        "thumbs.db",
+        "desktop.ini",
+        "layout.json",
+        "results.json",
+        "summary.csv",
+        "index.html",
+        "truth.jsonl",
+        "decisions.csv",
+    }
 )
 _TOOL_STARTS = (".", "~$", "__MACOSX")
 _TOOL_ENDS = (".part", ".tmp", ".bak", ".crdownload", "~")
@@ -114,12 +123,21 @@ class FileContent:
     students: tuple[str, ...] = ()
 
 
-def take_inventory(
-    files: Sequence[Path], folder: Path, names: Names, workers: Pool, progress: Progress, cache: PageCache
+def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
+    files: Sequence[Path],
+    folder: Path,
+    names: Names,
+    workers: Pool,
+    progress: Progress,
+    cache: PageCache,
+    place: Callable[[Sequence[PageRef]], Sequence[PageRef]] = tuple,
 ) -> list[FileContent]:
     """What each of a folder's files holds; never raises for a bad file.
 
-    Arguments: `cache` takes the pages as scanned; pages that are not there any more are dropped from it.
+    Arguments
+    ---------
+    cache : takes the pages as scanned; pages that are not there any more are dropped from it
+    place : all pages with the turns and corners that people gave, in the same order
     """
     contents = [FileContent()] * len(files)
     calls = [(path, shown_name(path, folder), names) for path in files]
@@ -137,11 +155,14 @@ def take_inventory(
         index, ref = waiting[number]
         pages[index].append(_with_problem(ref, page, workers) if isinstance(page, Problem) else page)
         progress("looking", done, len(waiting))
+    ordered = [sorted(pages[index], key=lambda page: page.page) for index in range(len(contents))]
+    scanned = [page for several in ordered for page in several]
+    placed = iter(place(scanned))
     contents = [
-        replace(content, pages=tuple(sorted(pages[index], key=lambda page: page.page)))
-        for index, content in enumerate(contents)
+        replace(content, pages=tuple(next(placed) for _ in several))
+        for content, several in zip(contents, ordered, strict=True)
     ]
-    cache.drop_others(page for content in contents for page in content.pages)
+    cache.drop_others([*scanned, *(page for content in contents for page in content.pages)])
     return contents
 
 

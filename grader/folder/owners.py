@@ -2,7 +2,8 @@
 
 Sources, the first that speaks decides: the page's QR code; the roster's `scans`; the roster's order
 over one class file (`--pages-per-student`); the file's name. All that speak must agree: a page on
-which two disagree is unmatched, and the problem names both. Codes of the problems:
+which two disagree is unmatched, and the problem names both. What a person decided goes before all.
+Codes of the problems:
 
 | code | meaning |
 |---|---|
@@ -20,6 +21,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import PurePath
+from types import MappingProxyType
 from typing import TypeVar
 
 from grader.inputs.roster import Roster, RosterRow, ScanRef, why_no_id
@@ -29,6 +31,7 @@ from grader.records import Identity, PageRef, Problem
 class How(Enum):
     """What says whose a page is, in the order in which they decide."""
 
+    PERSON = "a person"
     CODE = "QR code"
     SCANS = "roster's scans"
     ORDER = "roster's order"
@@ -87,6 +90,7 @@ def assign_pages(
     *,
     pages_per_student: int | None = None,
     student_ids: Iterable[str] = (),
+    decided: Mapping[tuple[str, int], RosterRow] = MappingProxyType({}),
 ) -> PageOwners:
     """Give every page its owner.
 
@@ -95,14 +99,22 @@ def assign_pages(
     roster : None where there is none; students are then those whom codes, file names and
         `student_ids` (of measurement files, for example) name
     pages_per_student : pages that each student has in the one class file, blank ones not counted
+    decided : the owners that a person gave, by file and page
     """
-    listed = roster if roster is not None else _improvised(pages, student_ids)
+    owners = [row.student_id for row in decided.values()]
+    listed = roster if roster is not None else _improvised(pages, [*student_ids, *owners])
     certain = [_certain_claims(page, listed) for page in pages]
     order, refusals = _order_claims(pages, listed, certain, pages_per_student)
     owned: list[Owned] = []
     unmatched: list[Unmatched] = []
     blank: list[PageRef] = []
     for index, page in enumerate(pages):
+        row = decided.get((page.file, page.page))
+        if row is not None:
+            own = page.identity is not None and page.identity.student_id == row.student_id
+            n = page.identity.n if own and row.n is None and page.identity is not None else row.n
+            owned.append(Owned(page, row.student_id, n, row.position, (How.PERSON,)))
+            continue
         if page.blank and page.identity is None:
             blank.append(page)
             continue

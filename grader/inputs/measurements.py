@@ -22,6 +22,7 @@ from typing import TypeGuard
 from pydantic import ValidationError
 
 from grader.documents import MeasurementsDocument
+from grader.inputs.decisions import Decision
 from grader.inputs.roster import MAX_LINES, delimiter_of, surplus_of, table_lines, whole_number, why_no_id
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.records import (
@@ -109,6 +110,7 @@ class StudentSubmission:
     measured : entered measurements, or None
     problems : what was noticed before marking
     has_unusable : whether something was handed in that cannot be used; `problems` say what
+    decided : what people decided of it, to be applied
     """
 
     student_id: str
@@ -120,6 +122,7 @@ class StudentSubmission:
     name: str = ""
     problems: tuple[Problem, ...] = ()
     has_unusable: bool = False
+    decided: tuple[Decision, ...] = ()
 
     @property
     def position(self) -> int | None:

@@ -163,18 +163,20 @@ def delimiter_of(text: str) -> str:
     return ";" if first.count(";") > first.count(",") else ","
 
 
-def table_lines(text: str, delimiter: str) -> tuple[list[tuple[int, list[str]]], list[Finding]]:
+def table_lines(
+    text: str, delimiter: str, most: int = MAX_LINES
+) -> tuple[list[tuple[int, list[str]]], list[Finding]]:
     """Lines of a CSV text that are not blank, and the fault that ends them before the text does.
 
-    A record of several lines has the number of its first, from 1.
+    A record of several lines has the number of its first, from 1. More than `most` lines are a fault.
     """
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     lines: list[tuple[int, list[str]]] = []
     number = 1
     try:
         for cells in reader:
-            if number > MAX_LINES:
-                return lines, [Finding(f"line {number}", f"more than {MAX_LINES} lines are no class")]
+            if number > most:
+                return lines, [Finding(f"line {number}", f"more than {most} lines are no class")]
             if any(cell.strip() for cell in cells):
                 lines.append((number, cells))
             number = reader.line_num + 1

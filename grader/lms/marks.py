@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -129,11 +129,24 @@ def _everything_is_right(grade: Grade) -> str:
 
 def _comments(grade: Grade) -> Iterator[tuple[str, list[Remark]]]:
     """For each report: a heading where there are several, and marks, titles and sentences."""
-    position = tongue(grade.person.lang).gettext("Position")
+    speaker = tongue(grade.person.lang)
+    position = speaker.gettext("Position")
     for report in grade.reports:
-        commented = [each for each in report.criteria if each.verdict in _COMMENTED]
-        remarks = [(MARKS[each.verdict], each.title, _one_line(each.feedback)) for each in commented]
+        commented = [each for each in report.criteria if each.verdict in _COMMENTED or _by_person(each)]
+        remarks = [(MARKS[each.verdict], each.title, _sentence(each)) for each in commented]
+        if report.comment or report.added:
+            sign = f"{report.added:+g}" if report.added else ""
+            remarks.append((sign, speaker.gettext("Comment on the whole"), _one_line(report.comment)))
         yield f"{position} {report.position}" if len(grade.reports) > 1 else "", remarks
+
+
+def _by_person(criterion: CriterionDocument) -> str:
+    """What a person who decided a criterion has to say of it."""
+    return "" if criterion.decided is None else criterion.decided.comment
+
+
+def _sentence(criterion: CriterionDocument) -> str:
+    return _one_line(f"{criterion.feedback} {_by_person(criterion)}")
 
 
 def _one_line(text: str) -> str:
@@ -187,14 +200,33 @@ def marks_of(grade: Grade) -> list[Mark]:
 def outline(grade: Grade) -> list[Mark]:
     """The marks of a grade that may still be open: what is under review counts nothing here."""
     speaker = tongue(grade.person.lang)
-    return [_mark(each, report, speaker) for report in grade.reports for each in report.criteria]
+    return [
+        mark
+        for report in grade.reports
+        for mark in _with_added([_mark(each, report, speaker) for each in report.criteria], report.added)
+    ]
+
+
+def _with_added(marks: list[Mark], added: float) -> list[Mark]:
+    """The marks with points that a person added to the whole: platforms add up the criteria themselves.
+
+    Points are taken from each criterion in proportion to its points, and added to what each lacks.
+    """
+    rooms = [mark.points if added < 0.0 else mark.max_points - mark.points for mark in marks]
+    whole = math.fsum(rooms)
+    if not added or whole <= 0.0:
+        return marks
+    return [
+        replace(mark, points=round(mark.points + added * room / whole, DECIMALS))
+        for mark, room in zip(marks, rooms, strict=True)
+    ]
 
 
 def _mark(criterion: CriterionDocument, report: ReportDocument, speaker: Tongue) -> Mark:
-    share = (report.score or 0.0) / report.max_score * criterion.max_points
+    share = ((report.score or 0.0) - report.added) / report.max_score * criterion.max_points
     points = share if criterion.points is None else criterion.points
     words = [speaker.gettext("not judged") if criterion.verdict == "not_judged" else ""]
-    words.append(_one_line(criterion.feedback))
+    words.append(_sentence(criterion))
     remark = f"{MARKS[criterion.verdict]} {': '.join(filter(None, words))}".strip()
     return Mark(
         criterion.id, criterion.title, round(points, DECIMALS), criterion.max_points, criterion.verdict,

@@ -9,6 +9,7 @@ from grader.comparison.criteria import NOT_DRAWN, Comparison, compare
 from grader.comparison.evidence import Submission
 from grader.comparison.task import Task
 from grader.documents import Verdict
+from grader.marking.confirming import confirmed
 from grader.marking.diagnosis import LEAST_CONFIDENCE, Lost, named
 from grader.marking.drawn import explain
 from grader.marking.settling import at_stake, charged_where_made, of_another
@@ -27,13 +28,16 @@ LOST = CHARGED | {"follow_through", "review"}
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission, explain)
+    surer = confirmed(task, submission, comparison)
+    if surer is not None:
+        submission, comparison = surer, compare(task, surer, explain)
     mistakes = _named(task, comparison)
     mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes))
     mistakes = (*mistakes, *_not_drawn(task, comparison, mistakes))
     mistakes = (*mistakes, *_slips(task, comparison, mistakes))
     outcomes = charged_where_made(task, comparison.outcomes, mistakes)
     outcomes = at_stake(task.rubric, of_another(task.rubric, outcomes, mistakes))
-    outcomes = tuple(_with_mistake(outcome, mistakes) for outcome in outcomes)
+    outcomes = tuple(with_mistake(outcome, mistakes) for outcome in outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
 
 
@@ -157,7 +161,7 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
     return found
 
 
-def _with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
+def with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
     """The outcome with the mistake that explains its loss."""
     if outcome.verdict not in {"none", "partial"}:
         return outcome

@@ -15,6 +15,8 @@ from grader.rubric import RubricFile
 
 NEARLY_CERTAIN = 0.95
 """A mistake named with this confidence is charged where it was made."""
+RESIDUALS = frozenset({"too_long", "too_short", "turned_left", "turned_right", "reversed", "should_be_zero"})
+"""Reasons of what is off as it was read."""
 
 
 def charged_where_made(
@@ -33,8 +35,8 @@ def _charged(task: Task, outcome: Outcome, certain: Sequence[NamedMistake]) -> O
         if mistake.at != segment.head or outcome.criterion not in mistake.explains:
             continue
         is_left_out = mistake.code == "normal_missing"
-        if outcome.proposed < FULL and (is_left_out or outcome.measured.length_mm is not None):
-            return settled(outcome, outcome.proposed, max(outcome.probability, mistake.confidence))
+        if is_left_out or RESIDUALS & {reason.code for reason in outcome.reasons}:
+            return settled(outcome, outcome.shares[0], mistake.confidence)
     return outcome
 
 

@@ -220,3 +220,25 @@ def _elements(view: PageView) -> Iterator[Markup]:
         shapes = Markup("".join(elements(layer.shapes)))  # noqa: S704 - written by the canvas
         opaque = layer.opacity == 1.0
         yield shapes if opaque else Markup('<g opacity="{:g}">{}</g>').format(layer.opacity, shapes)
+
+
+# A question about one vector ----------------------------------------------------------------------
+
+LOOK_MARGIN_MM = 14.0
+LEAST_LOOK_MM = 45.0
+
+
+def look(scene: Scene, name: str, names: Mapping[str, str] = _NO_NAMES) -> tuple[Box, Markup] | None:
+    """A box around a vector or link and the one expected, and the marks on its figure as SVG elements.
+
+    The others of its figure are faint. None where it is not drawn.
+    """
+    arrow = next((one for one in scene.arrows if one.name == name), None)
+    if arrow is None:
+        return None
+    ghosts = tuple(one for one in scene.ghosts if one.name == name)
+    box = _box([arrow, *ghosts], scene, LOOK_MARGIN_MM, LEAST_LOOK_MM)
+    part = replace(scene, arrows=(arrow,), ghosts=ghosts, dots=())
+    others = [one for one in _arrows_of(scene, arrow.figure) if one is not arrow]
+    layers = _marks(part, box, DETAIL_SIZE_PER_MM, [arrow], names, others)
+    return box, Markup("").join(_elements(PageView("detail", 0, box, layers, (name,))))

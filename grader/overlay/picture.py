@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from grader.outcomes import Outcome
 from grader.overlay.scene import XY, Picture, Scene, between, layers_of, scene_of
-from grader.records import Backdrop, GreyImage, Page, Reading, Sheet
+from grader.records import Backdrop, Box, GreyImage, Page, Reading, Sheet
 from grader.scan.pixels import cut_out, reduction
 from reference.construction.graph import Vector
 from reference.drawing.canvas import Area, Curve, Label, Ring, Shape, Stroke, set_pieces
@@ -127,6 +127,29 @@ def _upright(grey: GreyImage, sheet: Sheet, width_px: int) -> GreyImage:
     return cut_out(
         grey, reduction(1.0 / shrink) @ sheet.mm_to_px, (0.0, 0.0, *sheet.page_mm), scale, outside=255
     )
+
+
+def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
+    """A part of a page as it was scanned, as JPEG.
+
+    Arguments
+    ---------
+    sheet : of a page in the form that `straighten` gives; None where it was not registered
+    box : in sheet millimetres; in stored pixels without a sheet
+    px_per_mm : wanted resolution of the picture; pixels per stored pixel without a sheet
+    """
+    to_px, stored = (np.eye(3), 1.0) if sheet is None else (sheet.mm_to_px, sheet.px_per_mm)
+    grey, scale = page.grey, min(px_per_mm, 2.0 * stored)
+    shrink = int(stored / scale)
+    if shrink > 1:
+        # Averaging first, as in `_upright`.
+        smaller = (max(1, grey.shape[1] // shrink), max(1, grey.shape[0] // shrink))
+        grey = _grey(cv2.resize(grey, smaller, interpolation=cv2.INTER_AREA))
+        to_px = reduction(1.0 / shrink) @ to_px
+    part = cut_out(grey, to_px, box, scale, outside=255)
+    if not part.size:  # nothing of the page is there
+        part = np.full((1, 1), 255, np.uint8)
+    return _encode(".jpg", part, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
 
 
 def _clean(grey: GreyImage) -> GreyImage:

@@ -9,10 +9,10 @@ import cmath
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from grader.outcomes import Outcome
 from grader.records import MECHANISM, Box, FloatArray, Reading
 from reference.construction.graph import Vector
 from reference.drawing import symbols
@@ -167,11 +167,35 @@ class Picture:
 _NO_LINKS: Mapping[str, tuple[str, str]] = {}
 
 
+class Drawn(Protocol):
+    """A length and a direction on paper, None where not known."""
+
+    @property
+    def length_mm(self) -> float | None:
+        """Millimetres."""
+
+    @property
+    def direction_deg(self) -> float | None:
+        """Counter-clockwise from the sheet's +x."""
+
+
+class Judged(Protocol):
+    """A verdict and what was expected: an outcome, or a criterion of a report."""
+
+    @property
+    def verdict(self) -> str:
+        """One of `COLOURS`."""
+
+    @property
+    def expected(self) -> Drawn:
+        """The vector that was expected."""
+
+
 def scene_of(
     page_mm: XY,
     reading: Reading,
     vectors: Mapping[str, Vector],
-    outcomes: Mapping[str, Outcome],
+    outcomes: Mapping[str, Judged],
     *,
     show_expected: bool,
     links: Mapping[str, tuple[str, str]] = _NO_LINKS,
@@ -198,7 +222,7 @@ def between(start: XY, end: XY, share: float) -> XY:
 
 
 def _arrows(
-    reading: Reading, vectors: Mapping[str, Vector], outcomes: Mapping[str, Outcome]
+    reading: Reading, vectors: Mapping[str, Vector], outcomes: Mapping[str, Judged]
 ) -> Iterator[Arrow]:
     for kind, figure in reading.figures.items():
         if kind == MECHANISM:
@@ -215,7 +239,7 @@ def _arrows(
 
 
 def _links(
-    reading: Reading, links: Mapping[str, tuple[str, str]], outcomes: Mapping[str, Outcome]
+    reading: Reading, links: Mapping[str, tuple[str, str]], outcomes: Mapping[str, Judged]
 ) -> Iterator[Arrow]:
     """The links of the sketch that were judged."""
     sketch = reading.figures.get(MECHANISM)
@@ -229,7 +253,7 @@ def _links(
             yield Arrow(name, MECHANISM, *ends, outcome.verdict, doubtful, is_link=True)
 
 
-def _ghosts(arrows: list[Arrow], outcomes: Mapping[str, Outcome]) -> Iterator[Ghost]:
+def _ghosts(arrows: list[Arrow], outcomes: Mapping[str, Judged]) -> Iterator[Ghost]:
     """The expected vectors beside those that are wrong or wait for a person."""
     for arrow in arrows:
         expected = expected_vector(outcomes.get(arrow.name))
@@ -237,7 +261,7 @@ def _ghosts(arrows: list[Arrow], outcomes: Mapping[str, Outcome]) -> Iterator[Gh
             yield ghost_of(arrow, expected)
 
 
-def expected_vector(outcome: Outcome | None) -> complex | None:
+def expected_vector(outcome: Judged | None) -> complex | None:
     """The drawn vector that was expected, complex millimetres, y up; None where that is not known."""
     if outcome is None or outcome.expected.length_mm is None or outcome.expected.direction_deg is None:
         return None

@@ -252,6 +252,8 @@ def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
 
 BLANK = 0.25
 """Share of a vector's length that other lines may ink where the vector itself is not drawn."""
+INKED = 0.9
+"""Share from which it is drawn, though its stroke is another's too; it is read from its nodes."""
 LEAST_VECTOR_MM = 2.0
 """A shorter vector is read from its nodes, with or without a stroke."""
 
@@ -323,9 +325,10 @@ def _vectors(
             inked = where.share_inked(complex(fit.at[edge.tail]), complex(fit.at[edge.head]))
             if inked <= BLANK:
                 unread.append(Unread(edge.name, f"nothing is drawn between {ends}", is_blank=True))
-            else:
+                continue
+            if inked < INKED:
                 unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
-            continue
+                continue
         cov = _difference_cov(fit, edge, span, scale_se)
         signs = Signs(
             placed=within(cov),
@@ -339,7 +342,7 @@ def _vectors(
             signs = replace(
                 signs, off_mm=off_mm, thin=bool(plan.lines.thin[row]), marked=marked, elsewhere=elsewhere
             )
-        vectors[edge.name] = _vector(span, cov, signs.confidence())
+        vectors[edge.name] = vector_of(span, cov, signs.confidence())
     return vectors, unread
 
 
@@ -352,7 +355,7 @@ def _difference_cov(fit: NodeFit, edge: Edge, span: complex, scale_se: float) ->
     return np.asarray(difference @ fit.cov @ difference.T + np.outer(scaled, scaled))
 
 
-def _vector(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
+def vector_of(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
     """Length and direction with their standard errors."""
     length = float(abs(span))
     along = np.array([span.real, span.imag]) / max(length, 1e-9)

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.folder.workers import Limits, Workers
+from grader.inputs.decisions import Decision, DecisionFile
 from grader.inputs.measurements import names_of, read_measurements
 from grader.inputs.roster import read_roster
 from grader.records import Problem
@@ -31,11 +32,11 @@ from reference.errors import PlanmarkError
 from tests.fuzz.seeds import seeds
 
 CORPUS = Path(__file__).parent / "corpus"
-DOORS = ("pictures", "measurements", "roster", "authored")
+DOORS = ("pictures", "measurements", "roster", "decisions", "authored")
 LIMITS = Limits(seconds=60.0, memory_mb=1500)
 SLOW_S = 20.0
 """One input may take this long: a third of a worker's limit, on a busy machine."""
-BATCH = {"pictures": 100, "measurements": 400, "roster": 400, "authored": 150}
+BATCH = {"pictures": 100, "measurements": 400, "roster": 400, "decisions": 400, "authored": 150}
 MOST_PAGES = 3
 _WORDS = (
     b"", b"0", b"-1", b"1e400", b"nan", b"inf", b"NaN", b"999999999999999999999", b"1_0", b"0x10",
@@ -75,7 +76,7 @@ def _name(door: str, data: bytes) -> str:
                 "input.assignment.toml"}.get(table[1] if table else b"", "input.mechanism.toml")  # fmt: skip
     if door == "measurements":
         return "input.json" if data.lstrip()[:1] in {b"{", b"["} else "input.csv"
-    return "input.csv" if door == "roster" else "input.bin"
+    return "input.csv" if door in {"roster", "decisions"} else "input.bin"
 
 
 def _pictures(path: Path) -> str:
@@ -103,6 +104,18 @@ def _roster(path: Path) -> str:
     return f"{len(read_roster(path).rows)} rows"
 
 
+def _decisions(path: Path) -> str:
+    file = DecisionFile(path)
+    table = file.table()
+    added = Decision("s1", None, "v_A", "full", comment="=1+1")
+    file.add(added)
+    again = file.table()
+    kept = [row for row in table.rows if row.key != added.key]
+    if [row for row in again.rows if row.key != added.key] != kept or added not in again.rows:
+        raise AssertionError("a decision was lost or changed when another one was written")
+    return f"{len(table.rows)} rows, {len(table.faults)} faults"
+
+
 def _authored(path: Path) -> str:
     if path.name.endswith(".rubric.toml"):
         load_rubric(path)
@@ -119,7 +132,10 @@ def _authored(path: Path) -> str:
     return f"{len(variants)} variants of {len(assignment.mechanism(variants[:3]).joints)} joints"
 
 
-_ENTER = {"pictures": _pictures, "measurements": _measurements, "roster": _roster, "authored": _authored}
+_ENTER = {
+    "pictures": _pictures, "measurements": _measurements, "roster": _roster, "authored": _authored,
+    "decisions": _decisions,
+}  # fmt: skip
 
 
 # Mutation -----------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ SHAPE = (120, 170)
 
 
 def seeds(door: str) -> list[bytes]:
-    """Healthy files for a door: `pictures`, `measurements`, `roster` or `authored`."""
+    """Healthy files for a door: `pictures`, `measurements`, `roster`, `decisions` or `authored`."""
     return _SEEDS[door]()
 
 
@@ -136,4 +136,19 @@ def _authored() -> list[bytes]:
     return [path.read_bytes() for path in sorted((ROOT / "rubrics").rglob("*.toml"))]
 
 
-_SEEDS = {"pictures": _pictures, "measurements": _measurements, "roster": _roster, "authored": _authored}
+def _decisions() -> list[bytes]:
+    return [
+        (
+            b"student_id,position,criterion,verdict,points,comment,by,at,basis\r\n"
+            b's1,,a_D,partial,1.5,"well, yes",S. Popa,2026-11-22T18:00:00+02:00,b1.2.3.4\r\n'
+            b's1,2,node:velocity_plan:c,"61.250,140.500",,,,,\r\n'
+            b',,page:class.pdf#3,"owner=s3; turn=90; corners=1,2 9,2 9,8 1,8",,,,,\r\n'
+        ),
+        "student_id;criterion;verdict;points;comment\ns1;total;;-1,5;поздно\ns1;comment;;;așa e\n".encode(),
+    ]
+
+
+_SEEDS = {
+    "pictures": _pictures, "measurements": _measurements, "roster": _roster, "authored": _authored,
+    "decisions": _decisions,
+}  # fmt: skip

@@ -22,6 +22,7 @@ KINDS = {
     "CSV of measurements": ("measurements", b"student_id,"),
     "JSON of measurements": ("measurements", b"{"),
     "CSV of a class": ("roster", b"student_id,"),
+    "CSV of decisions": ("decisions", b"student_id,position,criterion,verdict,"),
 }
 """By kind of file: its door, and how such a file begins."""
 EXAMPLES = 25

@@ -4,13 +4,14 @@ Evidence that disagrees or is missing becomes a problem of the sheet. The most l
 sheet's size and pose is taken; where none is sure enough, the page is refused.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from grader.printed.layout import PAGE_MM
 from grader.records import FloatArray, Identity, Page, Problem, Sheet, Unread
-from grader.scan.pixels import Flat, flatten, inverted, local_axes, mapped
+from grader.scan.pixels import Flat, flatten, inverted, local_axes, mapped, through_corners
 from grader.scan.register import markers
 from grader.scan.register.distortion import find_lens
 from grader.scan.register.fitting import Fit, affine_of, fit_sides
@@ -26,7 +27,7 @@ from grader.scan.register.homography import (
     size_mm,
     title_block_mm,
 )
-from grader.scan.register.hypotheses import Hypothesis, Resolution, hypotheses, on_sides
+from grader.scan.register.hypotheses import Hypothesis, Resolution, hypotheses, match_sides, on_sides
 from grader.scan.register.lines import LongLine, long_lines, without_grid
 from grader.scan.register.markers import identify
 from reference.drawing.canvas import MM_PER_INCH
@@ -37,13 +38,19 @@ _BESIDE_MM = 3.0
 """A place so far beside the picture still counts: the map's own error, and a frame cut close."""
 
 
-def register(page: Page) -> tuple[Sheet | Unread, Identity | None]:
+def register(
+    page: Page, corners_px: Sequence[tuple[float, float]] = ()
+) -> tuple[Sheet | Unread, Identity | None]:
     """The page's map from millimetres to pixels, or why there is none; and whose page it is by its code.
 
     A printed sheet's code is searched in its place; on other pages only a reduced picture is searched.
+
+    Arguments: `corners_px` of the sheet, as in `PageRef`, where a person gave them: then they are taken.
     """
     printed = markers.register(page)
     identity = (None if printed is None else printed.identity) or identify(page)
+    if corners_px:
+        return printed or register_by_corners(page, corners_px), identity
     sheet = printed or register_plain(page)
     if isinstance(sheet, Unread):
         hint = f"; the page is as large as A4, and {HALVES_ADVICE}" if looks_a4(page) else ""
@@ -109,6 +116,8 @@ _AS_LIKELY = 2.0
 """Scores of readings that differ by less: either may be the right one."""
 _ANOTHER_SCALE = 0.012
 """Relative difference of two scales that is worth a warning."""
+_NEAR_TURN_DEG = 45.0
+"""A quarter turn that a person gave is the nearest one."""
 
 
 def register_plain(page: Page) -> Sheet | Unread:
@@ -123,6 +132,10 @@ def register_plain(page: Page) -> Sheet | Unread:
     resolution = _resolution(page, problems)
     dpi = resolution.dpi if resolution is not None and resolution.stated else None
     ranked = hypotheses(lines, shape, resolution)
+    if page.turn_is_sure:
+        ranked = [
+            reading for reading in ranked if off_turn_deg(reading.mm_to_px, page.turn_deg) < _NEAR_TURN_DEG
+        ]
     if ranked:
         rival = None if dpi is not None else _rival_scale(ranked)
         best = _turned_as_stated(ranked, page.turn_deg)
@@ -208,7 +221,7 @@ def _from_lines(
     doubt = _doubt(best, fit, block_mm, stated_a3=dpi is not None, stated_other=bool(problems))
     if doubt is not None:
         return Unread("sheet", doubt)
-    if block_mm == 0.0:
+    if block_mm == 0.0 and not page.turn_is_sure:
         problems.append(_unsure_upright(page))
     if fit.freedom > 0 and fit.chi2 / fit.freedom > _BAD_FIT:
         message = f"frame, paper and resolution disagree by {fit.rms_mm:.1f} mm"
@@ -294,12 +307,15 @@ def _from_resolution(
         params = np.array([*np.log(np.array(resolution.dpi) / MM_PER_INCH), angle, wide / 2.0, high / 2.0])
         matrix = affine_of(params)
         tried.append((title_block_mm(matrix, drawn), matrix))
-    block, matrix = max(tried, key=lambda one: (one[0], -off_turn_deg(one[1], page.turn_deg)))
+    if page.turn_is_sure:
+        block, matrix = min(tried, key=lambda one: off_turn_deg(one[1], page.turn_deg))
+    else:
+        block, matrix = max(tried, key=lambda one: (one[0], -off_turn_deg(one[1], page.turn_deg)))
     if not resolution.stated and (block == 0.0 or looks_a4(page)):
         return Unread(
             "sheet", "no whole drawing frame, no title block or no stated resolution: not known to be A3"
         )
-    if block == 0.0:
+    if block == 0.0 and not page.turn_is_sure:
         problems.append(_unsure_upright(page))
     if not resolution.stated:
         message = f"no stated resolution: {resolution.dpi[0]:.0f} dpi assumed, by which the page is A3"
@@ -335,6 +351,44 @@ def _tilt(lines: list[LongLine]) -> float:
     order = np.argsort(angles)
     cumulated = np.cumsum(np.array(weights)[order])
     return float(np.array(angles)[order][np.searchsorted(cumulated, cumulated[-1] / 2.0)])
+
+
+# By corners that a person gave -------------------------------------------------------------------
+
+_CLICKED_SE = 0.005
+"""Relative error of a scale by corners that a person points at: 1.5 mm at each of them."""
+_CLICKED_MM = 4.0
+"""Lines that move a corner by more than this are not the sheet's."""
+
+
+def register_by_corners(page: Page, corners_px: Sequence[tuple[float, float]]) -> Sheet | Unread:
+    """The map by the sheet's four corners; by frame and edges that lie there, where they are found."""
+    corners = np.asarray(corners_px, dtype=np.float64)
+    matrix = through_corners(PAPER.corners(), corners)
+    if not np.all(np.isfinite(matrix)):
+        return Unread("sheet", "the corners that were given span no sheet")
+    pointed = _sheet(Fit(matrix, 0.0, 0, 0.0, _CLICKED_SE, np.zeros(0)), None, _CLICKED_SE, [])
+    pointed = replace(pointed, method="corners")
+    flat = flatten(page.grey)
+    lines = without_grid(long_lines(flat), (page.grey.shape[0], page.grey.shape[1]))
+    sides, frame = match_sides(matrix, lines)
+    if any(len({side.value for side in sides if side.axis == axis}) < 2 for axis in (0, 1)):
+        return pointed
+    try:
+        fit = _settled(
+            Hypothesis(matrix, perspective=True, score=0.0, sides=sides, frame=frame), None, copied=False
+        )
+    except np.linalg.LinAlgError:
+        return pointed
+    moved_px = np.abs(mapped(fit.mm_to_px, PAPER.corners()) - corners).max()
+    if (
+        not fit.scale_se < _CLICKED_SE
+        or fit.rms_mm > _NO_FIT_MM
+        or moved_px > _CLICKED_MM * pointed.px_per_mm
+    ):
+        return pointed
+    sheet = replace(_sheet(fit, frame, fit.scale_se, []), method="corners")
+    return _with_lens(flat, sheet, Hypothesis(fit.mm_to_px, perspective=True, score=0.0, sides=sides))
 
 
 def _sheet(fit: Fit, frame: Outline | None, scale_se: float, problems: list[Problem]) -> Sheet:

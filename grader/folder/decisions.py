@@ -1,0 +1,340 @@
+"""Decisions of people given to the submissions and pages that they are about.
+
+What a decision was about stands in its `basis`, as digests. One whose basis has changed is stale: it is told
+and not applied. One that cannot be applied at all is a fault with its line; the others are applied.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from grader.documents import ReportDocument, StaleDecisionDocument, UnmatchedDocument
+from grader.folder.cache import digest_of
+from grader.inputs.decisions import FILE_NAME, Decision, read_table
+from grader.inputs.measurements import StudentSubmission
+from grader.inputs.roster import Roster, RosterRow
+from grader.marking.decided import NOT_APPLIED, why_not
+from grader.printed.layout import PAGE_MM
+from grader.records import PageRef
+from grader.rubric import RubricFile
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.construction.derive import construction_of
+from reference.construction.graph import Construction
+from reference.errors import Finding, near_names
+
+_DIGITS = 8
+"""Of each digest: two of a class are the same by chance once in 10^5 classes."""
+PageKey = tuple[str, int]
+"""File and page."""
+
+
+def decisions_path(folder: Path) -> Path:
+    """Where the decisions on what was handed in lie: in its folder, of a single file beside it."""
+    return (folder if folder.is_dir() else folder.parent) / FILE_NAME
+
+
+# What a decision is about -------------------------------------------------------------------------
+
+
+def basis_of(
+    submission: StudentSubmission, assignment: Assignment, rubric: RubricFile, criterion: str
+) -> str:
+    """The digest of what a decision is about: what was handed in, for which variant, what was asked for.
+
+    Arguments: `criterion` as in `Decision`, of any kind but a page's.
+
+    Titles, points, tolerances and the student's name are no part of it.
+    """
+    return _basis([*_handed_in(submission, assignment), _asked(submission, rubric, criterion)])
+
+
+def _handed_in(submission: StudentSubmission, assignment: Assignment) -> list[object]:
+    """What is the same for all decisions on a submission: files, pixels, the task."""
+    entered = submission.measured
+    by_hand = None if entered is None else (entered.numbers, entered.scales, entered.further_scales)
+    return [
+        (sorted((page.digest, page.page) for page in submission.pages), by_hand),
+        (sorted(page.content for page in submission.pages), by_hand),
+        (_task(assignment, submission.variant), submission.declared),
+    ]
+
+
+def _asked(submission: StudentSubmission, rubric: RubricFile, criterion: str) -> object:
+    """What a criterion asks for; of a node, how its page was placed."""
+    placed = [(page.turn_deg, page.corners_px) for page in submission.pages] if ":" in criterion else []
+    return [one.name for one in rubric.criterion if one.id == criterion], placed
+
+
+def page_basis(page: PageRef) -> str:
+    """The digest of a page that a decision is about."""
+    return _basis([(page.digest, page.page), page.content])
+
+
+def _basis(parts: Iterable[object]) -> str:
+    # A letter first, and points between: no spreadsheet takes it for a number.
+    return "b" + ".".join(digest_of([part])[:_DIGITS] for part in parts)
+
+
+def _task(assignment: Assignment, variant: Variant | None) -> object:
+    """What determines a variant's right answer, without titles."""
+    mechanism = assignment.mechanism_file.model_dump_json(exclude={"title"})
+    if variant is None:
+        return assignment.id, mechanism
+    scales = assignment.scales([variant])
+    numbers = {**assignment.values([variant]), **{name: getattr(scales, name) for name in SCALE_NAMES}}
+    told = {name: f"{float(np.ravel(number)[0]):.9g}" for name, number in numbers.items()}
+    return assignment.id, mechanism, assignment.file.plate_images, told
+
+
+_CHANGED = (
+    "what was handed in has changed since",
+    "the student's number or position, the scales or the assignment's data have changed since",
+    "the criterion asks for something else since, or the page was placed anew",
+)
+"""What is said of a stale decision, by the part of its basis that differs."""
+
+
+def _why_stale(then: str, now: str) -> str | None:
+    """Why a decision is stale by its basis then and now; None where it is not."""
+    before, after = then.split("."), now.split(".")
+    if not then or then == now:
+        return None
+    if len(before) != len(after):
+        return _CHANGED[0]
+    # The same file, or the same pixels in another file, are the same page.
+    same = [before[0] == after[0] or before[1] == after[1], *map(str.__eq__, before[2:], after[2:])]
+    return next((why for why, is_same in zip(_CHANGED, same, strict=False) if not is_same), None)
+
+
+# A class's ----------------------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class ClassDecisions:
+    """The decisions on a class, and what became of them so far.
+
+    Attributes
+    ----------
+    file : its name
+    rows : those that can be read
+    faults : lines that cannot be read or applied, by their number
+    stale : decisions whose basis has changed
+    """
+
+    file: str
+    rows: Sequence[Decision] = ()
+    faults: list[tuple[int, Finding]] = field(default_factory=list)
+    stale: list[StaleDecisionDocument] = field(default_factory=list)
+    pages: dict[PageKey, Decision] = field(default_factory=dict)
+    """What was decided of each page, as far as it applies."""
+
+    def problems(self) -> list[UnmatchedDocument]:
+        """The faults, by their lines."""
+        return [
+            UnmatchedDocument(file=self.file, code="decision_fault", message=str(fault))
+            for _, fault in sorted(self.faults, key=lambda fault: fault[0])
+        ]
+
+    # Pages -----------------------------------------------------------------------------------
+
+    def place(self, pages: Sequence[PageRef]) -> list[PageRef]:
+        """The pages, turned and with corners as people decided; call it once, with all pages of the class."""
+        rows = {(row.scan.file, row.scan.page or 1): row for row in self.rows if row.kind == "page"}
+        there = {(page.file, page.page): page for page in pages}
+        for key, row in rows.items():
+            page = there.get(key)
+            if page is None and row.basis:
+                self._out_of_date(row, "the page is not in the folder any more")
+            elif page is None:
+                self._fault(row, "criterion", f"there is no page {key[1]} of {key[0]} in the folder")
+            elif row.scan.page is None and page.pages > 1:
+                self._fault(
+                    row, "criterion", f"{page.file} has {page.pages} pages: write which, page:{page.file}#1"
+                )
+            elif (why := _why_stale(row.basis, page_basis(page))) is not None:
+                self._out_of_date(row, why)
+            else:
+                self.pages[key] = row
+        return [self._placed(page) for page in pages]
+
+    def _placed(self, page: PageRef) -> PageRef:
+        row = self.pages.get((page.file, page.page))
+        if row is None:
+            return page
+        return replace(page, turn_deg=row.page.turn, corners_px=row.page.corners)
+
+    def owners(self, roster: Roster | None) -> dict[PageKey, RosterRow]:
+        """The owners that people gave to pages, each on the roster where there is one."""
+        owners: dict[PageKey, RosterRow] = {}
+        for key, row in self.pages.items():
+            student = row.page.owner
+            if student is None:
+                continue
+            if roster is None:
+                owners[key] = RosterRow(student, position=row.position)
+                continue
+            listed = roster.rows_of(student)
+            fitting = [one for one in listed if row.position is None or one.position in (None, row.position)]
+            if len(fitting) == 1:
+                owners[key] = fitting[0]
+            elif listed:
+                self._fault(row, "position", f"{student} has the positions {_positions(listed)}: write which")
+            else:
+                self._fault(
+                    row, "verdict", f"{student} is not on the roster{_meant(student, roster.student_ids)}"
+                )
+        return owners
+
+    # Submissions -----------------------------------------------------------------------------
+
+    def give(
+        self, students: Sequence[StudentSubmission], assignment: Assignment, rubric: RubricFile
+    ) -> list[StudentSubmission]:
+        """The submissions, each with what was decided of it and still applies."""
+        check = _Check(assignment, rubric)
+        found: list[tuple[int, Decision]] = []
+        for row in self.rows:
+            if row.kind == "page":
+                continue
+            index = self._submission(row, students)
+            if index is not None:
+                found.append((index, row))
+        twice = Counter((index, row.criterion) for index, row in found)
+        given: dict[int, list[Decision]] = {}
+        with_basis = {index for index, row in found if row.basis}
+        about = {index: _handed_in(students[index], assignment) for index in with_basis}
+        for index, row in found:
+            fault = check.fault_of(row)
+            if twice[index, row.criterion] > 1:
+                fault = (
+                    "position",
+                    f"{row.criterion} of {row.student_id} is decided on another line too; leave one",
+                )
+            if fault is not None:
+                self._fault(row, *fault)
+                continue
+            asked = _asked(students[index], rubric, row.criterion)
+            why = _why_stale(row.basis, _basis([*about[index], asked])) if row.basis else None
+            if why is not None:
+                self._out_of_date(row, why)
+            else:
+                given.setdefault(index, []).append(row)
+        return [
+            replace(student, decided=tuple(sorted(own, key=lambda row: row.criterion)))
+            for index, student in enumerate(students)
+            for own in [[*given.get(index, []), *self._of_pages(student)]]
+        ]
+
+    def _of_pages(self, student: StudentSubmission) -> list[Decision]:
+        keys = [(page.file, page.page) for page in student.pages]
+        return [self.pages[key] for key in keys if key in self.pages]
+
+    def _submission(self, row: Decision, students: Sequence[StudentSubmission]) -> int | None:
+        """The submission that a row is about; None with a fault where there is none."""
+        own = [(index, one) for index, one in enumerate(students) if one.student_id == row.student_id]
+        fitting = [index for index, one in own if row.position in (None, one.position) or one.variant is None]
+        if len(fitting) == 1:
+            return fitting[0]
+        if own:
+            places = _positions(one for _, one in own)
+            self._fault(row, "position", f"{row.student_id} has the positions {places}: write which")
+        else:
+            near = _meant(row.student_id, [one.student_id for one in students])
+            self._fault(row, "student_id", f"{row.student_id} is nobody in this class{near}")
+        return None
+
+    def note_failures(self, reports: Iterable[ReportDocument]) -> None:
+        """Note the decisions that marking could not apply, which stand in the reports' problems."""
+        lines = {(row.student_id, row.position, row.criterion): row for row in self.rows}
+        for report in reports:
+            for problem in report.problems:
+                criterion = problem.message.partition(" ")[0]
+                keys = [(report.student_id, position, criterion) for position in (report.position, None)]
+                row = next((lines[key] for key in keys if key in lines), None)
+                if problem.code == NOT_APPLIED and row is not None:
+                    self._fault(row, "criterion", problem.message)
+
+    # Both ------------------------------------------------------------------------------------
+
+    def _fault(self, row: Decision, column: str, why: str) -> None:
+        self.faults.append((row.line, Finding(f"line {row.line}, {column}", why)))
+
+    def _out_of_date(self, row: Decision, reason: str) -> None:
+        self.stale.append(
+            StaleDecisionDocument(
+                line=row.line, student_id=row.student_id, position=row.position, criterion=row.criterion,
+                verdict=row.verdict, by=row.by, at=row.at, comment=row.comment, reason=reason,
+            )
+        )  # fmt: skip
+
+
+def decided(
+    submission: StudentSubmission, rows: Sequence[Decision], assignment: Assignment, rubric: RubricFile
+) -> StudentSubmission:
+    """One submission with those of some decisions that are about it and apply; the others are left out."""
+    decisions = ClassDecisions("", rows)
+    decisions.pages |= {(row.scan.file, row.scan.page or 1): row for row in rows if row.kind == "page"}
+    return decisions.give([submission], assignment, rubric)[0]
+
+
+def class_decisions(path: Path) -> ClassDecisions:
+    """The decisions in a file, none where there is none. Raises InputFileError for a fault of all of it."""
+    table = read_table(path)
+    faults = [(int(fault.path.split()[1].rstrip(",")), fault) for fault in table.faults]
+    return ClassDecisions(path.name, table.rows, faults)
+
+
+def _positions(rows: Iterable[RosterRow | StudentSubmission]) -> str:
+    return ", ".join("none" if row.position is None else str(row.position) for row in rows)
+
+
+def _meant(name: str, known: Iterable[str]) -> str:
+    near = near_names(name, known, most=1)
+    return f"; is {near[0]} meant?" if near else ""
+
+
+@dataclass(frozen=True)
+class _Check:
+    """Whether decisions fit an assignment and its rubric."""
+
+    assignment: Assignment
+    rubric: RubricFile
+
+    @cached_property
+    def construction(self) -> Construction:
+        """Of any variant: all have the same nodes."""
+        mechanism = self.assignment.mechanism(self.assignment.variants()[:1])
+        return construction_of(mechanism, accelerations=self.rubric.needs_accelerations)
+
+    @cached_property
+    def nodes(self) -> Mapping[str, list[str]]:
+        """The nodes of each figure."""
+        return {figure: [step.node for step in steps] for figure, steps in self.construction.figures.items()}
+
+    def fault_of(self, row: Decision) -> tuple[str, str] | None:
+        """The column that is wrong, and why; None for a decision that fits."""
+        checks: dict[str, Callable[[Decision], tuple[str, str] | None]]
+        checks = {"verdict": self._verdict, "node": self._node}
+        return checks[row.kind](row) if row.kind in checks else None
+
+    def _verdict(self, row: Decision) -> tuple[str, str] | None:
+        criteria = {one.id: one for one in self.rubric.criterion}
+        if row.criterion not in criteria:
+            return "criterion", f"'{row.criterion}' is not in this rubric{_meant(row.criterion, criteria)}"
+        why = why_not(row, criteria[row.criterion], self.rubric)
+        return None if why is None else ("points", why)
+
+    def _node(self, row: Decision) -> tuple[str, str] | None:
+        figure, node = row.node
+        if figure not in self.nodes:
+            return "criterion", f"'{figure}' is no figure here: {', '.join(self.nodes)}"
+        if node not in self.nodes[figure]:
+            return "criterion", f"'{node}' is no node of {figure}: {', '.join(self.nodes[figure])}"
+        x, y = row.place
+        if not (0.0 <= x <= PAGE_MM[0] and 0.0 <= y <= PAGE_MM[1]):
+            return "verdict", f"{x:g},{y:g} lies beside the sheet of {PAGE_MM[0]:g} x {PAGE_MM[1]:g} mm"
+        return None

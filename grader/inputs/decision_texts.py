@@ -1,0 +1,107 @@
+"""Texts of a decision that are more than a word: a node's place; a page's owner, turn and corners."""
+
+import re
+from dataclasses import dataclass
+
+from grader.inputs.roster import why_no_id
+
+TURNS = (0, 90, 180, 270)
+LARGEST = 100_000.0
+"""Of a coordinate or of points: scans have fewer pixels a side."""
+_NUMBER = r"[+-]?[0-9]+(?:[.][0-9]+)?"
+_PAIR = re.compile(rf"({_NUMBER})\s*[,;\s]\s*({_NUMBER})")
+_DECIMAL_COMMAS = re.compile(r"([+-]?[0-9]+,[0-9]+)\s*[;\s]\s*([+-]?[0-9]+,[0-9]+)")
+"""Two numbers with decimal commas, which a comma between them could not part."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageDecision:
+    """What a person says of a page.
+
+    Attributes
+    ----------
+    owner : the student's id; None where it stays as it was found
+    turn : counter-clockwise turn in degrees that makes the stored image upright; None where not said
+    corners : the sheet's corners as it lies upright, from the top left clockwise, pixels (x, y) of the stored
+        image (the centre of its first pixel is 0, 0); empty where not said
+    """
+
+    owner: str | None = None
+    turn: int | None = None
+    corners: tuple[tuple[float, float], ...] = ()
+
+    def __str__(self) -> str:
+        owner = [f"owner={self.owner}"] if self.owner is not None else []
+        turn = [f"turn={self.turn}"] if self.turn is not None else []
+        places = " ".join(f"{x:.1f},{y:.1f}" for x, y in self.corners)
+        return "; ".join([*owner, *turn, *([f"corners={places}"] if places else [])])
+
+
+def page_decision(text: str) -> PageDecision:
+    """Owner, turn and corners as a row has them. Raises ValueError with what is wrong and what is right."""
+    said: dict[str, str] = {}
+    for part in filter(None, (part.strip() for part in text.split(";"))):
+        name, mark, value = (piece.strip() for piece in part.partition("="))
+        if not mark or name not in {"owner", "turn", "corners"} or name in said:
+            raise ValueError(f"'{short(part)}': owner=, turn= and corners= are known, each once")
+        said[name] = value
+    if not said:
+        raise ValueError("is empty: say owner=STUDENT, turn=90 or corners=x,y x,y x,y x,y")
+    return PageDecision(_owner(said.get("owner")), _turn(said.get("turn")), _corners(said.get("corners")))
+
+
+def _owner(text: str | None) -> str | None:
+    why = None if text is None else why_no_id(text)
+    if why is not None:
+        raise ValueError(f"owner '{short(text or '')}' is refused: {why}")
+    return text
+
+
+def _turn(text: str | None) -> int | None:
+    if text is None:
+        return None
+    if text not in {str(turn) for turn in TURNS}:
+        raise ValueError(f"turn '{short(text)}': one of {', '.join(map(str, TURNS))} is right")
+    return int(text)
+
+
+def _corners(text: str | None) -> tuple[tuple[float, float], ...]:
+    if text is None:
+        return ()
+    corners = tuple(place(each) for each in re.sub(r"\s*,\s*", ",", text).split())
+    if len(corners) != 4:
+        raise ValueError(f"corners has {len(corners)} places x,y; four are right, parted by blanks")
+    edges = [
+        complex(*there) - complex(*here)
+        for here, there in zip(corners, corners[1:] + corners[:1], strict=True)
+    ]
+    turns = [(one.conjugate() * other).imag for one, other in zip(edges, edges[1:] + edges[:1], strict=True)]
+    if min(turns) <= 0.0:
+        raise ValueError(
+            "corners: give the upright sheet's from the top left clockwise; no three may lie in a line"
+        )
+    return corners
+
+
+def place_text(x_mm: float, y_mm: float) -> str:
+    """A node's place as a row has it, to a thousandth of a millimetre.
+
+    Always with decimals: a spreadsheet would take ``61,20`` for one number.
+    """
+    return f"{x_mm:.3f},{y_mm:.3f}"
+
+
+def place(text: str) -> tuple[float, float]:
+    """The two numbers of a place x,y. Raises ValueError with what is wrong and what is right."""
+    found = _PAIR.fullmatch(text.strip()) or _DECIMAL_COMMAS.fullmatch(text.strip())
+    if found is None:
+        raise ValueError(f"'{short(text)}' is no place: two numbers x,y are right, such as 61.25,140.5")
+    x, y = (float(number.replace(",", ".")) for number in found.groups())
+    if max(abs(x), abs(y)) > LARGEST:
+        raise ValueError(f"'{short(text)}' lies outside of every sheet")
+    return x, y
+
+
+def short(text: str) -> str:
+    """The text, not longer than a message should quote it."""
+    return text if len(text) <= 40 else text[:37] + "..."

@@ -1,0 +1,251 @@
+"""What people decided on a submission: verdicts in the place of the program's, nodes, points, a comment."""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import cast
+
+from grader.comparison.verdicts import EVEN
+from grader.documents import (
+    AppliedDecisionDocument,
+    CriterionDocument,
+    DecidedDocument,
+    ProblemDocument,
+    ReportDocument,
+    Verdict,
+)
+from grader.inputs.decisions import Decision
+from grader.inputs.measurements import StudentSubmission
+from grader.marking.mark import CHARGED, DECIMALS, score, with_mistake
+from grader.marking.settling import OPENING, at_stake
+from grader.outcomes import Judgement, NamedMistake, Outcome, Quantity, Reason, Tolerance
+from grader.reading.corrected import corrected
+from grader.records import Problem, ScannedPage
+from grader.rubric import CriterionTable, RubricFile
+from reference.authored.assignment import Assignment
+from reference.construction.derive import construction_of
+from reference.construction.graph import Construction
+
+NOT_APPLIED = "decision_not_applied"
+"""The problem of a decision that does not fit what was read; its message begins with the criterion."""
+
+
+def why_not(row: Decision, criterion: CriterionTable, rubric: RubricFile) -> str | None:
+    """Why the points of a decision contradict its verdict or the rubric; None where they do not."""
+    maximum, points = rubric.points[criterion.id], row.points
+    if points is None:
+        return None
+    if points > maximum and not math.isclose(points, maximum, abs_tol=1e-6):
+        return f"{points:g} points are more than the {maximum:g} of {criterion.id}"
+    right: Mapping[str, float] = {"full": maximum, "none": 0.0}
+    if row.verdict in right and not math.isclose(points, right[row.verdict], abs_tol=1e-6):
+        gives = f"{row.verdict} gives {right[row.verdict]:g} points, not {points:g}"
+        return f"{gives}; leave them blank, or write partial"
+    if row.verdict == "not_judged":
+        return "what is not judged has no points; leave them blank"
+    return None
+
+
+def decide(judgement: Judgement, rubric: RubricFile, rows: Sequence[Decision]) -> Judgement:
+    """The judgement with the verdicts that people decided, and the score that follows.
+
+    A mistake that explained only what was decided to be right is no longer named.
+    """
+    by_criterion = {row.criterion: row for row in rows if row.kind == "verdict"}
+    if not by_criterion:
+        return judgement
+    outcomes: tuple[Outcome, ...] = tuple(
+        _decided(outcome, by_criterion[outcome.criterion], rubric)
+        if outcome.criterion in by_criterion
+        else outcome
+        for outcome in judgement.outcomes
+    )
+    acquitted = {
+        one.criterion for one in outcomes if one.criterion in by_criterion and one.verdict not in CHARGED
+    }
+    mistakes = tuple(_left(judgement.mistakes, acquitted))
+    outcomes = tuple(with_mistake(outcome, mistakes) for outcome in at_stake(rubric, outcomes))
+    return replace(judgement, outcomes=outcomes, mistakes=mistakes, score=score(rubric, outcomes))
+
+
+def _decided(outcome: Outcome, row: Decision, rubric: RubricFile) -> Outcome:
+    verdict = cast("Verdict", row.verdict)
+    share = None if row.points is None else row.points / rubric.points[outcome.criterion]
+    keeps = verdict == outcome.verdict
+    return replace(
+        outcome,
+        verdict=verdict,
+        possible=(verdict, verdict),
+        shares=() if share is None else (share, share),
+        confidence=1.0,
+        probability=1.0,
+        reasons=outcome.reasons if keeps else tuple(_reasons(outcome.reasons, verdict)),
+        mistake=outcome.mistake if verdict in CHARGED else None,
+        cause=outcome.cause if verdict in CHARGED else None,
+    )
+
+
+FOR_THE_STUDENT = frozenset({"counted_for_you", "not_certainly_within", "at_stake", "other_variant"})
+"""Reasons of rules that hold where nobody decides."""
+REMARKS = frozenset({"right", "too_short_to_judge", "scale_assumed"})
+"""Reasons that tell of no loss."""
+FOLLOWED = "follows"
+
+
+def _reasons(reasons: Sequence[Reason], verdict: Verdict) -> Sequence[Reason]:
+    """What was read, as far as it says why a person's verdict is what it is; else that a person decided.
+
+    What would contradict the verdict, and why the program was in doubt, is not told.
+    """
+    said = [one for one in reasons if one.code not in OPENING | FOR_THE_STUDENT | {FOLLOWED}]
+    losses = [one for one in said if one.code not in REMARKS]
+    followed = [one for one in reasons if one.code == FOLLOWED]
+    match verdict:
+        case "full" if not losses:
+            return said or [Reason("right")]
+        case "none" | "partial" if losses:
+            return said
+        case "follow_through" if followed:
+            return followed
+    return [Reason("decided")]
+
+
+def _left(mistakes: Sequence[NamedMistake], acquitted: set[str]) -> Iterator[NamedMistake]:
+    for mistake in mistakes:
+        explains = tuple(name for name in mistake.explains if name not in acquitted)
+        if explains or not mistake.explains:
+            yield replace(mistake, explains=explains)
+
+
+NOTHING_READ = Outcome(
+    "",
+    "",
+    "review",
+    Quantity(),
+    Quantity(),
+    Tolerance(),
+    0.0,
+    (),
+    ("none", "full"),
+    shares=(0.0, 1.0),
+    probability=EVEN,
+)
+"""What nothing at all is known of."""
+
+
+def open_again(judgement: Judgement, rubric: RubricFile, submission: StudentSubmission) -> Judgement:
+    """The judgement of a submission of which nothing could be read: what is asked for waits for a person."""
+    why = Reason("unread" if submission.pages or submission.has_unusable else "not_measured")
+    waiting = replace(NOTHING_READ, reasons=(why,))
+    outcomes = tuple(
+        one
+        if one.verdict == "not_judged"
+        else replace(waiting, criterion=one.criterion, name=one.name, expected=one.expected)
+        for one in judgement.outcomes
+    )
+    return replace(judgement, outcomes=outcomes, mistakes=(), score=score(rubric, outcomes))
+
+
+# Nodes ----------------------------------------------------------------------------------------------
+
+
+def with_nodes(
+    pages: Sequence[ScannedPage], submission: StudentSubmission, assignment: Assignment
+) -> tuple[list[ScannedPage], list[Problem]]:
+    """The pages with nodes where people put them, and what is wrong with those that lie on no page."""
+    places = {row.node: row.place for row in submission.decided if row.kind == "node"}
+    if not places:
+        return list(pages), []
+    construction = construction_of(assignment.mechanism(assignment.variants()[:1]))
+    changed, astray = corrected(pages, places, construction)
+    why = "none of the student's pages has this figure; decide the verdicts in its place"
+    return changed, [_not_applied(f"node:{figure}:{node}", why) for figure, node in astray]
+
+
+def _not_applied(criterion: str, why: str) -> Problem:
+    return Problem(NOT_APPLIED, f"{criterion} is not applied: {why}")
+
+
+# The report -----------------------------------------------------------------------------------------
+
+
+def with_decisions(
+    report: ReportDocument,
+    submission: StudentSubmission,
+    before: Judgement | None = None,
+    construction: Construction | None = None,
+) -> ReportDocument:
+    """The report, in which it stands who decided what, what it was before, points added and a comment.
+
+    Arguments: `before`, the program's own judgement; the construction; neither for what was not judged.
+    """
+    rows = submission.decided
+    if not rows:
+        return report
+    astray = {problem.message.partition(" ")[0] for problem in report.problems if problem.code == NOT_APPLIED}
+    kinds: dict[str, list[Decision]] = defaultdict(list)
+    for row in rows:
+        if row.criterion not in astray:
+            kinds[row.kind].append(row)
+    verdicts = {} if before is None else {one.criterion: one.verdict for one in before.outcomes}
+    own = {row.criterion: row for row in kinds["verdict"]}
+    moved = {row.node[1]: row for row in kinds["node"]}
+    criteria = [
+        _with_verdict(one, own[one.id], verdicts.get(one.id))
+        if one.id in own
+        else _with_node(one, moved, construction)
+        for one in report.criteria
+    ]
+    if before is not None and all(
+        one.confidence == 0.0 or one.verdict == "not_judged" for one in before.outcomes
+    ):
+        nothing = {"probability": None, "proposed": None}
+        criteria = [one if one.verdict != "review" else one.model_copy(update=nothing) for one in criteria]
+    comment = "\n".join(row.comment for row in (*kinds["total"], *kinds["comment"]) if row.comment)
+    applied = [AppliedDecisionDocument.model_validate(row) for row in rows if row.criterion not in astray]
+    report = report.model_copy(update={"criteria": criteria, "comment": comment, "decisions": applied})
+    for row in kinds["total"]:
+        report = _with_points(report, row)
+    return report
+
+
+def _with_verdict(one: CriterionDocument, row: Decision, before: Verdict | None) -> CriterionDocument:
+    decided = DecidedDocument(by=row.by, at=row.at, before=before, comment=row.comment)
+    return one.model_copy(update={"decided": decided, "probability": 1.0, "proposed": None})
+
+
+def _with_node(
+    one: CriterionDocument, moved: Mapping[str, Decision], construction: Construction | None
+) -> CriterionDocument:
+    """A criterion of a vector or link between nodes that a person put in their places."""
+    if construction is None or not moved:
+        return one
+    vector = construction.vectors.get(one.vector or "")
+    ends = construction.links.get(one.link or "", ()) if vector is None else (vector.tail, vector.head)
+    row = next((moved[end] for end in ends if end in moved), None)
+    if row is None:
+        return one
+    decided = DecidedDocument(by=row.by, at=row.at, before=None, comment=row.comment)
+    return one.model_copy(update={"decided": decided})
+
+
+def _with_points(report: ReportDocument, row: Decision) -> ReportDocument:
+    """The report with points added to the score, or taken away, as far as they fit: so many are `added`."""
+    if report.score_range is None:
+        problem = _not_applied("total", "nothing was judged; decide the verdicts of criteria first")
+        problems = [*report.problems, ProblemDocument.model_validate(problem)]
+        return report.model_copy(update={"problems": problems})
+
+    def moved(score: float) -> float:
+        return round(min(max(score + (row.points or 0.0), 0.0), report.max_score), DECIMALS)
+
+    low, high = report.score_range
+    known = low if report.score is None else report.score
+    update = {
+        "score": None if report.score is None else moved(report.score),
+        "score_range": (moved(low), moved(high)),
+        "expected_score": None if report.expected_score is None else moved(report.expected_score),
+        "added": round(moved(known) - known, DECIMALS),
+    }
+    return report.model_copy(update=update)

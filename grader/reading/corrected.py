@@ -1,0 +1,215 @@
+"""Nodes that a person has put in their place: read again from the ink there, and the vectors between them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from grader.reading.expected import Edge, Expected
+from grader.reading.lines import Lines, lines_of
+from grader.reading.matching import StrokeAssignment
+from grader.reading.nodes import LINK_ENDS, PLAN_ENDS, fit_nodes
+from grader.reading.read import LEAST_VECTOR_MM, NEAR_MM, vector_of
+from grader.records import MECHANISM, Figure, FloatArray, Ink, Reading, ReadNode, ReadVector, ScannedPage
+from reference.construction.graph import Construction
+from reference.geometry import ComplexArray
+
+REACH_MM = 2.0
+"""A person points at a node within this; the next node is farther away."""
+ON_MM = 0.6
+"""A stroke this near to a node belongs to it: a pencil line and a half."""
+THROUGH_MM = 0.5
+"""Each further stroke at a place makes it as good as one that is nearer by this much."""
+MOST_THROUGH = 3
+"""Strokes beyond the first that count so."""
+POINTED_MM = 0.3
+"""Standard error of a place that a person points at, where no ink says it better."""
+BEYOND_MM, BEYOND_JOINT_MM = 1.0, 3.0
+"""How far a stroke may stop short of its node, and a link of its joint, at the circle drawn around it."""
+LEAST_STROKE_MM = 5.0
+"""Shorter strokes are those of letters and arrowheads; they count where there are no others."""
+LEAST_SINE = 0.17
+"""Of 10 degrees: strokes at a smaller angle do not show where they cross."""
+DRAWN_SHARE = 0.5
+"""A vector with ink along less of it is not drawn."""
+
+
+def snapped(ink: Ink | None, x_mm: float, y_mm: float, figure: str = "") -> ReadNode:
+    """The node that a person points at, fitted to the strokes that meet or end there.
+
+    Arguments: a place on the sheet, mm, y down; the figure: in a sketch strokes stop short of their joints.
+
+    Returns the place as pointed at where no ink within `REACH_MM` says it better.
+    """
+    at, is_sketch = complex(x_mm, -y_mm), figure == MECHANISM
+    pointed = ReadNode(at, np.eye(2) * POINTED_MM**2, 1.0)
+    if ink is None:
+        return pointed
+    beyond_mm = BEYOND_JOINT_MM if is_sketch else BEYOND_MM
+    lines = _near(lines_of(ink), at, beyond_mm)
+    centres = ink.circles[:, 0] - 1j * ink.circles[:, 1] if is_sketch else np.zeros(0, complex)
+    start = _likeliest(lines, centres, at, beyond_mm)
+    if start is None:
+        return pointed
+    through = lines.take(np.flatnonzero(_distance(lines, start, beyond_mm) < ON_MM))
+    fit = fit_nodes(_star(through, start), through, LINK_ENDS if is_sketch else PLAN_ENDS, {0: start})
+    node = ReadNode(complex(fit.at[0]), np.asarray(fit.cov[:2, :2]), 1.0)
+    return node if abs(node.at - at) <= REACH_MM else pointed
+
+
+def _near(lines: Lines, at: complex, beyond_mm: float) -> Lines:
+    """The single strokes within reach of a place; short ones only where there are no others."""
+    single = (lines.members == lines.members[:, :1]).all(axis=1)
+    near = single & (_distance(lines, at, beyond_mm) < REACH_MM)
+    long = near & (lines.length >= LEAST_STROKE_MM)
+    return lines.take(np.flatnonzero(long if long.any() else near))
+
+
+def _distance(lines: Lines, at: complex, beyond_mm: float) -> FloatArray:
+    """(n,) mm from a place to the nearest point of each stroke, lengthened at both ends."""
+    along = np.clip(_along(lines, at), -beyond_mm, lines.length + beyond_mm)
+    return np.abs(lines.start + along * lines.along - at)
+
+
+def _along(lines: Lines, at: complex) -> FloatArray:
+    """(n,) mm from the start of each stroke to the foot of a place on its line."""
+    return np.asarray(((at - lines.start) * np.conj(lines.along)).real)
+
+
+def _likeliest(lines: Lines, centres: ComplexArray, at: complex, beyond_mm: float) -> complex | None:
+    """The place within reach that is meant: the centre of a circle; else where strokes cross or end.
+
+    The nearest one, by the strokes that it has; else the nearest point of a stroke.
+    """
+    circled = centres[np.abs(centres - at) < REACH_MM]
+    if len(circled):
+        return complex(circled[np.argmin(np.abs(circled - at))])
+    places = np.array([*_crossings(lines, beyond_mm), *lines.start, *lines.end], dtype=complex)
+    places = places[np.abs(places - at) < REACH_MM]
+    if not len(places):
+        places = lines.start + np.clip(_along(lines, at), 0.0, lines.length) * lines.along
+    strokes = [np.count_nonzero(_distance(lines, complex(place), beyond_mm) < ON_MM) for place in places]
+    further = np.clip(np.array(strokes) - 1, 0, MOST_THROUGH)
+    return complex(places[np.argmin(np.abs(places - at) - THROUGH_MM * further)]) if len(places) else None
+
+
+def _crossings(lines: Lines, beyond_mm: float) -> list[complex]:
+    """Where two strokes cross, or would if they went on a little."""
+    sine = (np.conj(lines.along)[:, None] * lines.along[None, :]).imag
+    first, second = np.nonzero(np.triu(np.abs(sine) > LEAST_SINE, 1))
+    between = lines.start[second] - lines.start[first]
+    along = (np.conj(between) * lines.along[second]).imag / sine[first, second]
+    crossings = lines.start[first] + along * lines.along[first]
+    return [
+        complex(place)
+        for one, other, place in zip(first, second, crossings, strict=True)
+        if max(_distance(lines.take(np.array([one, other])), complex(place), beyond_mm)) < ON_MM
+    ]
+
+
+def _star(lines: Lines, at: complex) -> StrokeAssignment:
+    """The strokes as edges from one node to their far ends."""
+    far = np.where(np.abs(lines.start - at) > np.abs(lines.end - at), lines.start, lines.end)
+    places = np.array([at, *far], dtype=complex)
+    edges = tuple(Edge(str(row), 0, row) for row in range(1, len(places)))
+    names = tuple(str(row) for row in range(len(places)))
+    expected = Expected(names, places, np.eye(2 * len(places)), edges)
+    return StrokeAssignment(expected, np.arange(len(lines)), np.zeros(len(lines), dtype=bool), 0.0)
+
+
+# Readings with nodes in their places ----------------------------------------------------------------
+
+
+def corrected(
+    pages: Sequence[ScannedPage],
+    places: Mapping[tuple[str, str], tuple[float, float]],
+    construction: Construction,
+) -> tuple[list[ScannedPage], list[tuple[str, str]]]:
+    """A student's pages with nodes put in their places, and those that lie on none of the pages.
+
+    Arguments: `places` by figure and node, mm on the sheet, y down.
+
+    A moved node has confidence 1. The vectors that start or end there are those between the nodes as they now
+    lie, as sure as their other end; one that was not read before is read where ink lies along it.
+    """
+    changed, astray = list(pages), []
+    moved: dict[int, dict[str, dict[str, ReadNode]]] = {}
+    for (figure, node), (x, y) in places.items():
+        index = _page_of(pages, figure, node)
+        if index is None:
+            astray.append((figure, node))
+        else:
+            there = moved.setdefault(index, {}).setdefault(figure, {})
+            there[node] = snapped(pages[index].ink, x, y, figure)
+    for index, figures in moved.items():
+        page = pages[index]
+        reading = page.reading
+        for figure, nodes in figures.items():
+            reading = _with_nodes(reading, figure, nodes, page, construction)
+        changed[index] = replace(page, reading=reading)
+    return changed, astray
+
+
+def _page_of(pages: Sequence[ScannedPage], figure: str, node: str) -> int | None:
+    """The page on which a node lies: where it was read, else its figure; else the only page there is."""
+    with_figure = [index for index, page in enumerate(pages) if figure in page.reading.figures]
+    with_node = [index for index in with_figure if node in pages[index].reading.figures[figure].nodes]
+    registered = [index for index, page in enumerate(pages) if page.sheet is not None]
+    found = with_node or with_figure or (registered if len(registered) == 1 else [])
+    return found[0] if found else None
+
+
+def _with_nodes(
+    reading: Reading,
+    figure: str,
+    moved: Mapping[str, ReadNode],
+    page: ScannedPage,
+    construction: Construction,
+) -> Reading:
+    before = reading.figures.get(figure, Figure({}, {}))
+    nodes = {**before.nodes, **moved}
+    vectors, scale_se = dict(before.vectors), 0.0 if page.sheet is None else page.sheet.scale_se
+    for vector in construction.vectors_of(figure) if figure != MECHANISM else ():
+        ends = {vector.tail, vector.head}
+        if not ends & moved.keys() or not ends <= nodes.keys():
+            continue
+        tail, head = nodes[vector.tail], nodes[vector.head]
+        known = vectors.get(vector.name)
+        if known is None and not _is_drawn(page.ink, tail.at, head.at):
+            continue
+        stays = all(abs(nodes[end].at - before.nodes[end].at) < NEAR_MM for end in ends & before.nodes.keys())
+        least = known.confidence if known is not None and stays else 0.0
+        vectors[vector.name] = _between(tail, head, scale_se, least)
+    order = [step.node for step in construction.figures[figure]]
+    figures = {
+        **reading.figures,
+        figure: Figure({name: nodes[name] for name in order if name in nodes}, vectors),
+    }
+    found = {*moved, *vectors}
+    unread = tuple(gap for gap in reading.unread if gap.name not in found)
+    return replace(reading, figures=figures, unread=unread)
+
+
+def _between(tail: ReadNode, head: ReadNode, scale_se: float, least: float) -> ReadVector:
+    """The vector between two nodes, as sure as the less sure of them, and no less than `least`."""
+    span = head.at - tail.at
+    scaled = scale_se * np.array([span.real, span.imag])
+    cov = tail.cov + head.cov + np.outer(scaled, scaled)
+    return vector_of(span, np.asarray(cov), max(least, min(tail.confidence, head.confidence)))
+
+
+def _is_drawn(ink: Ink | None, tail: complex, head: complex) -> bool:
+    """Whether strokes lie along a vector; one too short to be drawn counts as drawn."""
+    length = abs(head - tail)
+    if length <= LEAST_VECTOR_MM:
+        return True
+    if ink is None or not len(ink.strokes):
+        return False
+    ends = (ink.strokes.ends[..., 0] - 1j * ink.strokes.ends[..., 1] - tail) / ((head - tail) / length)
+    on_it = np.abs(ends.imag).max(axis=1) < ON_MM
+    covered = np.sort(np.clip(ends.real[on_it], 0.0, length), axis=1)
+    inked, end = 0.0, 0.0
+    for low, high in sorted(map(tuple, covered.tolist())):
+        inked += max(0.0, high - max(low, end))
+        end = max(end, high)
+    return inked >= DRAWN_SHARE * length

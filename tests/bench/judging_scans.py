@@ -1,0 +1,150 @@
+"""Simulated students' scans, read once and kept, to be judged as often as one likes.
+
+Kinds of sheets are those that reach an instructor: flatbed scans of plain and printed sheets, 1-bit copies,
+photos; sloppy hands apart. Half of the drawings are right, a third have one mistake, the others two.
+"""
+
+import pickle
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from grader.inputs.measurements import StudentSubmission
+from grader.pipeline import read_submission, scan
+from grader.records import PageRef, Reading
+from grader.rubric import asked_of
+from samples.simulation import SimulatedSheet, any_settings, simulate
+from samples.simulation.mixture import Device
+from samples.simulation.student import drawn_by
+from samples.simulation.wording import declared_texts
+from tests.bench.judging_students import (
+    HANDS,
+    Kind,
+    StudentKey,
+    StudentWork,
+    assignment_named,
+    codes_of,
+    is_hidden,
+)
+from tests.bench.reading_scenes import answer_sheets
+
+_TRIES = 40
+SCANNED = ("pump", "press", "engine", "shaper", "piston")
+KIND_SHARES: Mapping[Kind, float] = {"right": 0.5, "single": 0.35, "pair": 0.15}
+
+
+@dataclass(frozen=True, slots=True)
+class SheetKind:
+    """How a class's sheets came to be files."""
+
+    title: str
+    device: Device = "flatbed"
+    dpi: float | None = 300.0
+    printed: bool = False
+    hands: tuple[str, ...] = ("careful", "typical")
+
+
+SHEET_KINDS: Mapping[str, SheetKind] = {
+    "flatbed": SheetKind("flatbed 300 dpi, plain sheet"),
+    "printed": SheetKind("flatbed 300 dpi, answer sheet", printed=True),
+    "copies": SheetKind("1-bit copies", device="copier"),
+    "phone": SheetKind("phone photos, answer sheet", device="phone", dpi=None, printed=True),
+    "sloppy": SheetKind("flatbed 300 dpi, sloppy hands", hands=("sloppy",)),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ReadWork:
+    """A student's sheets as they were read.
+
+    Attributes
+    ----------
+    declared : scales, as the student declares them
+    seconds : processor time of scanning and reading
+    """
+
+    kind: str
+    work: StudentWork
+    readings: tuple[Reading, ...]
+    declared: Mapping[str, str]
+    seconds: float
+
+
+def read_works(kind: str, seeds: Sequence[int], kept: Path | None = None) -> Iterator[ReadWork]:
+    """Students of a kind of sheets, each drawn, scanned and read; from the folder `kept` where it has them.
+
+    A student whose mistakes cannot be drawn is left out.
+    """
+    for seed in seeds:
+        path = None if kept is None else kept / f"{kind}-{seed}.pkl"
+        if path is not None and path.exists():
+            yield pickle.loads(path.read_bytes())  # noqa: S301 - written by the lines below
+            continue
+        made = drawn_on(SHEET_KINDS[kind], *_student(kind, seed))
+        if made is None:
+            continue
+        read = _read(kind, *made)
+        if path is not None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(pickle.dumps(read))
+        yield read
+
+
+def _student(kind: str, seed: int) -> tuple[StudentKey, np.random.Generator]:
+    lot = np.random.default_rng([seed, sum(map(ord, kind)), 77])
+    hands = SHEET_KINDS[kind].hands
+    hand = hands[int(lot.integers(len(hands)))]
+    what: Kind = lot.choice(list(KIND_SHARES), p=list(KIND_SHARES.values()))
+    return StudentKey(SCANNED[seed % len(SCANNED)], hand, what, seed), lot
+
+
+def drawn_on(
+    kind: SheetKind, key: StudentKey, lot: np.random.Generator
+) -> tuple[StudentWork, list[SimulatedSheet]] | None:
+    """What a student drew, and the pages of it; None where no such drawing comes about in many tries."""
+    assignment, rubric = assignment_named(key.assignment)
+    variants = assignment.variants()
+    variant = variants[int(lot.integers(len(variants)))]
+    printed = answer_sheets(assignment, variant) if kind.printed else None
+    for _ in range(_TRIES):
+        seed = int(lot.integers(10_000_000))
+        settings = any_settings(seed, device=kind.device, dpi=kind.dpi, mistakes=0.0)
+        habits = replace(settings.student, mistakes=codes_of(key, lot))
+        settings = replace(settings, hand=HANDS[key.hand], student=habits)
+        try:
+            desk, drawn = drawn_by(assignment, variant, seed, settings, printed=printed)
+        except ValueError:  # a mistake that cannot be made here
+            continue
+        if is_hidden(desk.task) or (printed and not all(sheet.kind in printed for sheet in drawn)):
+            continue
+        pages = simulate(assignment, variant, seed, settings, printed=printed)
+        figures = [figure for page in pages for figure in page.truth["figures"].values()]
+        left_out = {name for figure in figures for name in figure.get("missing", {})} | desk.task.missing
+        work = StudentWork(
+            key,
+            assignment,
+            rubric,
+            desk.task,
+            drawn,
+            declares=True,
+            letters=True,
+            left_out=frozenset(left_out),
+        )
+        return work, pages
+    return None
+
+
+def _read(kind: str, work: StudentWork, pages: Sequence[SimulatedSheet]) -> ReadWork:
+    declared, asked = declared_texts(work.task.declared), asked_of(work.assignment, work.rubric)
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [page.save(Path(folder) / str(number)) for number, page in enumerate(pages)]
+        refs = tuple(PageRef(path.name, path=path) for path in paths)
+        start = time.process_time()
+        submission = StudentSubmission("s", work.variant, refs, declared)
+        read = read_submission(submission, [scan(ref, asked) for ref in refs], work.assignment, asked)
+        spent = time.process_time() - start
+    return ReadWork(kind, work, tuple(page.reading for page in read), declared, spent)

@@ -1,0 +1,225 @@
+"""How many sheets of a scanned class are finished, and how many of the settled verdicts are wrong.
+
+::
+
+    python -m tests.bench.settling --students 300 --kept FOLDER
+
+reads the scans of 300 simulated students of each kind of sheet (some 5 s each; kept in the folder), judges
+them, and holds every verdict against what was due (`judging_truth`). Verdicts have a probability: the
+second table shows how often those of each probability are right.
+"""
+
+import argparse
+import itertools
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.marking.mark import judge
+from grader.outcomes import Judgement, Outcome
+from tests.bench.judging_handed_in import Due, Visible
+from tests.bench.judging_scans import SHEET_KINDS, ReadWork, read_works
+from tests.bench.judging_tally import CHARGED, CREDITED
+from tests.bench.judging_truth import charged_once, verdicts_due
+from tests.bench.plain_text import Table, as_text
+
+FIRST_SEED = 1001
+"""Students before it were used to set the probabilities of doubtful readings."""
+BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.97, 0.99, 0.999)
+LENGTHS_MM = (0.0, 5.0, 20.0, 1e9)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """One verdict: settled, or proposed to a person.
+
+    Attributes
+    ----------
+    is_right : None where either verdict is fair
+    """
+
+    is_settled: bool
+    is_right: bool | None
+    is_charge: bool
+    probability: float
+    length_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Marked:
+    """One student's sheets judged."""
+
+    kind: str
+    hand: str
+    is_drawn_right: bool
+    of_another: bool
+    was_read: bool
+    verdicts: tuple[Verdict, ...] = ()
+
+    @property
+    def waiting(self) -> int:
+        """How many verdicts wait for a person."""
+        return sum(not one.is_settled for one in self.verdicts)
+
+    @property
+    def wrong(self) -> list[Verdict]:
+        """Settled verdicts that are wrong."""
+        return [one for one in self.verdicts if one.is_settled and one.is_right is False]
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether nobody need look."""
+        return self.was_read and not self.waiting
+
+
+def marked(read: ReadWork) -> Marked:
+    """A student's sheets judged and held against the truth."""
+    work, drawn = read.work, tuple(one for one in read.readings if one.figures)
+    of_another = any(one.code == "other_variant" for one in work.task.mistakes)
+    about = read.kind, work.key.hand, work.key.kind == "right", of_another
+    if not drawn:
+        return Marked(*about, was_read=False)
+    task = task_of(work.assignment, work.rubric, work.variant)
+    judgement = judge(task, Submission(readings=drawn, declared=read.declared))
+    due = _due(read, judgement)
+    judged = [one for one in judgement.outcomes if one.verdict != "not_judged"]
+    return Marked(*about, was_read=True, verdicts=tuple(_verdict(one, due[one.criterion]) for one in judged))
+
+
+def _due(read: ReadWork, judgement: Judgement) -> dict[str, Due]:
+    """What is due to all that was drawn, read or not; a vector left out by mistake is wrong."""
+    work = read.work
+    names = {*work.construction.vectors, *work.construction.links} - work.left_out
+    said = {one.criterion: one.verdict for one in judgement.outcomes}
+    due = charged_once(work, verdicts_due(work, "scans", Visible(dict.fromkeys(names, True))), said)
+    missing = {one.id for one in work.rubric.criterion if one.name in work.task.missing}
+    return {name: "wrong" if name in missing else one for name, one in due.items()}
+
+
+def _verdict(outcome: Outcome, due: Due) -> Verdict:
+    is_settled = outcome.verdict != "review"
+    said = outcome.verdict if is_settled else outcome.proposed_verdict
+    fair = {"right": CREDITED, "follows": CREDITED, "wrong": CHARGED}.get(due)
+    length = outcome.expected.length_mm
+    return Verdict(
+        is_settled, None if fair is None else said in fair, said in CHARGED,
+        outcome.probability, 0.0 if length is None else length,
+    )  # fmt: skip
+
+
+# Tables --------------------------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class SettlingFigures:
+    """All students judged, and their tables."""
+
+    students: list[Marked] = field(default_factory=list)
+
+    def tables(self) -> Iterator[Table]:
+        """Finished sheets and wrong verdicts; then the probabilities against what was right."""
+        kinds = [kind for kind in SHEET_KINDS if any(one.kind == kind for one in self.students)]
+        heads = [
+            "sheets", "students", "finished", "right drawings finished", "criteria waiting",
+            "charged wrongly", "credited wrongly", "right drawings that lose", "not read",
+        ]  # fmt: skip
+        yield (
+            "Settling: a class of scans",
+            heads,
+            [
+                _row(SHEET_KINDS[kind].title, [one for one in self.students if one.kind == kind])
+                for kind in kinds
+            ],
+        )
+        groups = {
+            SHEET_KINDS[kind].title: [one for one in self.students if one.kind == kind] for kind in kinds
+        }
+        groups |= {f"{hand} hands": [one for one in self.students if one.hand == hand]
+                   for hand in dict.fromkeys(one.hand for one in self.students)}  # fmt: skip
+        found = {name: _fair(students) for name, students in groups.items()}
+        everything = _fair(self.students)
+        for low, high in itertools.pairwise(LENGTHS_MM):
+            name = f"vectors from {low:g} mm" if high > 1e3 else f"vectors of {low:g} to {high:g} mm"
+            found[name] = [one for one in everything if low <= one.length_mm < high]
+        bins = [*itertools.pairwise(BINS), (BINS[-1], 1.1)]
+        heads = ["verdicts", *(f"{low:g}-{min(high, 1.0):g}" for low, high in bins)]
+        yield (
+            "Settling: right verdicts, by their probability",
+            heads,
+            [
+                [
+                    name,
+                    *(
+                        _share([one for one in verdicts if low <= one.probability < high])
+                        for low, high in bins
+                    ),
+                ]
+                for name, verdicts in found.items()
+            ],
+        )
+
+
+def _row(title: str, students: Sequence[Marked]) -> list[str]:
+    own = [one for one in students if not one.of_another]
+    right = [one for one in students if one.is_drawn_right]
+    verdicts = [verdict for one in own for verdict in one.verdicts]
+    settled = [one for one in verdicts if one.is_settled]
+    wrong = Counter(one.is_charge for student in own for one in student.wrong)
+    losing = sum(any(one.is_charge for one in student.wrong) for student in right)
+    return [
+        title, str(len(students)), _percent(sum(one.is_finished for one in own), len(own)),
+        _percent(sum(one.is_finished for one in right), len(right)),
+        _percent(len(verdicts) - len(settled), len(verdicts)),
+        f"{wrong[True]} of {len(settled)}", f"{wrong[False]} of {len(settled)}",
+        f"{losing} of {len(right)}", str(sum(not one.was_read for one in students)),
+    ]  # fmt: skip
+
+
+def _fair(students: Iterable[Marked]) -> list[Verdict]:
+    """The verdicts of which only one would be fair."""
+    return [one for student in students for one in student.verdicts if one.is_right is not None]
+
+
+def _share(verdicts: Sequence[Verdict]) -> str:
+    right = sum(one.is_right is True for one in verdicts)
+    return f"{100.0 * right / len(verdicts):.1f} % of {len(verdicts)}" if verdicts else "-"
+
+
+def _percent(part: int, whole: int) -> str:
+    return f"{100.0 * part / whole:.1f} %" if whole else "-"
+
+
+# Running it ----------------------------------------------------------------------------------------
+
+
+def _marked_seed(kept: Path | None, task: tuple[str, int]) -> list[Marked]:
+    kind, seed = task
+    return [marked(read) for read in read_works(kind, [seed], kept)]
+
+
+def measure(students: int, kinds: Sequence[str], kept: Path | None, jobs: int) -> SettlingFigures:
+    """So many students of each kind, read and judged in some processes."""
+    tasks = [(kind, seed) for seed in range(FIRST_SEED, FIRST_SEED + students) for kind in kinds]
+    with ProcessPoolExecutor(jobs) as pool:
+        found = pool.map(partial(_marked_seed, kept), tasks, chunksize=4)
+        return SettlingFigures([one for some in found for one in some])
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The benchmark as text."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
+    parser.add_argument("--students", type=int, default=20, help="of each kind of sheet")
+    parser.add_argument("--kinds", nargs="+", default=list(SHEET_KINDS), choices=list(SHEET_KINDS))
+    parser.add_argument("--kept", type=Path, help="folder in which readings are kept")
+    parser.add_argument("--jobs", type=int, default=1)
+    chosen = parser.parse_args(arguments)
+    print(as_text(measure(chosen.students, chosen.kinds, chosen.kept, chosen.jobs).tables()))
+
+
+if __name__ == "__main__":
+    main()
