@@ -147,18 +147,19 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
         for one in comparison.outcomes
         if one.verdict == "full" and (one.measured.length_mm or 0.0) >= LEAST_SLIPPED_MM and not known
     }
-    found = []
+    of_vectors, of_rates = [], []
     for one in comparison.outcomes:
         rate = task.construction.rates.get(one.name)
         is_value_off = one.verdict in CHARGED and VALUE_OFF & {reason.code for reason in one.reasons}
-        is_of_right_vector = rate is not None and rate.vector in sure
         value, right = one.measured.value, one.expected.value
         factor = value / right if value and right else 1.0
-        is_slip = is_value_off and is_of_right_vector and abs(factor - 1.0) >= LEAST_SLIP
-        if one.mistake == "arithmetic" or is_slip:
-            slip = Mistake("arithmetic", one.name, factor=factor)
-            found.append(NamedMistake(slip, (one.criterion,), SLIPPED))
-    return found
+        slip = NamedMistake(Mistake("arithmetic", one.name, factor=factor), (one.criterion,), SLIPPED)
+        if one.mistake == "arithmetic":
+            of_vectors.append(slip)
+        elif rate is not None and rate.vector in sure and is_value_off and abs(factor - 1.0) >= LEAST_SLIP:
+            of_rates.append(slip)
+    # Several of them have one cause that is elsewhere.
+    return of_vectors + (of_rates if len(of_rates) == 1 else [])
 
 
 def with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
