@@ -207,6 +207,8 @@ class CriterionDocument(Document):
     """Codes of what the verdict rests on, most important first."""
     link: str | None = None
     """The link of the mechanism judged."""
+    section: str | None = None
+    """The section of the rubric that it belongs to, where that has a weight of its own."""
 
     @property
     def drawn(self) -> str:
@@ -376,6 +378,8 @@ class ResultsDocument(Document):
 
     schema_version: Version = 1
     assignment: str
+    titles: dict[str, str] = {}
+    """The criteria's titles in the language of the class, by id; those of a report are in its student's."""
     reports: list[ReportDocument]
     unmatched: list[UnmatchedDocument] = []
     moved: list[MovedDocument] = []

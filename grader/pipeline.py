@@ -10,7 +10,7 @@ becomes a problem of its page or report, never an error.
 """
 
 import time
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from hashlib import blake2b
@@ -169,11 +169,33 @@ def mark(
 
     Arguments: pictures show expected vectors beside wrong ones at level `full`, unless without `with_ghosts`.
     """
+    report, painted = _marked(submission, pages, assignment, rubric, level)
+    return report, painted(with_ghosts and level == "full")
+
+
+def report_on(
+    submission: StudentSubmission,
+    pages: Sequence[ScannedPage],
+    assignment: Assignment,
+    rubric: RubricFile,
+    level: Level = "full",
+) -> ReportDocument:
+    """The report alone, as of `mark`: pictures take most of its time."""
+    return _marked(submission, pages, assignment, rubric, level)[0]
+
+
+def _marked(
+    submission: StudentSubmission,
+    pages: Sequence[ScannedPage],
+    assignment: Assignment,
+    rubric: RubricFile,
+    level: Level,
+) -> tuple[ReportDocument, Callable[[bool], tuple[Picture, ...]]]:
+    """The report, and what paints the pages, with expected vectors or without."""
     pages = [page.asked_only(rubric.vectors) for page in pages]
     pages, astray = with_nodes(pages, submission, assignment)
     sheets = [reading_document(page, submission.student_id) for page in pages]
     problems = (*submission.problems, *(problem for page in pages for problem in page.problems), *astray)
-    ghosts = with_ghosts and level == "full"
     judged = _judged(submission, assignment, rubric, [page.reading for page in pages])
     if isinstance(judged, Problem):
         is_there = submission.pages or submission.measured or submission.has_unusable
@@ -181,8 +203,9 @@ def mark(
             assignment, rubric, submission.variant or Variant(), submission.student_id,
             "unreadable" if is_there else "missing", problems=(*problems, judged), sheets=sheets,
         )  # fmt: skip
+        plain = [(page.backdrop, page.reading) for page in pages if page.backdrop]
         report = with_decisions(report, submission)
-        return report, tuple(overlay(page.backdrop, page.reading, {}, {}) for page in pages if page.backdrop)
+        return report, lambda _ghosts: tuple(overlay(scan, reading, {}, {}) for scan, reading in plain)
     task, own, declared = judged
     judgement = decide(own, rubric, submission.decided)
     names, lang, measured = assignment.file.names, submission.lang, submission.measured or NOTHING_MEASURED
@@ -196,7 +219,9 @@ def mark(
     )  # fmt: skip
     report = with_mistakes_explained(report, judgement, assignment, task.variant, lang, level)
     report = with_decisions(report, submission, own, task.construction)
-    return report, _pictures(pages, measured, task.construction, judgement, show_expected=ghosts)
+    return report, lambda ghosts: _pictures(
+        pages, measured, task.construction, judgement, show_expected=ghosts
+    )
 
 
 def _judged(

@@ -240,12 +240,15 @@ class RubricFile(Authored):
     @property
     def points(self) -> Mapping[str, float]:
         """Points by criterion, scaled so that each section has its weight."""
-        weights = {section: getattr(self.weights, section) for section in self.sections}
         factors = {
-            section: 1.0 if weights[section] is None else weights[section] / whole
-            for section, whole in self.sections.items()
+            section: (self.weight_of(section) or whole) / whole for section, whole in self.sections.items()
         }
         return {one.id: one.points * factors[one.section] for one in self.criterion}
+
+    def weight_of(self, section: Section) -> float | None:
+        """What a section is worth whatever its points add up to; None where its points say it."""
+        weight: float | None = getattr(self.weights, section)
+        return weight
 
     @property
     def sections(self) -> Mapping[Section, float]:

@@ -19,10 +19,10 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.ge
 
 
 SLOW = (
-    "bench", "docs/test_readme", "functional", "fuzz", "laws", "samples", "synthetic", "unit/bench",
-    "unit/folder/test_workers", "unit/older", "unit/reading", "unit/reference/test_exact_plan",
-    "unit/scan/decode/test_hostile", "unit/scan/handwriting", "unit/scan/register", "unit/scan/strokes",
-    "unit/similarity",
+    "bench", "browser", "docs/test_readme", "functional", "fuzz", "laws", "samples", "synthetic",
+    "unit/bench", "unit/folder/test_workers", "unit/older", "unit/reading",
+    "unit/reference/test_exact_plan", "unit/review/test_session", "unit/scan/decode/test_hostile",
+    "unit/scan/handwriting", "unit/scan/register", "unit/scan/strokes", "unit/similarity",
 )  # fmt: skip
 """Where tests run the whole program, read scans, or try many cases; the others are the quick set."""
 

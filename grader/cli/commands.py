@@ -204,6 +204,30 @@ def grade(
 
 
 @app.command()
+def review(
+    results: Annotated[
+        Path,
+        typer.Argument(metavar="OUT", help="The folder that `planmark grade` wrote, or the submissions'."),
+    ],
+    host: Annotated[
+        str, typer.Option("--host", help="Address to listen on; other machines need the --token, too.")
+    ] = "127.0.0.1",
+    token: Annotated[
+        str, typer.Option("--token", help="What people must have in the address: 8 signs or more.")
+    ] = "",
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0: any that is free.")] = 8321,
+    jobs: JobsOption = None,
+    lang: Annotated[
+        str | None, typer.Option("--lang", help="Of the page: en, ro or ru; as graded if absent.")
+    ] = None,
+) -> None:
+    """Settle what waits on a web page; decisions go to decisions.csv beside the submissions."""
+    from grader.cli.reviewing import review_class
+
+    review_class(results, host=host, token=token, port=port, jobs=jobs, lang=lang)
+
+
+@app.command()
 def check(
     assignment: AssignmentArgument,
     measured: Annotated[Path, typer.Option("--measured", help="Measurement file, CSV or JSON.")],

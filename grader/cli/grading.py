@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import shutil
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -12,7 +13,8 @@ import typer
 from grader.cli.app import check_language, new_table, progress
 from grader.cli.checking import checked_level
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
-from grader.feedback.class_page import CAUSES, SIGNS, waiting
+from grader.feedback.class_page import CAUSES, SIGNS, write_demo_page
+from grader.feedback.class_statistics import waiting
 from grader.files import samples_folder
 from grader.folder.batch import Batch, grade, needs_person
 from grader.folder.changes import standing_text
@@ -60,11 +62,19 @@ def grade_folder(
 
 
 def demo(out: Path, lang: str, jobs: int | None) -> None:
-    """Grade the bundled samples."""
+    """Grade the bundled samples, and write the page that leads to their classes."""
+    classes = {}
     for name in ("pump", "press"):
         typer.echo(f"Grading the {name} class of the samples")
-        folder = samples_folder() / name
+        # A copy: what is decided on it lies beside it.
+        folder = out / "handed-in" / name
+        shutil.copytree(samples_folder() / name, folder, dirs_exist_ok=True)
         grade_folder(folder, name, out / name, roster=None, pages_per_student=None, jobs=jobs, lang=lang)
+        title = load_assignment(name).file.title.in_language(lang)
+        results = ResultsDocument.model_validate_json((out / name / "results.json").read_bytes())
+        classes[name] = (title, results)
+    write_demo_page(classes, out, lang)
+    typer.echo(f"Begin at {out / 'index.html'}; decide what waits with: planmark review {out / 'pump'}")
 
 
 def read_scans(

@@ -1,11 +1,10 @@
-"""The class's page: states, scores, criteria, mistakes, what waits. Readable offline and on paper."""
+"""The class's page, and the demo's that leads to its classes. Readable offline, on a phone and on paper."""
 
+import shlex
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import floor
 from pathlib import Path
-from statistics import mean, median
 from urllib.parse import quote
 
 from markupsafe import Markup
@@ -20,193 +19,35 @@ from grader.documents import (
     Sign,
     StandingDocument,
 )
-from grader.feedback.mistakes import MISTAKES
-from grader.feedback.words import (
-    STATES,
-    VERDICTS,
-    environment,
-    problem_sentence,
-    score_text,
-    unmatched_sentence,
+from grader.feedback.class_statistics import (
+    BINS,
+    commonest,
+    follow_through,
+    hardest,
+    histogram,
+    open_shares,
+    settled,
+    shares,
+    spread,
+    states,
+    title_of,
+    waiting,
+    wrong_scales,
 )
+from grader.feedback.mistakes import MISTAKES
+from grader.feedback.numbers import score_text
+from grader.feedback.words import STATES, VERDICTS, environment, problem_sentence, unmatched_sentence
 from grader.files import result_folders, write_whole
 from grader.language import N_, Tongue, tongue
-from grader.overlay.scene import COLOURS, MARKS
-
-BINS = 10
-HARDEST = 8
-COMMONEST = 8
-
-_JUDGED = {"full", "partial", "none", "follow_through"}
-_LOST = {"none", "partial"}
-
-
-def states(results: ResultsDocument) -> Counter[str]:
-    """How many reports are in each state."""
-    return Counter(report.status for report in results.reports)
-
-
-# Scores -------------------------------------------------------------------------------------------
-
-
-def shares(results: ResultsDocument) -> list[float]:
-    """Final scores as shares of the maximum."""
-    return [
-        report.score / report.max_score
-        for report in results.reports
-        if report.score is not None and report.max_score > 0.0
-    ]
-
-
-def open_shares(results: ResultsDocument) -> list[float]:
-    """Of what waits for a person, the middle of the range that the score lies in, as a share."""
-    return [
-        sum(report.score_range) / 2.0 / report.max_score
-        for report in results.reports
-        if report.status == "needs_review" and report.score is None
-        if report.score_range is not None and report.max_score > 0.0
-    ]
-
-
-def histogram(values: Iterable[float]) -> list[int]:
-    """Counts in ten equal bins of 0..1; full marks belong to the last."""
-    counts = [0] * BINS
-    for value in values:
-        counts[min(BINS - 1, max(0, floor(value * BINS + 1e-9)))] += 1
-    return counts
-
-
-@dataclass(frozen=True, slots=True)
-class ScoreSpread:
-    """Mean, median, least and largest of the final scores, as shares of the maximum."""
-
-    mean: float
-    median: float
-    least: float
-    largest: float
-
-
-def spread(results: ResultsDocument) -> ScoreSpread | None:
-    """How the final scores spread; None while there are none."""
-    values = shares(results)
-    return ScoreSpread(mean(values), median(values), min(values), max(values)) if values else None
-
-
-# Criteria -----------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class Hardness:
-    """How a criterion went: the share of its points that was earned where it was judged."""
-
-    title: str
-    vector: str | None
-    earned: float
-    judged: int
-
-
-def hardest(results: ResultsDocument) -> list[Hardness]:
-    """The criteria at which most points were lost, worst first; those that everybody got are left out."""
-    judged: dict[str, list[CriterionDocument]] = {}
-    first: dict[str, CriterionDocument] = {}
-    for report in results.reports:
-        for criterion in report.criteria:
-            first.setdefault(criterion.id, criterion)
-            if criterion.verdict in _JUDGED and criterion.points is not None:
-                judged.setdefault(criterion.id, []).append(criterion)
-    hardness = []
-    for name, criteria in judged.items():
-        earned = sum(criterion.points or 0.0 for criterion in criteria)
-        possible = sum(criterion.max_points for criterion in criteria)
-        if earned < possible:
-            hardness.append(Hardness(first[name].title, first[name].vector, earned / possible, len(criteria)))
-    return sorted(hardness, key=lambda criterion: criterion.earned)[:HARDEST]
-
-
-@dataclass(frozen=True, slots=True)
-class Followed:
-    """What counts as right because it follows from an own earlier value: each criterion, how often."""
-
-    points: float
-    reports: list[ReportDocument]
-    criteria: list[tuple[str, int]]
-
-
-def follow_through(results: ResultsDocument) -> Followed:
-    """Follow-through granted, with the reports."""
-    points, reports, times = 0.0, [], Counter[str]()
-    for report in results.reports:
-        given = [criterion for criterion in report.criteria if criterion.verdict == "follow_through"]
-        points += sum(criterion.points or 0.0 for criterion in given)
-        times.update(criterion.title for criterion in given)
-        reports += [report] if given else []
-    return Followed(points, reports, times.most_common(HARDEST))
-
-
-# Mistakes -----------------------------------------------------------------------------------------
-
-
-def commonest(results: ResultsDocument) -> list[tuple[str, list[ReportDocument]]]:
-    """Codes of mistakes with the reports that show them, commonest first."""
-    reports: dict[str, list[ReportDocument]] = {}
-    for report in results.reports:
-        for code in dict.fromkeys(mistake.code for mistake in report.mistakes):
-            reports.setdefault(code, []).append(report)
-    return sorted(reports.items(), key=lambda item: -len(item[1]))[:COMMONEST]
-
-
-def wrong_scales(results: ResultsDocument) -> list[tuple[ReportDocument, list[CriterionDocument], list[str]]]:
-    """Reports whose scales were not right: the criteria lost, and the scales not understood."""
-    wrong = []
-    for report in results.reports:
-        # A criterion asks for a scale where it expects something per millimetre on paper.
-        asked = [each for each in report.criteria if each.vector is None]
-        asked = [each for each in asked if (each.expected.unit or "").endswith("/mm")]
-        lost = [criterion for criterion in asked if criterion.verdict in _LOST]
-        refused = [
-            f"{name} = {scale.text}" for name, scale in report.scales.items() if scale.refused and scale.text
-        ]
-        if lost or refused:
-            wrong.append((report, lost, refused))
-    return wrong
-
-
-# What waits ---------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class Waiting:
-    """A report that a person must review, the points at stake, and the criteria that wait."""
-
-    report: ReportDocument
-    points: float
-    criteria: list[CriterionDocument]
-
-
-def waiting(results: ResultsDocument) -> list[Waiting]:
-    """The reports that wait for a person, those with the most points at stake first."""
-    reports = [report for report in results.reports if report.status in {"needs_review", "unreadable"}]
-    return sorted(
-        (
-            Waiting(report, _stake(report), [one for one in report.criteria if one.verdict == "review"])
-            for report in reports
-        ),
-        key=lambda item: -item.points,
-    )
-
-
-def _stake(report: ReportDocument) -> float:
-    """Points between the least and the largest score that are still possible."""
-    if report.status == "unreadable" or report.score_range is None:
-        return report.max_score
-    return report.score_range[1] - report.score_range[0]
-
+from grader.overlay.scene import MARKS
 
 # The page -----------------------------------------------------------------------------------------
 
 _NO_NAMES: Mapping[str, str] = {}
 SHOWN = 12
 """Students named at once; the others unfold."""
+FEW = 3
+"""Changed criteria of a student that are shown at once; more unfold together."""
 SIGNS: Mapping[Sign, str] = {
     "hand_errors": N_("the same small errors of the hand"),
     "same_place": N_("figures lie in the same places on the sheet"),
@@ -227,6 +68,11 @@ CAUSES: Mapping[Cause, str] = {
 }
 
 
+REVIEW = N_("Look at what waits, and decide:")
+EXPORT = N_("Hand on what is finished:")
+WRONG = N_("Of %(settled)s verdicts that nobody has checked, about %(wrong)s may be wrong.")
+
+
 def write_index(
     results: ResultsDocument,
     out_dir: Path,
@@ -236,13 +82,19 @@ def write_index(
     student_names: Mapping[str, str] = _NO_NAMES,
 ) -> None:
     """Write `index.html`, the class at a glance, into a folder; `student_names` by student_id."""
-    write_whole(out_dir / "index.html", index_page(results, lang, title=title, student_names=student_names))
+    page = index_page(results, lang, title=title, student_names=student_names, out=str(out_dir))
+    write_whole(out_dir / "index.html", page)
 
 
 def index_page(
-    results: ResultsDocument, lang: str, *, title: str = "", student_names: Mapping[str, str] = _NO_NAMES
+    results: ResultsDocument,
+    lang: str,
+    *,
+    title: str = "",
+    student_names: Mapping[str, str] = _NO_NAMES,
+    out: str = "OUT",
 ) -> str:
-    """The class's page."""
+    """The class's page; `out` is the folder of the results, as commands name it."""
     speaker = tongue(lang)
     links = _links(results.reports)
     followed = follow_through(results)
@@ -253,6 +105,8 @@ def index_page(
     return environment(speaker.lang).get_template("index.html").render(
         results=results,
         title=title or results.assignment,
+        steps=_next_steps(results, out),
+        how_sure=_how_sure(results, speaker),
         rows=[_row(report, student_names, link(report), speaker) for report in results.reports],
         has_positions=any(report.position is not None for report in results.reports),
         has_n=any("n" in report.variant for report in results.reports),
@@ -271,16 +125,63 @@ def index_page(
         followers=[link(report) for report in followed.reports],
         waiting=[(link(waiting.report), waiting) for waiting in waiting(results)],
         scales=[
-            (link(report), [_scale(criterion, speaker) for criterion in lost], refused)
+            (link(report), [_scale(results, criterion, speaker) for criterion in lost], refused)
             for report, lost, refused in wrong_scales(results)
         ],
         alike=[_similar_row(pair, links, speaker) for pair in results.alike],
-        moved=[_change_row(change, link(change), speaker) for change in results.moved],
+        moved=[_change_row(results, change, link(change), speaker) for change in results.moved],
         causes=_causes(results.moved),
         score_text=lambda report: score_text(report, speaker),
+        title_of=lambda criterion: title_of(results, criterion),
         shown=SHOWN,
-        colours=COLOURS,
+        few=FEW,
     )  # fmt: skip
+
+
+def needs_review(results: ResultsDocument) -> bool:
+    """Whether anything is there that a person can decide."""
+    return bool(results.unmatched or results.stale or waiting(results))
+
+
+def _next_steps(results: ResultsDocument, out: str) -> list[tuple[str, str]]:
+    """What to do next, each with its command."""
+    folder = shlex.quote(out)
+    steps = [(REVIEW, f"planmark review {folder}")] if needs_review(results) else []
+    if states(results)["graded"]:
+        steps.append((EXPORT, f"planmark export {folder} --to moodle"))
+    return steps
+
+
+def _how_sure(results: ResultsDocument, speaker: Tongue) -> str:
+    """How many verdicts may be wrong; empty where that is not known."""
+    if results.expected_wrong is None:
+        return ""
+    known = {"settled": settled(results), "wrong": speaker.significant(results.expected_wrong, 1)}
+    return speaker.gettext(WRONG) % known
+
+
+# The demo's page ----------------------------------------------------------------------------------
+
+
+def write_demo_page(classes: Mapping[str, tuple[str, ResultsDocument]], out_dir: Path, lang: str) -> None:
+    """Write `index.html`, which leads to the demo's classes; `classes` by folder: title and results."""
+    speaker = tongue(lang)
+    page = (
+        environment(speaker.lang)
+        .get_template("demo.html")
+        .render(
+            classes=[
+                (
+                    title,
+                    f"{quote(folder)}/index.html",
+                    states(results),
+                    _next_steps(results, f"{out_dir}/{folder}"),
+                )
+                for folder, (title, results) in classes.items()
+            ]
+        )
+    )
+    write_whole(out_dir / "index.html", page)
 
 
 # Students -----------------------------------------------------------------------------------------
@@ -322,11 +223,11 @@ def _row(report: ReportDocument, names: Mapping[str, str], link: Link, speaker: 
     }
 
 
-def _scale(criterion: CriterionDocument, speaker: Tongue) -> str:
+def _scale(results: ResultsDocument, criterion: CriterionDocument, speaker: Tongue) -> str:
     """A scale that was not right: what was declared, and what it is."""
     quantities = (criterion.measured, criterion.expected)
     values = [speaker.value(each.value, each.unit or "") for each in quantities if each.value is not None]
-    return f"{criterion.title}: {' ≠ '.join(values)}"
+    return f"{title_of(results, criterion)}: {' ≠ '.join(values)}"
 
 
 # Similar sheets, and changes since the last run -----------------------------------------------------------
@@ -349,7 +250,9 @@ def _similar_row(pair: AlikeDocument, links: Links, speaker: Tongue) -> dict[str
     }
 
 
-def _change_row(change: MovedDocument, link: Link, speaker: Tongue) -> dict[str, object]:
+def _change_row(
+    results: ResultsDocument, change: MovedDocument, link: Link, speaker: Tongue
+) -> dict[str, object]:
     return {
         "student": link,
         "before": _standing(change.before, speaker),
@@ -357,7 +260,7 @@ def _change_row(change: MovedDocument, link: Link, speaker: Tongue) -> dict[str,
         "why": [speaker.gettext(CAUSES[cause]) for cause in change.why],
         "criteria": [
             (
-                criterion.title,
+                title_of(results, criterion),
                 _verdict(criterion.before, criterion.points_before, speaker),
                 _verdict(criterion.after, criterion.points_after, speaker),
             )

@@ -7,11 +7,12 @@ Names of vectors stand in sentences as `v_BA`, `a_BA_n`; pages set them with ind
 
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Literal
 
 from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, question_of, words_of
 from grader.language import N_, Tongue, tongue
-from grader.outcomes import NamedMistake, Outcome, Param, Reason
+from grader.outcomes import NamedMistake, Outcome, Param, Quantity, Reason
 
 Level = Literal["symbol", "hint", "full"]
 
@@ -21,6 +22,12 @@ _NO_NAMES: Mapping[str, str] = {}
 
 UNDECIDED = "scale_undecided"
 """Stands for `scale_assumed` and `follows` together, under review: neither alone says what is in doubt."""
+UNSURE = "read_unsurely"
+"""Stands for `unread` where something was read, though not surely, and for `doubtful` beside it."""
+UNCHECKED = "unchecked"
+"""Stands where nothing was judged and no reason is given."""
+OPEN_ONLY = frozenset({"near_limit", "hand_may_miss", "doubtful", UNSURE})
+"""Said of what waits alone: no doubt is left where there is a verdict."""
 
 HINTS: dict[str, str] = {
     "right": N_("Right."),
@@ -61,6 +68,8 @@ HINTS: dict[str, str] = {
         "No scale was declared: it is off at the assignment's own, and right at the one"
         " that the drawing follows."
     ),
+    UNSURE: N_("It was read with too little certainty."),
+    UNCHECKED: N_("Nothing was drawn that it could be held against."),
 }
 """What is said at level `hint`, by code of the reason."""
 
@@ -82,6 +91,7 @@ FULL: dict[str, str] = {
     "unread": N_("It could not be read on the sheet (%(reason)s)."),
     "entry_refused": N_("An entry that it rests on cannot be used (%(reason)s): a person must look."),
     "doubtful": N_("It was read with too little certainty (%(confidence)s)."),
+    UNSURE: N_("It was read with too little certainty (%(reason)s)."),
     "near_limit": N_(
         "It lies so near the limit of the tolerance that the scan cannot decide (standard error %(se)s)."
     ),
@@ -151,6 +161,8 @@ def criterion_feedback(
 
 def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     """The reasons without those that say nothing beside the others, or too much."""
+    if outcome.verdict == "not_judged" and not outcome.reasons:
+        return [Reason(UNCHECKED)]
     codes = {reason.code for reason in outcome.reasons}
     by_scale = any(one.code == "follows" and one.params.get("what") == "scale" for one in outcome.reasons)
     if outcome.verdict == "review" and "scale_assumed" in codes and by_scale:
@@ -158,15 +170,23 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     if outcome.verdict == "follow_through" and "follows" in codes:
         return [one for one in outcome.reasons if one.code in {"follows", "counted_for_you", "at_stake"}]
     needless = {"right"} if codes - {"right"} else set()
+    if outcome.verdict != "review":
+        needless |= OPEN_ONLY
+    if "doubtful" in codes:
+        needless |= {"near_limit"}
     if level != "full" and codes & {"not_measured", "unread"}:
         # How short it should be is an answer, where nothing was drawn.
         needless |= {"too_short_to_judge"}
     if "optional" in codes:
         needless |= {"not_measured", "unread"}
-    near = next((reason for reason in outcome.reasons if reason.code == "near_limit"), None)
+    reasons = list(outcome.reasons)
+    if "unread" in codes and outcome.measured != Quantity():
+        needless |= {"doubtful", "near_limit"}
+        reasons = [replace(one, code=UNSURE) if one.code == "unread" else one for one in reasons]
+    near = next((reason for reason in reasons if reason.code == "near_limit"), None)
     return [
         reason
-        for reason in outcome.reasons
+        for reason in reasons
         # Of several limits that are near, the first one is enough.
         if reason.code not in needless and (reason.code != "near_limit" or reason is near)
     ]

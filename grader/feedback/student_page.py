@@ -1,9 +1,9 @@
 """What one student's page says: one description, from the report."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from markupsafe import Markup
 
@@ -15,28 +15,32 @@ from grader.documents import (
     RivalDocument,
     ScaleDocument,
     ScaleName,
-    ToleranceDocument,
 )
 from grader.feedback import words
 from grader.feedback.mistakes import MISTAKES, words_of
+from grader.feedback.numbers import (
+    added_text,
+    quantity_cells,
+    scale_text,
+    score_line,
+    score_text,
+    tolerance_cells,
+)
 from grader.feedback.sentences import HINTS, PLACES, Level, place
-from grader.feedback.words import ProblemText, environment, problem_sentence, score_text
+from grader.feedback.words import ProblemText, environment, problem_sentence
 from grader.files import write_whole
 from grader.language import N_, Tongue, tongue
 from grader.overlay.closeup import PageView, detail, page_views, scan_element, svg
-from grader.overlay.scene import COLOURS, Picture
-from reference.drawing.subject import SCALE_UNITS
+from grader.overlay.scene import Picture
 
 NUMBER, POSITION, PAGE = N_("number"), N_("position"), N_("page")
 WIDENED = N_("widened")
+FROM_OWN = N_("from your own values")
+"""Beside what was expected where that follows from the student's own earlier values."""
+MAY_BE_WRONG = N_("What may be wrong")
 AS_MEASURED = N_("drawn from the entered measurements")
 SHEET = N_("the sheet")
 DETAIL = N_("a closer look")
-OTHERS = N_("Also off, without a single likely cause")
-OTHERS_SAID = N_(
-    "What is off is told below, beside each criterion. Begin with the first of them:"
-    " others may follow from it."
-)
 OR = N_("or")
 WHY_WIDENED = N_(
     "Widened: small errors of a careful hand add up to more than the rubric's tolerance here, as they do"
@@ -45,11 +49,17 @@ WHY_WIDENED = N_(
 UNITS = N_(
     "Lengths are millimetres on paper; directions count counter-clockwise from the horizontal to the right."
 )
-MOST_WAITING_DETAILS = 3
-"""Close-ups of what waits for a person: they stand in one row."""
 PRINTED = "feedback.pdf"
 """Earlier versions wrote it; an old one is removed, it may show more than the page does now."""
 
+GroupName = Literal["lost", "waiting", "right", "not_judged"]
+GROUPS: Mapping[GroupName, tuple[str, ...]] = {
+    "lost": (N_("What is wrong"), "none", "partial"),
+    "waiting": (N_("What a person must still look at"), "review"),
+    "right": ("", "full", "follow_through"),
+    "not_judged": ("", "not_judged"),
+}
+"""Verdicts of the groups of rows, after the titles of those that are not folded."""
 WAITING: dict[str, str] = {
     "other_variant": N_("drawn with another student's data"),
     "entry_refused": N_("an entry that it rests on cannot be used"),
@@ -79,9 +89,12 @@ class About:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """A mistake, or what is off without one: what happened, what to redo, what it explains, where to see it.
+    """A mistake: what happened, what to redo, what it explains, where to see it.
 
-    `alternatives` would explain the same nearly as well.
+    Attributes
+    ----------
+    alternatives : what would explain the same nearly as well
+    is_open : whether all that it explains still waits for a person
     """
 
     title: str
@@ -91,6 +104,26 @@ class Action:
     redo: tuple[str, ...] = ()
     explains: tuple[str, ...] = ()
     view: PageView | None = None
+    is_open: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Rows that are shown together: those that lost points, that wait, that are right, that do not count."""
+
+    title: str
+    verdict: str
+    rows: tuple[CriterionDocument, ...]
+
+    @property
+    def points(self) -> float:
+        """Those that its rows gave."""
+        return sum(row.points or 0.0 for row in self.rows)
+
+    @property
+    def max_points(self) -> float:
+        """Those that its rows can give."""
+        return sum(row.max_points for row in self.rows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,10 +173,31 @@ class StudentPage:
 
     # Criteria and scales --------------------------------------------------------------------------
 
+    def group(self, name: GroupName) -> Group:
+        """The rows of a group, those that need not be handed in and were not left out."""
+        title, *verdicts = GROUPS[name]
+        rows = (row for row in self.report.criteria if row.verdict in verdicts and not _is_left_out(row))
+        return Group(self.speaker.gettext(title), verdicts[0], tuple(rows))
+
     @property
-    def criteria(self) -> list[CriterionDocument]:
-        """The rows of the table."""
-        return [criterion for criterion in self.report.criteria if not _is_left_out(criterion)]
+    def score_line(self) -> str:
+        """How the points of the rows become the score."""
+        return score_line(self.report, self.speaker)
+
+    @property
+    def added(self) -> str:
+        """The points that a person added or took off."""
+        return added_text(self.report, self.speaker)
+
+    @property
+    def remarks_of_people(self) -> list[tuple[str, str]]:
+        """What a person wrote: on the whole, then on criteria, each text once with the criteria's titles."""
+        titles: dict[str, list[str]] = {}
+        for row in self.report.criteria:
+            if row.decided and row.decided.comment:
+                titles.setdefault(row.decided.comment, []).append(row.title)
+        whole = [("", self.report.comment)] if self.report.comment else []
+        return [*whole, *((", ".join(about), text) for text, about in titles.items())]
 
     @property
     def not_required(self) -> list[Markup]:
@@ -161,24 +215,37 @@ class StudentPage:
         return self.shown(criterion.drawn) if is_needed else ""
 
     def sentence(self, criterion: CriterionDocument) -> str:
-        """What is said of a criterion; nothing where it is just right."""
-        return "" if criterion.feedback == self.speaker.gettext(HINTS["right"]) else criterion.feedback
+        """What is said of a criterion; nothing where its mark says it: just right, or checked by a person."""
+        needless = (self.speaker.gettext(HINTS[code]) for code in ("right", "decided"))
+        return "" if criterion.feedback in needless else criterion.feedback
 
     def measured(self, criterion: CriterionDocument) -> list[str]:
         """What was handed in, as lines of a cell."""
         return quantity_cells(criterion.measured, self.speaker)
 
     def expected(self, criterion: CriterionDocument) -> list[str]:
-        """What is right, as lines of a cell."""
-        return quantity_cells(criterion.expected, self.speaker) if self.shows_expected else []
+        """What is right, as lines of a cell; what is shorter than its tolerance has no direction."""
+        if not self.shows_expected:
+            return []
+        expected = criterion.expected
+        if (expected.length_mm or 0.0) <= (criterion.tolerance.length_mm or -1.0):
+            expected = expected.model_copy(update={"direction_deg": None})
+        return quantity_cells(expected, self.speaker)
 
     def tolerance(self, criterion: CriterionDocument) -> list[str]:
-        """What full marks allow; a tolerance in per cent of what is expected would give that away."""
+        """What full marks allow, and why; one in per cent of what is expected would give that away."""
         if not self.shows_expected:
             return []
         unit = criterion.expected.unit or criterion.measured.unit or ""
-        cells = tolerance_cells(criterion.tolerance, unit, self.speaker)
-        return [*cells, self.speaker.gettext(WIDENED)] if cells and criterion.tolerance.widened else cells
+        tolerance = criterion.tolerance
+        if "too_short_to_judge" in criterion.reasons:
+            tolerance = tolerance.model_copy(update={"direction_deg": None})
+        cells = tolerance_cells(tolerance, unit, self.speaker)
+        if cells and tolerance.widened:
+            cells.append(self.speaker.gettext(WIDENED))
+        if cells and "follows" in criterion.reasons:
+            cells.append(self.speaker.gettext(FROM_OWN))
+        return cells
 
     @property
     def widening(self) -> str:
@@ -212,17 +279,23 @@ class StudentPage:
         return [scan_element(picture, index) for index, picture in enumerate(self.pictures)]
 
     @property
-    def sheets(self) -> list[tuple[str, list[PageView]]]:
-        """Each page: its name, and the views of it."""
-        return [
-            (self._source(picture), page_views(picture, index, self.about.names))
-            for index, picture in enumerate(self.pictures)
-        ]
+    def views(self) -> tuple[list[PageView], list[PageView]]:
+        """What is shown at once, and whole sheets that show no more than their plans, shown by themselves."""
+        pages = [page_views(picture, index, self.about.names) for index, picture in enumerate(self.pictures)]
+        views = [view for page in pages for view in page]
+        whole = [page[0] for page in pages if len(page) > 1 and page[0].kind == "sheet" and not page[0].names]
+        return [view for view in views if view not in whole], whole
 
     @property
-    def has_marks(self) -> bool:
-        """Whether anything is marked in a picture."""
-        return any(picture.scene.arrows for picture in self.pictures)
+    def marked(self) -> list[str]:
+        """The verdicts that occur on the drawing."""
+        shown = {arrow.verdict for picture in self.pictures for arrow in picture.scene.arrows}
+        return [verdict for verdict in words.VERDICTS if verdict in shown]
+
+    @property
+    def has_doubts(self) -> bool:
+        """Whether any doubtful vector is drawn."""
+        return any(arrow.doubtful for picture in self.pictures for arrow in picture.scene.arrows)
 
     @property
     def has_ghosts(self) -> bool:
@@ -237,43 +310,45 @@ class StudentPage:
         """The description of a view in words, for readers who cannot see it."""
         verdicts = {
             criterion.drawn: self.speaker.gettext(words.VERDICTS[criterion.verdict])
-            for criterion in self.criteria
+            for criterion in self.report.criteria
         }
         parts = (f"{name}: {verdicts[name]}" for name in view.names if name in verdicts)
         return f"{self._caption(view)}. {'; '.join(parts)}".rstrip(". ")
 
     def below(self, view: PageView) -> Markup:
-        """The caption below a view; of a detail with the names in it."""
-        caption = self._caption(view)
+        """The caption below a view: of a detail with the names in it, of other views with their page."""
+        caption, picture = self._caption(view), self.pictures[view.picture]
         said = Markup.escape(caption[:1].upper() + caption[1:])
-        if view.kind != "detail" or not view.names:
-            return said
-        return Markup("{}: {}").format(said, Markup(", ").join(map(words.symbols, view.names)))
+        if view.kind == "sheet":
+            return Markup.escape(self._source(picture) + self._placed(picture))
+        if view.kind == "detail":
+            return Markup("{}: {}").format(said, Markup(", ").join(map(words.symbols, view.names)))
+        return Markup("{}: {}").format(said, self._source(picture))
 
     def _caption(self, view: PageView) -> str:
         return self.speaker.gettext({**PLACES, "sheet": SHEET, "detail": DETAIL}[view.kind])
 
     def _source(self, picture: Picture) -> str:
-        """Which page of which file it is, and for instructors how its millimetres were found."""
+        """Which page of which file it is."""
         if not picture.scan:
-            return f"{picture.source}: {self.speaker.gettext(AS_MEASURED)}"
-        page = f"{picture.source}, {self.speaker.gettext(PAGE)} {picture.page}"
+            return f"{picture.source}, {self.speaker.gettext(AS_MEASURED)}"
+        return f"{picture.source}, {self.speaker.gettext(PAGE)} {picture.page}"
+
+    def _placed(self, picture: Picture) -> str:
+        """For instructors, how the page's millimetres were found."""
         for reading in self.report.reading.sheets if self.shows_expected else ():
             sheet = reading.sheet
             is_this = (reading.source, reading.page) == (picture.source, picture.page)
             if is_this and sheet is not None and sheet.method in words.METHODS:
                 method = self.speaker.gettext(words.METHODS[sheet.method])
-                return f"{page} · {method}, ±{self.speaker.quantity(sheet.residual_mm, 2, 'mm')}"
-        return page
-
-    def _detail(self, concerned: AbstractSet[str]) -> PageView | None:
-        return detail(self.pictures, concerned, self.about.names)
+                return f" · {method}, ±{self.speaker.quantity(sheet.residual_mm, 2, 'mm')}"
+        return ""
 
     # What to put right ----------------------------------------------------------------------------
 
     @property
     def actions(self) -> list[Action]:
-        """The mistakes in the order of construction, then what is off without one."""
+        """The mistakes in the order of construction."""
         if self.level == "symbol":
             return []
         order = {criterion.id: number for number, criterion in enumerate(self.report.criteria)}
@@ -281,15 +356,14 @@ class StudentPage:
         def first(mistake: MistakeDocument) -> int:
             return min((order[name] for name in mistake.explains if name in order), default=-1)
 
-        mistakes = sorted(self.report.mistakes, key=first)
-        actions = [self._action(mistake) for mistake in mistakes if mistake.code in MISTAKES]
-        explained = {name for mistake in mistakes for name in mistake.explains}
-        others = [
-            criterion
-            for criterion in self.report.criteria
-            if criterion.verdict in {"none", "partial"} and criterion.id not in explained
-        ]
-        return [*actions, self._others(others)] if others else actions
+        known = (mistake for mistake in self.report.mistakes if mistake.code in MISTAKES)
+        return [self._action(mistake) for mistake in sorted(known, key=first)]
+
+    @property
+    def title_of_wrong(self) -> str:
+        """The heading of what is wrong, or may be: while nothing has lost points it is not certain."""
+        is_certain = self.group("lost").rows or not all(action.is_open for action in self.actions)
+        return self.group("lost").title if is_certain else self.speaker.gettext(MAY_BE_WRONG)
 
     def _action(self, mistake: MistakeDocument) -> Action:
         criteria = {criterion.id: criterion for criterion in self.report.criteria}
@@ -304,17 +378,18 @@ class StudentPage:
             said=mistake.feedback,
             alternatives=tuple(rival.feedback for rival in mistake.rivals if rival.feedback),
             redo=tuple(mistake.redo),
-            explains=tuple(criteria[name].title if name in criteria else name for name in mistake.explains),
-            view=self._detail(off),
+            explains=tuple(self.shown(one.drawn or one.id) for one in explained),
+            view=detail(self.pictures, off, self.about.names),
+            is_open=bool(explained) and all(one.verdict == "review" for one in explained),
         )
 
-    def _others(self, criteria: Sequence[CriterionDocument]) -> Action:
-        """What no mistake explains, with a look at the figure in which the first of it is."""
-        drawn = [criterion for criterion in criteria if criterion.drawn]
-        first = {one.drawn for one in drawn if (one.vector or "")[:1] == (drawn[0].vector or "")[:1]}
-        say = self.speaker.gettext
-        titles = tuple(criterion.title for criterion in criteria)
-        return Action(say(OTHERS), "", say(OTHERS_SAID), explains=titles, view=self._detail(first))
+    @property
+    def view_of_others(self) -> PageView | None:
+        """A closer look at what lost points without a named mistake, in the figure of the first of it."""
+        named = {name for mistake in self.report.mistakes for name in mistake.explains}
+        lost = [row for row in self.group("lost").rows if row.drawn and row.id not in named]
+        first = {row.drawn for row in lost if (row.vector or "")[:1] == (lost[0].vector or "")[:1]}
+        return detail(self.pictures, first, self.about.names)
 
     # What waits for a person ----------------------------------------------------------------------
 
@@ -322,25 +397,18 @@ class StudentPage:
     def waiting(self) -> list[tuple[str, list[str]]]:
         """Reasons for which a person must look, each with the criteria that wait for it."""
         groups: dict[str, list[str]] = {}
-        for criterion in self._open:
-            why = next((code for code in WAITING if code in criterion.reasons), "")
-            groups.setdefault(why, []).append(self.shown(criterion.drawn or criterion.id))
+        for row in self.group("waiting").rows:
+            why = next((code for code in WAITING if code in row.reasons), "")
+            if why == "unread" and row.measured != QuantityDocument():
+                why = "doubtful"
+            groups.setdefault(why, []).append(self.shown(row.drawn or row.id))
         return [(self.speaker.gettext(WAITING[why]), names) for why, names in groups.items()]
 
     @property
-    def waiting_views(self) -> list[PageView]:
-        """Details of some of what waits for a person; vectors that meet are in one detail."""
-        names = [criterion.drawn for criterion in self._open if criterion.drawn]
-        views: list[PageView] = []
-        for name in names:
-            if len(views) < MOST_WAITING_DETAILS and not any(name in view.names for view in views):
-                view = self._detail(_near(name, names, self.pictures))
-                views += [view] if view is not None else []
-        return views
-
-    @property
-    def _open(self) -> Iterator[CriterionDocument]:
-        return (criterion for criterion in self.report.criteria if criterion.verdict == "review")
+    def likely(self) -> list[tuple[str, int]]:
+        """How many of what waits have each likeliest verdict, where that is known."""
+        proposed = [row.proposed for row in self.group("waiting").rows]
+        return [(verdict, proposed.count(verdict)) for verdict in words.VERDICTS if verdict in proposed]
 
 
 def _is_left_out(criterion: CriterionDocument) -> bool:
@@ -351,52 +419,6 @@ def _is_left_out(criterion: CriterionDocument) -> bool:
 def _title(cause: MistakeDocument | RivalDocument, speaker: Tongue) -> str:
     known = dict(part.split(" = ", 1) for part in cause.detail.split(", ") if " = " in part)
     return speaker.gettext(words_of(cause.code, cause.at, known.get("line", "")).title)
-
-
-def _near(name: str, names: Sequence[str], pictures: Sequence[Picture]) -> set[str]:
-    """A vector and those that end or start where it ends."""
-    for picture in pictures:
-        arrows = {arrow.name: arrow for arrow in picture.scene.arrows}
-        if name in arrows:
-            tip = arrows[name].tip
-            known = [other for other in names if other in arrows]
-            return {name, *(other for other in known if tip in {arrows[other].tail, arrows[other].tip})}
-    return {name}
-
-
-# Cells --------------------------------------------------------------------------------------------
-
-
-def quantity_cells(quantity: QuantityDocument, speaker: Tongue) -> list[str]:
-    """Length and direction on paper, real value: a line each."""
-    drawn = []
-    if quantity.length_mm is not None:
-        drawn.append(speaker.quantity(quantity.length_mm, 1, "mm"))
-    if quantity.direction_deg is not None:
-        # 359.96 is written as 0.0, not as 360.0.
-        rounded = round(quantity.direction_deg, 1) % 360.0
-        drawn.append(f"∠\N{NO-BREAK SPACE}{speaker.number(rounded, 1)}°")
-    lines = [" ".join(drawn)] if drawn else []
-    if quantity.value is not None:
-        lines.append(speaker.value(quantity.value, quantity.unit or ""))
-    return lines
-
-
-def tolerance_cells(tolerance: ToleranceDocument, unit: str, speaker: Tongue) -> list[str]:
-    """What full marks allow, in length and direction or in the value, which is in this unit."""
-    drawn = []
-    if tolerance.length_mm is not None:
-        drawn.append(f"±{speaker.quantity(tolerance.length_mm, 1, 'mm')}")
-    if tolerance.direction_deg is not None:
-        drawn.append(f"±{speaker.number(tolerance.direction_deg, 1)}°")
-    if tolerance.value is not None and not drawn:
-        drawn.append(f"±{speaker.value(tolerance.value, unit, digits=2)}")
-    return [" ".join(drawn)] if drawn else []
-
-
-def scale_text(value: float | None, name: str, speaker: Tongue) -> str:
-    """A scale with its unit; a dash where there is none."""
-    return "–" if value is None else speaker.value(value, SCALE_UNITS[name])
 
 
 # Files --------------------------------------------------------------------------------------------
@@ -446,5 +468,4 @@ def feedback_page(
         report=report,
         title=page.about.title or report.assignment,
         student=page.about.student_name,
-        colours=COLOURS,
     )

@@ -7,10 +7,10 @@ from functools import cache
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from grader.documents import ProblemDocument, ReportDocument, UnmatchedDocument
+from grader.documents import ProblemDocument, UnmatchedDocument
 from grader.feedback.sentences import BETWEEN_RIVALS, RIVALS
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
-from grader.overlay.scene import MARKS
+from grader.overlay.scene import COLOURS, MARKS
 
 VERDICTS = {
     "full": N_("right"),
@@ -36,6 +36,18 @@ SOURCES = {
     "measurements": N_("from the measurements"),
     "box": N_("read in the sheet's box"),
 }
+DARK_COLOURS = {
+    "full": "#4fc3ad",
+    "partial": "#e3b341",
+    "none": "#ff8b77",
+    "follow_through": "#8ab6ff",
+    "review": "#dd9fe6",
+    "not_judged": "#a9afb7",
+}
+"""Colours of the verdicts on a dark page; drawings stay on white paper."""
+STATE_TONES = {
+    "graded": "v-full", "needs_review": "v-review", "unreadable": "v-none", "missing": "v-not_judged"
+}  # fmt: skip
 STATE_MARKS = {"graded": "✓", "needs_review": "?", "unreadable": "✗", "missing": "–"}
 
 _GREEK = {"omega": "ω", "epsilon": "ε"}
@@ -90,19 +102,10 @@ def environment(lang: str) -> Environment:
     made.filters["points"] = lambda value: speaker.trimmed(value, 2)
     made.globals.update(
         speaker=speaker, verdicts=VERDICTS, states_words=STATES, state_marks=STATE_MARKS,
-        marks=MARKS, rivals=speaker.gettext(RIVALS), either=speaker.gettext(BETWEEN_RIVALS),
+        tones=STATE_TONES, colours=COLOURS, dark_colours=DARK_COLOURS, marks=MARKS,
+        rivals=speaker.gettext(RIVALS), either=speaker.gettext(BETWEEN_RIVALS),
     )  # fmt: skip
     return made
-
-
-def score_text(report: ReportDocument, speaker: Tongue) -> str:
-    """The score, the range it lies in, or a dash."""
-    if report.score is not None:
-        return speaker.trimmed(report.score, 2)
-    if report.score_range is None or report.status in {"missing", "unreadable"}:
-        return "–"
-    low, high = (speaker.trimmed(value, 2) for value in report.score_range)
-    return low if low == high else f"{low}–{high}"
 
 
 # Problems -----------------------------------------------------------------------------------------

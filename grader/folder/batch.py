@@ -160,6 +160,7 @@ def _graded(
     decisions.note_failures(reports)
     results = ResultsDocument(
         assignment=batch.assignment.id,
+        titles={one.id: one.title.in_language(batch.lang) for one in batch.rubric.criterion},
         reports=reports,
         unmatched=[*unmatched, *decisions.problems()],
         moved=changes_since(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
@@ -169,7 +170,7 @@ def _graded(
     )
     _write_results(batch, results, students)
     note_inputs(notes, inputs)
-    note_run(_note_of(batch), notes, batch.folder)
+    note_run(_note_of(batch), notes)
     pages = tuple(page for content in contents for page in content.pages)
     return Graded(results, tuple(jobs), pages, cache)
 

@@ -4,7 +4,6 @@ Beside the results lies a note of what they came from: digests of assignment, ru
 each submission's files and line of the roster. What differs from the note of the run before is the why.
 """
 
-import contextlib
 import hashlib
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
@@ -21,7 +20,7 @@ from grader.documents import (
     Status,
     Verdict,
 )
-from grader.files import OutputError, write_whole
+from grader.files import write_whole
 from grader.inputs.measurements import StudentSubmission
 from reference.errors import CallError
 
@@ -148,8 +147,6 @@ def note_inputs(folder: Path, inputs: Inputs) -> None:
 # What was run -------------------------------------------------------------------------------------
 
 RUN_NOTE = "run.json"
-FOLDER_NOTE = ".planmark.json"
-"""The same note beside the submissions, so that they lead to the results, too."""
 
 
 class RunNote(BaseModel):
@@ -166,35 +163,43 @@ class RunNote(BaseModel):
     with_ghosts: bool = True
 
 
-def note_run(note: RunNote, notes: Path, folder: Path) -> None:
-    """Leave a note beside the results and, where that can be written, beside the submissions."""
-    text = note.model_dump_json(indent=1)
-    write_whole(notes / RUN_NOTE, text)
-    with contextlib.suppress(OutputError):
-        write_whole(folder / FOLDER_NOTE, text)
+def note_run(note: RunNote, folder: Path) -> None:
+    """Leave a note beside the results."""
+    write_whole(folder / RUN_NOTE, note.model_dump_json(indent=1))
 
 
 def noted_run(folder: Path) -> RunNote:
-    """The last run whose folder of results, or of submissions, this is.
+    """The last run whose folder of results this is; of submissions, the last one with results near by.
+
+    Near by is in the folder itself, beside it, beside the folder that it is in, and in the working folder.
 
     Raises CallError where none is noted, and where the submissions are no longer there.
     """
     if not folder.is_dir():
         raise CallError("folder_missing", f"{folder}: there is no such folder")
-    for path in (folder / CACHE_FOLDER / RUN_NOTE, folder / FOLDER_NOTE):
-        try:
-            note = RunNote.model_validate_json(path.read_bytes())
-        except (OSError, ValidationError):
-            continue
-        # A folder may have been moved since.
-        moved = "out" if path.name == RUN_NOTE else "folder"
-        note = note.model_copy(update={moved: folder.resolve()})
-        if not note.folder.is_dir():
-            why = f"the submissions are not in {note.folder} any more; grade them again where they are now"
-            raise CallError("submissions_moved", f"{folder}: {why}")
-        return note
-    why = "nothing here says what was graded; run planmark grade first, and name its folder or its --out"
-    raise CallError("run_unknown", f"{folder}: {why}")
+    own, here = _read_note(folder), folder.resolve()
+    if own is None:
+        places = (here, here.parent, here.parent.parent, Path.cwd())
+        outs = {path.parents[1] for top in places for path in top.glob(f"*/{CACHE_FOLDER}/{RUN_NOTE}")}
+        notes = {out: note for out in outs if (note := _read_note(out)) is not None and note.folder == here}
+        last = max(notes, default=None, key=lambda out: (out / CACHE_FOLDER / RUN_NOTE).stat().st_mtime_ns)
+        own = None if last is None else notes[last]
+    if own is None:
+        why = "nothing says what was graded here; run planmark grade first, then name its --out"
+        raise CallError("run_unknown", f"{folder}: {why}")
+    if not own.folder.is_dir():
+        why = f"the submissions are not in {own.folder} any more; grade them again where they are now"
+        raise CallError("submissions_moved", f"{folder}: {why}")
+    return own
+
+
+def _read_note(out: Path) -> RunNote | None:
+    """The note in a folder of results, which may have been moved since; None without one."""
+    try:
+        note = RunNote.model_validate_json((out / CACHE_FOLDER / RUN_NOTE).read_bytes())
+    except (OSError, ValidationError):
+        return None
+    return note.model_copy(update={"out": out.resolve()})
 
 
 # Changes ---------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from grader.folder.cache import digest_of
 from grader.inputs.decisions import FILE_NAME, Decision, read_table
 from grader.inputs.measurements import StudentSubmission
 from grader.inputs.roster import Roster, RosterRow
+from grader.language import N_
 from grader.marking.decided import NOT_APPLIED, why_not
 from grader.printed.layout import PAGE_MM
 from grader.records import PageRef
@@ -91,9 +92,9 @@ def _task(assignment: Assignment, variant: Variant | None) -> object:
 
 
 _CHANGED = (
-    "what was handed in has changed since",
-    "the student's number or position, the scales or the assignment's data have changed since",
-    "the criterion asks for something else since, or the page was placed anew",
+    N_("what was handed in has changed since"),
+    N_("the student's number or position, the scales or the assignment's data have changed since"),
+    N_("the criterion asks for something else since, or the page was placed anew"),
 )
 """What is said of a stale decision, by the part of its basis that differs."""
 
@@ -148,7 +149,7 @@ class ClassDecisions:
         for key, row in rows.items():
             page = there.get(key)
             if page is None and row.basis:
-                self._out_of_date(row, "the page is not in the folder any more")
+                self._out_of_date(row, N_("the page is not in the folder any more"))
             elif page is None:
                 self._fault(row, "criterion", f"there is no page {key[1]} of {key[0]} in the folder")
             elif row.scan.page is None and page.pages > 1:

@@ -83,7 +83,7 @@ KINDS: Mapping[tuple[str, str], _Kind] = {
 """By platform and thing; the first thing of a platform is the default."""
 
 TARGETS = tuple(dict.fromkeys(to for to, _ in KINDS))
-_COMMON = frozenset({"to", "what", "out", "people", "lang", "now"})
+_COMMON = frozenset({"to", "what", "out", "people", "titles", "lang", "now"})
 """Options of every export."""
 
 
@@ -122,6 +122,7 @@ def draft(results: ResultsDocument, options: Options) -> Delivery:
     students = tuple(dict.fromkeys(report.student_id for report in results.reports))
     if kind.of_grades is None:
         return Delivery(kind.of_results(results) if kind.of_results else "", students)
+    options = replace(options, titles=results.titles)
     grades = grades_of(results, options)
     _check_maxima(grades, options, what)
     delivery = kind.of_grades(grades, options)

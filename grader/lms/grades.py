@@ -45,6 +45,7 @@ class Options:
     ----------
     out : the folder of results; only ``feedback`` needs it
     people : names, addresses and the platform's numbers by student_id
+    titles : the criteria's, in the language of the class, by id; `export` takes them from the results
     form : the platform's own file to fill in: Moodle's worksheet, Canvas's exported gradebook
     item : the grade item's name; the assignment's id where empty
     now : time of the export; the clock's if None
@@ -54,6 +55,7 @@ class Options:
     what: str | None = None
     out: Path | None = None
     people: Mapping[str, Person] = field(default_factory=lambda: MappingProxyType({}))
+    titles: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     form: Path | None = None
     criteria: Path | None = None
     identity: str | None = None

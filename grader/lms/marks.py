@@ -260,7 +260,7 @@ def _combined(marks: Sequence[Mark], combine: str | None) -> Mark:
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """A criterion of the rubric; `titles` are those of all languages that students read."""
+    """A criterion of the rubric; `titles`: that of the class, then those that students read."""
 
     id: str
     titles: tuple[str, ...]
@@ -303,11 +303,15 @@ def class_criteria(grades: Sequence[Grade], options: Options) -> list[Criterion]
         message = "one rubric cannot hold all; grade all with one rubric, or choose a position"
         raise InputFileError("criteria_differ", f"{message}\n{lines_of(faults)}")
     return [
-        Criterion(
-            each, tuple(sorted(dict.fromkeys(titles[each]), key=titles[each].count, reverse=True)), most
-        )
+        Criterion(each, _titles(titles[each], options.titles.get(each)), most)
         for each, most in maxima.items()
     ]
+
+
+def _titles(titles: Sequence[str], first: str | None) -> tuple[str, ...]:
+    """The titles that students read, the commonest first, after that of the class."""
+    by_number = sorted(dict.fromkeys(titles), key=titles.count, reverse=True)
+    return tuple(dict.fromkeys([first, *by_number] if first else by_number))
 
 
 def platform_marks(

@@ -114,15 +114,19 @@ _LONG = (
 
 def criteria_text(results: ResultsDocument) -> str:
     """A row per student, position and criterion, with all that was measured and expected."""
-    rows = (_criterion_row(report, criterion) for report in results.reports for criterion in report.criteria)
+    rows = (
+        _criterion_row(report, criterion, results.titles.get(criterion.id, criterion.title))
+        for report in results.reports
+        for criterion in report.criteria
+    )
     return csv_text(_LONG, rows)
 
 
-def _criterion_row(report: ReportDocument, criterion: CriterionDocument) -> list[Cell]:
+def _criterion_row(report: ReportDocument, criterion: CriterionDocument, title: str) -> list[Cell]:
     measured, expected, tolerance = criterion.measured, criterion.expected, criterion.tolerance
     return [
         report.student_id, report.variant.get("n"), report.position, report.status,
-        criterion.id, criterion.title, criterion.vector, criterion.verdict,
+        criterion.id, title, criterion.vector, criterion.verdict,
         criterion.points, criterion.max_points,
         measured.length_mm, measured.direction_deg, measured.value,
         expected.length_mm, expected.direction_deg, expected.value, expected.unit or measured.unit,

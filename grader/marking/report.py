@@ -69,6 +69,7 @@ def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
     sources : where each scale was declared
     """
     titles = {one.id: one.title.in_language(language) for one in task.rubric.criterion}
+    sections = {one.id: one.section for one in task.rubric.criterion if task.rubric.weight_of(one.section)}
     maxima = task.rubric.points
     refused = [
         Problem("scale_refused", f"{name}: {scale.refused}")
@@ -89,6 +90,7 @@ def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
                     "title": titles[outcome.criterion],
                     "points": judgement.score.points[outcome.criterion],
                     "max_points": maxima[outcome.criterion],
+                    "section": sections.get(outcome.criterion),
                     "feedback": (sentences or {}).get(outcome.criterion, ""),
                 }
                 for outcome in judgement.outcomes

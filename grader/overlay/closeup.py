@@ -226,19 +226,24 @@ def _elements(view: PageView) -> Iterator[Markup]:
 
 LOOK_MARGIN_MM = 14.0
 LEAST_LOOK_MM = 45.0
+LOOK_SIZE_PER_MM = 0.0095
+"""A look fills a screen: its marks are smaller than those of details that stand three in a row."""
 
 
-def look(scene: Scene, name: str, names: Mapping[str, str] = _NO_NAMES) -> tuple[Box, Markup] | None:
+def look(
+    scene: Scene, name: str, ghost: Ghost | None, names: Mapping[str, str] = _NO_NAMES
+) -> tuple[Box, Markup] | None:
     """A box around a vector or link and the one expected, and the marks on its figure as SVG elements.
 
-    The others of its figure are faint. None where it is not drawn.
+    The others of its figure are faint. None where it is not drawn and nothing says where it should be.
     """
-    arrow = next((one for one in scene.arrows if one.name == name), None)
-    if arrow is None:
+    arrows = tuple(one for one in scene.arrows if one.name == name)[:1]
+    ghosts = () if ghost is None else (ghost,)
+    if not arrows and not ghosts:
         return None
-    ghosts = tuple(one for one in scene.ghosts if one.name == name)
-    box = _box([arrow, *ghosts], scene, LOOK_MARGIN_MM, LEAST_LOOK_MM)
-    part = replace(scene, arrows=(arrow,), ghosts=ghosts, dots=())
-    others = [one for one in _arrows_of(scene, arrow.figure) if one is not arrow]
-    layers = _marks(part, box, DETAIL_SIZE_PER_MM, [arrow], names, others)
+    figure = (*arrows, *ghosts)[0].figure
+    box = _box([*arrows, *ghosts], scene, LOOK_MARGIN_MM, LEAST_LOOK_MM)
+    part = replace(scene, arrows=arrows, ghosts=ghosts, dots=())
+    others = [one for one in _arrows_of(scene, figure) if one not in arrows]
+    layers = _marks(part, box, LOOK_SIZE_PER_MM, arrows, names, others)
     return box, Markup("").join(_elements(PageView("detail", 0, box, layers, (name,))))

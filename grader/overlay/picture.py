@@ -49,6 +49,8 @@ _FLAT_PNG = [
 """Of pictures that are white for the most part."""
 FRACTION_BITS = 4
 JPEG_QUALITY = 78
+CUT_QUALITY = 90
+"""Close up, the blocks of a coarser JPEG file are seen beside thin lines."""
 
 
 def backdrop(page: Page, sheet: Sheet | None, *, width_px: int = WIDTH_PX) -> Backdrop:
@@ -149,7 +151,7 @@ def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
     part = cut_out(grey, to_px, box, scale, outside=255)
     if not part.size:  # nothing of the page is there
         part = np.full((1, 1), 255, np.uint8)
-    return _encode(".jpg", part, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return _encode(".jpg", part, [cv2.IMWRITE_JPEG_QUALITY, CUT_QUALITY])
 
 
 def _clean(grey: GreyImage) -> GreyImage:

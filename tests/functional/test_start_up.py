@@ -11,7 +11,7 @@ from tests.functional.conftest import ROOT
 
 HEAVY = frozenset(
     "scipy cv2 skimage reportlab pikepdf pypdfium2 PIL tifffile imagecodecs simplejpeg zxingcpp jinja2 rich"
-    " mpmath pebble psutil segno babel".split()
+    " mpmath pebble psutil segno babel starlette uvicorn".split()
 )
 SCANS = frozenset("scipy cv2 PIL pikepdf pypdfium2 tifffile imagecodecs simplejpeg zxingcpp".split())
 PAGES = frozenset({"jinja2", "reportlab"})

@@ -9,9 +9,10 @@ from grader.documents import (
     ProblemDocument,
     ReadingDocument,
     ReadSheets,
+    StaleDecisionDocument,
     StandingDocument,
 )
-from grader.feedback.class_page import index_page, write_index
+from grader.feedback.class_page import index_page, write_demo_page, write_index
 from grader.files import result_folders
 from grader.language import LANGUAGES
 from tests.unit.feedback.parsed import Page
@@ -120,6 +121,15 @@ def test_what_moved_tells_standing_criteria_and_why():
     assert "s777 5–7,5 – nu mai există" in text
 
 
+def test_many_changed_criteria_of_a_student_unfold():
+    standing = StandingDocument(status="graded", score=7.5, score_range=(7.5, 7.5))
+    change = CriterionMovedDocument(id="v_D", title="Vector v_D", before="review", after="full")
+    for count in (3, 4):
+        move = MovedDocument(student_id="s001", before=standing, after=standing, criteria=[change] * count)
+        text = index_page(results(*in_class(1)).model_copy(update={"moved": [move]}), "en")
+        assert (f"<summary>{count} criteria</summary>" in text) == (count == 4)
+
+
 def test_students_who_made_a_common_mistake_are_named_and_the_many_unfold():
     text = index_page(results(*in_class(30)), "en")
     before = text.split("Students</h2>")[0]
@@ -134,3 +144,55 @@ def test_several_positions_of_a_student_are_told_apart_everywhere():
     ]
     text = Page(index_page(results(*reports), "en")).text
     assert text.index("s1, 1 9 1–10") < text.index("s1, 2 8 2–10")
+
+
+def test_the_page_says_what_to_do_next_with_the_folder_as_a_command_names_it(tmp_path):
+    waits = report(status="needs_review", score=None, score_range=(5.0, 7.5))
+    write_index(results(waits, report(student_id="s08")), tmp_path / "my marks", "en")
+    text = Page((tmp_path / "my marks" / "index.html").read_text(encoding="utf-8")).text
+    assert f"planmark review '{tmp_path / 'my marks'}'" in text
+    assert "planmark export" in text
+
+
+def test_a_finished_class_asks_for_no_review():
+    finished = results(report()).model_copy(update={"unmatched": []})
+    text = Page(index_page(finished, "en")).text
+    assert "planmark review" not in text
+    assert "planmark export OUT --to moodle" in text
+
+
+def test_how_many_verdicts_may_be_wrong_is_told_where_it_is_known():
+    made = results(report())
+    assert "may be wrong" not in index_page(made, "en")
+    told = index_page(made.model_copy(update={"expected_wrong": 0.0312}), "en")
+    assert "Of 2 verdicts that nobody has checked, about 0.03 may be wrong." in told
+
+
+def test_outdated_decisions_are_listed_with_line_and_reason():
+    stale = StaleDecisionDocument(
+        line=4, student_id="s07", criterion="v_B", verdict="full", by=HOSTILE, at="2026-11-22T10:00:00+00:00",
+        reason="what was handed in has changed since",
+    )  # fmt: skip
+    made = results(report()).model_copy(update={"stale": [stale], "titles": {"v_B": "Velocity of B"}})
+    text = Page(index_page(made, "en")).text
+    assert f"4 Velocity of B: right {HOSTILE}, 2026-11-22 what was handed in has changed since" in text
+    assert "ceea ce s-a predat s-a schimbat" in index_page(made, "ro")
+
+
+def test_on_a_phone_every_table_with_more_than_two_columns_is_cards():
+    made = results(*in_class(3)).model_copy(update={"alike": [told_alike()]})
+    for tag, attributes in Page(index_page(made, "en")).tags:
+        if tag == "table" and "id" in attributes:
+            assert "cards" in attributes["class"]
+    assert 'class="card scroll"' not in index_page(made, "en")
+
+
+def test_the_demos_page_leads_to_every_class(tmp_path):
+    waits = report(status="needs_review", score=None, score_range=(5.0, 7.5))
+    classes = {"pump": ("Pump", results(waits)), "press": (HOSTILE, results(report()))}
+    write_demo_page(classes, tmp_path, "en")
+    page = Page((tmp_path / "index.html").read_text(encoding="utf-8"))
+    assert page.open == []
+    links = {attributes.get("href") for tag, attributes in page.tags if tag == "a"}
+    assert links == {"pump/index.html", "press/index.html"}
+    assert f"planmark review {tmp_path}/pump" in page.text

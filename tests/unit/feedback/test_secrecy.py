@@ -109,7 +109,7 @@ def test_the_full_level_shows_them(judged):
 def test_no_expected_number_is_told(judged, level, lang):
     found = numbers(shown(told(judged, level, lang))) & answers(judged)
     page = told(judged, level, "en")
-    own = numbers(" ".join(" ".join(page.measured(row)) for row in page.criteria))
+    own = numbers(" ".join(" ".join(page.measured(row)) for row in page.report.criteria))
     assert found - own == set()
 
 
@@ -140,8 +140,8 @@ def test_lengths_without_directions_are_not_drawn_along_the_right_ones(judged, l
 @pytest.mark.parametrize("level", ["hint", "symbol"])
 def test_neither_tolerances_nor_scales_used_are_told_where_they_follow_from_the_answers(judged, level):
     page = told(judged, level)
-    assert page.criteria
-    assert all(page.tolerance(row) == page.expected(row) == [] for row in page.criteria)
+    assert page.report.criteria
+    assert all(page.tolerance(row) == page.expected(row) == [] for row in page.report.criteria)
     assert all(page.used(name) == "" for name in page.report.scales)
 
 

@@ -1,6 +1,7 @@
 """Reasons and mistakes as sentences."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -45,8 +46,8 @@ def test_every_mistake_of_the_contract_has_words():
     ("lang", "text"),
     [
         ("en", "It is too long by 2.3\u00a0mm (tolerance ±1.0\u00a0mm)."),
-        ("ro", "Este prea lung cu 2,3\u00a0mm (toleranță ±1,0\u00a0mm)."),
-        ("ru", "Длиннее, чем нужно, на 2,3\u00a0мм (допуск ±1,0\u00a0мм)."),
+        ("ro", "Segmentul este prea lung cu 2,3\u00a0mm (toleranță ±1,0\u00a0mm)."),
+        ("ru", "Отрезок длиннее, чем нужно, на 2,3\u00a0мм (допуск ±1,0\u00a0мм)."),
     ],
 )
 def test_a_length_off_is_told_in_the_language_with_its_decimal_mark(lang, text):
@@ -122,6 +123,37 @@ def test_a_doubt_about_an_undeclared_scale_is_told_as_one():
 def test_what_is_not_required_is_not_called_missing_too():
     told = criterion_feedback(outcome("not_judged", Reason("optional"), Reason("not_measured")), "en")
     assert told == "It was not handed in, and is not required."
+
+
+def test_what_was_read_is_not_called_unread():
+    unread = Reason("unread", {"reason": "n_BA, on which it hangs, was not read for certain"})
+    doubtful = Reason("doubtful", {"confidence": 0.4})
+    read = replace(outcome("review", doubtful, unread), measured=Quantity(48.1, 255.0))
+    told = "It was read with too little certainty (n_BA, on which it hangs, was not read for certain)."
+    assert criterion_feedback(read, "en") == told
+    assert criterion_feedback(read, "en", "hint") == "It was read with too little certainty."
+    assert criterion_feedback(outcome("review", unread), "en").startswith("It could not be read")
+
+
+def test_where_there_is_a_verdict_no_doubt_is_told():
+    near = Reason("near_limit", {"what": "direction", "off": 3.2, "tolerance": 1.5, "se": 0.2})
+    assert criterion_feedback(outcome("none", TOO_LONG, near), "en") == criterion_feedback(
+        outcome("none", TOO_LONG), "en"
+    )
+
+
+def test_what_was_hardly_read_is_not_called_near_a_limit():
+    near = Reason("near_limit", {"what": "length", "off": 5.1, "tolerance": 1.2, "se": 3.6})
+    told = criterion_feedback(
+        outcome("review", Reason("doubtful", {"confidence": 0.07}), TOO_LONG, near), "en"
+    )
+    assert "near the limit" not in told
+
+
+def test_what_is_not_judged_says_why_also_without_a_reason():
+    assert (
+        criterion_feedback(outcome("not_judged"), "en") == "Nothing was drawn that it could be held against."
+    )
 
 
 def test_what_follows_rightly_is_not_called_off():

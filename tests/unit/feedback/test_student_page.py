@@ -1,11 +1,13 @@
 """What a student is told: mistakes first, each where it is seen, and what waits with its reason."""
 
+import re
 from dataclasses import replace
 
-from grader.documents import MistakeDocument, ToleranceDocument
-from grader.feedback.student_page import About, StudentPage
+from grader.documents import DecidedDocument, MistakeDocument, QuantityDocument, ToleranceDocument
+from grader.feedback.student_page import GROUPS, About, StudentPage, feedback_page
 from grader.language import tongue
 from grader.overlay.scene import Arrow
+from tests.unit.feedback.parsed import Page
 from tests.unit.feedback.works import criterion, picture, report
 
 
@@ -25,10 +27,107 @@ def test_mistakes_come_in_the_order_of_the_drawing_not_of_their_certainty():
     assert [action.at for action in page_of(one).actions] == ["a", "b"]
 
 
-def test_what_no_mistake_explains_is_told_too():
+def test_what_no_mistake_explains_is_told_too_with_a_closer_look():
     one = report(criteria=[criterion("v_B", "none", 0.0), criterion("v_C", "partial", 1.0)], mistakes=[])
-    (action,) = page_of(one).actions
-    assert list(action.explains) == ["Vector v_B", "Vector v_C"]
+    page = page_of(one, [picture()])
+    assert page.actions == []
+    assert [row.id for row in page.group("lost").rows] == ["v_B", "v_C"]
+    assert set(page.view_of_others.names) <= {"v_B", "v_C"}
+    explained = report(
+        criteria=[criterion("v_B", "none", 0.0)], mistakes=[mistake("wrong_link", "b", ["v_B"])]
+    )
+    assert page_of(explained, [picture()]).view_of_others is None
+
+
+def test_a_mistake_of_which_everything_waits_is_not_called_certain():
+    waits = [criterion("v_A", "review", None), criterion("v_B", "review", None)]
+    one = report(criteria=waits, mistakes=[mistake("wrong_link", "b", ["v_A", "v_B"])])
+    assert page_of(one).actions[0].is_open
+    told = Page(feedback_page(one, [], "en")).text
+    assert "What may be wrong Wrong link" in told.replace("Line drawn by the wrong link", "Wrong link")
+    assert "Not certain yet" in told
+    lost = [waits[0], criterion("v_B", "none", 0.0)]
+    assert not page_of(one.model_copy(update={"criteria": lost})).actions[0].is_open
+
+
+def test_what_is_wrong_comes_first_then_what_waits_and_what_is_right_is_folded():
+    rows = [criterion("v_A"), criterion("v_B", "review", None), criterion("v_C", "none", 0.0)]
+    text = feedback_page(report(criteria=rows, mistakes=[]), [picture()], "en")
+    places = [
+        text.index(words) for words in ("What is wrong", "What a person must still look at", "The drawing")
+    ]
+    assert places == sorted(places)
+    right = text[text.index("The drawing") :]
+    assert re.search(r"<details class=.card.>\s*<summary>.*Right: 1</b>.*5 <span[^>]*>/ 5", right)
+    assert "Vector" not in right.partition("<details")[0]
+
+
+def test_every_criterion_stands_in_one_group():
+    verdicts = ["full", "partial", "none", "follow_through", "review", "not_judged"]
+    rows = [criterion(f"v_{verdict[0].upper()}", verdict, None) for verdict in verdicts]
+    page = page_of(report(criteria=rows, mistakes=[]))
+    shown = [row.verdict for name in GROUPS for row in page.group(name).rows]
+    assert sorted(shown) == sorted(verdicts)
+
+
+def test_what_a_person_decided_is_told_with_the_comment():
+    decided = DecidedDocument(
+        by="A. B.", at="2026-11-22T10:00:00+00:00", before="review", comment="Well seen."
+    )
+    row = criterion("v_A").model_copy(update={"decided": decided})
+    one = report(criteria=[row], mistakes=[], comment="Use a sharper pencil.", added=0.5)
+    text = Page(feedback_page(one, [], "en")).text
+    assert "checked by a person" in text
+    for words in ("Use a sharper pencil.", "Vector v A : Well seen.", "A person added 0.5."):
+        assert words in text
+    assert "A. B." not in text
+
+
+def test_one_comment_on_several_criteria_is_told_once():
+    decided = DecidedDocument(by="x", at="2026-11-22T10:00:00+00:00", before=None, comment="It is here.")
+    rows = [
+        criterion(name, feedback="A person has decided this.").model_copy(update={"decided": decided})
+        for name in ("v_A", "v_B")
+    ]
+    page = page_of(report(criteria=rows, mistakes=[]))
+    assert page.remarks_of_people == [("Vector v_A, Vector v_B", "It is here.")]
+    assert page.sentence(rows[0]) == ""
+
+
+def test_what_waits_is_told_with_what_it_is_likely_to_be():
+    rows = [
+        criterion(name, "review", None).model_copy(update={"proposed": proposed, "probability": 0.9})
+        for name, proposed in (("v_A", "full"), ("v_B", "full"), ("v_C", "none"))
+    ]
+    assert page_of(report(criteria=rows, mistakes=[])).likely == [("full", 2), ("none", 1)]
+    assert (
+        "Most likely: ✓ 2 right, ✗ 1 wrong"
+        in Page(feedback_page(report(criteria=rows, mistakes=[]), [], "en")).text
+    )
+
+
+def test_what_was_read_is_not_called_unread():
+    unsure = criterion("v_B", "review", None).model_copy(update={"reasons": ["unread"]})
+    nothing = unsure.model_copy(update={"measured": QuantityDocument()})
+    told = [page_of(report(criteria=[row], mistakes=[])).waiting[0][0] for row in (unsure, nothing)]
+    assert told == ["read with too little certainty", "not read on the sheet"]
+
+
+def test_what_was_expected_from_own_values_says_so():
+    own = criterion("v_B", "follow_through").model_copy(update={"reasons": ["follows"]})
+    assert page_of(report(criteria=[own], mistakes=[])).tolerance(own)[-1] == "from your own values"
+
+
+def test_no_direction_is_shown_where_none_is_judged():
+    short = criterion("v_B").model_copy(
+        update={
+            "expected": QuantityDocument(length_mm=0.4, direction_deg=90.0),
+            "reasons": ["right", "too_short_to_judge"],
+        }
+    )
+    page = page_of(report(criteria=[short], mistakes=[]))
+    assert page.expected(short) == ["0.4\u00a0mm"]
+    assert page.tolerance(short) == ["±1.0\u00a0mm"]
 
 
 def test_a_right_drawing_has_nothing_to_put_right():
@@ -65,16 +164,22 @@ def test_a_review_for_a_reason_without_words_is_told_as_open():
 def test_a_picture_is_told_in_words_for_those_who_do_not_see_it():
     one = report(criteria=[criterion("v_A"), criterion("v_B", "none", 0.0)], mistakes=[])
     page = page_of(one, [picture()])
-    _source, views = page.sheets[0]
-    plan = next(view for view in views if view.kind == "velocity_plan")
+    plan = next(view for view in page.views[0] if view.kind == "velocity_plan")
     assert page.description(plan) == "the velocity plan. v_A: right; v_B: wrong"
 
 
 def test_plans_as_measured_have_no_sheet_beneath_them():
     page = page_of(report(), [picture(scanned=False)])
-    source, views = page.sheets[0]
+    views, whole = page.views
     assert [view.kind for view in views] == ["velocity_plan"]
-    assert "entered measurements" in source
+    assert whole == []
+    assert "entered measurements" in page.below(views[0])
+
+
+def test_a_sheet_that_shows_no_more_than_its_plans_is_folded():
+    views, whole = page_of(report(), [picture(), picture("s07_2.jpg", spread=250.0)]).views
+    assert [view.kind for view in views] == ["velocity_plan", "sheet"]
+    assert [view.picture for view in whole] == [0]
 
 
 def test_what_is_not_required_and_not_there_takes_one_line():
@@ -82,7 +187,7 @@ def test_what_is_not_required_and_not_there_takes_one_line():
         update={"reasons": ["optional", "not_measured"]}
     )
     page = page_of(report(criteria=[criterion("v_A"), omega], mistakes=[]))
-    assert [row.vector for row in page.criteria] == ["v_A"]
+    assert page.group("not_judged").rows == ()
     assert [one.striptags() for one in page.not_required] == ["ω2 (1.670 m/s)"]
     hinted = page_of(report(criteria=[omega], mistakes=[]), level="hint")
     assert [one.striptags() for one in hinted.not_required] == ["ω2"]
@@ -93,7 +198,7 @@ def test_a_widened_tolerance_is_told_as_such_with_the_reason():
         update={"tolerance": ToleranceDocument(length_mm=2.4, direction_deg=3.0, widened=True)}
     )
     page = page_of(report(criteria=[wider, criterion("v_A")], mistakes=[]))
-    assert [page.tolerance(row) for row in page.criteria] == [
+    assert [page.tolerance(row) for row in page.report.criteria] == [
         ["±2.4\u00a0mm ±3.0°", "widened"],
         ["±1.0\u00a0mm ±1.5°"],
     ]
@@ -109,8 +214,8 @@ def test_a_link_that_is_off_is_shown_on_the_sketch():
     sketched = picture()
     arrow = Arrow("O1A", "mechanism", (200.0, 200.0), (250.0, 220.0), "none", doubtful=False, is_link=True)
     sketched = replace(sketched, scene=replace(sketched.scene, arrows=(*sketched.scene.arrows, arrow)))
-    (action,) = page_of(report(criteria=[link], mistakes=[]), [sketched]).actions
-    assert action.view.names == ("O1A",)
+    page = page_of(report(criteria=[link], mistakes=[]), [sketched])
+    assert page.view_of_others.names == ("O1A",)
 
 
 def test_what_hangs_on_something_open_says_so_unless_there_is_a_better_reason():

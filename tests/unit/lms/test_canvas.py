@@ -396,6 +396,17 @@ def test_titles_in_several_languages_are_one_criterion(tmp_path, rubric):
     assert delivery.written == ("s01", "s02")
 
 
+def test_a_rubric_has_the_titles_of_the_class(tmp_path):
+    made = results(marked("s01", 5.0, 2.5, title="Vectorul {}")).model_copy(
+        update={"titles": {"c1": "Velocity of A", "c2": "Velocity of B"}}
+    )
+    path = tmp_path / "rubric.csv"
+    export(made, path, Options(to="canvas", what="rubric"))
+    text = path.read_text(encoding="utf-8")
+    assert "c1: Velocity of A" in text
+    assert "Vectorul" not in text
+
+
 def test_positions_are_summed_or_averaged_criterion_by_criterion(tmp_path, rubric):
     both = marked("s01", 5.0, 2.5, position=1), marked("s01", 0.0, 5.0, position=2)
     _, text = points(tmp_path, rubric, *both, combine="mean")

@@ -66,6 +66,12 @@ def test_the_table_of_criteria_tells_measured_and_expected():
     assert len(rows(criteria_text(a_class()))) == 4
 
 
+def test_titles_are_those_of_the_class():
+    named = a_class().model_copy(update={"titles": {"v_B": "Velocity of B"}})
+    told = {row["criterion"]: row["title"] for row in rows(criteria_text(named))}
+    assert told["v_B"] == "Velocity of B"
+
+
 @pytest.mark.parametrize(
     "text",
     ["=cmd|' /C calc'!A0", "+1", "-1+2", "@SUM(A1)", "\t=1", "\r=1", " =1", "\ufeff=1", "＝1+1"],

@@ -2,14 +2,15 @@
 
 import re
 
-from grader.documents import QuantityDocument, ScaleDocument
-from grader.feedback.class_page import (
+from grader.documents import DecidedDocument, QuantityDocument, ScaleDocument
+from grader.feedback.class_page import distribution_svg
+from grader.feedback.class_statistics import (
     commonest,
-    distribution_svg,
     follow_through,
     hardest,
     histogram,
     open_shares,
+    settled,
     shares,
     spread,
     waiting,
@@ -42,7 +43,7 @@ def test_the_hardest_criterion_comes_first():
     one = report(criteria=[criterion("v_A", "partial", 2.5), criterion("v_B", "none", 0.0)])
     two = report(criteria=[criterion("v_A", "full", 5.0), criterion("v_B", "partial", 2.5)])
     found = hardest(results(one, two))
-    assert [(hard.vector, hard.earned, hard.judged) for hard in found] == [("v_B", 0.25, 2), ("v_A", 0.75, 2)]
+    assert [(hard.title, hard.earned) for hard in found] == [("Vector v_B", 0.25), ("Vector v_A", 0.75)]
 
 
 def test_a_mistake_made_twice_by_one_student_counts_once():
@@ -101,3 +102,19 @@ def test_scales_lost_or_not_understood_are_told_and_links_are_no_scales():
     assert [(of, [c.id for c in lost], text) for of, lost, text in found] == [
         (one, ["kv"], []), (two, [], ["ka = bla"]),
     ]  # fmt: skip
+
+
+def test_titles_are_those_of_the_class_not_of_a_students_language():
+    russian = report(criteria=[criterion("v_A", "none", 0.0, title="Скорость точки A")])
+    made = results(russian).model_copy(update={"titles": {"v_A": "Velocity of A"}})
+    assert hardest(made)[0].title == "Velocity of A"
+
+
+def test_verdicts_that_a_person_decided_are_not_the_programs():
+    decided = DecidedDocument(by="x", at="2026-11-22T10:00:00+00:00", before="review")
+    rows = [
+        criterion("v_A"),
+        criterion("v_B").model_copy(update={"decided": decided}),
+        criterion("v_C", "review", None),
+    ]
+    assert settled(results(report(criteria=rows))) == 1

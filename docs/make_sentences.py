@@ -1,0 +1,187 @@
+"""Write every text that people read, side by side in all languages, into sentences.md.
+
+    python -m docs.make_sentences
+
+Texts stand in the order of the files that say them, each with an example: its parameters filled as a page
+would fill them. Below them stand the titles and tasks of the built-in assignments and rubrics. A native
+speaker can read it from top to bottom, about half an hour.
+"""
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from babel.messages.extract import extract_from_dir
+from babel.messages.frontend import parse_mapping_cfg
+
+from grader.language import LANGUAGES, Tongue, tongue
+from reference.authored.assignment import library
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+PAGE = HERE / "sentences.md"
+COUNTS = (1, 3, 20)
+"""Numbers that take every form of a plural in all three languages."""
+PLACEHOLDER = re.compile(r"%\((\w+)\)[sd]|\{(\w+)\}")
+KEYWORDS = {"_": None, "gettext": None, "N_": None, "ngettext": (1, 2)}
+HEAD = """# Every sentence, in all languages
+
+Written by `python -m docs.make_sentences` from the catalogues ([translating.md](translating.md)); a test
+holds it complete. Names and numbers are examples. `/` stands between the forms for 1, 3 and 20.
+"""
+
+Row = tuple[str, ...]
+"""A text in each of the languages."""
+
+EXAMPLES: Mapping[str, str] = {
+    "angle": "@35°", "at": "b", "base": "AB", "centre": "A", "chance": "0.0004", "confidence": "62\u00a0%",
+    "count": "2", "declared": "@0.04 (m/s)/mm", "degrees": "90", "direction": "perpendicular to %(link)s",
+    "drawn": "@47.2 mm", "end": "b", "expected": "@1.67 m/s", "factor": "1.5", "first": "ab",
+    "first_direction": "perpendicular to %(link)s", "first_length": "@30.0 mm", "fixed": "O1, O2",
+    "from": "o", "head": "B", "high": "5.38", "joint": "D", "judged": "39", "least": "@3.0 mm",
+    "length": "@48.1 mm", "line": "the line through %(tail)s and %(head)s", "link": "AB", "low": "0",
+    "maximum": "42", "measured": "@1.91 m/s", "model": "ABC", "n": "7", "name": "v_BA", "node": "c",
+    "nodes": "n_CA, n_CB", "number": "1", "of": "v_BA", "off": "@2.3 mm", "origin": "O1", "other": "BC",
+    "p": "a", "p_radius": "@60.0 mm", "points": "0.5", "position": "3", "q": "b", "q_radius": "@40.0 mm",
+    "radius": "@60.0 mm", "rate": "omega_3", "ratio": "0.4", "real_x": "@0.3 m", "real_y": "@0.1 m",
+    "reason": "%(nodes)s, on which it hangs, was not read for certain", "result": "32.31", "scale": "kv",
+    "se": "@0.25 mm", "second": "bc", "second_direction": "parallel to the guide of %(joint)s",
+    "second_length": "@40.0 mm", "segment": "ab", "settled": "310", "slide": "v_BD", "start": "o'",
+    "sum": "30", "tail": "A", "terms": "9 × 2 + 10 × 1", "text": "1:5?", "third": "C", "through": "a",
+    "tolerance": "@1.0 mm", "used": "@0.036 (m/s)/mm", "vector": "a_BA_n", "why": "no unit", "wrong": "0.4",
+    "written": "@45.0 mm", "x": "@60.0 mm", "x_direction": "@0°", "y": "@20.0 mm", "y_direction": "@90°",
+    "cause": "normal component reversed", "done": "12", "minutes": "4", "open": "38", "total": "30",
+    "verdict": "right", "who": "A. B.", "beyond": "@0.2 mm", "good_to": "@0.3 mm", "whose": "7",
+    "instead": "v_CA", "share": "62\u00a0%",
+}  # fmt: skip
+"""Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""
+OTHERWISE: Mapping[str, Mapping[str, str]] = {
+    "Draw %(first)s": {"first": "the line through %(tail)s and %(head)s", "second": "the guide of %(joint)s"},
+    "The drawing gives": {"first": "@47.2 mm", "second": "@49.0 mm"},
+    "The letters": {"first": "b", "second": "c"},
+    "Through %(first)s": {"first": "n_BA", "second": "o'"},
+    "All of": {"at": "the velocity plan"},
+    "All lengths": {"at": "kv"},
+    "At %(at)s, the triangle": {"at": "c"},
+    "It is turned": {"off": "@3.2°", "tolerance": "@1.5°"},
+    "It is zero": {"measured": "@5.1 mm"},
+    "%(at)s is not drawn": {"at": "v_BA"},
+    "It is too short for": {"length": "@2.4 mm"},
+    "From %(start)s": {"direction": "parallel to %(link)s, from %(tail)s towards %(head)s"},
+    "Declared is": {"expected": "@0.036 (m/s)/mm"},
+}
+"""Parameters of texts that begin so."""
+
+
+# Examples -----------------------------------------------------------------------------------------
+
+
+def example(text: str, speaker: Tongue, original: str) -> str:
+    """A text of a language with its parameters filled; `original` is the English text, the key."""
+    own = next((known for start, known in OTHERWISE.items() if original.startswith(start)), {})
+
+    def filled(match: re.Match[str]) -> str:
+        name = match[1] or match[2]
+        value = own.get(name, EXAMPLES[name])
+        if value.startswith("@"):
+            return _with_unit(value[1:], speaker)
+        if PLACEHOLDER.search(value):
+            return example(speaker.gettext(value), speaker, value)
+        if value.replace(".", "").isdigit():
+            return value.replace(".", speaker.decimal_mark)
+        return speaker.gettext(value)
+
+    return PLACEHOLDER.sub(filled, text)
+
+
+def _with_unit(text: str, speaker: Tongue) -> str:
+    """``2.3 mm`` in a language's letters."""
+    number, _, unit = text.partition(" ")
+    number = number.replace(".", speaker.decimal_mark)
+    return f"{number}\u00a0{speaker.unit(unit)}" if unit else number
+
+
+def _plural(one: str, many: str, speaker: Tongue) -> str:
+    forms = (speaker.ngettext(one, many, count).replace("%(num)d", str(count)) for count in COUNTS)
+    return " / ".join(forms)
+
+
+# Texts --------------------------------------------------------------------------------------------
+
+
+def texts() -> dict[str, list[Row]]:
+    """The texts of the program by the file that says them first, in its order, with an example each."""
+    with (ROOT / "grader/locale/babel.cfg").open(encoding="utf-8") as file:
+        methods, options = parse_mapping_cfg(file)
+    said: set[object] = set()
+    groups: dict[str, list[Row]] = {}
+    messages = extract_from_dir(ROOT, methods, options, KEYWORDS, comment_tags=())
+    for file_name, line, message, *_ in sorted(messages, key=lambda one: (one[0], one[1])):
+        del line
+        if message in said or not message:
+            continue
+        said.add(message)
+        groups.setdefault(file_name, []).append(
+            tuple(in_language(tongue(lang), message) for lang in LANGUAGES)
+        )
+    return groups
+
+
+def in_language(speaker: Tongue, message: str | tuple[str, ...]) -> str:
+    """A text of the catalogues as an example, a plural in its forms."""
+    if isinstance(message, tuple):
+        return _plural(message[0], message[1], speaker)
+    return example(speaker.gettext(message), speaker, message)
+
+
+def authored() -> dict[str, list[Row]]:
+    """Titles and tasks of the built-in files, each once, by the first file that has it."""
+    said: set[Row] = set()
+    groups: dict[str, list[Row]] = {}
+    for path in sorted(library().rglob("*.toml")):
+        rows = dict.fromkeys(_translated(tomllib.loads(path.read_text(encoding="utf-8"))))
+        new = [row for row in rows if row not in said]
+        said.update(new)
+        if new:
+            groups[path.relative_to(library()).as_posix()] = new
+    return groups
+
+
+def _translated(value: object) -> Iterator[Row]:
+    """The tables of languages in an authored file; empty where a language is not given."""
+    if isinstance(value, dict):
+        if isinstance(value.get("en"), str):
+            yield tuple(value.get(lang, "") for lang in LANGUAGES)
+            return
+        value = [*value.values()]
+    if isinstance(value, list):
+        for one in value:
+            yield from _translated(one)
+
+
+# The page -----------------------------------------------------------------------------------------
+
+
+def page() -> str:
+    """The document."""
+    parts = [HEAD]
+    for title, groups in (("Sentences of the program", texts()), ("Built-in assignments", authored())):
+        parts.append(f"## {title}\n")
+        parts += [_table(name, rows) for name, rows in groups.items()]
+    return "\n".join(parts)
+
+
+def _table(name: str, rows: list[Row]) -> str:
+    names = " | ".join(tongue(lang).name for lang in LANGUAGES)
+    lines = [f"### {name}", "", f"| {names} |", f"|{' --- |' * len(LANGUAGES)}"]
+    lines += [f"| {' | '.join(map(_cell, row))} |" for row in rows]
+    return "\n".join([*lines, ""])
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.replace("|", "\\|").replace("<", "&lt;").replace("_", "\\_").split(" ")).strip()
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

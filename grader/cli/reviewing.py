@@ -1,0 +1,72 @@
+"""``planmark review``."""
+
+import logging
+import os
+import socket
+from dataclasses import replace
+from pathlib import Path
+
+import typer
+import uvicorn
+
+from grader.cli.app import check_language, progress
+from grader.cli.grading import tell_class
+from grader.folder.batch import noted_batch
+from grader.review.server import LOOPBACK, application
+from grader.review.session import Session
+from reference.errors import CallError
+
+LEAST_TOKEN = 8
+"""Letters of a token: fewer could be tried out."""
+
+
+def review_class(
+    folder: Path, *, host: str, token: str, port: int, jobs: int | None, lang: str | None
+) -> None:
+    """Serve the review of a class until it is ended; then bring the results up to date.
+
+    Raises CallError for a folder of which nothing is known, a host without a token, a port that is taken.
+    """
+    if lang is not None:
+        check_language(lang)
+    if host not in LOOPBACK and not token:
+        raise CallError(
+            "token_needed", f"--host {host} opens the class to other machines: give a --token, too"
+        )
+    if token and len(token) < LEAST_TOKEN:
+        raise CallError("token_short", f"--token must have {LEAST_TOKEN} signs or more")
+    batch = replace(noted_batch(folder), jobs=jobs or os.cpu_count() or 1)
+    listener = _listener(host, port)
+    session = Session(batch)
+    with progress() as tell:
+        session.bring_up_to_date(tell)
+    shown = f"[{host}]" if ":" in host else host
+    address = f"http://{shown}:{listener.getsockname()[1]}/"
+    typer.echo(f"Review: {address}{f'?token={token}' if token else ''}")
+    typer.echo(f"Decisions go to {batch.decisions_path}; Ctrl+C ends the review.")
+    _serve(listener, session, lang or batch.lang, token)
+    if session.made:
+        with progress() as tell:
+            tell_class(session.bring_up_to_date(tell).results, batch.out)
+
+
+def _listener(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return socket.create_server((host, port), family=family)
+    except OSError as error:
+        why = f"{error.strerror or error}; choose another with --port, 0 takes any that is free"
+        raise CallError("port_taken", f"--host {host} --port {port}: {why}") from error
+
+
+def _serve(listener: socket.socket, session: Session, lang: str, token: str) -> None:
+    """Answer until the process is interrupted."""
+    logging.getLogger("uvicorn").setLevel(logging.WARNING)
+    config = uvicorn.Config(
+        application(session, lang, token), log_level="warning", access_log=False, lifespan="off", ws="none",
+        timeout_graceful_shutdown=2, server_header=False,
+    )  # fmt: skip
+    try:
+        uvicorn.Server(config).run(sockets=[listener])
+    except KeyboardInterrupt:
+        typer.echo("The review has ended.")

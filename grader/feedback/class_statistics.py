@@ -1,0 +1,184 @@
+"""The class in figures: states, scores, criteria, mistakes, what waits."""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import floor
+from statistics import mean, median
+
+from grader.documents import CriterionDocument, CriterionMovedDocument, ReportDocument, ResultsDocument
+
+BINS = 10
+HARDEST = 8
+COMMONEST = 8
+
+_JUDGED = {"full", "partial", "none", "follow_through"}
+_LOST = {"none", "partial"}
+
+
+def states(results: ResultsDocument) -> Counter[str]:
+    """How many reports are in each state."""
+    return Counter(report.status for report in results.reports)
+
+
+# Scores -------------------------------------------------------------------------------------------
+
+
+def shares(results: ResultsDocument) -> list[float]:
+    """Final scores as shares of the maximum."""
+    return [
+        report.score / report.max_score
+        for report in results.reports
+        if report.score is not None and report.max_score > 0.0
+    ]
+
+
+def open_shares(results: ResultsDocument) -> list[float]:
+    """Of what waits for a person, the middle of the range that the score lies in, as a share."""
+    return [
+        sum(report.score_range) / 2.0 / report.max_score
+        for report in results.reports
+        if report.status == "needs_review" and report.score is None
+        if report.score_range is not None and report.max_score > 0.0
+    ]
+
+
+def histogram(values: Iterable[float]) -> list[int]:
+    """Counts in ten equal bins of 0..1; full marks belong to the last."""
+    counts = [0] * BINS
+    for value in values:
+        counts[min(BINS - 1, max(0, floor(value * BINS + 1e-9)))] += 1
+    return counts
+
+
+@dataclass(frozen=True, slots=True)
+class ScoreSpread:
+    """Mean, median, least and largest of the final scores, as shares of the maximum."""
+
+    mean: float
+    median: float
+    least: float
+    largest: float
+
+
+def spread(results: ResultsDocument) -> ScoreSpread | None:
+    """How the final scores spread; None while there are none."""
+    values = shares(results)
+    return ScoreSpread(mean(values), median(values), min(values), max(values)) if values else None
+
+
+# Criteria -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Hardness:
+    """How a criterion went: the share of its points that was earned where it was judged."""
+
+    title: str
+    earned: float
+
+
+def title_of(results: ResultsDocument, criterion: CriterionDocument | CriterionMovedDocument) -> str:
+    """A criterion's title in the language of the class."""
+    return results.titles.get(criterion.id, criterion.title)
+
+
+def hardest(results: ResultsDocument) -> list[Hardness]:
+    """The criteria at which most points were lost, worst first; those that everybody got are left out."""
+    judged: dict[str, list[CriterionDocument]] = {}
+    for report in results.reports:
+        for criterion in report.criteria:
+            if criterion.verdict in _JUDGED and criterion.points is not None:
+                judged.setdefault(criterion.id, []).append(criterion)
+    hardness = []
+    for criteria in judged.values():
+        earned = sum(criterion.points or 0.0 for criterion in criteria)
+        possible = sum(criterion.max_points for criterion in criteria)
+        if earned < possible:
+            hardness.append(Hardness(title_of(results, criteria[0]), earned / possible))
+    return sorted(hardness, key=lambda criterion: criterion.earned)[:HARDEST]
+
+
+def settled(results: ResultsDocument) -> int:
+    """How many verdicts the program settled itself."""
+    criteria = (criterion for report in results.reports for criterion in report.criteria)
+    return sum(criterion.verdict in _JUDGED and criterion.decided is None for criterion in criteria)
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What counts as right because it follows from an own earlier value: each criterion, how often."""
+
+    points: float
+    reports: list[ReportDocument]
+    criteria: list[tuple[str, int]]
+
+
+def follow_through(results: ResultsDocument) -> Followed:
+    """Follow-through granted, with the reports."""
+    points, reports, times = 0.0, [], Counter[str]()
+    for report in results.reports:
+        given = [criterion for criterion in report.criteria if criterion.verdict == "follow_through"]
+        points += sum(criterion.points or 0.0 for criterion in given)
+        times.update(title_of(results, criterion) for criterion in given)
+        reports += [report] if given else []
+    return Followed(points, reports, times.most_common(HARDEST))
+
+
+# Mistakes -----------------------------------------------------------------------------------------
+
+
+def commonest(results: ResultsDocument) -> list[tuple[str, list[ReportDocument]]]:
+    """Codes of mistakes with the reports that show them, commonest first."""
+    reports: dict[str, list[ReportDocument]] = {}
+    for report in results.reports:
+        for code in dict.fromkeys(mistake.code for mistake in report.mistakes):
+            reports.setdefault(code, []).append(report)
+    return sorted(reports.items(), key=lambda item: -len(item[1]))[:COMMONEST]
+
+
+def wrong_scales(results: ResultsDocument) -> list[tuple[ReportDocument, list[CriterionDocument], list[str]]]:
+    """Reports whose scales were not right: the criteria lost, and the scales not understood."""
+    wrong = []
+    for report in results.reports:
+        # A criterion asks for a scale where it expects something per millimetre on paper.
+        asked = [each for each in report.criteria if each.vector is None]
+        asked = [each for each in asked if (each.expected.unit or "").endswith("/mm")]
+        lost = [criterion for criterion in asked if criterion.verdict in _LOST]
+        refused = [
+            f"{name} = {scale.text}" for name, scale in report.scales.items() if scale.refused and scale.text
+        ]
+        if lost or refused:
+            wrong.append((report, lost, refused))
+    return wrong
+
+
+# What waits ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A report that a person must review, the points at stake, and the criteria that wait."""
+
+    report: ReportDocument
+    points: float
+    criteria: list[CriterionDocument]
+
+
+def waiting(results: ResultsDocument) -> list[Waiting]:
+    """The reports that wait for a person, those with the most points at stake first."""
+    reports = [report for report in results.reports if report.status in {"needs_review", "unreadable"}]
+    return sorted(
+        (
+            Waiting(report, _stake(report), [one for one in report.criteria if one.verdict == "review"])
+            for report in reports
+        ),
+        key=lambda item: -item.points,
+    )
+
+
+def _stake(report: ReportDocument) -> float:
+    """Points between the least and the largest score that are still possible."""
+    if report.status == "unreadable" or report.score_range is None:
+        return report.max_score
+    return report.score_range[1] - report.score_range[0]

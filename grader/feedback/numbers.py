@@ -1,0 +1,147 @@
+"""Numbers as pages write them: cells of a table, the score, and how the points of the rows become it."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from grader.documents import QuantityDocument, ReportDocument, ToleranceDocument
+from grader.language import N_, Tongue
+from reference.drawing.subject import SCALE_UNITS
+
+SUM = N_("The points of all criteria add up to %(sum)s.")
+SCALED = N_(
+    "The points of all criteria add up to %(sum)s of %(judged)s. What was not judged does not count:"
+    " %(sum)s × %(maximum)s / %(judged)s = %(result)s."
+)
+WEIGHTED = N_(
+    "What was not judged does not count, and each part of the work keeps its weight: %(terms)s = %(result)s."
+)
+WAITS = N_("What waits for a person adds %(low)s to %(high)s.")
+ADDED = N_("A person added %(points)s.")
+TAKEN = N_("A person took off %(points)s.")
+
+
+# Cells --------------------------------------------------------------------------------------------
+
+
+def quantity_cells(quantity: QuantityDocument, speaker: Tongue) -> list[str]:
+    """Length and direction on paper, real value: a line each."""
+    drawn = []
+    if quantity.length_mm is not None:
+        drawn.append(speaker.quantity(quantity.length_mm, 1, "mm"))
+    if quantity.direction_deg is not None:
+        # 359.96 is written as 0.0, not as 360.0.
+        rounded = round(quantity.direction_deg, 1) % 360.0
+        drawn.append(f"∠\N{NO-BREAK SPACE}{speaker.number(rounded, 1)}°")
+    lines = [" ".join(drawn)] if drawn else []
+    if quantity.value is not None:
+        lines.append(speaker.value(quantity.value, quantity.unit or ""))
+    return lines
+
+
+def tolerance_cells(tolerance: ToleranceDocument, unit: str, speaker: Tongue) -> list[str]:
+    """What full marks allow, in length and direction or in the value, which is in this unit."""
+    drawn = []
+    if tolerance.length_mm is not None:
+        drawn.append(f"±{speaker.quantity(tolerance.length_mm, 1, 'mm')}")
+    if tolerance.direction_deg is not None:
+        drawn.append(f"±{speaker.number(tolerance.direction_deg, 1)}°")
+    if tolerance.value is not None and not drawn:
+        drawn.append(f"±{speaker.value(tolerance.value, unit, digits=2)}")
+    return [" ".join(drawn)] if drawn else []
+
+
+def scale_text(value: float | None, name: str, speaker: Tongue) -> str:
+    """A scale with its unit; a dash where there is none."""
+    return "–" if value is None else speaker.value(value, SCALE_UNITS[name])
+
+
+# The score ----------------------------------------------------------------------------------------
+
+
+def score_text(report: ReportDocument, speaker: Tongue) -> str:
+    """The score, the range it lies in, or a dash."""
+    if report.score is not None:
+        return speaker.trimmed(report.score, 2)
+    if report.score_range is None or report.status in {"missing", "unreadable"}:
+        return "–"
+    low, high = (speaker.trimmed(value, 2) for value in report.score_range)
+    return low if low == high else f"{low}–{high}"
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Points that are scaled together: those given, those that could be, and by what they are scaled."""
+
+    given: float
+    judged: float
+    factor: float
+
+    @property
+    def result(self) -> float:
+        """What it gives of the score."""
+        return self.given * self.factor
+
+
+def score_line(report: ReportDocument, speaker: Tongue) -> str:
+    """How the points of the rows become the score, so that a reader can compute it again.
+
+    Empty where nothing was judged.
+    """
+    parts = _parts(report)
+    if not parts:
+        return ""
+    return " ".join((_settled(report, parts, speaker), *_open_and_added(report, parts, speaker)))
+
+
+def settled_points(report: ReportDocument) -> float | None:
+    """What the points of the rows give together, in points of the score; None where nothing was judged."""
+    parts = _parts(report)
+    return sum(part.result for part in parts) if parts else None
+
+
+def _parts(report: ReportDocument) -> list[Part]:
+    """Each section with a weight of its own, of which anything was judged, and all others together."""
+    parts = []
+    for section in dict.fromkeys(criterion.section for criterion in report.criteria):
+        own = [criterion for criterion in report.criteria if criterion.section == section]
+        judged = sum(one.max_points for one in own if one.verdict != "not_judged")
+        if judged:
+            whole = judged if section is None else sum(one.max_points for one in own)
+            parts.append(Part(sum(one.points or 0.0 for one in own), judged, whole / judged))
+    in_full = sum(part.judged * part.factor for part in parts)
+    return [replace(part, factor=part.factor * report.max_score / in_full) for part in parts]
+
+
+def _settled(report: ReportDocument, parts: Sequence[Part], speaker: Tongue) -> str:
+    def points(value: float) -> str:
+        return speaker.trimmed(value, 2)
+
+    first = parts[0].factor
+    known = {
+        "sum": points(sum(part.given for part in parts)),
+        "judged": points(sum(part.judged for part in parts)),
+        "maximum": points(report.max_score),
+        "result": points(sum(part.result for part in parts)),
+        "terms": " + ".join(f"{points(part.given)} × {speaker.trimmed(part.factor, 4)}" for part in parts),
+    }
+    is_one = all(math.isclose(part.factor, first) for part in parts)
+    text = (SUM if math.isclose(first, 1.0) else SCALED) if is_one else WEIGHTED
+    return speaker.gettext(text) % known
+
+
+def _open_and_added(report: ReportDocument, parts: Sequence[Part], speaker: Tongue) -> Iterator[str]:
+    """What waits, and what a person added or took off."""
+    if report.score is None and report.score_range is not None:
+        settled = sum(part.result for part in parts) + report.added
+        low, high = (max(end - settled, 0.0) for end in report.score_range)
+        yield speaker.gettext(WAITS) % {"low": speaker.trimmed(low, 2), "high": speaker.trimmed(high, 2)}
+    if report.added:
+        yield added_text(report, speaker)
+
+
+def added_text(report: ReportDocument, speaker: Tongue) -> str:
+    """The points that a person added or took off; empty where none."""
+    text = ADDED if report.added > 0.0 else TAKEN
+    points = speaker.trimmed(abs(report.added), 2)
+    return speaker.gettext(text) % {"points": points} if report.added else ""

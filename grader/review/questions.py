@@ -1,0 +1,288 @@
+"""What the page is told: a student's criteria as rows, and one question with all that is to be seen of it."""
+
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import urlencode
+
+from markupsafe import Markup
+
+from grader.documents import CriterionDocument, QuantityDocument
+from grader.feedback.numbers import quantity_cells, score_text, tolerance_cells
+from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
+from grader.inputs.decisions import Decision
+from grader.language import N_, Tongue
+from grader.overlay.closeup import look
+from grader.overlay.scene import MARKS
+from grader.records import MECHANISM, Box
+from grader.review.session import OPEN, Session, Standing, Student, mark_of, page_criterion
+from grader.rubric import RubricFile
+
+Facts = dict[str, Any]
+"""An object of JSON."""
+
+TEXTS = {
+    "left": N_("{open} open, about {minutes} min"),
+    "nothing_left": N_("nothing is open"),
+    "sheet": N_("sheet"),
+    "node": N_("node"),
+    "corner": N_("corner"),
+    "no_scan": N_("It was entered by hand: there is no scan of it."),
+    "choose": N_("There is no proposal: choose a verdict, 1 to 4."),
+    "gone": N_("The server does not answer. What was accepted is kept; start planmark review again."),
+    "look_again": N_("look again"),
+    "close": N_("close"),
+    "saved": N_("Saved."),
+    "changed": N_("Somebody else has decided this in the meantime."),
+    "nothing_to_undo": N_("Nothing was decided in this window."),
+    "settles": N_("This settles {count}"),
+    "accept_all": N_("Accept {count}"),
+    "page_saved": N_("Saved. The page counts when the class is brought up to date."),
+    "still_open": N_("Still open: {open}"),
+    "all_settled": N_("Everything is settled."),
+    "can_finish": N_("You may export now; what is open has no grade yet. Or go on with what is open."),
+    "now_finish": N_("Bring the pages up to date and export the grades; then look through the class's page."),
+}
+"""What the script says, in braces what it fills in itself."""
+CLASH = N_("%(who)s has decided this in the meantime: %(verdict)s. Yours was not written.")
+TAKEN_BACK = N_("Somebody has taken this decision back in the meantime. Yours was not written.")
+SOMEBODY = N_("somebody")
+CHECKED = N_("decided by %(who)s")
+STALE = N_("%(who)s decided: %(verdict)s; what that was about has changed since")
+PROPOSED = N_("proposed: %(verdict)s")
+ACCEPT = N_("Accept: %(verdict)s")
+NO_PROPOSAL = N_("No proposal: choose a verdict")
+GO_ON = N_("Go on")
+FAULT = "decision_fault"
+WHOLE_MARGIN = 0.03
+"""Of a figure's size, where nothing else says what to look at."""
+
+
+def texts(speaker: Tongue) -> Facts:
+    """What the script says in a language."""
+    return {
+        **{name: speaker.gettext(text) for name, text in TEXTS.items()},
+        "verdicts": {verdict: speaker.gettext(word) for verdict, word in VERDICTS.items()},
+        "marks": dict(MARKS),
+    }
+
+
+# Rows ---------------------------------------------------------------------------------------------
+
+
+def label_of(student: Student, speaker: Tongue) -> str:
+    """What a student is called: id, name, position."""
+    report = student.report
+    label = " ".join(part for part in (report.student_id, student.name) if part)
+    if report.position is None:
+        return label
+    return f"{label} · {speaker.gettext('position')} {report.position}"
+
+
+def student_facts(student: Student, standing: Standing, rubric: RubricFile, speaker: Tongue) -> Facts:
+    """A student and the rows of the criteria, to be ordered by the script."""
+    report = student.report
+    titles = {one.id: one.title.in_language(speaker.lang) for one in rubric.criterion}
+    return {
+        "key": student.key,
+        "number": student.number,
+        "label": label_of(student, speaker),
+        "score": f"{score_text(report, speaker)} / {speaker.trimmed(report.max_score, 2)}",
+        "remark": report.comment,
+        "added": report.added,
+        "seen": [mark_of(standing.of(student, name)) for name in ("comment", "total")],
+        "rows": [
+            _row(student, criterion, standing, titles[criterion.id], order)
+            for order, criterion in enumerate(report.criteria)
+        ],
+    }
+
+
+def _row(
+    student: Student,
+    criterion: CriterionDocument,
+    standing: Standing,
+    title: str,
+    order: int = 0,
+) -> Facts:
+    row = standing.of(student, criterion.id)
+    drawn = "" if criterion.drawn in title else criterion.drawn
+    return {
+        "student": student.key,
+        "criterion": criterion.id,
+        "order": order,
+        "title": Markup("{} {}").format(symbols(title), symbols(drawn)) if drawn else symbols(title),
+        "verdict": criterion.verdict,
+        "proposed": criterion.proposed,
+        "probability": criterion.probability,
+        "stake": criterion.max_points if criterion.verdict == OPEN else 0.0,
+        "decided": criterion.decided is not None,
+        "seen": mark_of(row),
+    }
+
+
+# One question -------------------------------------------------------------------------------------
+
+
+def question_facts(session: Session, student: Student, name: str, speaker: Tongue) -> Facts:
+    """One criterion of a student: what was handed in, what is right, what is proposed, where to look."""
+    criterion, standing = student.criterion(name), session.standing()
+    title = next(one.title for one in session.batch.rubric.criterion if one.id == name)
+    row = _row(student, criterion, standing, title.in_language(speaker.lang))
+    decision = standing.of(student, name)
+    proposed = criterion.proposed if criterion.verdict == OPEN else None
+    what = speaker.gettext(VERDICTS[proposed]) if proposed else ""
+    if proposed and criterion.probability is not None:
+        what = f"{what}, {per_cent(criterion.probability)}"
+    accept = ACCEPT if proposed else NO_PROPOSAL if criterion.verdict == OPEN else GO_ON
+    said = speaker.gettext(PROPOSED) % {"verdict": what} if proposed else ""
+    return {
+        **row,
+        "proposed": proposed,
+        "decided": criterion.verdict if decision and criterion.decided else "",
+        "comment": decision.comment if decision else "",
+        "position": "",
+        "numbers": list(_numbers(criterion, speaker)),
+        "state": _state(criterion, decision, said, speaker),
+        "brief": said or speaker.gettext(VERDICTS[criterion.verdict]),
+        "accept": Markup("<kbd>Enter</kbd> {}").format(speaker.gettext(accept) % {"verdict": what}),
+        "why": symbols(criterion.feedback) if criterion.verdict == OPEN else "",
+        "sentence": symbols(session.sentence_if(student, criterion)) if accept != NO_PROPOSAL else "",
+        "look": _look(session, student, criterion),
+    }
+
+
+def per_cent(probability: float) -> str:
+    """A probability as people read it: never rounded up to certainty."""
+    return f"{int(100 * probability)}\N{NO-BREAK SPACE}%"
+
+
+def _state(criterion: CriterionDocument, decision: Decision | None, said: str, speaker: Tongue) -> Markup:
+    badge = Markup('<span class="badge v-{}" aria-hidden="true">{}</span> {}').format(
+        criterion.verdict, MARKS[criterion.verdict], speaker.gettext(VERDICTS[criterion.verdict])
+    )
+    if criterion.decided is not None:
+        said = speaker.gettext(CHECKED) % {"who": criterion.decided.by or speaker.gettext(SOMEBODY)}
+    elif decision is not None:
+        was = speaker.gettext(VERDICTS[decision.verdict])
+        who = decision.by or speaker.gettext(SOMEBODY)
+        said = speaker.gettext(STALE) % {"who": who, "verdict": was}
+    return Markup('{} <span class="soft">{}</span>').format(badge, said) if said else badge
+
+
+def _numbers(criterion: CriterionDocument, speaker: Tongue) -> Iterator[tuple[str, Markup]]:
+    def cells(quantity: QuantityDocument) -> str:
+        return " · ".join(quantity_cells(quantity, speaker))
+
+    unit = criterion.expected.unit or criterion.measured.unit or ""
+    shown = (
+        (N_("Measured"), cells(criterion.measured)),
+        (N_("Expected"), cells(criterion.expected)),
+        (N_("Tolerance"), " · ".join(tolerance_cells(criterion.tolerance, unit, speaker))),
+        (N_("Points"), _points(criterion, speaker)),
+    )
+    return ((speaker.gettext(name), Markup.escape(value)) for name, value in shown if value)
+
+
+def _points(criterion: CriterionDocument, speaker: Tongue) -> str:
+    given = "–" if criterion.points is None else speaker.trimmed(criterion.points, 2)
+    return f"{given} / {speaker.trimmed(criterion.max_points, 2)}"
+
+
+# Where to look ------------------------------------------------------------------------------------
+
+
+def _look(session: Session, student: Student, criterion: CriterionDocument) -> Facts | None:
+    """The part of a scan that a question is about, with what was read there; None without a scan."""
+    names = session.batch.assignment.file.names
+    pages, standing = session.pages_of(student), session.standing()
+
+    def seen_of(figure: str, node: str) -> str:
+        return mark_of(standing.of(student, f"node:{figure}:{node}"))
+
+    first: Facts | None = None
+    for sheet, page in enumerate(pages):
+        scene = session.scene(student, sheet)
+        if scene is None or page.sheet is None:
+            continue
+        ghost = session.ghost(student, sheet, criterion)
+        seen = look(scene, criterion.drawn, ghost, names) if criterion.drawn else None
+        figure = session.figure_of(student, criterion)
+        read = student.report.reading.sheets[sheet].figures
+        box = seen[0] if seen else _box_of(read.get(figure), scene.page_mm)  # type: ignore[call-overload]
+        facts = {
+            "sheet": sheet,
+            "scan": "/scan?" + urlencode({"student": student.key, "sheet": sheet, "run": session.runs}),
+            "page_mm": scene.page_mm,
+            "box": box,
+            "marks": seen[1] if seen else "",
+            "nodes": [
+                {"figure": kind, "name": name, "x": node.x_mm, "y": node.y_mm, "seen": seen_of(kind, name)}
+                for kind, one in read.items()
+                if kind == figure or (figure == "" and kind != MECHANISM)
+                for name, node in one.nodes.items()
+            ],
+        }
+        if seen or figure in read:
+            return facts
+        first = first or facts
+    return first
+
+
+def _box_of(figure: Any, page_mm: tuple[float, float]) -> Box:  # noqa: ANN401 - a figure's document, or None
+    """A box around a figure's nodes, the whole page without them."""
+    nodes = list(figure.nodes.values()) if figure else []
+    if not nodes:
+        return (0.0, 0.0, *page_mm)
+    xs, ys = [node.x_mm for node in nodes], [node.y_mm for node in nodes]
+    margin = 15.0 + WHOLE_MARGIN * (max(xs) - min(xs))
+    return (
+        min(xs) - margin, min(ys) - margin,
+        max(xs) - min(xs) + 2 * margin, max(ys) - min(ys) + 2 * margin,
+    )  # fmt: skip
+
+
+# Pages --------------------------------------------------------------------------------------------
+
+
+def pages_facts(session: Session, speaker: Tongue) -> Facts:
+    """The pages that are nobody's or were refused, and those whom they may be given to."""
+    standing = session.standing()
+    pages = []
+    for ref, problem in session.waiting_pages():
+        row = standing.rows.get(("", None, page_criterion(ref)))
+        said = None if row is None else row.page
+        try:
+            (width, height), turn = session.scans.size(ref), session.scans.turn(ref)
+        except Exception:  # noqa: BLE001 - a page that cannot be decoded can still be given to somebody
+            width, height, turn = 0, 0, 0
+        owner = session.owner_of(ref, row)
+        pages.append(
+            {
+                "file": ref.file,
+                "page": ref.page,
+                "label": str(ref),
+                "why": problem_sentence(problem, speaker).text,
+                "said": row.verdict if row else "",
+                "seen": mark_of(row),
+                "owner": "" if owner is None else owner.key,
+                "turn": said.turn if said and said.turn is not None else turn,
+                "upright": turn,
+                "corners": list(said.corners) if said else [],
+                "width": width,
+                "height": height,
+                "picture": "/page?" + urlencode({"file": ref.file, "page": ref.page}),
+            }
+        )
+    owners = [{"key": student.key, "label": label_of(student, speaker)} for student in session.students]
+    return {"pages": pages, "owners": owners, "idle": list(_idle(session, speaker))}
+
+
+def _idle(session: Session, speaker: Tongue) -> Iterator[str]:
+    """The decisions that the last run could not apply, each with the reason."""
+    results = None if session.graded is None else session.graded.results
+    for one in [] if results is None else results.stale:
+        what = speaker.gettext(VERDICTS[one.verdict]) if one.verdict in VERDICTS else one.verdict
+        yield f"{one.student_id} {one.criterion}: {what}. {speaker.gettext(one.reason)}".strip()
+    for fault in [] if results is None else results.unmatched:
+        if fault.code == FAULT:
+            yield unmatched_sentence(fault, speaker).text

@@ -1,0 +1,479 @@
+"""The web application: its routes, and who may use it.
+
+It listens on this machine alone, or asks for a token. A page of another site can neither read nor post: the
+Host header must be one of this machine's (a name that was made to point here is refused), and what is posted
+must come from the page itself (Origin, a header of its own, JSON).
+"""
+
+import getpass
+import hmac
+import threading
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any
+from urllib.parse import urlsplit
+
+from jinja2 import PackageLoader
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
+from starlette.routing import Route
+
+from grader.feedback.words import VERDICTS, environment
+from grader.inputs.decision_texts import PageDecision, place_text
+from grader.inputs.decisions import Decision
+from grader.language import N_, Tongue, tongue
+from grader.lms.export import export, usual_name
+from grader.lms.grades import Options
+from grader.review import questions
+from grader.review.scans import page_of
+from grader.review.session import Answer, ChangedError, OnWhole, Session, page_criterion
+from reference.errors import CallError, PlanmarkError
+
+LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
+COOKIE = "planmark"
+MOST_BYTES = 1_000_000
+"""Of what is posted: a thousand answers have a tenth of it."""
+LONGEST_PX = 2000.0
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; img-src 'self' data:; style-src 'self';"
+    " script-src 'self'; connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+PAGE_HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; img-src 'self' data:; style-src 'unsafe-inline';"
+    " script-src 'unsafe-inline'; frame-ancestors 'none'",
+}
+"""Of the pages that `planmark grade` wrote, which have their styles in them."""
+EXPORTS = ("moodle", "canvas", "gradescope")
+WORKING = N_("Bringing the pages up to date: %(done)d of %(total)d")
+UP_TO_DATE = N_("The pages are up to date.")
+CLASS_PAGE, TABLE = N_("the class's page"), N_("the table of grades")
+FORBIDDEN = "this address is not allowed here: open the address that planmark review printed"
+Handler = Callable[[Request], Awaitable[Response]]
+
+
+@dataclass(slots=True)
+class Run:
+    """A run in the background that brings the class up to date."""
+
+    running: bool = False
+    progress: str = ""
+    message: str = ""
+    files: list[dict[str, str]] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class Review:
+    """The application's handlers; `token` is asked for where the server can be reached from elsewhere."""
+
+    session: Session
+    lang: str = "en"
+    token: str = ""
+    run: Run = field(default_factory=Run)
+
+    @property
+    def speaker(self) -> Tongue:
+        """The interface's language."""
+        return tongue(self.lang)
+
+    # Pages of the interface -----------------------------------------------------------------------
+
+    def index(self, _request: Request) -> Response:
+        """The page itself."""
+        made = environment(self.lang).overlay(loader=PackageLoader("grader.review"))
+        title = self.session.batch.assignment.file.title.in_language(self.lang)
+        page = made.get_template("review.html").render(
+            title=title, texts=questions.texts(self.speaker), by=_user(), verdicts=VERDICTS
+        )
+        return Response(page, media_type="text/html")
+
+    # The class ------------------------------------------------------------------------------------
+
+    def class_facts(self, request: Request) -> Response:
+        """All students, or those that changed since the version that the page has."""
+        self.session.refresh()
+        return JSONResponse(self._facts(_whole(request.query_params.get("since", "-1"))))
+
+    def _facts(self, since: int) -> dict[str, Any]:
+        session, standing = self.session, self.session.standing()
+        changed = [student for student in session.students if student.version > since]
+        return {
+            "version": session.version,
+            "keys": [student.key for student in session.students],
+            "students": [
+                questions.student_facts(one, standing, session.batch.rubric, self.speaker) for one in changed
+            ],
+            "comments": session.comments(),
+            "pages": len(session.waiting_pages()),
+        }
+
+    def question(self, request: Request) -> Response:
+        """One question."""
+        asked = request.query_params
+        student = self.session.student(asked.get("student", ""))
+        return JSONResponse(
+            questions.question_facts(self.session, student, asked.get("criterion", ""), self.speaker)
+        )
+
+    def pages(self, _request: Request) -> Response:
+        """The pages that are nobody's or were refused."""
+        return JSONResponse(questions.pages_facts(self.session, self.speaker))
+
+    # Pictures -------------------------------------------------------------------------------------
+
+    def scan(self, request: Request) -> Response:
+        """A part of a registered page."""
+        asked = request.query_params
+        student, sheet = self.session.student(asked.get("student", "")), _whole(asked.get("sheet", ""))
+        pages = self.session.pages_of(student)
+        if not 0 <= sheet < len(pages):
+            raise CallError("page_missing", "there is no such page")
+        x, y, w, h, scale = (_number(asked.get(name, "")) for name in ("x", "y", "w", "h", "scale"))
+        if not (0.5 <= w <= 2000.0 and 0.5 <= h <= 2000.0 and 0.1 <= scale <= 100.0):
+            raise CallError("part_refused", "this part of the page cannot be shown")
+        scale = min(scale, 4000.0 / max(w, h))
+        picture = self.session.scans.part(pages[sheet], (x, y, w, h), scale)
+        return Response(picture, media_type="image/jpeg", headers={"Cache-Control": "private, max-age=600"})
+
+    def page_picture(self, request: Request) -> Response:
+        """A page as it is stored."""
+        asked = request.query_params
+        ref = page_of(self.session.pages, asked.get("file", ""), _whole(asked.get("page", "")))
+        if ref is None:
+            raise CallError("page_missing", "there is no such page")
+        return Response(self.session.scans.whole(ref, LONGEST_PX), media_type="image/jpeg")
+
+    def out(self, request: Request) -> Response:
+        """A page of the results."""
+        top = self.session.batch.out.resolve()
+        path = (top / request.path_params["path"]).resolve()
+        is_shown = path.suffix in {".html", ".png", ".csv"} and path.is_relative_to(top)
+        if (
+            not is_shown
+            or not path.is_file()
+            or any(part.startswith(".") for part in path.relative_to(top).parts)
+        ):
+            return Response("not found", 404)
+        return FileResponse(path, headers=PAGE_HEADERS)
+
+    # Decisions ------------------------------------------------------------------------------------
+
+    def decide(self, said: "Answers") -> dict[str, Any]:
+        """Verdicts on criteria, all of them or none."""
+        since = self.session.version
+        answers = [Answer(**one.model_dump()) for one in said.answers]
+        self.session.decide(answers, said.by, said.window)
+        return self._facts(since)
+
+    def whole(self, said: "Whole") -> dict[str, Any]:
+        """A comment on a whole submission, and points added."""
+        since = self.session.version
+        whole = OnWhole(said.student, said.comment, said.added, said.seen)
+        self.session.decide_whole(whole, said.by, said.window)
+        return self._facts(since)
+
+    def node(self, said: "Moved") -> dict[str, Any]:
+        """A node put elsewhere; it snaps to the ink there."""
+        since = self.session.version
+        figure = said.node.partition(":")[0]
+        at = self.session.snapped(said.student, said.sheet, figure, (said.x, said.y))
+        answer = Answer(said.student, f"node:{said.node}", place_text(*at), seen=said.seen)
+        self.session.move(answer, said.by, said.window)
+        return self._facts(since)
+
+    def page(self, said: "OnPage") -> dict[str, Any]:
+        """Whose a page is, its turn, its corners."""
+        ref = page_of(self.session.pages, said.file, said.page)
+        if ref is None:
+            raise CallError("page_missing", "there is no such page")
+        owner = None if said.owner is None else self.session.student(said.owner).report
+        student_id = None if owner is None else owner.student_id
+        decision = PageDecision(student_id, said.turn, tuple(said.corners))
+        if not str(decision):
+            raise CallError("answer_refused", "say whose the page is, or turn it, or give its corners")
+        position = None if owner is None else owner.position
+        row = Decision("", position, page_criterion(ref), str(decision), by=said.by)
+        self.session.decide_page(ref, row, said.seen, said.window)
+        return self._facts(self.session.version)
+
+    def undo(self, said: "Said") -> dict[str, Any]:
+        """The last decision of a window taken back."""
+        since = self.session.version
+        students, row = self.session.undo(said.window)
+        undone = "" if row is None else f"{students[0].key}/{row.criterion}" if students else row.criterion
+        return {**self._facts(since), "undone": undone}
+
+    # The end --------------------------------------------------------------------------------------
+
+    def finish(self, _said: "Said") -> dict[str, Any]:
+        """Start to bring all pages up to date and to export."""
+        if not self.run.running:
+            self.run = Run(running=True)
+            threading.Thread(target=self._finish, args=(self.run,), daemon=True).start()
+        return {}
+
+    def _finish(self, run: Run) -> None:
+        speaker, out = self.speaker, self.session.batch.out
+
+        def progress(_what: str, done: int, total: int) -> None:
+            run.progress = speaker.gettext(WORKING) % {"done": done, "total": total}
+
+        try:
+            results = self.session.bring_up_to_date(progress).results
+            options = Options(to="csv", what="grades", out=out, lang=self.lang)
+            table = out / usual_name(options)
+            export(results, table, options)
+            run.files = [
+                {"href": f"/out/{name}", "label": speaker.gettext(label), "path": str(out / name)}
+                for name, label in (("index.html", CLASS_PAGE), (table.name, TABLE))
+            ]
+        except PlanmarkError as error:
+            run.message = error.message
+        finally:
+            run.running = False
+
+    def finished(self, _request: Request) -> Response:
+        """How far that is, and what it wrote."""
+        out = self.session.batch.out
+        return JSONResponse(
+            {
+                "running": self.run.running,
+                "progress": self.run.progress,
+                "message": self.run.message,
+                "summary": self.speaker.gettext(UP_TO_DATE),
+                "files": self.run.files,
+                "commands": [f"planmark export {_quoted(out)} --to {name}" for name in EXPORTS],
+            }
+        )
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError):  # nobody is logged in
+        return ""
+
+
+def _quoted(path: Path) -> str:
+    text = str(path)
+    return f'"{text}"' if " " in text else text
+
+
+# What a request holds -----------------------------------------------------------------------------
+
+Number = Annotated[int, Field(ge=0, lt=100_000)]
+Place = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False)]
+
+
+class Said(BaseModel):
+    """What every post says: who decides, and in which window."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    by: str = ""
+    window: str = ""
+
+
+class Given(BaseModel):
+    """An answer to one question, see `Answer`."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    student: str
+    criterion: str
+    verdict: str
+    comment: str = ""
+    seen: str = ""
+
+
+class Answers(Said):
+    """Answers that are written together."""
+
+    answers: Annotated[list[Given], Field(min_length=1)]
+
+
+class Whole(Said):
+    """A comment on a whole submission, and points added."""
+
+    student: str
+    comment: str = ""
+    added: Place = 0.0
+    seen: Annotated[tuple[str, str], Field(strict=False)] = ("", "")
+
+
+class Moved(Said):
+    """A node, ``FIGURE:NODE``, and the place on a sheet that a person points at, mm."""
+
+    student: str
+    sheet: Number
+    node: str
+    x: Place
+    y: Place
+    seen: str = ""
+
+
+class OnPage(Said):
+    """Whose a page is (a student's key), its turn in degrees, its corners in stored pixels."""
+
+    file: str
+    page: Number
+    owner: str | None = None
+    turn: int | None = None
+    seen: str = ""
+    corners: list[Annotated[tuple[Place, Place], Field(strict=False)]] = []
+
+
+def _whole(value: object) -> int:
+    number = _number(value)
+    if number != int(number):
+        raise CallError("answer_refused", f"{value} is no whole number")
+    return int(number)
+
+
+def _number(value: object) -> float:
+    try:
+        number = float(str(value))
+    except ValueError:
+        raise CallError("answer_refused", f"'{str(value)[:40]}' is no number") from None
+    if not abs(number) < 1e6:
+        raise CallError("answer_refused", f"'{str(value)[:40]}' is no such number")
+    return number
+
+
+# The application ----------------------------------------------------------------------------------
+
+
+def application(session: Session, lang: str = "en", token: str = "") -> Starlette:
+    """The web application of a class; with a `token`, only for those who have it."""
+    review = Review(session, lang, token)
+    gets: dict[str, Callable[[Request], Response]] = {
+        "/": review.index,
+        "/api/class": review.class_facts,
+        "/api/question": review.question,
+        "/api/pages": review.pages,
+        "/api/finish": review.finished,
+        "/scan": review.scan,
+        "/page": review.page_picture,
+        "/out/{path:path}": review.out,
+        "/review.js": _static("review.js", "text/javascript"),
+        "/review.css": _static("review.css", "text/css"),
+    }
+    posts: dict[str, tuple[type[Said], Callable[[Any], dict[str, Any]]]] = {
+        "/api/decide": (Answers, review.decide),
+        "/api/whole": (Whole, review.whole),
+        "/api/node": (Moved, review.node),
+        "/api/page": (OnPage, review.page),
+        "/api/undo": (Said, review.undo),
+        "/api/finish": (Said, review.finish),
+    }
+    return Starlette(
+        routes=[
+            *(
+                Route(path, _guarded(review, _read(review, act)), methods=["GET"])
+                for path, act in gets.items()
+            ),
+            *(
+                Route(path, _guarded(review, _posted(review, *one)), methods=["POST"])
+                for path, one in posts.items()
+            ),
+        ]
+    )
+
+
+def _static(name: str, kind: str) -> Callable[[Request], Response]:
+    text = (files("grader.review") / "static" / name).read_text(encoding="utf-8")
+    return lambda _request: Response(text, media_type=kind)
+
+
+def _read(review: Review, act: Callable[[Request], Response]) -> Handler:
+    async def handler(request: Request) -> Response:
+        return await run_in_threadpool(lambda: _told(review, lambda: act(request)))
+
+    return handler
+
+
+def _posted(review: Review, model: type[Said], act: Callable[[Any], dict[str, Any]]) -> Handler:
+    async def handler(request: Request) -> Response:
+        body = bytearray()
+        async for part in request.stream():
+            body += part
+            if len(body) > MOST_BYTES:
+                return JSONResponse({"message": "too much is posted"}, 413)
+        try:
+            said = model.model_validate_json(bytes(body))
+        except ValidationError as error:
+            fault = error.errors(include_url=False, include_context=False, include_input=False)[0]
+            where = ".".join(map(str, fault["loc"]))
+            return JSONResponse({"message": f"{where}: {fault['msg']}".lstrip(": ")}, 400)
+        return await run_in_threadpool(lambda: _told(review, lambda: JSONResponse(act(said))))
+
+    return handler
+
+
+def _told(review: Review, act: Callable[[], Response]) -> Response:
+    """The response, or in words why there is none."""
+    speaker = review.speaker
+    try:
+        return act()
+    except ChangedError as error:
+        there = error.there
+        if there is None:
+            return JSONResponse({"message": speaker.gettext(questions.TAKEN_BACK), "clash": True}, 409)
+        verdict = speaker.gettext(VERDICTS[there.verdict]) if there.verdict in VERDICTS else there.verdict
+        who = there.by or speaker.gettext(questions.SOMEBODY)
+        message = speaker.gettext(questions.CLASH) % {"who": who, "verdict": verdict}
+        return JSONResponse({"message": message, "clash": True}, 409)
+    except PlanmarkError as error:
+        return JSONResponse({"message": error.message, "code": error.code}, 400)
+
+
+# Who may use it -----------------------------------------------------------------------------------
+
+
+def _guarded(review: Review, handler: Handler) -> Handler:
+    async def guarded(request: Request) -> Response:
+        response = refusal(request, review.token) or await handler(request)
+        for name, value in HEADERS.items():
+            response.headers.setdefault(name, value)
+        return response
+
+    return guarded
+
+
+def refusal(request: Request, token: str) -> Response | None:
+    """Why a request is not answered; None where it is."""
+    host = request.headers.get("host", "")
+    if not token and urlsplit(f"//{host}").hostname not in LOOPBACK:
+        return JSONResponse({"message": FORBIDDEN}, 403)
+    if token and not _has_token(request, token):
+        given = request.query_params.get("token", "")
+        if request.url.path == "/" and hmac.compare_digest(given.encode(), token.encode()):
+            response = RedirectResponse("/", 303)
+            response.set_cookie(COOKIE, token, httponly=True, samesite="lax")
+            return response
+        return JSONResponse(
+            {"message": "the token is missing or wrong: open the address with its token"}, 401
+        )
+    if request.method == "POST" and not _is_own_page(request, host):
+        return JSONResponse({"message": "only the review's own page may post"}, 403)
+    return None
+
+
+def _has_token(request: Request, token: str) -> bool:
+    return hmac.compare_digest(request.cookies.get(COOKIE, "").encode(), token.encode())
+
+
+def _is_own_page(request: Request, host: str) -> bool:
+    headers = request.headers
+    origin = headers.get("origin")
+    is_same = origin is None or urlsplit(origin).netloc == host
+    is_json = headers.get("content-type", "").partition(";")[0].strip() == "application/json"
+    return is_same and is_json and headers.get("x-planmark") == "review"

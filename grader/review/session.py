@@ -1,0 +1,484 @@
+"""A class under review: its questions, the decisions on them, and what follows from these at once.
+
+The file of decisions is the only thing that is kept. Reports in memory are of the decisions in it; results
+and pages on the disk are of the last run, and `bring_up_to_date` makes them anew.
+"""
+
+import threading
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+
+import numpy as np
+
+from grader.comparison.task import task_of
+from grader.documents import CriterionDocument, ProblemDocument, ReadingDocument, ReportDocument
+from grader.folder.batch import Batch, Graded, Job, graded, pages_read
+from grader.folder.decisions import basis_of, decided, page_basis
+from grader.folder.workers import Pool
+from grader.inputs.decisions import ClashError, Decision, DecisionFile, Key
+from grader.inputs.measurements import StudentSubmission
+from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, on_paper, scene_of
+from grader.pipeline import report_on
+from grader.reading.corrected import snapped
+from grader.records import MECHANISM, Figure, PageRef, Reading, ReadNode, ReadVector, ScannedPage
+from grader.review.scans import Scans
+from reference.construction.graph import Construction
+from reference.errors import CallError, PlanmarkError
+
+OPEN = "review"
+SURE = 0.9
+"""Proposals of at least this probability are offered to be accepted together."""
+MOST_COMMENTS = 30
+"""Comments that are offered again."""
+
+
+class ChangedError(PlanmarkError):
+    """What a person answered is no longer what it was when the question was shown; `there` decided it."""
+
+    exit_status = 1
+
+    def __init__(self, there: Decision | None) -> None:
+        super().__init__("decision_clash", "decided by somebody else in the meantime")
+        self.there = there
+
+
+@dataclass(slots=True)
+class Student:
+    """One submission under review; `number` is its place in the class, from 0."""
+
+    number: int
+    job: Job
+    report: ReportDocument
+    name: str
+    version: int = 0
+    pages: list[ScannedPage] | None = None
+
+    @property
+    def key(self) -> str:
+        """What it is called between page and server; it stays when others come to the class."""
+        return self.job.folder
+
+    def criterion(self, name: str) -> CriterionDocument:
+        """A criterion by its id. Raises CallError."""
+        for criterion in self.report.criteria:
+            if criterion.id == name:
+                return criterion
+        raise CallError("criterion_unknown", f"{self.job.folder} has no criterion {name}")
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a person decided on one criterion.
+
+    Attributes
+    ----------
+    student : the key
+    seen : `mark_of` what stood decided when the question was shown
+    """
+
+    student: str
+    criterion: str
+    verdict: str
+    comment: str = ""
+    seen: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class OnWhole:
+    """What a person said of a whole submission: a comment, points added, the marks of what stood there."""
+
+    student: str
+    comment: str
+    added: float
+    seen: tuple[str, str] = ("", "")
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Rows that were written, and those that they stand in the place of."""
+
+    written: tuple[Decision, ...]
+    before: tuple[Decision, ...]
+
+
+class Standing:
+    """What stands decided: rows by what they are about."""
+
+    def __init__(self, rows: Sequence[Decision]) -> None:
+        self.rows = {row.key: row for row in rows}
+
+    def key(self, student: Student, criterion: str) -> Key:
+        """What a row on a student's criterion is about: people may leave the position blank."""
+        report = student.report
+        blank = (report.student_id, None, criterion)
+        return blank if blank in self.rows else (report.student_id, report.position, criterion)
+
+    def of(self, student: Student, criterion: str) -> Decision | None:
+        """The row on a student's criterion."""
+        return self.rows.get(self.key(student, criterion))
+
+
+@dataclass(slots=True)
+class Session:
+    """One class, for several people at once; every method may be called from any thread.
+
+    Arguments
+    ---------
+    workers : what grades, processes of its own where not given
+    """
+
+    batch: Batch
+    workers: Pool | None = None
+    students: list[Student] = field(default_factory=list)
+    pages: tuple[PageRef, ...] = ()
+    version: int = 0
+    runs: int = 0
+    made: int = 0
+    """How many decisions were made here since the pages were brought up to date."""
+    scans: Scans = field(default_factory=Scans)
+    graded: Graded | None = None
+    _file: DecisionFile = field(init=False)
+    _stamp: tuple[int, int] = (0, 0)
+    _rows: list[Decision] = field(default_factory=list)
+    _undo: dict[str, list[Change]] = field(default_factory=dict)
+    _lock: threading.RLock = field(default_factory=threading.RLock)
+
+    def __post_init__(self) -> None:
+        self._file = DecisionFile(self.batch.decisions_path)
+
+    # The class ------------------------------------------------------------------------------------
+
+    def bring_up_to_date(self, progress: Callable[[str, int, int], None]) -> Graded:
+        """Grade what has changed, so that results and pages on the disk are of all decisions.
+
+        Raises as `grader.folder.batch.graded`.
+        """
+        stamp, made, rows = self._file_stamp(), self.made, self._file.all()
+        run = graded(self.batch, progress, self.workers)
+        with self._lock:
+            self.graded, self.pages = run, run.pages
+            self.version, self.runs = self.version + 1, self.runs + 1
+            self.students = [
+                Student(number, job, report, job.submission.name, self.version)
+                for number, (job, report) in enumerate(zip(run.jobs, run.results.reports, strict=True))
+            ]
+            for student in self.students:
+                if student.report.status == "unreadable":
+                    student.report = self._with_questions(student, student.job.submission)
+            # What was decided meanwhile is taken in by the next `refresh`.
+            self.made -= made
+            self._stamp, self._rows = stamp, rows
+        return run
+
+    def student(self, key: str) -> Student:
+        """A student by the key. Raises CallError."""
+        for student in self.students:
+            if student.key == key:
+                return student
+        raise CallError("student_unknown", f"there is no student '{key}' in this class any more")
+
+    def pages_of(self, student: Student) -> list[ScannedPage]:
+        """The pages as the last run read them."""
+        if self.graded is None:
+            return []
+        if student.pages is None:
+            pages = pages_read(self.batch, self.graded.cache, student.job)
+            student.pages = [replace(page, backdrop=None) for page in pages]
+        return student.pages
+
+    # Decisions ------------------------------------------------------------------------------------
+
+    def standing(self) -> Standing:
+        """What stands decided now. Raises InputFileError for a file that people have broken."""
+        return Standing(self._file.all())
+
+    def decide(self, answers: Sequence[Answer], by: str, window: str) -> list[Student]:
+        """Write what a person decided, all of it or nothing; the students whom it concerns, marked anew.
+
+        Raises ChangedError where somebody else was quicker, CallError for an answer that cannot be used.
+        """
+        with self._lock:
+            wanted: list[tuple[Decision, str]] = []
+            there = self.standing()
+            for answer in answers:
+                student = self.student(answer.student)
+                student.criterion(answer.criterion)
+                row = self._row(student, answer.criterion, answer.verdict, by, there)
+                wanted.append((replace(row, comment=answer.comment), answer.seen))
+            self._write(wanted, there, window)
+            return self._marked_anew({answer.student for answer in answers})
+
+    def decide_whole(self, answer: OnWhole, by: str, window: str) -> list[Student]:
+        """Write a comment on a whole submission and points added to it; an empty one takes it back.
+
+        Raises as `decide`.
+        """
+        with self._lock:
+            student, there = self.student(answer.student), self.standing()
+            comment = replace(self._row(student, "comment", "", by, there), comment=answer.comment)
+            total = replace(self._row(student, "total", "", by, there), points=answer.added)
+            wanted = ((comment, answer.seen[0], answer.comment), (total, answer.seen[1], answer.added))
+            gone = [
+                (row, seen) for row, seen, said in wanted if not said and there.rows.get(row.key) is not None
+            ]
+            self._write([(row, seen) for row, seen, said in wanted if said], there, window, gone)
+            return self._marked_anew({answer.student})
+
+    def move(self, answer: Answer, by: str, window: str) -> list[Student]:
+        """Write where a node lies: ``node:FIGURE:NODE`` as the criterion, ``x,y`` in sheet mm as the verdict.
+
+        Raises as `decide`.
+        """
+        with self._lock:
+            student, there = self.student(answer.student), self.standing()
+            row = self._row(student, answer.criterion, answer.verdict, by, there)
+            self._write([(row, answer.seen)], there, window)
+            return self._marked_anew({answer.student})
+
+    def decide_page(self, ref: PageRef, row: Decision, seen: str, window: str) -> None:
+        """Write whose a page is, how it is turned, where its corners are; it counts from the next run on.
+
+        Raises as `decide`.
+        """
+        with self._lock:
+            dated = replace(row, at=_now(), basis=page_basis(ref))
+            self._write([(dated, seen)], self.standing(), window)
+
+    def undo(self, window: str) -> tuple[list[Student], Decision | None]:
+        """Take back the last thing decided in a window: the students concerned, and a row of it.
+
+        Raises ChangedError where somebody has changed it since.
+        """
+        with self._lock:
+            changes = self._undo.get(window, [])
+            if not changes:
+                return [], None
+            change = changes.pop()
+            try:
+                self._file.remove(*change.written, restored=change.before)
+            except ClashError as error:
+                raise ChangedError(error.rows[0] if error.rows else None) from error
+            self.made -= 1
+            row = (*change.written, *change.before)[0]
+            own = [one for one in self.students if one.report.student_id == row.student_id]
+            fitting = [one for one in own if row.position in {None, one.report.position}]
+            self._marked_anew(set())
+            return fitting, row
+
+    def comments(self) -> list[str]:
+        """The comments written so far, the commonest first."""
+        texts = [row.comment for row in self._file.all() if row.kind == "verdict" and row.comment]
+        return sorted(dict.fromkeys(texts), key=lambda text: -texts.count(text))[:MOST_COMMENTS]
+
+    def refresh(self) -> None:
+        """Take in what others wrote into the file in the meantime."""
+        with self._lock:
+            if self._file_stamp() != self._stamp:
+                self._marked_anew(set())
+
+    def _row(self, student: Student, criterion: str, verdict: str, by: str, there: Standing) -> Decision:
+        batch = self.batch
+        basis = basis_of(student.job.submission, batch.assignment, batch.rubric, criterion)
+        return Decision(*there.key(student, criterion), verdict, None, "", by, _now(), basis)
+
+    def _write(
+        self,
+        wanted: Sequence[tuple[Decision, str]],
+        there: Standing,
+        window: str,
+        gone: Sequence[tuple[Decision, str]] = (),
+    ) -> None:
+        """Write rows, and take others out, each with the mark of what the person saw in its place."""
+        for row, seen in (*wanted, *gone):
+            standing = there.rows.get(row.key)
+            if mark_of(standing) != seen:
+                raise ChangedError(standing)
+        rows, out = [row for row, _ in wanted], [there.rows[row.key] for row, _ in gone]
+        if not rows and not out:
+            return
+        try:
+            before = self._file.add(*rows, expected=there.rows.values()) if rows else []
+            if out:
+                self._file.remove(*out)
+        except ClashError as error:
+            raise ChangedError(error.rows[0] if error.rows else None) from error
+        self._undo.setdefault(window, []).append(Change(tuple(rows), (*before, *out)))
+        self.made += 1
+
+    def _file_stamp(self) -> tuple[int, int]:
+        try:
+            stat = self._file.path.stat()
+        except OSError:
+            return (0, 0)
+        return (stat.st_mtime_ns, stat.st_size)
+
+    # Marks ----------------------------------------------------------------------------------------
+
+    def _marked_anew(self, keys: Collection[str]) -> list[Student]:
+        """These students, and those of whom rows of the file changed, marked with what is decided now."""
+        self._stamp = self._file_stamp()
+        rows = self._file.all()
+        changed = {row.student_id for row in {*rows} ^ {*self._rows}}
+        self._rows = rows
+        students = [one for one in self.students if one.key in keys or one.report.student_id in changed]
+        self.version += 1
+        for student in students:
+            student.report = self._report(student, rows)
+            student.version = self.version
+        return students
+
+    def _report(self, student: Student, rows: Sequence[Decision]) -> ReportDocument:
+        """The report with what is decided in some rows of the file."""
+        batch, report = self.batch, student.report
+        own = [row for row in rows if row.kind == "page" or row.student_id == report.student_id]
+        submission = decided(student.job.submission, own, batch.assignment, batch.rubric)
+        return self._with_questions(student, submission)
+
+    def _with_questions(self, student: Student, submission: StudentSubmission) -> ReportDocument:
+        """The report; of a submission of which nothing could be read, as if a person began to settle it."""
+        batch, pages = self.batch, self.pages_of(student)
+        report = report_on(submission, pages, batch.assignment, batch.rubric, batch.level)
+        if report.status != "unreadable" or report.criteria or submission.variant is None:
+            return report
+        first = batch.rubric.criterion[0].id
+        begun = Decision(submission.student_id, submission.position, first, "not_judged")
+        opened = report_on(
+            replace(submission, decided=(*submission.decided, begun)),
+            pages, batch.assignment, batch.rubric, batch.level,
+        )  # fmt: skip
+        asked = {"verdict": OPEN, "points": None, "decided": None, "probability": None}
+        criteria = [
+            one.model_copy(update=asked) if one.id == first and one.drawn else one for one in opened.criteria
+        ]
+        return opened.model_copy(update={"criteria": criteria})
+
+    def sentence_if(self, student: Student, criterion: CriterionDocument) -> str:
+        """What the student is told of a criterion, if what is proposed is accepted."""
+        if criterion.verdict != OPEN or criterion.proposed is None:
+            return criterion.feedback
+        with self._lock:
+            report = student.report
+            accepted = Decision(report.student_id, report.position, criterion.id, criterion.proposed)
+            rows = [*self._file.all(), accepted]
+            after = {one.id: one for one in self._report(student, rows).criteria}
+        return after[criterion.id].feedback if criterion.id in after else criterion.feedback
+
+    def snapped(self, key: str, sheet: int, figure: str, at: tuple[float, float]) -> tuple[float, float]:
+        """The point of the ink that is meant by a place on a page, both in sheet millimetres.
+
+        Raises CallError for a page that there is not.
+        """
+        pages = self.pages_of(self.student(key))
+        if not 0 <= sheet < len(pages):
+            raise CallError("page_missing", "there is no such page")
+        node = snapped(pages[sheet].ink, *at, figure)
+        return node.at.real, -node.at.imag
+
+    # Pages ----------------------------------------------------------------------------------------
+
+    def waiting_pages(self) -> list[tuple[PageRef, ProblemDocument]]:
+        """The pages that are nobody's, then those that could not be placed, each with its problem."""
+        if self.graded is None:
+            return []
+        found: dict[tuple[str, int], ProblemDocument] = {}
+        for page in self.graded.results.unmatched:
+            if page.page is not None:
+                problem = ProblemDocument(code=page.code, message=page.message)
+                found.setdefault((page.file, page.page), problem)
+        for student in self.students:
+            for sheet in student.report.reading.sheets:
+                if sheet.sheet is None and sheet.problems and sheet.problems[0].code != "page_blank":
+                    found.setdefault((sheet.source, sheet.page), sheet.problems[0])
+        refs = {(ref.file, ref.page): ref for ref in self.pages}
+        return [(refs[place], problem) for place, problem in found.items() if place in refs]
+
+    def owner_of(self, ref: PageRef, row: Decision | None) -> Student | None:
+        """Whose a page is, by a decision or as it was found."""
+        said = None if row is None else row.page.owner
+        for student in self.students:
+            report = student.report
+            if said is not None and (report.student_id, report.position) == (said, row and row.position):
+                return student
+            own = {(page.file, page.page) for page in student.job.submission.pages}
+            if said is None and (ref.file, ref.page) in own:
+                return student
+        return None
+
+    # What is seen ---------------------------------------------------------------------------------
+
+    def scene(self, student: Student, sheet: int) -> Scene | None:
+        """What was read on one of a student's pages; None of a refused one."""
+        construction = self._construction(student)
+        page = self.pages_of(student)[sheet]
+        if page.sheet is None or construction is None:
+            return None
+        reading = reading_of(student.report.reading.sheets[sheet])
+        judged = {criterion.drawn: criterion for criterion in student.report.criteria if criterion.drawn}
+        return scene_of(
+            page.sheet.page_mm, reading, construction.vectors, judged,
+            show_expected=False, links=construction.links,
+        )  # fmt: skip
+
+    def ghost(self, student: Student, sheet: int, criterion: CriterionDocument) -> Ghost | None:
+        """The vector or link expected, laid off from where the drawn one starts; None if that is unread."""
+        construction, figure = self._construction(student), self.figure_of(student, criterion)
+        read = reading_of(student.report.reading.sheets[sheet]).figures.get(figure)
+        expected = expected_vector(criterion)
+        if construction is None or read is None or expected is None:
+            return None
+        vector = construction.vectors.get(criterion.drawn)
+        tail = construction.links[criterion.drawn][0] if vector is None else vector.tail
+        node = read.nodes.get(tail)
+        if node is None:
+            return None
+        at = on_paper(node.at)
+        return ghost_of(Arrow(criterion.drawn, figure, at, at, criterion.verdict, doubtful=False), expected)
+
+    def _construction(self, student: Student) -> Construction | None:
+        variant = student.job.submission.variant
+        if variant is None:
+            return None
+        return task_of(self.batch.assignment, self.batch.rubric, variant).construction
+
+    def figure_of(self, student: Student, criterion: CriterionDocument) -> str:
+        """The figure that a criterion's vector or link is in; empty for a scale or an angular quantity."""
+        construction = self._construction(student)
+        if criterion.link or construction is None:
+            return MECHANISM if criterion.link else ""
+        figures = (
+            figure
+            for figure in construction.poles
+            if any(vector.name == criterion.vector for vector in construction.vectors_of(figure))
+        )
+        return next(figures, "")
+
+
+def reading_of(document: ReadingDocument) -> Reading:
+    """The record of a document; covariances are as if they were the same in all directions."""
+    figures: dict[str, Figure] = {}
+    for kind, figure in document.figures.items():
+        nodes = {
+            name: ReadNode(complex(node.x_mm, -node.y_mm), np.eye(2) * node.se_mm**2, node.confidence)
+            for name, node in figure.nodes.items()
+        }
+        vectors = {
+            name: ReadVector(one.length_mm, one.se_mm, one.direction_deg, one.se_deg, one.confidence)
+            for name, one in figure.vectors.items()
+        }
+        figures[kind] = Figure(nodes, vectors)
+    return Reading(figures)
+
+
+def page_criterion(ref: PageRef) -> str:
+    """How decisions name a page."""
+    return f"page:{ref.file}#{ref.page}"
+
+
+def mark_of(row: Decision | None) -> str:
+    """A mark of what stands decided; empty where nothing is."""
+    return "" if row is None else f"{row.at} {row.by} {row.verdict} {row.points} {row.comment}"
+
+
+def _now() -> str:
+    return datetime.now().astimezone().isoformat(timespec="milliseconds")

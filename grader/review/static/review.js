@@ -1,0 +1,781 @@
+"use strict";
+// The review page: one question after the other, by keys, mouse or touch. Everything that is decided is sent
+// to the server at once; nothing is kept here but where one is and what is shown.
+
+const $ = (id) => document.getElementById(id);
+const texts = JSON.parse($("texts").textContent);
+const SVG = "http://www.w3.org/2000/svg";
+const VERDICT_KEYS = { 1: "full", 2: "partial", 3: "none", 4: "follow_through", 0: "not_judged" };
+const FIRST_GUESS_S = 6, LONGEST_LOOK_S = 60, LOOKS_COUNTED = 20, POLL_MS = 2500, SETTLE_MS = 160;
+const EIGHT = 8;
+
+const state = {
+  students: new Map(), rows: new Map(), version: -1, mode: "student", list: [], at: 0, question: null, busy: false,
+  comments: [], looks: [], shown: performance.now(), tiles: [], tile: 0, fetched: new Map(), page: null,
+};
+const stored = {
+  get: (name, otherwise) => { try { return localStorage.getItem(`planmark-${name}`) ?? otherwise; } catch { return otherwise; } },
+  set: (name, value) => { try { localStorage.setItem(`planmark-${name}`, value); } catch { /* not kept */ } },
+};
+const windowId = Math.random().toString(36).slice(2) + Date.now().toString(36);
+
+// The server ---------------------------------------------------------------------------------------
+
+async function call(path, body) {
+  const options = body === undefined ? {} : {
+    method: "POST", body: JSON.stringify({ window: windowId, by: $("by").value.trim(), ...body }),
+    headers: { "Content-Type": "application/json", "X-Planmark": "review" },
+  };
+  let answer;
+  try { answer = await fetch(path, options); } catch { throw { message: texts.gone }; }
+  const data = await answer.json().catch(() => ({}));
+  if (!answer.ok) throw { status: answer.status, message: data.message || answer.statusText, ...data };
+  return data;
+}
+
+function tell(message, buttons = []) {
+  const note = $("note");
+  note.replaceChildren(document.createTextNode(message || ""));
+  for (const [text, act] of buttons) {
+    const button = element("button", { type: "button" }, text);
+    button.onclick = act;
+    note.append(" ", button);
+  }
+  note.hidden = !message;
+}
+
+function element(name, attributes = {}, text = "") {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (text) made.textContent = text;
+  return made;
+}
+
+// What there is to decide --------------------------------------------------------------------------
+
+const keyOf = (row) => `${row.student}/${row.criterion}`;
+const isOpen = (row) => row.verdict === "review";
+const current = () => state.rows.get(state.list[state.at]);
+const nameOf = (student) => ($("anonymous").checked ? `${texts.sheet} ${student.number + 1}` : student.label);
+
+function take(data) {
+  const changed = new Set(data.students.map((student) => student.key)), there = new Set(data.keys);
+  for (const [key, row] of state.rows) {
+    if (changed.has(row.student) || !there.has(row.student)) { state.rows.delete(key); state.fetched.delete(key); }
+  }
+  for (const student of data.students) {
+    state.students.set(student.key, student);
+    for (const row of student.rows) state.rows.set(keyOf(row), row);
+  }
+  if (data.comments) state.comments = data.comments;
+  state.version = data.version;
+  $("pages-left").textContent = data.pages ? `(${data.pages})` : "";
+  showProgress();
+}
+
+function ordered() {
+  // Where most points are at stake first: students by the sum of theirs, criteria by the sum of the class.
+  const rows = [...state.rows.values()], sums = new Map();
+  const group = state.mode === "student" ? (row) => row.student : (row) => row.criterion;
+  for (const row of rows) sums.set(group(row), (sums.get(group(row)) || 0) + (isOpen(row) ? row.stake : 0));
+  const inside = state.mode === "student" ? (row) => row.order : (row) => row.probability ?? 0;
+  const place = new Map([...sums.keys()].sort((a, b) => sums.get(b) - sums.get(a)).map((name, index) => [name, index]));
+  return rows.sort((a, b) => place.get(group(a)) - place.get(group(b)) || inside(a) - inside(b) || state.students.get(a.student).number - state.students.get(b.student).number);
+}
+
+function relist(keep) {
+  const all = $("all").checked;
+  state.list = ordered().filter((row) => all || isOpen(row) || keyOf(row) === keep).map(keyOf);
+  state.at = Math.max(0, state.list.indexOf(keep));
+}
+
+function showProgress() {
+  const rows = [...state.rows.values()], open = rows.filter(isOpen).length;
+  const settled = rows.filter((row) => row.decided).length;
+  const mean = state.looks.length ? state.looks.reduce((a, b) => a + b) / state.looks.length : FIRST_GUESS_S;
+  const minutes = Math.ceil((open * mean) / 60);
+  $("bar").max = Math.max(1, open + settled);
+  $("bar").value = settled;
+  $("progress").textContent = open ? texts.left.replace("{open}", open).replace("{minutes}", minutes) : texts.nothing_left;
+  $("progress").dataset.open = open;
+}
+
+function looked() {
+  state.looks.push(Math.min((performance.now() - state.shown) / 1000, LONGEST_LOOK_S));
+  state.looks = state.looks.slice(-LOOKS_COUNTED);
+}
+
+// A view of a scan ---------------------------------------------------------------------------------
+
+class Viewer {
+  constructor(svg, onNode) {
+    this.svg = svg; this.onNode = onNode; this.pointers = new Map(); this.view = null;
+    svg.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.zoom(Math.exp(Math.sign(event.deltaY) * Math.min(Math.abs(event.deltaY), 60) * 0.004), this.point(event));
+    }, { passive: false });
+    svg.addEventListener("pointerdown", (event) => this.down(event));
+    svg.addEventListener("pointermove", (event) => this.move(event));
+    for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, (event) => this.up(event));
+    new ResizeObserver(() => { if (this.view) { this.fit(this.view); this.refine(); } }).observe(svg);
+  }
+
+  show(look) {
+    this.look = look; this.drag = null; this.pointers.clear();
+    this.svg.replaceChildren();
+    this.base = this.image(); this.fine = this.image();
+    this.marks = document.createElementNS(SVG, "g");
+    this.marks.setAttribute("class", "marks");
+    this.marks.innerHTML = look.marks || "";
+    this.nodes = document.createElementNS(SVG, "g");
+    this.nodes.setAttribute("class", "nodes");
+    this.svg.append(this.base, this.fine, this.marks, this.nodes);
+    for (const node of look.nodes || []) this.addNode(node);
+    const [x, y, w, h] = look.box;
+    this.fit({ x, y, w, h });
+    this.place(this.base, this.visible(1.0));
+  }
+
+  image() {
+    const image = document.createElementNS(SVG, "image");
+    image.setAttribute("preserveAspectRatio", "none");
+    return image;
+  }
+
+  addNode(node) {
+    const circle = document.createElementNS(SVG, "circle"), title = document.createElementNS(SVG, "title");
+    circle.setAttribute("class", "node"); circle.setAttribute("tabindex", "0"); circle.setAttribute("role", "button");
+    circle.setAttribute("aria-label", `${texts.node} ${node.name}`);
+    circle.setAttribute("cx", node.x); circle.setAttribute("cy", node.y);
+    circle.dataset.node = `${node.figure}:${node.name}`;
+    title.textContent = node.name;
+    circle.append(title);
+    circle.addEventListener("keydown", (event) => this.nudge(event, circle));
+    this.nodes.append(circle);
+  }
+
+  nudge(event, circle) {
+    const step = event.shiftKey ? 1.0 : 0.2, by = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    if (by) {
+      circle.setAttribute("cx", Number(circle.getAttribute("cx")) + step * by[0]);
+      circle.setAttribute("cy", Number(circle.getAttribute("cy")) + step * by[1]);
+    } else if (event.key === "Enter") {
+      this.onNode(circle.dataset.node, Number(circle.getAttribute("cx")), Number(circle.getAttribute("cy")));
+    } else return;
+    event.preventDefault(); event.stopPropagation();
+  }
+
+  fit(view) {
+    const { width, height } = this.svg.getBoundingClientRect();
+    if (!width || !height) { this.view = view; return; }
+    const w = Math.max(view.w, (view.h * width) / height), h = (w * height) / width;
+    this.view = { x: view.x + view.w / 2 - w / 2, y: view.y + view.h / 2 - h / 2, w, h };
+    this.svg.setAttribute("viewBox", [this.view.x, this.view.y, w, h].join(" "));
+    const mm = w / width;
+    for (const circle of this.nodes ? this.nodes.children : []) {
+      circle.setAttribute("r", 11 * mm); circle.setAttribute("stroke-width", 1.6 * mm);
+    }
+  }
+
+  visible(margin) {
+    const [wide, high] = this.look.page_mm, { x, y, w, h } = this.view;
+    const left = Math.max(0, x - (margin - 1) * w / 2), top = Math.max(0, y - (margin - 1) * h / 2);
+    const right = Math.min(wide, x + (w * (1 + margin)) / 2), bottom = Math.min(high, y + (h * (1 + margin)) / 2);
+    return { x: left, y: top, w: Math.max(1, right - left), h: Math.max(1, bottom - top) };
+  }
+
+  place(image, part) {
+    const { width } = this.svg.getBoundingClientRect();
+    if (!this.look.scan || !width) return;
+    const scale = (width * (window.devicePixelRatio || 1)) / this.view.w;
+    const query = new URLSearchParams({
+      x: part.x.toFixed(2), y: part.y.toFixed(2), w: part.w.toFixed(2), h: part.h.toFixed(2), scale: Math.min(scale, 60).toFixed(2),
+    });
+    const loader = new Image();
+    loader.onload = () => {
+      for (const [name, value] of [["x", part.x], ["y", part.y], ["width", part.w], ["height", part.h]]) image.setAttribute(name, Number(value.toFixed(2)));
+      image.setAttribute("href", loader.src);
+      this.svg.dataset.loaded = this.look.scan;
+    };
+    loader.src = `${this.look.scan}&${query}`;
+  }
+
+  refine() {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => { if (this.look) this.place(this.fine, this.visible(1.3)); }, SETTLE_MS);
+  }
+
+  point(event) {
+    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(this.svg.getScreenCTM().inverse());
+    return { x: at.x, y: at.y };
+  }
+
+  zoom(factor, about = null) {
+    if (!this.look) return;
+    const { x, y, w, h } = this.view, centre = about || { x: x + w / 2, y: y + h / 2 };
+    const most = 1.3 * Math.max(...this.look.page_mm), wide = Math.min(Math.max(w * factor, 4), most), f = wide / w;
+    this.fit({ x: centre.x - (centre.x - x) * f, y: centre.y - (centre.y - y) * f, w: wide, h: h * f });
+    this.refine();
+  }
+
+  whole() {
+    if (!this.look) return;
+    const isWhole = this.view.w >= 0.98 * this.look.page_mm[0], [x, y, w, h] = this.look.box;
+    this.fit(isWhole ? { x, y, w, h } : { x: 0, y: 0, w: this.look.page_mm[0], h: this.look.page_mm[1] });
+    this.refine();
+  }
+
+  down(event) {
+    if (!this.look) return;
+    this.svg.setPointerCapture(event.pointerId);
+    this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    const node = event.target.closest(".node");
+    this.drag = node && this.pointers.size === 1 ? node : null;
+    this.moved = false;
+  }
+
+  move(event) {
+    const last = this.pointers.get(event.pointerId);
+    if (!last || !this.look) return;
+    const mm = this.view.w / this.svg.getBoundingClientRect().width;
+    const by = { x: (event.clientX - last.x) * mm, y: (event.clientY - last.y) * mm };
+    if (this.drag) {
+      const at = this.point(event);
+      this.moved = true;
+      this.drag.setAttribute("cx", at.x); this.drag.setAttribute("cy", at.y);
+    } else if (this.pointers.size === 2) {
+      const other = [...this.pointers].find(([id]) => id !== event.pointerId)[1];
+      const before = Math.hypot(last.x - other.x, last.y - other.y), after = Math.hypot(event.clientX - other.x, event.clientY - other.y);
+      if (before > 5 && after > 5) this.zoom(before / after, this.point({ clientX: (event.clientX + other.x) / 2, clientY: (event.clientY + other.y) / 2 }));
+      this.fit({ ...this.view, x: this.view.x - by.x / 2, y: this.view.y - by.y / 2 });
+    } else this.fit({ ...this.view, x: this.view.x - by.x, y: this.view.y - by.y });
+    this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+  }
+
+  up(event) {
+    if (!this.pointers.delete(event.pointerId)) return;
+    if (this.drag && this.moved) this.onNode(this.drag.dataset.node, Number(this.drag.getAttribute("cx")), Number(this.drag.getAttribute("cy")));
+    else if (!this.drag) this.refine();
+    this.drag = null;
+  }
+}
+
+// One question -------------------------------------------------------------------------------------
+
+const viewer = new Viewer($("view"), (node, x, y) => moveNode(node, x, y));
+
+function fetchQuestion(key) {
+  if (!state.fetched.has(key)) {
+    const row = state.rows.get(key);
+    const wanted = call(`/api/question?student=${row.student}&criterion=${encodeURIComponent(row.criterion)}`);
+    wanted.catch(() => state.fetched.delete(key));
+    state.fetched.set(key, wanted);
+  }
+  return state.fetched.get(key);
+}
+
+async function showQuestion(keepView = false) {
+  const row = current();
+  if (!row) { showMode("done"); return; }
+  const question = await fetchQuestion(keyOf(row));
+  if (current() !== row && keyOf(current() || {}) !== keyOf(row)) return;
+  const same = state.question && keyOf(state.question) === keyOf(question);
+  state.question = question;
+  const student = state.students.get(question.student);
+  $("who").textContent = nameOf(student);
+  $("place").textContent = [question.position, `${state.at + 1} / ${state.list.length}`].filter(Boolean).join(" · ");
+  $("what").innerHTML = question.title;
+  $("state").innerHTML = question.state;
+  $("sentence").innerHTML = question.sentence;
+  $("sentence").parentElement.hidden = !question.sentence;
+  $("why").innerHTML = question.why;
+  $("why").hidden = !question.why;
+  $("numbers").replaceChildren(...question.numbers.flatMap(([name, value]) => {
+    const cell = element("dd");
+    cell.innerHTML = value;
+    return [element("dt", {}, name), cell];
+  }));
+  const accept = $("accept");
+  accept.innerHTML = question.accept;
+  accept.disabled = !question.proposed && isOpen(row);
+  for (const button of document.querySelectorAll("#question [data-verdict]")) {
+    button.setAttribute("aria-pressed", String(button.dataset.verdict === (question.decided || "")));
+  }
+  if (!same) $("comment").value = question.comment;
+  $("score").textContent = student.score;
+  $("remark").value = student.remark;
+  $("added").value = student.added || "";
+  $("comments").replaceChildren(...state.comments.slice(0, 6).map((text) => {
+    const chip = element("button", { type: "button" }, text);
+    chip.onclick = () => { $("comment").value = text; };
+    return chip;
+  }));
+  $("view").style.display = question.look ? "" : "none";
+  $("no-scan").hidden = Boolean(question.look);
+  $("no-scan").textContent = texts.no_scan;
+  if (question.look) {
+    const view = viewer.view;
+    viewer.show(question.look);
+    if (keepView && same && view) { viewer.fit(view); viewer.refine(); }
+  }
+  document.body.dataset.shown = `${keyOf(row)} ${state.version}`;
+  state.shown = performance.now();
+  const next = state.list[state.at + 1];
+  if (next) fetchQuestion(next).then((one) => { if (one.look && one.look.first) new Image().src = one.look.first; }, () => {});
+}
+
+function step(by) {
+  if (state.mode === "eight") { focusTile(state.tile + by); return; }
+  const to = state.at + by;
+  if (to < 0 || to >= state.list.length) { if (to > 0) showMode("done"); return; }
+  state.at = to;
+  showQuestion().catch(failed);
+}
+
+function onward(from) {
+  // To the next question that is open, as the list stood when the last one was shown.
+  const rest = [...state.list.keys()].slice(state.at + 1), open = rest.find((at) => isOpen(state.rows.get(state.list[at]) || {}));
+  const wrap = [...state.list.keys()].find((at) => isOpen(state.rows.get(state.list[at]) || {}));
+  const all = $("all").checked;
+  const next = all ? (rest.length ? rest[0] : undefined) : open ?? wrap;
+  if (next === undefined) { relist(); if (state.list.length && !all) { showQuestion().catch(failed); } else showMode("done"); return; }
+  state.at = next;
+  showQuestion().catch(failed);
+}
+
+async function busy(work) {
+  // A key while the last answer is still being written would be an answer to a question not yet seen.
+  if (state.busy) return;
+  state.busy = true;
+  document.body.dataset.busy = "1";
+  try { await work(); } catch (error) { failed(error); } finally { state.busy = false; delete document.body.dataset.busy; }
+}
+
+function failed(error) {
+  if (error instanceof Error) throw error;
+  if (error.clash) {
+    const again = async () => { tell(""); state.fetched.clear(); take(await call("/api/class")); await refreshScreen(); };
+    tell(error.message, [[texts.look_again, () => busy(again)]]);
+  } else tell(error.message, [[texts.close, () => tell("")]]);
+}
+
+function answerOf(question, verdict) {
+  return { student: question.student, criterion: question.criterion, verdict, comment: $("comment").value.trim(), seen: question.seen };
+}
+
+function decide(verdict) {
+  return busy(async () => {
+    const question = state.question;
+    if (!question || !verdict) { tell(texts.choose); return; }
+    take(await call("/api/decide", { answers: [answerOf(question, verdict)] }));
+    looked(); showProgress(); tell("");
+    onward();
+  });
+}
+
+function accept() {
+  const question = state.question, row = current();
+  if (!question || !row) return;
+  if (!isOpen(row)) { busy(async () => onward()); return; }
+  decide(question.proposed);
+}
+
+function saveComment() {
+  const row = current();
+  if (!row || isOpen(row)) { $("comment").blur(); return; }
+  busy(async () => {
+    take(await call("/api/decide", { answers: [answerOf(state.question, row.verdict)] }));
+    tell(texts.saved, [[texts.close, () => tell("")]]);
+    $("comment").blur();
+    await showQuestion(true);
+  });
+}
+
+function undo() {
+  return busy(async () => {
+    const data = await call("/api/undo", {});
+    if (!data.undone) { tell(texts.nothing_to_undo, [[texts.close, () => tell("")]]); return; }
+    take(data); tell("");
+    if (state.mode === "eight") { showEight(data.undone); return; }
+    if (!state.rows.has(data.undone)) { await refreshScreen(); return; }
+    if (!state.list.includes(data.undone)) relist(data.undone);
+    state.at = state.list.indexOf(data.undone);
+    showSection("question");
+    state.question = null;
+    await showQuestion();
+  });
+}
+
+function moveNode(node, x, y) {
+  return busy(async () => {
+    const question = state.question, started = performance.now();
+    try {
+      take(await call("/api/node", { student: question.student, sheet: question.look.sheet, node, x, y, seen: question.look.nodes.find((one) => `${one.figure}:${one.name}` === node).seen }));
+    } finally { await showQuestion(true); }
+    document.body.dataset.nodeMs = Math.round(performance.now() - started);
+  });
+}
+
+// Eight to a screen --------------------------------------------------------------------------------
+
+function showEight(keep) {
+  const open = ordered().filter(isOpen);
+  const first = keep && state.rows.get(keep) ? state.rows.get(keep) : open[0];
+  if (!first) { showMode("done"); return; }
+  const same = open.filter((row) => row.criterion === first.criterion).slice(0, EIGHT);
+  state.tiles = (same.length ? same : [first]).map(keyOf);
+  $("eight-title").innerHTML = first.title;
+  $("tiles").replaceChildren(...state.tiles.map((key, index) => tileOf(key, index)));
+  focusTile(0);
+}
+
+function tileOf(key, index) {
+  const row = state.rows.get(key), tile = element("div", { class: "tile", tabindex: "-1", "data-key": key });
+  const svg = document.createElementNS(SVG, "svg"), about = element("p"), buttons = element("div", { class: "row" });
+  about.append(element("b", {}, nameOf(state.students.get(row.student))));
+  const said = element("span", { class: "soft" });
+  about.append(" ", said);
+  Object.values(VERDICT_KEYS).filter((verdict) => verdict !== "not_judged").forEach((verdict) => {
+    const button = element("button", { type: "button", "data-verdict": verdict, title: texts.verdicts[verdict], "aria-label": texts.verdicts[verdict] });
+    button.append(element("span", { class: `badge v-${verdict}` }, texts.marks[verdict]));
+    button.onclick = () => { focusTile(index); decideTiles([index], verdict); };
+    buttons.append(button);
+  });
+  const acceptButton = element("button", { type: "button" });
+  acceptButton.onclick = () => { focusTile(index); decideTiles([index]); };
+  tile.append(svg, about, acceptButton, buttons);
+  tile.onclick = (event) => { if (!event.target.closest("button")) focusTile(index); };
+  fetchQuestion(key).then((question) => {
+    said.innerHTML = question.brief;
+    acceptButton.innerHTML = question.accept;
+    acceptButton.disabled = !question.proposed;
+    if (question.look) {
+      const small = new Viewer(svg, () => {});
+      small.show({ ...question.look, nodes: [] });
+    }
+  }).catch(failed);
+  return tile;
+}
+
+function focusTile(index) {
+  if (!state.tiles.length) return;
+  state.tile = Math.min(Math.max(index, 0), state.tiles.length - 1);
+  [...$("tiles").children].forEach((tile, at) => tile.classList.toggle("now", at === state.tile));
+  const tile = $("tiles").children[state.tile];
+  tile.focus({ preventScroll: true });
+  tile.scrollIntoView({ block: "nearest" });
+}
+
+function decideTiles(indices, verdict) {
+  return busy(async () => {
+    const open = indices.map((index) => state.tiles[index]).filter((key) => state.rows.get(key) && (verdict || isOpen(state.rows.get(key))));
+    const questions = await Promise.all(open.map(fetchQuestion));
+    const answers = questions.filter((question) => verdict || question.proposed).map((question) => ({
+      student: question.student, criterion: question.criterion, verdict: verdict || question.proposed, comment: "", seen: question.seen,
+    }));
+    if (!answers.length) { tell(texts.choose); return; }
+    take(await call("/api/decide", { answers }));
+    looked(); showProgress(); tell("");
+    state.tiles.forEach((key, at) => $("tiles").children[at].classList.toggle("settled", !isOpen(state.rows.get(key) || {})));
+    const next = state.tiles.findIndex((key) => isOpen(state.rows.get(key) || {}));
+    if (next < 0) showEight(); else focusTile(next);
+  });
+}
+
+// Sure proposals -----------------------------------------------------------------------------------
+
+function sureOnes() {
+  const least = Number($("least").value) / 100;
+  return [...state.rows.values()].filter((row) => isOpen(row) && row.proposed && row.probability !== null && row.probability >= least);
+}
+
+function showSure() {
+  const rows = sureOnes();
+  $("sure-count").textContent = texts.settles.replace("{count}", rows.length);
+  $("sure-list").replaceChildren(...rows.map((row) => {
+    const item = element("li"), what = element("span");
+    what.innerHTML = row.title;
+    item.append(element("span", { class: `badge v-${row.proposed}` }, texts.marks[row.proposed]), ` ${nameOf(state.students.get(row.student))}: `, what, ` – ${texts.verdicts[row.proposed]}, ${Math.floor(100 * row.probability)} %`);
+    return item;
+  }));
+  $("sure-accept").textContent = texts.accept_all.replace("{count}", rows.length);
+  $("sure-accept").disabled = !rows.length;
+}
+
+function acceptSure() {
+  return busy(async () => {
+    const answers = sureOnes().map((row) => ({ student: row.student, criterion: row.criterion, verdict: row.proposed, comment: "", seen: row.seen }));
+    take(await call("/api/decide", { answers }));
+    $("sure").close();
+    await refreshScreen();
+  });
+}
+
+// Pages --------------------------------------------------------------------------------------------
+
+const pageViewer = { turn: 0, corners: [] };
+
+async function showPages() {
+  const data = await call("/api/pages");
+  $("no-pages").hidden = data.pages.length > 0;
+  $("read-again").hidden = !data.pages.length;
+  $("page-form").hidden = true;
+  $("idle").hidden = !data.idle.length;
+  $("idle-list").replaceChildren(...data.idle.map((text) => element("li", {}, text)));
+  $("page-list").replaceChildren(...data.pages.map((page) => {
+    const item = element("li"), button = element("button", { type: "button" }, page.label + (page.said ? ` – ${page.said}` : ""));
+    button.onclick = () => showPage(page, button);
+    item.append(button);
+    return item;
+  }));
+  $("owner").replaceChildren(element("option", { value: "" }, "–"), ...data.owners.map((owner) => element("option", { value: owner.key }, owner.label)));
+  if (data.pages.length) showPage(data.pages[0], $("page-list").querySelector("button"));
+}
+
+function showPage(page, button) {
+  state.page = page;
+  for (const one of $("page-list").querySelectorAll("button")) one.setAttribute("aria-current", String(one === button));
+  $("page-form").hidden = false;
+  $("page-why").textContent = page.why;
+  $("owner").value = page.owner;
+  pageViewer.turn = page.turn;
+  pageViewer.corners = page.corners.length ? page.corners : null;
+  $("corners").checked = page.corners.length > 0;
+  drawPage();
+}
+
+function drawPage() {
+  const { width, height, picture } = state.page, svg = $("page-view"), turned = document.createElementNS(SVG, "g");
+  const flips = pageViewer.turn % 180 !== 0, wide = flips ? height : width, high = flips ? width : height;
+  svg.replaceChildren(turned);
+  if (!width) return;
+  svg.setAttribute("viewBox", [-0.03 * wide, -0.03 * high, 1.06 * wide, 1.06 * high].join(" "));
+  const shift = { 0: "", 90: `translate(0 ${width})`, 180: `translate(${width} ${height})`, 270: `translate(${height} 0)` }[pageViewer.turn];
+  turned.setAttribute("transform", `${shift} rotate(${-pageViewer.turn})`);
+  const image = document.createElementNS(SVG, "image");
+  for (const [name, value] of [["width", width], ["height", height], ["href", picture], ["preserveAspectRatio", "none"]]) image.setAttribute(name, value);
+  turned.append(image);
+  if (!$("corners").checked) return;
+  if (!pageViewer.corners) {
+    const box = [[0, 0], [width, 0], [width, height], [0, height]].map(([x, y]) => [0.06 * width + 0.88 * x, 0.06 * height + 0.88 * y]);
+    pageViewer.corners = [...box, ...box].slice(pageViewer.turn / 90, pageViewer.turn / 90 + 4);
+  }
+  const outline = document.createElementNS(SVG, "polygon"), size = Math.max(width, height);
+  outline.setAttribute("class", "outline"); outline.setAttribute("stroke-width", size / 500);
+  const redraw = () => outline.setAttribute("points", pageViewer.corners.map((at) => at.join(",")).join(" "));
+  redraw();
+  turned.append(outline);
+  pageViewer.corners.forEach((corner, index) => {
+    const handle = document.createElementNS(SVG, "circle");
+    const set = (x, y) => {
+      pageViewer.corners[index] = [Math.min(Math.max(x, 0), width - 1), Math.min(Math.max(y, 0), height - 1)];
+      handle.setAttribute("cx", pageViewer.corners[index][0]); handle.setAttribute("cy", pageViewer.corners[index][1]);
+      redraw();
+    };
+    for (const [name, value] of [["class", "handle"], ["r", size / 45], ["stroke-width", size / 400], ["tabindex", 0], ["role", "button"], ["aria-label", `${texts.corner} ${index + 1}`]]) handle.setAttribute(name, value);
+    set(corner[0], corner[1]);
+    handle.onpointerdown = (event) => { handle.setPointerCapture(event.pointerId); handle.dataset.held = "1"; };
+    handle.onpointerup = () => { delete handle.dataset.held; };
+    handle.onpointermove = (event) => {
+      if (!handle.dataset.held) return;
+      const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(turned.getScreenCTM().inverse());
+      set(at.x, at.y);
+    };
+    handle.onkeydown = (event) => {
+      const by = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+      if (!by) return;
+      const pace = (event.shiftKey ? 0.02 : 0.002) * size;
+      set(pageViewer.corners[index][0] + pace * by[0], pageViewer.corners[index][1] + pace * by[1]);
+      event.preventDefault(); event.stopPropagation();
+    };
+    turned.append(handle);
+  });
+}
+
+function turnPage(by) {
+  // The corners go round with the sheet: the first is the upright sheet's top left one.
+  pageViewer.turn = (pageViewer.turn + by + 360) % 360;
+  if (pageViewer.corners) { const [a, b, c, d] = pageViewer.corners; pageViewer.corners = by > 0 ? [b, c, d, a] : [d, a, b, c]; }
+  drawPage();
+}
+
+function savePage() {
+  return busy(async () => {
+    const page = state.page;
+    take(await call("/api/page", {
+      file: page.file, page: page.page, seen: page.seen, owner: $("owner").value || null, turn: pageViewer.turn === page.upright ? null : pageViewer.turn,
+      corners: $("corners").checked ? pageViewer.corners : [],
+    }));
+    await showPages();
+    tell(texts.page_saved, [[texts.close, () => tell("")]]);
+  });
+}
+
+// Finished -----------------------------------------------------------------------------------------
+
+function showDone() {
+  const open = [...state.rows.values()].filter(isOpen).length;
+  $("done-title").textContent = open ? texts.still_open.replace("{open}", open) : texts.all_settled;
+  $("done-text").textContent = open ? texts.can_finish : texts.now_finish;
+}
+
+function finish() {
+  return busy(async () => {
+    $("finish").disabled = true;
+    $("finished").hidden = true;
+    try {
+      await call("/api/finish", {});
+      let data;
+      do {
+        await new Promise((later) => setTimeout(later, 250));
+        data = await call("/api/finish");
+        $("finish-progress").textContent = data.progress;
+      } while (data.running);
+      if (data.message) throw data;
+      state.fetched.clear(); state.rows.clear(); state.students.clear();
+      take(await call("/api/class"));
+      $("finish-progress").textContent = data.summary;
+      $("results").replaceChildren(...data.files.map((file) => {
+        const item = element("li"), link = element("a", { href: file.href, target: "_blank", rel: "noopener" }, file.label);
+        item.append(link, ` ${file.path}`);
+        return item;
+      }));
+      $("commands").textContent = data.commands.join("\n");
+      $("finished").hidden = false;
+      document.body.dataset.finished = "1";
+    } finally { $("finish").disabled = false; }
+  });
+}
+
+// Screens ------------------------------------------------------------------------------------------
+
+function showSection(id) {
+  for (const section of document.querySelectorAll("main > section")) section.hidden = section.id !== id;
+  for (const button of document.querySelectorAll("#top nav button")) {
+    const mode = id === "question" || id === "eight" ? state.mode : id;
+    button.setAttribute("aria-current", String(button.dataset.mode === mode));
+  }
+}
+
+async function refreshScreen() {
+  if (!$("done").hidden) { showDone(); return; }
+  if (!$("pages").hidden) return;
+  if (state.mode === "eight") { showEight(); return; }
+  relist(state.list[state.at]);
+  if (!state.list.length) showMode("done"); else await showQuestion();
+}
+
+function showMode(mode) {
+  if (mode === "done") { showSection("done"); showDone(); return; }
+  if (mode === "pages") { showSection("pages"); showPages().catch(failed); return; }
+  state.mode = mode;
+  if (mode === "eight") { showSection("eight"); showEight(); return; }
+  const keep = state.question ? keyOf(state.question) : undefined;
+  relist(state.rows.get(keep) && ($("all").checked || isOpen(state.rows.get(keep))) ? keep : undefined);
+  if (!state.list.length) { showMode("done"); return; }
+  showSection("question");
+  showQuestion().catch(failed);
+}
+
+function hideMarks() {
+  const isBare = $("view").classList.toggle("bare");
+  $("hide").setAttribute("aria-pressed", String(isBare));
+}
+
+function jumps() {
+  $("jump").replaceChildren(element("option", { value: "" }, "–"), ...[...state.students.values()].map((student) => element("option", { value: student.key }, `${nameOf(student)} ${student.score}`)));
+}
+
+// Keys ---------------------------------------------------------------------------------------------
+
+document.addEventListener("keydown", (event) => {
+  const field = event.target.closest("input, textarea, select");
+  if (field) {
+    if (event.key === "Escape") field.blur();
+    else if (event.key === "Enter" && !event.shiftKey && field.id === "comment") { event.preventDefault(); saveComment(); }
+    return;
+  }
+  if (event.ctrlKey || event.metaKey || event.altKey || $("sure").open) return;
+  const onButton = event.target.closest("button, summary, a") && (event.key === "Enter" || event.key === " ");
+  if (onButton || event.repeat) return;
+  const asks = !$("question").hidden, eight = !$("eight").hidden;
+  const acts = {
+    Enter: () => (eight ? decideTiles([state.tile]) : accept()), ArrowRight: () => step(1), ArrowLeft: () => step(-1),
+    c: () => { if (asks) { $("comment").focus(); $("comment").select(); } }, u: undo, " ": hideMarks, "+": () => viewer.zoom(0.7), "=": () => viewer.zoom(0.7),
+    "-": () => viewer.zoom(1.4), f: () => viewer.whole(), a: () => { if (eight) decideTiles([...state.tiles.keys()]); },
+  };
+  // Keyboards of other alphabets have other letters on the same keys.
+  const isForeign = event.key.length === 1 && event.key > "\u007f" && event.code.startsWith("Key");
+  const letter = isForeign ? event.code.slice(3) : event.key;
+  const key = letter.length === 1 ? letter.toLowerCase() : letter, verdict = VERDICT_KEYS[event.key];
+  if (!asks && !eight && key !== "u") return;
+  if (verdict) { if (eight) { if (verdict !== "not_judged") decideTiles([state.tile], verdict); } else decide(verdict); }
+  else if (acts[key]) acts[key]();
+  else return;
+  event.preventDefault();
+});
+
+$("accept").onclick = accept;
+for (const button of document.querySelectorAll("#question [data-verdict]")) button.onclick = () => decide(button.dataset.verdict);
+for (const button of document.querySelectorAll("#top nav button")) button.onclick = () => showMode(button.dataset.mode);
+$("back").onclick = () => step(-1);
+$("on").onclick = () => step(1);
+$("undo").onclick = undo;
+$("eight-undo").onclick = undo;
+$("hide").onclick = hideMarks;
+$("closer").onclick = () => viewer.zoom(0.7);
+$("wider").onclick = () => viewer.zoom(1.4);
+$("whole").onclick = () => viewer.whole();
+$("accept-shown").onclick = () => decideTiles([...state.tiles.keys()]);
+$("proposals").onclick = () => { $("settings").open = false; showSure(); $("sure").showModal(); };
+$("least").oninput = showSure;
+$("sure-accept").onclick = acceptSure;
+$("turn-left").onclick = () => turnPage(90);
+$("turn-right").onclick = () => turnPage(-90);
+$("corners").onchange = drawPage;
+$("save-page").onclick = savePage;
+$("read-again").onclick = () => { showMode("done"); finish(); };
+$("finish").onclick = finish;
+$("save-whole").onclick = () => busy(async () => {
+  const student = state.question.student;
+  take(await call("/api/whole", { student, comment: $("remark").value.trim(), added: Number($("added").value) || 0, seen: state.students.get(student).seen }));
+  tell(texts.saved, [[texts.close, () => tell("")]]);
+  await showQuestion(true);
+});
+$("by").value = stored.get("by", document.body.dataset.by);
+$("by").onchange = () => stored.set("by", $("by").value.trim());
+$("anonymous").checked = stored.get("anonymous", "") === "1";
+$("anonymous").onchange = () => { stored.set("anonymous", $("anonymous").checked ? "1" : ""); jumps(); refreshScreen().catch(failed); };
+$("all").onchange = () => refreshScreen().catch(failed);
+$("settings").ontoggle = () => { if ($("settings").open) jumps(); };
+$("jump").onchange = () => {
+  const wanted = $("jump").value;
+  if (!wanted) return;
+  $("all").checked = true; state.mode = "student"; $("settings").open = false;
+  relist([...state.rows.values()].filter((row) => row.student === wanted).map(keyOf)[0]);
+  showSection("question");
+  showQuestion().catch(failed);
+};
+
+async function poll() {
+  try {
+    const data = await call(`/api/class?since=${state.version}`);
+    if (data.students.length && !state.busy) {
+      const shown = state.question && keyOf(state.question), before = shown && state.rows.get(shown);
+      take(data);
+      const after = shown && state.rows.get(shown);
+      if (before && after && before.seen !== after.seen && !$("question").hidden) tell(texts.changed, [[texts.look_again, () => { tell(""); showQuestion().catch(failed); }]]);
+    }
+  } catch { /* told when something is decided */ }
+  setTimeout(poll, POLL_MS);
+}
+
+(async () => {
+  take(await call("/api/class"));
+  const wanted = new URLSearchParams(location.search).get("student");
+  relist();
+  const first = state.list.find((key) => state.rows.get(key).student === wanted);
+  if (first) state.question = state.rows.get(first);
+  showMode("student");
+  setTimeout(poll, POLL_MS);
+})().catch(failed);

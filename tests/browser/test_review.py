@@ -1,0 +1,264 @@
+"""A person reviews a class of 30: by keys, by mouse on a phone, in two windows, through a power cut."""
+
+import pytest
+
+SHEETS = 30
+
+
+def test_a_class_is_settled_by_keys_alone(open_window, server):
+    window = open_window(server)
+    was_open = window.open
+    assert was_open > SHEETS
+    while not window.is_done:
+        window.press("Enter" if window.page.is_enabled("#accept") else "1")
+    assert window.open == 0
+    # One look and one key for each question; what follows from a decision is not asked.
+    assert window.keys <= was_open
+    assert len(window.screens) <= was_open + 1
+    assert window.keys / SHEETS < 2.0
+    assert len(server.decisions()) == window.keys
+    window.page.click("#finish")
+    window.page.wait_for_selector("#finished:visible")
+    assert "planmark export" in window.page.inner_text("#commands")
+    assert "needs review" not in (server.top / "out" / "export-csv-grades.csv").read_text(encoding="utf-8")
+
+
+def test_every_key_does_what_the_page_says(open_window, server):
+    window = open_window(server)
+    page, first = window.page, window.shown
+    window.press("3")
+    student, criterion = first.split("/")
+    assert next(iter(server.decisions().values())).verdict == "none"
+    window.press("u")
+    assert window.shown == first
+    assert not server.decisions()
+    window.press("ArrowRight")
+    assert window.shown != first
+    window.press("ArrowLeft")
+    assert window.shown == first
+    page.keyboard.press(" ")
+    assert page.locator("#view.bare").count() == 1
+    page.keyboard.press(" ")
+    assert page.locator("#view.bare").count() == 0
+    page.keyboard.press("c")
+    page.keyboard.type("look at the arrow 2")
+    page.keyboard.press("Escape")
+    window.press("2")
+    (row,) = server.decisions().values()
+    assert (row.criterion, row.verdict, row.comment) == (criterion, "partial", "look at the arrow 2")
+    assert student == "s02"
+    assert page.locator("#comments button", has_text="look at the arrow 2").count() == 1
+
+
+def test_a_class_is_settled_by_mouse_on_a_phone(open_window, server):
+    window = open_window(server, 390, 844)
+    page, clicks = window.page, 0
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    while not window.is_done:
+        shown = page.evaluate("document.body.dataset.shown")
+        button = "#accept" if page.is_enabled("#accept") else ".verdicts [data-verdict=full]"
+        box = page.locator(button).bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 390
+        assert box["y"] + box["height"] <= 844  # without scrolling
+        page.click(button)
+        clicks += 1
+        page.wait_for_function(
+            "shown => !document.body.dataset.busy && (document.body.dataset.shown !== shown"
+            " || !document.getElementById('done').hidden)",
+            arg=shown,
+        )
+    assert len(server.decisions()) == clicks
+    assert window.open == 0
+
+
+def test_a_touch_settles_and_takes_back(open_window, server):
+    window = open_window(server, 390, 844, has_touch=True, is_mobile=True)
+    first = window.shown
+    window.page.tap(".verdicts [data-verdict=none]")
+    window.page.wait_for_function("first => !document.body.dataset.shown.startsWith(first + ' ')", arg=first)
+    assert len(server.decisions()) == 1
+    window.page.tap("#undo")
+    window.page.wait_for_function("first => document.body.dataset.shown.startsWith(first + ' ')", arg=first)
+    assert not server.decisions()
+
+
+def test_a_killed_server_has_kept_every_key(open_window, process):
+    server, window = process, open_window(process)
+    was_open = window.open
+    for key in ("1", "3", "2"):
+        window.press(key)
+    server.kill()
+    window.page.keyboard.press("1")
+    window.page.wait_for_selector("#note:visible")
+    assert sorted(row.verdict for row in server.decisions().values()) == ["full", "none", "partial"]
+    server.start()
+    again = open_window(process)
+    assert again.open <= was_open - 3
+    assert len(server.decisions()) == 3
+
+
+def test_two_windows_lose_nothing_and_show_the_clash(open_window, server):
+    ana, ion = open_window(server), open_window(server)
+    assert ana.shown == ion.shown
+    student, criterion = ana.shown.split("/")
+    for window, name in ((ana, "Ana"), (ion, "Ion")):
+        window.page.evaluate("name => { document.getElementById('by').value = name; }", name)
+    ana.press("1")
+    ion.page.keyboard.press("3")
+    ion.page.wait_for_selector("#note:visible")
+    assert "Ana" in ion.page.inner_text("#note")
+    (row,) = server.decisions().values()
+    assert (row.criterion, row.verdict, row.by) == (criterion, "full", "Ana")
+    ion.page.click("#note button")
+    ion.ready()
+    assert ion.page.is_hidden("#note")
+    assert "Ana" in ion.page.inner_text("#state")
+    ion.press("Enter")
+    ion.press("3")
+    assert sorted(row.by for row in server.decisions().values()) == ["Ana", "Ion"]
+    assert student == "s02"
+
+
+def test_a_dragged_node_snaps_and_the_marks_follow(open_window, server):
+    window = open_window(server)
+    page = window.page
+    page.wait_for_selector("#view[data-loaded]")
+    node = page.locator(""".node[data-node="acceleration_plan:a'"]""")
+    before = page.inner_text("#numbers")
+    box = node.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 60, y + 45, steps=4)
+    page.mouse.up()
+    page.wait_for_function("() => document.body.dataset.nodeMs")
+    rows = [row for row in server.decisions().values() if row.kind == "node"]
+    assert len(rows) == 1
+    assert page.inner_text("#numbers") != before
+
+
+def test_wheel_and_buttons_zoom_into_the_scan(open_window, server):
+    window = open_window(server)
+    page = window.page
+    page.wait_for_selector("#view[data-loaded]")
+
+    def width():
+        return float(page.get_attribute("#view", "viewBox").split()[2])
+
+    start = width()
+    page.mouse.move(400, 400)
+    page.mouse.wheel(0, -300)
+    page.wait_for_function(
+        "start => document.getElementById('view').viewBox.baseVal.width < start", arg=start
+    )
+    nearer = width()
+    page.click("#wider")
+    assert width() > nearer
+    page.click("#whole")
+    assert width() > 400.0
+
+
+def test_eight_to_a_screen(open_window, server):
+    window = open_window(server)
+    page = window.page
+    page.click("[data-mode=eight]")
+    page.wait_for_selector(".tile.now")
+    assert page.locator(".tile").count() == 8
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("1")
+    page.wait_for_function("() => document.querySelectorAll('.tile.settled').length === 1")
+    assert len(server.decisions()) == 1
+    page.keyboard.press("u")
+    page.wait_for_function(
+        "() => document.querySelectorAll('.tile.settled').length === 0 && !document.body.dataset.busy"
+    )
+    assert not server.decisions()
+
+
+def test_names_are_hidden_where_that_is_asked_for(open_window, server):
+    window = open_window(server)
+    page = window.page
+    assert "s02" in page.inner_text("#who")
+    page.click("#settings summary")
+    page.check("#anonymous")
+    page.wait_for_function("!document.getElementById('who').textContent.includes('s02')")
+    assert "s02" not in page.inner_text("body")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_focus_is_seen(open_window, server, scheme):
+    window = open_window(server, color_scheme=scheme)
+    page = window.page
+    page.keyboard.press("Tab")
+    style = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
+    assert style == "solid"
+    grounds = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert (sum(int(part) for part in grounds[4:-1].split(",")) < 200) == (scheme == "dark")
+
+
+def test_a_page_that_is_nobodys_is_given_an_owner_and_corners(open_window, server):
+    window = open_window(server)
+    page = window.page
+    page.click("[data-mode=pages]")
+    page.wait_for_selector("#page-view image")
+    assert "nobody.jpg" in page.inner_text("#page-list")
+    page.select_option("#owner", label="m05 Student")
+    page.click("#turn-left")
+    page.check("#corners")
+    handle = page.locator(".handle").first.bounding_box()
+    x, y = handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 30, y + 20, steps=3)
+    page.mouse.up()
+    page.click("#save-page")
+    page.wait_for_function("() => document.getElementById('page-list').textContent.includes('owner=m05')")
+    (row,) = server.decisions().values()
+    assert (row.criterion, row.page.owner, row.page.turn) == ("page:nobody.jpg#1", "m05", 90)
+    assert len(row.page.corners) == 4
+    page.click("#read-again")
+    page.wait_for_function("() => document.body.dataset.finished")
+    assert "nobody.jpg" not in [page.file for page in server.session.graded.results.unmatched]
+
+
+def test_sure_proposals_are_listed_before_they_are_accepted(open_window, server):
+    chances = {"m03": 0.97, "m06": 0.95, "m09": 0.5}
+    for student in server.session.students:
+        if student.key in chances:
+            said = {"proposed": "full", "probability": chances[student.key]}
+            criteria = [
+                one.model_copy(update=said) if one.id == "v_DC" else one for one in student.report.criteria
+            ]
+            student.report = student.report.model_copy(update={"criteria": criteria})
+    window = open_window(server)
+    page = window.page
+
+    def listed():
+        return [item.split(":")[0].split()[-2] for item in page.locator("#sure-list li").all_inner_texts()]
+
+    page.click("#settings summary")
+    page.click("#proposals")
+    assert listed() == ["m03", "m06"]
+    assert not server.decisions()
+    page.fill("#least", "96")
+    assert listed() == ["m03"]
+    page.fill("#least", "90")
+    page.click("#sure-accept")
+    page.wait_for_selector("#sure", state="hidden")
+    window.ready()
+    assert sorted(server.decisions()) == [("m03", "v_DC"), ("m06", "v_DC")]
+    window.press("u")
+    assert not server.decisions()
+
+
+def test_a_comment_on_the_whole_is_kept(open_window, server):
+    window = open_window(server)
+    page = window.page
+    page.click("#whole-student summary")
+    page.fill("#remark", "drawn with care")
+    page.fill("#added", "1.5")
+    page.click("#save-whole")
+    page.wait_for_selector("#note:visible")
+    rows = {row.criterion: row for row in server.decisions().values()}
+    assert (rows["comment"].comment, rows["total"].points) == ("drawn with care", 1.5)

@@ -1,0 +1,74 @@
+"""Numbers as a table's cells, and the line that says how they become the score."""
+
+import pytest
+
+from grader.documents import QuantityDocument, ToleranceDocument
+from grader.feedback.numbers import quantity_cells, scale_text, score_line, tolerance_cells
+from grader.language import tongue
+from tests.unit.feedback.works import criterion, report
+
+
+@pytest.mark.parametrize(("direction", "shown"), [(359.96, "0.0"), (359.94, "359.9"), (0.04, "0.0")])
+def test_directions_are_written_below_360_degrees(direction, shown):
+    assert quantity_cells(QuantityDocument(direction_deg=direction), tongue("en")) == [f"∠\u00a0{shown}°"]
+
+
+def test_a_vector_is_told_on_paper_and_in_reality():
+    one = QuantityDocument(length_mm=46.4, direction_deg=12.3, value=1.6704, unit="m/s")
+    assert quantity_cells(one, tongue("ru")) == ["46,4\u00a0мм ∠\u00a012,3°", "1,670\u00a0м/с"]
+
+
+def test_the_tolerance_of_a_value_has_its_unit_and_that_of_a_vector_needs_none():
+    assert tolerance_cells(ToleranceDocument(value=0.0123), "rad/s", tongue("ro")) == ["±0,012\u00a0rad/s"]
+    both = ToleranceDocument(length_mm=1.0, direction_deg=1.5, value=0.1)
+    assert tolerance_cells(both, "m/s", tongue("en")) == ["±1.0\u00a0mm ±1.5°"]
+
+
+def test_what_is_not_known_is_a_dash_or_nothing():
+    assert scale_text(None, "kv", tongue("en")) == "–"
+    assert quantity_cells(QuantityDocument(), tongue("en")) == []
+    assert tolerance_cells(ToleranceDocument(), "", tongue("en")) == []
+
+
+def line(*criteria, **changes):
+    return score_line(report(criteria=list(criteria), **changes), tongue("en"))
+
+
+def test_points_that_are_all_judged_just_add_up():
+    assert line(criterion("v_A", points=5.0), criterion("v_B", "none", 0.0), max_score=10.0, score=5.0) == (
+        "The points of all criteria add up to 5."
+    )
+
+
+def test_what_was_not_judged_is_scaled_away_and_the_line_says_how():
+    told = line(
+        criterion("v_A", points=5.0), criterion("v_B", "partial", 2.5), criterion("v_C", "not_judged", None),
+        max_score=15.0, score=11.25,
+    )  # fmt: skip
+    assert "add up to 7.5 of 10" in told
+    assert told.endswith("7.5 × 15 / 10 = 11.25.")
+
+
+def test_a_section_with_a_weight_keeps_it():
+    weighted = [
+        criterion("v_A", points=5.0).model_copy(update={"section": "velocity_plan"}),
+        criterion("v_B", "not_judged", None).model_copy(update={"section": "velocity_plan"}),
+        criterion("a_A", "partial", 2.5).model_copy(update={"section": "acceleration_plan"}),
+    ]
+    # Velocities are worth 10 whatever was judged of them, accelerations 5.
+    assert "5 × 2 + 2.5 × 1 = 12.5." in line(*weighted, max_score=15.0, score=12.5)
+
+
+def test_what_waits_and_what_a_person_added_is_told():
+    told = line(
+        criterion("v_A", points=5.0), criterion("v_B", "review", None),
+        max_score=10.0, score=None, score_range=(6.0, 11.0), added=1.0,
+    )  # fmt: skip
+    assert told == (
+        "The points of all criteria add up to 5. What waits for a person adds 0 to 5. A person added 1."
+    )
+    assert line(criterion("v_A"), max_score=5.0, score=4.5, added=-0.5).endswith("A person took off 0.5.")
+
+
+def test_nothing_judged_has_no_line():
+    assert line(criterion("v_A", "not_judged", None), max_score=5.0) == ""

@@ -1,0 +1,432 @@
+"""A class under review: what is asked, what is decided, and what follows at once."""
+
+import io
+import json
+import threading
+import time
+
+import pytest
+from PIL import Image
+
+from grader.folder.decisions import basis_of
+from grader.inputs.decisions import Decision, DecisionFile
+from grader.review.server import application
+from grader.review.session import mark_of
+from tests.unit.review.conftest import PUMP, Page, silent
+
+SCANNED, ENTERED = "s02", "s09"
+
+
+def decided(session):
+    return {
+        (row.student_id, row.criterion): row
+        for row in DecisionFile(session.batch.folder / "decisions.csv").all()
+    }
+
+
+def test_the_page_is_there_in_every_language(session):
+    for lang, word in (("en", "undo"), ("ro", "anulează"), ("ru", "отменить")):
+        text = Page(application(session, lang), base_url="http://127.0.0.1:8321").get("/").text
+        assert f'lang="{lang}"' in text
+        assert word in text
+
+
+def test_every_criterion_of_every_student_is_a_row(page, session):
+    rows = page.rows()
+    wanted = {
+        (student.key, criterion.id) for student in session.students for criterion in student.report.criteria
+    }
+    assert set(rows) == wanted
+    assert all(row["stake"] > 0.0 for row in rows.values() if row["verdict"] == "review")
+
+
+def test_a_question_says_what_was_measured_and_shows_where(page):
+    question = page.get("/api/question", params={"student": SCANNED, "criterion": "v_B"}).json()
+    assert [name for name, _ in question["numbers"]] == ["Measured", "Expected", "Tolerance", "Points"]
+    look = question["look"]
+    x, y, w, h = look["box"]
+    inside = {node["name"] for node in look["nodes"] if x <= node["x"] <= x + w and y <= node["y"] <= y + h}
+    assert {"o", "b"} <= inside
+    assert look["marks"].startswith("<")
+
+
+def test_a_question_says_why_it_waits_and_what_the_student_will_read(page):
+    waiting = [row for row in page.rows().values() if row["verdict"] == "review" and row["proposed"]]
+    assert waiting
+    asked = {"student": waiting[0]["student"], "criterion": waiting[0]["criterion"]}
+    question = page.get("/api/question", params=asked).json()
+    assert question["why"]
+    assert question["sentence"] != question["why"]
+    page.answer(**asked, verdict=question["proposed"])
+    settled = page.get("/api/question", params=asked).json()
+    assert (settled["sentence"], settled["why"]) == (question["sentence"], "")
+
+
+def test_without_a_scan_there_is_nothing_to_look_at(page):
+    question = page.get("/api/question", params={"student": ENTERED, "criterion": "v_B"}).json()
+    assert question["look"] is None
+
+
+def test_a_part_of_a_scan_is_cut_as_large_as_asked(page):
+    asked = {"student": SCANNED, "sheet": 0, "x": 20, "y": 30, "w": 40, "h": 20, "scale": 5}
+    answer = page.get("/scan", params=asked)
+    assert answer.headers["content-type"] == "image/jpeg"
+    assert Image.open(io.BytesIO(answer.content)).size == (200, 100)
+
+
+@pytest.mark.parametrize(
+    ("path", "asked"),
+    [
+        ("/scan", {"student": "s02", "sheet": 7, "x": 0, "y": 0, "w": 9, "h": 9, "scale": 1}),
+        ("/scan", {"student": "s70", "sheet": 0, "x": 0, "y": 0, "w": 9, "h": 9, "scale": 1}),
+        ("/scan", {"student": "s02", "sheet": 0, "x": 0, "y": 0, "w": 0, "h": 9, "scale": 1}),
+        ("/scan", {"student": "s02", "sheet": 0, "x": 0, "y": 0, "w": 9e5, "h": 9e5, "scale": 99}),
+        ("/scan", {"student": "s02", "sheet": 0, "x": "nan", "y": 0, "w": 9, "h": 9, "scale": 1}),
+        ("/scan", {"student": "s02", "sheet": 0}),
+        ("/page", {"file": "../roster.csv", "page": 1}),
+        ("/page", {"file": "/etc/passwd", "page": 1}),
+        ("/api/question", {"student": "s02", "criterion": "nothing"}),
+        ("/api/question", {"student": "x", "criterion": "v_B"}),
+        ("/api/question", {}),
+    ],
+)
+def test_what_is_not_there_is_refused_in_words(page, path, asked):
+    answer = page.get(path, params=asked)
+    assert answer.status_code == 400
+    assert answer.json()["message"]
+
+
+@pytest.mark.parametrize(
+    "path", ["results.json", ".planmark/run.json", "../in/roster.csv", "%2e%2e/in/roster.csv", "s02"]
+)
+def test_only_pages_and_tables_of_the_results_are_served(page, path):
+    assert page.get(f"/out/{path}").status_code == 404
+
+
+def test_the_pages_of_the_results_are_served(page):
+    assert "Pump" in page.get("/out/index.html").text
+
+
+# Decisions ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("verdict", ["full", "partial", "none", "follow_through", "not_judged"])
+def test_a_verdict_is_written_and_counts_at_once(page, session, verdict):
+    answer = page.answer(SCANNED, "v_D", verdict, comment="seen")
+    assert answer.status_code == 200
+    row = decided(session)["s02", "v_D"]
+    assert (row.verdict, row.by, row.comment) == (verdict, "Ana", "seen")
+    student = session.student(SCANNED).job.submission
+    assert row.basis == basis_of(student, PUMP, session.batch.rubric, "v_D")
+    after = {one["criterion"]: one for one in answer.json()["students"][0]["rows"]}["v_D"]
+    assert (after["verdict"], after["decided"], after["stake"]) == (verdict, True, 0.0)
+    assert "Ana" in page.get("/api/question", params={"student": SCANNED, "criterion": "v_D"}).json()["state"]
+
+
+def test_a_settled_verdict_is_overridden(page, session):
+    before = page.rows()[ENTERED, "v_A"]
+    assert before["verdict"] == "full"
+    page.answer(ENTERED, "v_A", "none")
+    assert page.rows()[ENTERED, "v_A"]["verdict"] == "none"
+    assert decided(session)["s09", "v_A"].verdict == "none"
+
+
+def test_undo_brings_back_what_stood_there_before(page, session):
+    own = page.rows()[SCANNED, "v_D"]["verdict"]
+    page.answer(SCANNED, "v_D", "full", comment="first")
+    page.answer(SCANNED, "v_D", "none")
+    undone = page.said("/api/undo").json()
+    assert undone["undone"] == "s02/v_D"
+    assert (decided(session)["s02", "v_D"].verdict, decided(session)["s02", "v_D"].comment) == (
+        "full",
+        "first",
+    )
+    page.said("/api/undo")
+    assert not decided(session)
+    assert page.rows()[SCANNED, "v_D"]["verdict"] == own
+    assert page.said("/api/undo").json()["undone"] == ""
+
+
+def test_the_undo_of_one_window_leaves_the_others_alone(page, session):
+    page.answer(SCANNED, "v_D", "full")
+    assert page.said("/api/undo", window="another").json()["undone"] == ""
+    assert decided(session)
+
+
+def test_two_windows_and_neither_loses_anything(page, session):
+    row = page.rows()[SCANNED, "v_D"]
+    answer = {"student": SCANNED, "criterion": "v_D", "seen": row["seen"]}
+    first = page.said("/api/decide", answers=[{**answer, "verdict": "full"}], by="Ana", window="a")
+    second = page.said("/api/decide", answers=[{**answer, "verdict": "none"}], by="Ion", window="b")
+    assert first.status_code == 200
+    assert second.status_code == 409
+    assert "Ana" in second.json()["message"]
+    assert "right" in second.json()["message"]
+    assert decided(session)["s02", "v_D"].verdict == "full"
+
+
+def test_answers_together_are_written_all_or_none(page, session):
+    page.answer(SCANNED, "v_D", "full")
+    rows = page.rows()
+    answers = [
+        {"student": SCANNED, "criterion": name, "verdict": "none", "seen": ""} for name in ("v_DC", "v_D")
+    ]
+    assert page.said("/api/decide", answers=answers).status_code == 409
+    assert ("s02", "v_DC") not in decided(session)
+    answers[1]["seen"] = rows[SCANNED, "v_D"]["seen"]
+    assert page.said("/api/decide", answers=answers).status_code == 200
+    assert {row.verdict for row in decided(session).values()} == {"none"}
+
+
+def test_many_at_once_lose_nothing(page, session):
+    rows = page.rows()
+    names = [name for student, name in rows if student == SCANNED][:12]
+
+    def settle(name, verdict):
+        answer = {
+            "student": SCANNED,
+            "criterion": name,
+            "verdict": verdict,
+            "seen": rows[SCANNED, name]["seen"],
+        }
+        page.said("/api/decide", answers=[answer], window=verdict)
+
+    threads = [
+        threading.Thread(target=settle, args=(name, verdict))
+        for name in names
+        for verdict in ("full", "none")
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {criterion for _, criterion in decided(session)} == set(names)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        {"student": "s02", "criterion": "v_D", "verdict": "perfect", "seen": ""},
+        {"student": "s02", "criterion": "nothing", "verdict": "full", "seen": ""},
+        {"student": "s90", "criterion": "v_D", "verdict": "full", "seen": ""},
+        {"student": 0, "criterion": "v_D", "verdict": "full", "seen": ""},
+        {"student": 0.5, "criterion": "v_D", "verdict": "full", "seen": ""},
+        {"student": "s02", "criterion": ["v_D"], "verdict": "full", "seen": ""},
+        {"student": "s02", "criterion": "v_D", "verdict": "full", "comment": 7, "seen": ""},
+        {"student": "s02", "criterion": "v_D", "verdict": "full", "comment": "c" * 5000, "seen": ""},
+        {"student": "s02", "criterion": "total", "verdict": "full", "seen": ""},
+    ],
+)
+def test_an_answer_that_cannot_be_used_is_refused_and_nothing_written(page, session, answer):
+    refused = page.said("/api/decide", answers=[answer])
+    assert refused.status_code == 400
+    assert refused.json()["message"]
+    assert not decided(session)
+
+
+@pytest.mark.parametrize("said", [{}, {"answers": []}, {"answers": {}}, {"answers": [7]}])
+def test_no_answer_is_refused(page, said):
+    assert page.said("/api/decide", **said).status_code == 400
+
+
+def test_a_comment_is_offered_again_the_commonest_first(page):
+    page.answer(SCANNED, "v_D", "full", comment="rare")
+    page.answer(SCANNED, "v_DC", "full", comment="usual")
+    page.answer(SCANNED, "v_A", "full", comment="usual")
+    assert page.get("/api/class").json()["comments"] == ["usual", "rare"]
+
+
+def test_a_comment_on_the_whole_and_points_added(page, session):
+    page.said("/api/whole", student=ENTERED, comment="well drawn", added=1.5)
+    rows = decided(session)
+    assert rows["s09", "comment"].comment == "well drawn"
+    assert rows["s09", "total"].points == 1.5
+    seen = page.get("/api/class").json()["students"][1]["seen"]
+    assert page.said("/api/whole", student=ENTERED, comment="", added=0).status_code == 409
+    page.said("/api/whole", student=ENTERED, comment="", added=0, seen=seen)
+    assert not decided(session)
+    page.said("/api/undo")
+    assert set(decided(session)) == {("s09", "comment"), ("s09", "total")}
+
+
+def test_a_row_that_people_wrote_without_a_position_is_replaced(page, session):
+    """A second row on the same would make both of them faults."""
+    path = session.batch.folder / "decisions.csv"
+    DecisionFile(path).add(Decision("s02", None, "v_D", "partial", by="by hand"))
+    page.answer(SCANNED, "v_D", "none")
+    assert [row.verdict for row in DecisionFile(path).all()] == ["none"]
+
+
+def test_only_those_of_whom_something_changed_are_marked_anew(page, session):
+    version = page.get("/api/class").json()["version"]
+    path = session.batch.folder / "decisions.csv"
+    DecisionFile(path).add(Decision("s09", None, "v_A", "partial", by="by hand"))
+    told = page.get("/api/class", params={"since": version}).json()
+    assert [one["key"] for one in told["students"]] == [ENTERED]
+
+
+def test_a_file_that_people_broke_is_told_and_left_alone(page, session):
+    path = session.batch.folder / "decisions.csv"
+    path.write_text("who,what\n1,2\n", encoding="utf-8")
+    answer = {"student": SCANNED, "criterion": "v_D", "verdict": "full", "seen": ""}
+    told = page.said("/api/decide", answers=[answer])
+    assert told.status_code == 400
+    assert "decisions.csv" in told.json()["message"]
+    assert path.read_text(encoding="utf-8") == "who,what\n1,2\n"
+
+
+def test_what_others_write_into_the_file_is_taken_in(page, session):
+    version = page.get("/api/class").json()["version"]
+    path = session.batch.folder / "decisions.csv"
+    DecisionFile(path).add(Decision("s02", None, "v_D", "partial", by="by hand"))
+    told = page.get("/api/class", params={"since": version}).json()
+    assert {one["key"] for one in told["students"]} >= {SCANNED}
+    assert page.rows()[SCANNED, "v_D"]["verdict"] == "partial"
+
+
+def test_a_page_that_knows_all_is_told_nothing_again(page):
+    version = page.get("/api/class").json()["version"]
+    assert page.get("/api/class", params={"since": version}).json()["students"] == []
+
+
+# Nodes ----------------------------------------------------------------------------------------------
+
+
+def test_a_node_snaps_to_the_ink_and_marks_follow(page, session):
+    look = page.get("/api/question", params={"student": SCANNED, "criterion": "v_B"}).json()["look"]
+    node = next(one for one in look["nodes"] if one["name"] == "b")
+    said = {"student": SCANNED, "sheet": look["sheet"], "node": "velocity_plan:b"}
+    answer = page.said("/api/node", **said, x=node["x"] + 0.8, y=node["y"] - 0.5)
+    assert answer.status_code == 200
+    x, y = decided(session)["s02", "node:velocity_plan:b"].place
+    assert abs(complex(x - node["x"], y - node["y"])) < 0.4
+    assert page.said("/api/node", **said, x=node["x"], y=node["y"]).status_code == 409
+    look = page.get("/api/question", params={"student": SCANNED, "criterion": "v_B"}).json()["look"]
+    seen = next(one["seen"] for one in look["nodes"] if one["name"] == "b")
+    moved = page.said("/api/node", **said, x=node["x"] + 25.0, y=node["y"], seen=seen)
+    after = {one["criterion"]: one for one in moved.json()["students"][0]["rows"]}
+    assert after["v_B"]["verdict"] != "full"
+
+
+def test_marks_change_within_200_ms_of_a_moved_node(page, session):
+    look = page.get("/api/question", params={"student": SCANNED, "criterion": "v_B"}).json()["look"]
+    node = next(one for one in look["nodes"] if one["name"] == "b")
+    said = {"student": SCANNED, "sheet": look["sheet"], "node": "velocity_plan:b", "y": node["y"]}
+    spent = []
+    for step in range(5):
+        seen = mark_of(decided(session).get(("s02", "node:velocity_plan:b")))
+        started = time.process_time()
+        assert page.said("/api/node", **said, x=node["x"] + step, seen=seen).status_code == 200
+        spent.append(time.process_time() - started)
+    assert min(spent) < 0.2
+
+
+# Pages ----------------------------------------------------------------------------------------------
+
+
+def test_a_page_that_is_nobodys_is_offered_and_assigned(page, session):
+    told = page.get("/api/pages").json()
+    (stranger,) = told["pages"]
+    assert (stranger["file"], stranger["owner"]) == ("stranger.jpg", "")
+    assert page.get(stranger["picture"]).headers["content-type"] == "image/jpeg"
+    corners = [[10, 10], [900, 12], [905, 600], [8, 610]]
+    said = {"file": "stranger.jpg", "page": 1, "owner": "s09", "turn": 90, "corners": corners}
+    assert page.said("/api/page", **said).status_code == 200
+    row = next(row for row in decided(session).values() if row.kind == "page")
+    assert (row.page.owner, row.page.turn, len(row.page.corners)) == ("s09", 90, 4)
+    again = page.get("/api/pages").json()["pages"][0]
+    assert (again["owner"], again["turn"], again["corners"]) == (
+        "s09",
+        90,
+        [list(map(float, one)) for one in corners],
+    )
+    page.said("/api/undo")
+    assert not decided(session)
+
+
+def test_decisions_that_were_not_applied_are_told(session):
+    path = session.batch.folder / "decisions.csv"
+    DecisionFile(path).add(
+        Decision("s02", None, "v_D", "full", basis="b0.1.2.3"), Decision("nobody", None, "v_D", "full")
+    )
+    session.bring_up_to_date(silent)
+    page = Page(application(session), base_url="http://127.0.0.1:8321")
+    stale, fault = page.get("/api/pages").json()["idle"]
+    assert "s02 v_D: right" in stale
+    assert "nobody" in fault
+    said = page.get("/api/question", params={"student": SCANNED, "criterion": "v_D"}).json()
+    assert "has changed since" in said["state"]
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"file": "stranger.jpg", "page": 1},
+        {"file": "nothing.jpg", "page": 1, "turn": 90},
+        {"file": "stranger.jpg", "page": 2, "turn": 90},
+        {"file": "stranger.jpg", "page": 1, "turn": 45},
+        {"file": "stranger.jpg", "page": 1, "owner": "s90"},
+        {"file": "stranger.jpg", "page": 1, "corners": [[0, 0], [1]]},
+        {"file": "stranger.jpg", "page": 1, "corners": 7},
+        {"file": "stranger.jpg", "page": 1, "corners": [[0, 0], [1, 1], [2, 2], [3, 3]]},
+    ],
+)
+def test_a_page_decision_that_cannot_be_used_is_refused(page, session, said):
+    assert page.said("/api/page", **said).status_code == 400
+    assert not decided(session)
+
+
+# The end --------------------------------------------------------------------------------------------
+
+
+def finished(page):
+    page.said("/api/finish")
+    for _ in range(600):
+        told = page.get("/api/finish").json()
+        if not told["running"]:
+            return told
+        time.sleep(0.1)
+    raise AssertionError("it does not end")
+
+
+def test_finishing_brings_the_pages_up_to_date_and_exports(page, session):
+    page.answer(ENTERED, "v_A", "none", comment="look again")
+    assert session.made == 1
+    told = finished(page)
+    assert told["message"] == ""
+    assert session.made == 0
+    assert [one["href"] for one in told["files"]] == ["/out/index.html", "/out/export-csv-grades.csv"]
+    assert all(page.get(one["href"]).status_code == 200 for one in told["files"])
+    assert any("--to moodle" in line for line in told["commands"])
+    report = json.loads((session.batch.out / "s09" / "report.json").read_text(encoding="utf-8"))
+    written = next(one for one in report["criteria"] if one["id"] == "v_A")
+    assert (written["verdict"], written["decided"]["by"]) == ("none", "Ana")
+    assert written["decided"]["comment"] == "look again"
+    assert page.rows()[ENTERED, "v_A"]["verdict"] == "none"
+
+
+def test_a_run_that_fails_is_told(page, session):
+    (session.batch.folder / "roster.csv").write_text("nothing\n1\n", encoding="utf-8")
+    assert "roster.csv" in finished(page)["message"]
+
+
+def test_a_second_session_has_every_decision(page, session):
+    page.answer(SCANNED, "v_D", "partial")
+    again = type(session)(session.batch, session.workers)
+    again.bring_up_to_date(silent)
+    assert next(one for one in again.student(SCANNED).report.criteria if one.id == "v_D").verdict == "partial"
+
+
+def test_what_could_not_be_read_is_settled_by_hand(session):
+    """The only student's only page is not a drawing of this assignment."""
+    folder = session.batch.folder
+    for name in ("s02_1.jpg", "s02_2.jpg"):
+        (folder / name).unlink()
+    Image.new("L", (1600, 1100), 255).save(folder / "s02.png")
+    session.bring_up_to_date(silent)
+    page = Page(application(session), base_url="http://127.0.0.1:8321")
+    before = {name: row for (student, name), row in page.rows().items() if student == SCANNED}
+    assert {"v_A", "v_D", "a_D"} <= {name for name, row in before.items() if row["verdict"] == "review"}
+    page.answer(SCANNED, "v_D", "full")
+    after = {name: row for (student, name), row in page.rows().items() if student == SCANNED}
+    assert (after["v_D"]["verdict"], after["a_D"]["verdict"]) == ("full", "review")
