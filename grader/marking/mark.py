@@ -128,7 +128,7 @@ def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]
     return found
 
 
-VALUE_OFF = frozenset({"value_too_large", "value_too_small", "value_reversed"})
+VALUE_OFF = frozenset({"value_too_large", "value_too_small"})
 LEAST_SLIPPED_MM = 10.0
 """A value from a shorter vector may be off because it was read badly."""
 LEAST_SLIP = 0.2
