@@ -171,7 +171,7 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     pairs = [_similar_line(pair) for pair in results.alike]
     _list("Look alike (no accusation; hold both beside each other):", pairs, page)
     stale = [
-        f"line {one.line}, {_who(one.student_id, one.position)}, {one.criterion} {one.verdict}: {one.reason}"
+        f"line {one.line}, {_who(one.student_id, one.position)} {one.criterion} {one.verdict}: {one.reason}"
         for one in results.stale
     ]
     _list("Decisions that are out of date, and were not applied; decide again or remove them:", stale, page)

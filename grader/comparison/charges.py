@@ -163,7 +163,7 @@ class Charges:
     def opened(self, segment: TaskSegment, mark: MarkRange, *, follows_through: bool) -> MarkRange:
         """A loss on a sheet is open while what it may follow from was not read for certain."""
         unknown = self.unknown_upstream(segment) if follows_through else ()
-        if mark.is_full or not unknown:
+        if mark.share == FULL or not unknown:
             return mark
         self.charged.discard(segment.head)
         self.doubtful.add(segment.head)

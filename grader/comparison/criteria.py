@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 
 from grader.comparison import verdicts
 from grader.comparison.charges import Against, Charges, ComparedMark, new_charges
-from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
+from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather, held_against_cells
 from grader.comparison.follow_through import NO_SPREAD, Explain, ReplayResult, nothing_explained
 from grader.comparison.scales import Scale, settle
 from grader.comparison.task import Task, TaskSegment, unit_of
 from grader.comparison.verdicts import (
     ALL_RIGHT,
     FULL,
+    SHORT_MM,
     MarkRange,
     by_rule,
     left_open,
@@ -33,7 +34,7 @@ from grader.comparison.verdicts import (
     widened,
 )
 from grader.outcomes import Outcome, Quantity, Reason, Tolerance, UsedScale
-from grader.rubric import CriterionTable, ToleranceTable
+from grader.rubric import CriterionTable
 from reference.construction.elements import Normal
 from reference.construction.graph import AngularRate
 from reference.construction.steps import Given
@@ -181,7 +182,7 @@ def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
     with_direction = criterion.direction and drawn.direction_rad is not None
     is_read = drawn is charges.evidence.drawn.get(criterion.name)
     written = charges.evidence.written.get(criterion.name) if is_read else None
-    confidence, remarks = held_against_cells(drawn, written, table, least)
+    _, remarks = held_against_cells(drawn, written, table, least)
 
     def against(
         expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
@@ -198,7 +199,7 @@ def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
                     mark_vector(drawn, expected, widened(plain, size, uncertainty), table, se), rule
                 )
                 mark = left_open(mark, ALL_RIGHT if _is_boundless(uncertainty, size) else by_hand)
-        mark = verdicts.with_confidence(mark, confidence, rubric.doubt.settle)
+        mark = verdicts.with_confidence(mark, drawn.confidence, rubric.doubt.settle, size)
         return mark if mark.is_full else replace(mark, reasons=(*remarks, *mark.reasons))
 
     return against
@@ -223,33 +224,6 @@ def _full_tolerance(
     if marked.uncertainty is NO_SPREAD:
         return plain
     return widened(plain, size, marked.uncertainty, charges.task.rubric.hand.at_most)
-
-
-MISWRITTEN, BY_CHANCE = 0.1, 0.05
-"""Probabilities that a length in the cells is not that of the vector drawn (misread, measured to another
-node), and that it agrees with what was read although that is another stroke."""
-
-
-def held_against_cells(
-    drawn: DrawnVector, written: tuple[float, float] | None, tolerance: ToleranceTable, least: float
-) -> tuple[float, tuple[Reason, ...]]:
-    """The confidence in a drawn vector beside the length written into the sheet's cells, and what to say.
-
-    A ruler's error is no more than the tolerance of a length.
-
-    Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
-    `least` the probability from which it counts.
-    """
-    if written is None or written[1] < least:
-        return drawn.confidence, ()
-    length_mm = written[0]
-    allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
-    agrees = abs(drawn.length_mm - length_mm) <= allowed
-    if_right, if_misread = (1.0 - MISWRITTEN, BY_CHANCE) if agrees else (MISWRITTEN, 1.0 - BY_CHANCE)
-    right = drawn.confidence * if_right
-    confidence = right / (right + (1.0 - drawn.confidence) * if_misread)
-    params: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
-    return confidence, () if agrees else (Reason("written_disagrees", params),)
 
 
 # Computed values -----------------------------------------------------------------------------------
@@ -383,8 +357,6 @@ def _is_charged(charges: Charges, scale: str) -> bool:
 # What was not handed in, or not read ---------------------------------------------------------------
 
 
-LEAST_BLANK_MM = 5.0
-"""A shorter vector may be hidden by the marks of its ends."""
 NOT_DRAWN = 0.98
 """That a vector was not drawn, where both its ends were read for certain and no ink lies between them."""
 
@@ -420,7 +392,7 @@ def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> O
 def is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -> bool:
     """Whether a vector of this expected length is not on the sheet, though both its ends were read."""
     vector = task.construction.vectors.get(name)
-    if vector is None or name not in evidence.blank or length_mm < LEAST_BLANK_MM:
+    if vector is None or name not in evidence.blank or length_mm < SHORT_MM:
         return False
     return {vector.tail, vector.head} <= {*evidence.nodes, *task.construction.poles.values()}
 

@@ -3,12 +3,14 @@
 import cmath
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from grader.comparison.task import Task
+from grader.outcomes import Reason
 from grader.records import MECHANISM, Figure, Reading, ReadNode
+from grader.rubric import ToleranceTable
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,15 +96,21 @@ def gather(task: Task, submission: Submission) -> Evidence:
         sheets.take(reading)
     measured = _measured(submission.measured)
     own = sheets.nodes if submission.readings else _nodes_from(task, measured)
+    written = {name: one for reading in submission.readings for name, one in reading.lengths.items()}
+    least = task.rubric.least_confidence
+    drawn = {}
+    for name, one in sheets.drawn.items():
+        sure, _ = held_against_cells(one, written.get(name), task.rubric.tolerance_of(name), least)
+        drawn[name] = replace(one, confidence=sure)
     return Evidence(
-        drawn=sheets.drawn,
+        drawn=drawn,
         measured=measured,
         nodes=own,
         yardstick_mm=min(sheets.lengths, key=lambda one: one[1], default=None),
         unread={gap.name: gap.reason for reading in submission.readings for gap in reading.unread},
         has_sheets=bool(submission.readings),
         values=submission.values,
-        written={name: one for reading in submission.readings for name, one in reading.lengths.items()},
+        written=written,
         se_mm=sheets.se_mm,
         sketches=sheets.sketches,
         has_sketch=any(MECHANISM in reading.figures for reading in submission.readings),
@@ -157,6 +165,35 @@ class _Sheets:
             if name not in self.nodes:
                 self.nodes[name] = place
                 self.se_mm[name] = read.nodes[name].se_mm
+
+
+# The lengths written beside the drawing -------------------------------------------------------------
+
+MISWRITTEN, BY_CHANCE = 0.1, 0.05
+"""Probabilities that a length in the cells is not that of the vector drawn (misread, measured to another
+node), and that it agrees with what was read although that is another stroke."""
+
+
+def held_against_cells(
+    drawn: DrawnVector, written: tuple[float, float] | None, tolerance: ToleranceTable, least: float
+) -> tuple[float, tuple[Reason, ...]]:
+    """The confidence in a drawn vector beside the length written into the sheet's cells, and what to say.
+
+    A ruler's error is no more than the tolerance of a length.
+
+    Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
+    `least` the probability from which it counts.
+    """
+    if written is None or written[1] < least:
+        return drawn.confidence, ()
+    length_mm = written[0]
+    allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
+    agrees = abs(drawn.length_mm - length_mm) <= allowed
+    if_right, if_misread = (1.0 - MISWRITTEN, BY_CHANCE) if agrees else (MISWRITTEN, 1.0 - BY_CHANCE)
+    right = drawn.confidence * if_right
+    confidence = right / (right + (1.0 - drawn.confidence) * if_misread)
+    params: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
+    return confidence, () if agrees else (Reason("written_disagrees", params),)
 
 
 # Vectors and nodes --------------------------------------------------------------------------------

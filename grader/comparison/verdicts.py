@@ -219,7 +219,13 @@ SURELY_READ, MOSTLY_MISREAD = 0.03, 0.7
 """Of vectors read with more doubt than the first that are off as read, up to this share is not."""
 
 
-def with_confidence(mark: MarkRange, confidence: float, settle: float) -> MarkRange:
+SHORT_MM, WRONG_SHORT = 5.0, 0.03
+"""What is expected shorter than this may be hidden by the marks of its ends; there is little to misread."""
+
+
+def with_confidence(
+    mark: MarkRange, confidence: float, settle: float, expected_mm: float = math.inf
+) -> MarkRange:
     """A mark, wholly open where a misreading is too likely to have made it.
 
     Arguments: `confidence` is the probability that the vector is read rightly, `settle` the least
@@ -233,7 +239,7 @@ def with_confidence(mark: MarkRange, confidence: float, settle: float) -> MarkRa
     elif any(one.code == COUNTED["student"] for one in mark.reasons):
         wrong = WRONG_COUNTED * misread
     else:
-        wrong = WRONG_CREDIT * misread**2
+        wrong = (WRONG_SHORT if expected_mm < SHORT_MM else WRONG_CREDIT) * misread**2
     sure = min(mark.sure, 1.0 - wrong)
     if sure >= settle:
         return replace(mark, sure=sure)

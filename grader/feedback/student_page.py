@@ -49,6 +49,8 @@ WHY_WIDENED = N_(
 UNITS = N_(
     "Lengths are millimetres on paper; directions count counter-clockwise from the horizontal to the right."
 )
+MOST_TITLES = 2
+"""Mistakes in one heading, the likeliest ones; the text below it tells them all."""
 PRINTED = "feedback.pdf"
 """Earlier versions wrote it; an old one is removed, it may show more than the page does now."""
 
@@ -94,7 +96,7 @@ class Action:
     Attributes
     ----------
     alternatives : what would explain the same nearly as well
-    is_open : whether all that it explains still waits for a person
+    is_open : whether nothing that it explains has lost points yet, and some of it waits for a person
     """
 
     title: str
@@ -368,10 +370,11 @@ class StudentPage:
     def _action(self, mistake: MistakeDocument) -> Action:
         criteria = {criterion.id: criterion for criterion in self.report.criteria}
         explained = [criteria[name] for name in mistake.explains if name in criteria]
+        verdicts = {one.verdict for one in explained}
         off = {one.drawn for one in explained if one.verdict in {"none", "partial", "review"}}
         causes: list[MistakeDocument | RivalDocument] = [mistake, *mistake.rivals]
         titles = dict.fromkeys(_title(cause, self.speaker) for cause in causes)
-        joined = f" {self.speaker.gettext(OR)} ".join(titles)
+        joined = f" {self.speaker.gettext(OR)} ".join(list(titles)[:MOST_TITLES])
         return Action(
             title=joined[:1].upper() + joined[1:],
             at=place(mistake.at, self.speaker, self.about.names),
@@ -380,7 +383,7 @@ class StudentPage:
             redo=tuple(mistake.redo),
             explains=tuple(self.shown(one.drawn or one.id) for one in explained),
             view=detail(self.pictures, off, self.about.names),
-            is_open=bool(explained) and all(one.verdict == "review" for one in explained),
+            is_open="review" in verdicts and not verdicts & {"none", "partial"},
         )
 
     @property

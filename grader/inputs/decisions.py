@@ -23,6 +23,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -55,6 +56,8 @@ _MAX_LINES = 200_000
 """A thousand students with two hundred decisions each."""
 _LONGEST = 4_000
 """Characters of a cell: two pages of a comment."""
+_REMEMBERED = 20_000
+"""Lines understood before: a file is read again at every decision, and differs in one."""
 _LOCK_S = 20.0
 """A write takes some milliseconds; one that waits longer than this waits for a process that hangs."""
 _FORMULA = re.compile(r"'*[=+\-@]")
@@ -232,10 +235,11 @@ def parse_table(text: str, file: str = FILE_NAME) -> DecisionTable:
     findings = findings or list(_check_header(header))
     if findings:
         raise _refused(file, findings)
+    named = tuple(header)
     table: list[Line] = []
     faults: list[tuple[int, Finding]] = []
     for number, cells in lines[1:]:
-        line, found = _line(number, header, cells, delimiter)
+        line, found = _line(number, named, tuple(cells), delimiter)
         table.append(line)
         faults += [(number, Finding(f"line {number}{where}", why)) for where, why in found]
     table, again = _without_repeated(table, delimiter)
@@ -260,8 +264,9 @@ def _check_header(header: Sequence[str]) -> Iterator[Finding]:
             yield Finding("line 1", f"column '{short(name)}' is not known; {advice}")
 
 
+@lru_cache(_REMEMBERED)
 def _line(
-    number: int, header: Sequence[str], cells: Sequence[str], delimiter: str
+    number: int, header: tuple[str, ...], cells: tuple[str, ...], delimiter: str
 ) -> tuple[Line, list[tuple[str, str]]]:
     """A line, and what is wrong with it: where in the line, and why."""
     given = dict(zip(header, cells, strict=False))
@@ -428,10 +433,11 @@ class DecisionFile:
         if len(set(keys)) < len(keys):
             raise CallError("decision_refused", "the same is decided twice in one call")
         with self._open() as table:
-            there = _by_key(table.rows)
+            there = {row.key: row for row in table.rows}
             if expected is not None:
-                read = _by_key(expected)
-                _check_unchanged([(read.get(key), there.get(key)) for key in keys])
+                read = {row.key: row for row in expected}
+                seen = [_clean(read[key]) if key in read else None for key in keys]
+                _check_unchanged([(row, there.get(key)) for row, key in zip(seen, keys, strict=True)])
             self._write(table, keys, rows)
             return [there[key] for key in keys if key in there]
 
@@ -442,7 +448,7 @@ class DecisionFile:
         """
         rows, back = [_clean(row) for row in decisions], [_clean(row) for row in restored]
         with self._open() as table:
-            there = _by_key(table.rows)
+            there = {row.key: row for row in table.rows}
             _check_unchanged([(row, there.get(row.key)) for row in rows])
             self._write(table, [row.key for row in (*rows, *back)], back)
 
@@ -482,10 +488,6 @@ class DecisionFile:
         sync_folder(self.path.parent)
 
 
-def _by_key(rows: Iterable[Decision]) -> dict[Key, Decision]:
-    return {row.key: row for row in map(_clean, rows)}
-
-
 def _check_unchanged(pairs: Sequence[tuple[Decision | None, Decision | None]]) -> None:
     """Raise ClashError where what was read and what stands there are not the same."""
     now = [there for read, there in pairs if read != there]
@@ -504,6 +506,7 @@ def _clean(row: Decision) -> Decision:
     return replace(row, **texts, points=row.points if points is None else points, line=0)
 
 
+@lru_cache(_REMEMBERED)
 def _cells(row: Decision, delimiter: str) -> tuple[str, ...]:
     """A row's cells in the order of `COLUMNS`."""
     points = "" if row.points is None else f"{row.points:.6f}".rstrip("0").rstrip(".")

@@ -183,6 +183,10 @@ def with_decisions(
     rows = submission.decided
     if not rows:
         return report
+    if report.score_range is None and any(row.kind == "total" for row in rows):
+        problem = _not_applied("total", "nothing was judged; decide the verdicts of criteria first")
+        problems = [*report.problems, ProblemDocument.model_validate(problem)]
+        report = report.model_copy(update={"problems": problems})
     astray = {problem.message.partition(" ")[0] for problem in report.problems if problem.code == NOT_APPLIED}
     kinds: dict[str, list[Decision]] = defaultdict(list)
     for row in rows:
@@ -233,9 +237,7 @@ def _with_node(
 def _with_points(report: ReportDocument, row: Decision) -> ReportDocument:
     """The report with points added to the score, or taken away, as far as they fit: so many are `added`."""
     if report.score_range is None:
-        problem = _not_applied("total", "nothing was judged; decide the verdicts of criteria first")
-        problems = [*report.problems, ProblemDocument.model_validate(problem)]
-        return report.model_copy(update={"problems": problems})
+        return report
 
     def moved(score: float) -> float:
         return round(min(max(score + (row.points or 0.0), 0.0), report.max_score), DECIMALS)

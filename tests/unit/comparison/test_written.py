@@ -1,7 +1,6 @@
 import pytest
 
-from grader.comparison.criteria import held_against_cells
-from grader.comparison.evidence import DrawnVector
+from grader.comparison.evidence import DrawnVector, held_against_cells
 from grader.feedback.sentences import FULL, HINTS
 from grader.rubric import ToleranceTable
 

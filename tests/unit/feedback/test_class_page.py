@@ -196,3 +196,10 @@ def test_the_demos_page_leads_to_every_class(tmp_path):
     links = {attributes.get("href") for tag, attributes in page.tags if tag == "a"}
     assert links == {"pump/index.html", "press/index.html"}
     assert f"planmark review {tmp_path}/pump" in page.text
+
+
+def test_what_waits_has_its_likely_score_where_that_is_known():
+    waits = report(status="needs_review", score=None, score_range=(5.0, 7.5), expected_score=7.1)
+    assert "5–7.5 ≈ 7.1" in Page(index_page(results(waits), "en")).text
+    unknown = waits.model_copy(update={"expected_score": None})
+    assert "≈ 7" not in Page(index_page(results(unknown), "en")).text

@@ -3,7 +3,13 @@
 import re
 from dataclasses import replace
 
-from grader.documents import DecidedDocument, MistakeDocument, QuantityDocument, ToleranceDocument
+from grader.documents import (
+    DecidedDocument,
+    MistakeDocument,
+    QuantityDocument,
+    RivalDocument,
+    ToleranceDocument,
+)
 from grader.feedback.student_page import GROUPS, About, StudentPage, feedback_page
 from grader.language import tongue
 from grader.overlay.scene import Arrow
@@ -39,6 +45,16 @@ def test_what_no_mistake_explains_is_told_too_with_a_closer_look():
     assert page_of(explained, [picture()]).view_of_others is None
 
 
+def test_a_heading_names_the_two_likeliest_mistakes_and_no_more():
+    rivals = [
+        RivalDocument(code=code, at="b", confidence=0.2)
+        for code in ("sense_reversed", "normal_missing", "wrong_intersection")
+    ]
+    doubtful = mistake("wrong_link", "b", ["v_B"]).model_copy(update={"rivals": rivals})
+    (action,) = page_of(report(criteria=[criterion("v_B", "none", 0.0)], mistakes=[doubtful])).actions
+    assert action.title == "Line drawn by the wrong link or sense reversed"
+
+
 def test_a_mistake_of_which_everything_waits_is_not_called_certain():
     waits = [criterion("v_A", "review", None), criterion("v_B", "review", None)]
     one = report(criteria=waits, mistakes=[mistake("wrong_link", "b", ["v_A", "v_B"])])
@@ -46,6 +62,8 @@ def test_a_mistake_of_which_everything_waits_is_not_called_certain():
     told = Page(feedback_page(one, [], "en")).text
     assert "What may be wrong Wrong link" in told.replace("Line drawn by the wrong link", "Wrong link")
     assert "Not certain yet" in told
+    beside = [waits[0], criterion("v_B")]
+    assert page_of(one.model_copy(update={"criteria": beside})).actions[0].is_open
     lost = [waits[0], criterion("v_B", "none", 0.0)]
     assert not page_of(one.model_copy(update={"criteria": lost})).actions[0].is_open
 

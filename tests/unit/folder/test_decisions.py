@@ -13,7 +13,7 @@ from grader.inputs.roster import Roster, RosterRow
 from grader.lms.grades import Grade, Person
 from grader.lms.marks import marks_of
 from grader.records import PageRef
-from grader.rubric import load_rubric
+from grader.rubric import load_rubric, rubric_of
 from grader.solution.document import plan_document
 from reference.authored.assignment import Variant, load_assignment
 from reference.errors import InputFileError
@@ -367,3 +367,37 @@ def test_one_submission_is_given_what_is_about_it():
     rows = [row("v_D", "full"), row("v_B", "full", student="s2"), page_row("x.jpg#1", "owner=s1")]
     found = decided(submission, rows, PUMP, RUBRIC).decided
     assert [one.criterion for one in found] == ["page:x.jpg#1", "v_D"]
+
+
+# Several positions --------------------------------------------------------------------------------
+
+
+def test_of_a_student_with_several_positions_the_row_says_which():
+    press = load_assignment("press")
+    rubric = rubric_of(press)
+    students = [StudentSubmission("s1", Variant(position=place)) for place in (0, 3)]
+    name = rubric.criterion[0].id
+    rows = [
+        replace(row(name, "full"), position=3, line=2), replace(row(name, "none"), line=3),
+        replace(row(name, "none"), position=5, line=4),
+        replace(row("comment", comment="Well."), position=0, line=5),
+    ]  # fmt: skip
+    decisions = ClassDecisions("decisions.csv", rows)
+    first, second = decisions.give(students, press, rubric)
+    assert [one.criterion for one in first.decided] == ["comment"]
+    assert [one.verdict for one in second.decided] == ["full"]
+    told = [problem.message for problem in decisions.problems()]
+    assert told == [
+        f"line {line}, position: s1 has the positions 0, 3: write which" for line in (3, 4)
+    ]  # fmt: skip
+
+
+def test_the_same_submission_decided_by_two_rows_is_not_guessed():
+    rows = [replace(row("v_D", "full"), line=2), replace(row("v_D", "none"), position=0, line=3)]
+    press = load_assignment("press")
+    rubric = rubric_of(press)
+    rows = [replace(one, criterion=rubric.criterion[0].id) for one in rows]
+    decisions = ClassDecisions("decisions.csv", rows)
+    (student,) = decisions.give([StudentSubmission("s1", Variant(position=0))], press, rubric)
+    assert student.decided == ()
+    assert [problem.message[:6] for problem in decisions.problems()] == ["line 2", "line 3"]

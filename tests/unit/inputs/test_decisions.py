@@ -317,3 +317,24 @@ def test_threads_and_processes_lose_nothing(path):
     for worker in workers:
         worker.join()
     assert len(read_decisions(path)) == 5 * 15
+
+
+def add_and_tell(path, pipe):
+    file = DecisionFile(path)
+    for number in range(10_000):
+        file.add(replace(ROW, criterion=f"c{number}"))
+        pipe.send(number)
+
+
+def test_what_was_accepted_is_there_after_the_process_was_killed(path):
+    spawn = multiprocessing.get_context("spawn")
+    receiving, sending = spawn.Pipe(duplex=False)
+    worker = spawn.Process(target=add_and_tell, args=(path, sending))
+    worker.start()
+    accepted = [receiving.recv() for _ in range(12)]
+    worker.kill()
+    worker.join()
+    there = {row.criterion for row in read_decisions(path)}
+    assert {f"c{number}" for number in accepted} <= there
+    DecisionFile(path).add(ROW)  # the lock went with the process
+    assert len(read_decisions(path)) == len(there) + 1

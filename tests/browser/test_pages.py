@@ -1,0 +1,60 @@
+"""Pages of a class as a phone, a dark room and a printer show them."""
+
+import pypdfium2
+import pytest
+
+PHONE = {"width": 390, "height": 844}
+
+
+@pytest.fixture
+def phone(chromium):
+    """Opens a page as a phone does; `scheme` is light or dark."""
+    contexts = []
+
+    def open_page(path, scheme="light"):
+        contexts.append(chromium.new_context(viewport=PHONE, color_scheme=scheme))
+        page = contexts[-1].new_page()
+        page.goto(path.as_uri())
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+
+
+def height(page):
+    return page.evaluate("document.documentElement.scrollHeight")
+
+
+def test_no_page_is_cut_on_a_phone_and_students_pages_are_short(phone, class_of_30):
+    pages = sorted((class_of_30 / "out").rglob("*.html"))
+    assert len(pages) > 30
+    for path in pages:
+        page = phone(path)
+        assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"], path
+        if path.name == "feedback.html":
+            assert height(page) < 4 * PHONE["height"], path
+
+
+def test_score_and_first_mistake_are_on_the_first_screen(phone, class_of_30):
+    page = phone(class_of_30 / "out" / "s02" / "feedback.html")
+    score, mistake = page.locator(".score").bounding_box(), page.locator("h3").first.bounding_box()
+    assert score["y"] < mistake["y"] < PHONE["height"] / 2
+
+
+def test_a_dark_room_has_dark_pages(phone, class_of_30):
+    page = phone(class_of_30 / "out" / "index.html", "dark")
+    red, green, blue = page.evaluate(
+        "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).slice(0, 3).map(Number)"
+    )
+    assert max(red, green, blue) < 60
+
+
+def test_what_is_folded_is_printed(phone, class_of_30, tmp_path):
+    page = phone(class_of_30 / "out" / "s02" / "feedback.html")
+    assert not page.locator("text=Velocity of A").first.is_visible()
+    page.pdf(path=tmp_path / "page.pdf", format="A4", prefer_css_page_size=True)
+    document = pypdfium2.PdfDocument(tmp_path / "page.pdf")
+    text = "".join(sheet.get_textpage().get_text_range() for sheet in document)
+    document.close()
+    assert "Velocity of A" in text
