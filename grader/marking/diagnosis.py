@@ -35,6 +35,8 @@ FURTHER_SCALE = 4.0
 """What it costs to suppose a further wrong scale: it often comes from the first."""
 BEYOND_DOUBT = 8.0
 """A mistake is named only where the drawing made rightly by any hand costs this much more: 50 to 1."""
+BEYOND_DOUBT_BY_LENGTHS = 14.0
+"""The same where no direction is known: a thousand to one."""
 LEAST_WRONG = 0.06
 """Of a scale's logarithm: a smaller error is no mistake to be named, drafting errors reach it."""
 USUAL = 1.0
@@ -78,7 +80,9 @@ def explained(case: Case) -> tuple[Replay, ...]:
     innocent = _cost_if_right(explanations)
     if explanations and not _is_clear(explanations, case):
         explanations = _searched_further(case, roots, explanations)
-    if not explanations or innocent - explanations[0].cost < BEYOND_DOUBT:
+    has_directions = any(one.has_direction for one in case.observations.entries)
+    doubt = BEYOND_DOUBT if has_directions else BEYOND_DOUBT_BY_LENGTHS
+    if not explanations or innocent - explanations[0].cost < doubt:
         return ()
     return tuple(explanations)
 

@@ -32,12 +32,9 @@ def judge(task: Task, submission: Submission) -> Judgement:
     if surer is not None:
         submission, comparison = surer, compare(task, surer, explain)
     mistakes = _named(task, comparison)
-    mistakes = (
-        *mistakes,
-        *_swapped_letters(task, submission, mistakes),
-        *_not_drawn(task, comparison),
-        *_slips(task, comparison),
-    )
+    mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes))
+    mistakes = (*mistakes, *_not_drawn(task, comparison, mistakes))
+    mistakes = (*mistakes, *_slips(task, comparison, mistakes))
     outcomes = charged_where_made(task, comparison.outcomes, mistakes)
     outcomes = at_stake(task.rubric, of_another(task.rubric, outcomes, mistakes))
     outcomes = tuple(with_mistake(outcome, mistakes) for outcome in outcomes)
@@ -111,48 +108,58 @@ def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMi
     return found
 
 
-def _not_drawn(task: Task, comparison: Comparison) -> list[NamedMistake]:
-    """Vectors that are asked for and not on the sheet, or left blank in a table of measurements."""
+def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) -> list[NamedMistake]:
+    """Vectors that are asked for and not on the sheet, or left blank in a table of measurements.
+
+    None of a component that is known to have been left out.
+    """
+    left_out = {one.at for one in known if one.code == "normal_missing"}
     evidence, vectors = comparison.evidence, task.construction.vectors
     found = []
     for one in comparison.outcomes:
         codes = {reason.code for reason in one.reasons}
         is_table = bool(evidence.measured) and not evidence.has_sheets
         is_left_blank = "not_measured" in codes and is_table and one.verdict == "none"
-        if one.name in vectors and ("not_drawn" in codes or is_left_blank):
+        if one.name not in vectors or vectors[one.name].head in left_out:
+            continue
+        if "not_drawn" in codes or is_left_blank:
             sure = NOT_DRAWN if evidence.has_sheets else 1.0
             found.append(NamedMistake(Mistake("vector_missing", one.name), (one.criterion,), sure))
     return found
 
 
-VALUE_OFF = frozenset({"value_too_large", "value_too_small", "value_reversed"})
+VALUE_OFF = frozenset({"value_too_large", "value_too_small"})
 LEAST_SLIPPED_MM = 10.0
 """A value from a shorter vector may be off because it was read badly."""
 LEAST_SLIP = 0.2
 """An angular quantity that is wrong by a smaller share may come from lengths measured badly."""
 SLIPPED = 0.95
-"""Confidence in a slip: the drawing that the value comes from is right, or follows rightly."""
+"""Confidence in a slip: the drawing that the value comes from is right."""
 
 
-def _slips(task: Task, comparison: Comparison) -> list[NamedMistake]:
-    """Values that were computed wrongly from a vector that is right, or follows rightly."""
+def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) -> list[NamedMistake]:
+    """Values that were computed wrongly from a right vector.
+
+    Of angular quantities only where no mistake is known: they depend on links and senses, too.
+    """
     sure = {
         one.name
         for one in comparison.outcomes
-        if one.verdict in {"full", "follow_through"} and (one.measured.length_mm or 0.0) >= LEAST_SLIPPED_MM
+        if one.verdict == "full" and (one.measured.length_mm or 0.0) >= LEAST_SLIPPED_MM and not known
     }
-    found = []
+    of_vectors, of_rates = [], []
     for one in comparison.outcomes:
         rate = task.construction.rates.get(one.name)
         is_value_off = one.verdict in CHARGED and VALUE_OFF & {reason.code for reason in one.reasons}
-        is_of_right_vector = rate is not None and rate.vector in sure
         value, right = one.measured.value, one.expected.value
         factor = value / right if value and right else 1.0
-        is_slip = is_value_off and is_of_right_vector and abs(factor - 1.0) >= LEAST_SLIP
-        if one.mistake == "arithmetic" or is_slip:
-            slip = Mistake("arithmetic", one.name, factor=factor)
-            found.append(NamedMistake(slip, (one.criterion,), SLIPPED))
-    return found
+        slip = NamedMistake(Mistake("arithmetic", one.name, factor=factor), (one.criterion,), SLIPPED)
+        if one.mistake == "arithmetic":
+            of_vectors.append(slip)
+        elif rate is not None and rate.vector in sure and is_value_off and abs(factor - 1.0) >= LEAST_SLIP:
+            of_rates.append(slip)
+    # Several of them have one cause that is elsewhere.
+    return of_vectors + (of_rates if len(of_rates) == 1 else [])
 
 
 def with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:

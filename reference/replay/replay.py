@@ -115,6 +115,9 @@ def replay(
             measured = {step.node: rough[step.node] for step in steps if step.node in rough}
             for step in steps:
                 if step.node in needed:
+                    if isinstance(step, Given) and step.node not in by_name and step.start in measured:
+                        # A vector laid off has the error of its start.
+                        measured[step.node] = measured[step.start]
                     here, nodes = by_name.get(step.node, ()), ChainMap(sketch, branches.nodes)
                     observed = branches.observed(here, figure)
                     context = StepContext(
