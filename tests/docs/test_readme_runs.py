@@ -5,6 +5,7 @@ import os
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -40,11 +41,27 @@ def desk(tmp_path_factory) -> Path:
     return here
 
 
+def _serves(command: list[str], desk: Path, environment: dict[str, str]) -> None:
+    """A server's command says where it listens, and ends on Ctrl+C."""
+    with subprocess.Popen(  # noqa: S603 - our own program
+        command, cwd=desk, env=environment, stdout=subprocess.PIPE, text=True, encoding="utf-8"
+    ) as server:
+        try:
+            said = [server.stdout.readline() for _ in range(2)]
+        finally:
+            server.send_signal(signal.SIGINT)
+        server.wait(timeout=60)
+    assert "http://127.0.0.1:" in "".join(said)
+
+
 def test_every_command_of_the_readme_does_what_it_says(desk):
     assert len(COMMANDS) > 8
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     for command in COMMANDS:
         arguments = shlex.split(command)[1:]
+        if arguments[0] == "review":
+            _serves([sys.executable, "-m", "grader", *arguments], desk, environment)
+            continue
         ran = subprocess.run(  # noqa: S603 - our own program
             [sys.executable, "-m", "grader", *arguments],
             cwd=desk,
