@@ -13,6 +13,10 @@ from reference.authored.assignment import load_assignment
 from tests.inline import Inline
 
 PUMP = load_assignment("pump")
+AS_MARKED = load_rubric("pump")
+DOUBT = AS_MARKED.doubt.model_copy(update={"settle": 0.9999, "stake": 0.0})
+RUBRIC = AS_MARKED.model_copy(update={"doubt": DOUBT})
+"""So strict that a scanned student has open questions."""
 WINDOW = "window-1"
 
 
@@ -41,7 +45,7 @@ def scanned(tmp_path_factory):
     )
     (folder / "roster.csv").write_text(roster, encoding="utf-8")
     out = folder.parent / "out"
-    Session(Batch(PUMP, load_rubric("pump"), folder, out), Inline()).bring_up_to_date(silent)
+    Session(Batch(PUMP, RUBRIC, folder, out), Inline()).bring_up_to_date(silent)
     return folder.parent
 
 
@@ -49,7 +53,7 @@ def scanned(tmp_path_factory):
 def session(scanned, tmp_path):
     """The class under review, each test with a copy of its own."""
     shutil.copytree(scanned, tmp_path / "class")
-    batch = Batch(PUMP, load_rubric("pump"), tmp_path / "class" / "in", tmp_path / "class" / "out")
+    batch = Batch(PUMP, RUBRIC, tmp_path / "class" / "in", tmp_path / "class" / "out")
     opened = Session(batch, Inline())
     opened.bring_up_to_date(silent)
     return opened
