@@ -278,7 +278,9 @@ def _readings(work: StudentWork, lot: np.random.Generator) -> tuple[Reading, ...
             }
             figures[drawn.name] = Figure(nodes, _vectors(work, drawn.name, nodes, se))
             unread += [
-                Unread(vector.name, f"no stroke between {vector.tail} and {vector.head} could be told apart")
+                Unread(
+                    vector.name, f"nothing is drawn between {vector.tail} and {vector.head}", is_blank=True
+                )
                 for vector in work.construction.vectors_of(drawn.name)
                 if vector.name in work.left_out
             ]

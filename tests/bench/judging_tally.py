@@ -131,7 +131,10 @@ def result_of(work: StudentWork, source: Source, handed_in: Submission, judgemen
     not_made = [
         mistake
         for mistake, is_first in zip(judgement.mistakes, told_first, strict=False)
-        if not is_first and not any(names(mistake, one.mistake) for one in made)
+        if not is_first
+        and not any(names(mistake, one.mistake) for one in made)
+        # An entry that somebody leaves blank is missing, whatever the reason.
+        and not (mistake.code == "vector_missing" and mistake.at not in visible.directed)
     ]
     charged = any(one.verdict in CHARGED | {"review"} for one in judgement.outcomes)
     by_letters = work.by_letters(source) and first is not None and first.code == "labels_swapped"
