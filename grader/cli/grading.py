@@ -74,7 +74,7 @@ def demo(out: Path, lang: str, jobs: int | None) -> None:
         results = ResultsDocument.model_validate_json((out / name / "results.json").read_bytes())
         classes[name] = (title, results)
     write_demo_page(classes, out, lang)
-    typer.echo(f"Begin at {out / 'index.html'}; decide what waits with: planmark review {out / 'pump'}")
+    typer.echo(f"Begin at {out / 'index.html'}; settle or change marks with: planmark review {out / 'pump'}")
 
 
 def read_scans(
