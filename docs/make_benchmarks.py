@@ -1,7 +1,7 @@
 """Measure and put the figures into benchmarks.md: `python -m docs.make_benchmarks`, some half an hour.
 
-With `solver`, `reading`, `lines` or `judging` only that part is measured and replaced; `reading 20` takes 20
-students per scene, `judging 20` so many of each kind, hand and mechanism.
+With `solver`, `reading`, `lines`, `judging` or `settling` only that part is measured and replaced; a number
+is that of students: for each scene, for each kind, hand and mechanism, for each kind of sheet.
 """
 
 import re
@@ -12,12 +12,14 @@ from pathlib import Path
 import cv2
 
 from tests.bench.judging import JudgingBench
+from tests.bench.judging_scans import SHEET_KINDS
 from tests.bench.judging_tally import judging_tables
 from tests.bench.lines import lines_tables, measure_lines
 from tests.bench.plain_text import Table, as_text
 from tests.bench.reading import STUDENTS, measure_reading
 from tests.bench.reading_scenes import foreign_tables, measure_foreign
 from tests.bench.reading_tally import reading_tables
+from tests.bench.settling import measure
 from tests.bench.solver import measure_solver, solver_tables
 
 PAGE = Path(__file__).resolve().parent / "benchmarks.md"
@@ -41,11 +43,17 @@ def _judging(students: int | None) -> Iterable[Table]:
     return judging_tables(bench.figures)
 
 
+def _settling(students: int | None) -> Iterable[Table]:
+    cv2.setNumThreads(1)
+    return measure(students or 50, list(SHEET_KINDS), None, 1).tables()
+
+
 PARTS: dict[str, Callable[[int | None], Iterable[Table]]] = {
     "solver": lambda _: solver_tables(measure_solver()),
     "reading": _reading,
     "lines": _lines,
     "judging": _judging,
+    "settling": _settling,
 }
 
 
@@ -59,7 +67,7 @@ def main(wanted: list[str]) -> None:
 
 def write(part: str, tables: str) -> None:
     """Put a part's tables between its marks."""
-    figures = re.sub(r"(?m)^(Solver|Stability|Reading|Lines|Judging): (.*)$", r"### \1: \2", tables)
+    figures = re.sub(r"(?m)^(Solver|Stability|Reading|Lines|Judging|Settling): (.*)$", r"### \1: \2", tables)
     first, last = f"<!-- {part}: written by make_benchmarks.py -->\n", f"<!-- {part}: end -->"
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(first)
     _, _, after = rest.partition(last)

@@ -1,0 +1,29 @@
+"""How the benchmark of settling counts."""
+
+from tests.bench.settling import Marked, SettlingFigures, Verdict
+
+RIGHT = Verdict(is_settled=True, is_right=True, is_charge=False, probability=0.99, length_mm=40.0)
+WRONG = Verdict(is_settled=True, is_right=False, is_charge=True, probability=0.98, length_mm=4.0)
+OPEN = Verdict(is_settled=False, is_right=True, is_charge=False, probability=0.6, length_mm=40.0)
+FAIR = Verdict(is_settled=True, is_right=None, is_charge=True, probability=0.99, length_mm=40.0)
+
+
+def student(*verdicts, was_read=True, of_another=False):
+    return Marked("flatbed", "careful", True, of_another, was_read, verdicts)
+
+
+def test_sheets_are_counted_as_they_are():
+    students = [
+        student(RIGHT, FAIR), student(RIGHT, OPEN), student(WRONG), student(was_read=False),
+        student(OPEN, of_another=True),
+    ]  # fmt: skip
+    assert [one.is_finished for one in students] == [True, False, True, False, False]
+    (_, heads, rows), (_, _, shares) = SettlingFigures(students).tables()
+    row = dict(zip(heads, rows[0], strict=True))
+    assert row["students"] == "5"
+    assert row["finished"] == "50.0 %"
+    assert row["criteria waiting"] == "20.0 %"
+    assert (row["charged wrongly"], row["credited wrongly"]) == ("1 of 4", "0 of 4")
+    assert (row["right drawings that lose"], row["not read"]) == ("1 of 5", "1")
+    by_name = {cells[0]: cells[1:] for cells in shares}
+    assert "0.0 % of 1" in by_name["vectors of 0 to 5 mm"]
