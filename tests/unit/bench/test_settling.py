@@ -9,7 +9,9 @@ FAIR = Verdict(is_settled=True, is_right=None, is_charge=True, probability=0.99,
 
 
 def student(*verdicts, was_read=True, of_another=False):
-    return Marked("flatbed", "careful", True, of_another, was_read, verdicts)
+    return Marked(
+        "flatbed", "careful", is_drawn_right=True, of_another=of_another, was_read=was_read, verdicts=verdicts
+    )
 
 
 def test_sheets_are_counted_as_they_are():
