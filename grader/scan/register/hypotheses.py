@@ -29,6 +29,8 @@ _UNEQUAL_SE = 0.004
 """Relative difference of a scanner's scales along its two axes."""
 _DPI_SE = 0.005
 """Of a stated resolution, with room for copies at a slightly other scale."""
+_SCANNED_WITHIN = 0.03
+"""A page that is A3 by its stated resolution has that scale, or a copier's, a per cent or two beside it."""
 _WINDOW_SE = 0.02
 """Of a resolution that was only guessed by the size of the image."""
 _HOPELESS = 12.0
@@ -141,12 +143,29 @@ def _in_each_turn(
             continue
         bend = np.abs(mapped(affine_of(params), model.corners()) - mapped(map_px, model.corners())).max()
         perspective = bool(bend / np.exp(params[:2].mean()) > _SCAN_BEND_MM)
+        if resolution is not None and not _is_possible(params, resolution, shape, perspective=perspective):
+            continue
         penalty = _camera_misfit(map_px, shape) if perspective else _scan_misfit(params, resolution)
         if penalty < _HOPELESS:
             turned = _quad_map(model, np.roll(corners, turns + 2, axis=0))
             readings.append(Hypothesis(map_px, perspective, trust - penalty))
             readings += [] if turned is None else [Hypothesis(turned, perspective, trust - penalty)]
     return readings
+
+
+def _is_possible(
+    params: FloatArray, resolution: Resolution, shape: tuple[int, int], *, perspective: bool
+) -> bool:
+    """Whether a map may be that of a page of which the file states a resolution by which it is A3.
+
+    Long lines of a drawing may be taken for a frame; the page itself says that it was scanned as it is. A
+    camera's picture seldom has the shape of the sheet.
+    """
+    is_sheet = abs(np.log(max(shape) / min(shape) * PAGE_MM[1] / PAGE_MM[0])) < _SCANNED_WITHIN
+    if not resolution.stated or not is_sheet:
+        return True
+    off = params[:2] - np.log(np.array(resolution.dpi) / MM_PER_INCH)
+    return not perspective and bool(np.all(np.abs(off) < _SCANNED_WITHIN))
 
 
 def _quad_map(model: Outline, corners: FloatArray) -> FloatArray | None:
