@@ -155,7 +155,7 @@ def test_without_a_roster_names_that_no_folder_can_have_are_nobodys(tmp_path):
     assert run.exit_code == 1
     results = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
     assert {one["student_id"]: one["status"] for one in results["reports"]} == {
-        "s1": "needs_review",
+        "s1": "graded",
         "s2": "unreadable",
     }
     assert len(results["unmatched"]) == 4
