@@ -69,9 +69,12 @@ class Case:
     otherwise: tuple[Observations, ...] = ()
 
 
-def explained(case: Case) -> tuple[Replay, ...]:
-    """The explanations of a drawing, the likeliest first; none where it may well be right."""
-    roots = [Root(), *_other_scales(case)]
+def explained(case: Case, *, by_another: bool = False) -> tuple[Replay, ...]:
+    """The explanations of a drawing, the likeliest first; none where it may well be right.
+
+    Arguments: `by_another` tries other variants' data even where the own ones explain it.
+    """
+    roots = [Root(), *_other_scales(case), *(_other_variants(case) if by_another else ())]
     explanations = replay(case.drawing, case.observations, roots, case.skill, cares=CARES)
     for observations in case.otherwise:
         others = replay(case.drawing, observations, roots, case.skill, cares=CARES)

@@ -10,8 +10,8 @@ from grader.comparison.evidence import Submission
 from grader.comparison.task import Task
 from grader.documents import Verdict
 from grader.marking.confirming import confirmed
-from grader.marking.diagnosis import LEAST_CONFIDENCE, Lost, named
-from grader.marking.drawn import explain
+from grader.marking.diagnosis import LEAST_CONFIDENCE, Lost, explained, named
+from grader.marking.drawn import case_of, explain
 from grader.marking.settling import at_stake, charged_where_made, of_another
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
 from grader.rubric import CriterionTable, RubricFile
@@ -19,6 +19,7 @@ from reference.authored.assignment import SCALE_NAMES
 from reference.construction.mistakes import Mistake
 from reference.geometry import ComplexArray
 from reference.plan import exact_plan
+from reference.replay.replay import Replay
 
 CHARGED = frozenset({"none", "partial"})
 LOST = CHARGED | {"follow_through", "review"}
@@ -49,10 +50,13 @@ def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
     by_vector = {one.name: one.criterion for one in lost if one.name in vectors or one.name in links}
     by_scale = {one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED}
     is_other_scale = any(scale.other and not scale.used.assumed for scale in scales.values())
-    if not by_vector and not is_other_scale and not _is_nearer_to_another(task, comparison):
-        return ()
-    explanation = comparison.explanation or explain(task, comparison.evidence, scales)
-    return named(explanation.explanations, task.construction, Lost(by_vector, by_scale))
+    explanations: Sequence[Replay] = ()
+    if by_vector or is_other_scale:
+        explanation = comparison.explanation or explain(task, comparison.evidence, scales)
+        explanations = explanation.explanations
+    if not explanations and _is_nearer_to_another(task, comparison):
+        explanations = explained(case_of(task, comparison.evidence, scales), by_another=True)
+    return named(explanations, task.construction, Lost(by_vector, by_scale))
 
 
 CLEARLY_NEARER = 6.0

@@ -79,3 +79,10 @@ def test_a_mistake_that_is_nearly_certain_is_charged_where_it_was_made():
     assert (settled.verdict, settled.probability >= 0.99) == ("none", True)
     for other in (replace(certain, confidence=0.9), replace(certain, rivals=(certain,))):
         assert charged_where_made(PUMP, [waiting], [other]) == (waiting,)
+
+
+def test_a_neighbours_sheet_is_told_though_nearly_all_of_it_is_within_the_tolerances():
+    other = task_of(PUMP.assignment, PUMP.rubric, Variant(n=PUMP.variant.n + 2))
+    judgement = judge(with_doubt(other_variant="person"), Submission(readings=(sheet(other),)))
+    assert [(one.code, one.mistake.n) for one in judgement.mistakes] == [("other_variant", other.variant.n)]
+    assert judgement.score.total is None
