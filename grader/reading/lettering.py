@@ -36,6 +36,11 @@ REPORTED = 0.5
 """Probability from which a swap is reported."""
 COMPONENTS = ("n_", "k_")
 """How names of ends of normal and Coriolis components begin: few write them, and they share a letter."""
+LEAST_SHARE, CLEAREST = 0.01, 30.0
+"""Of a sign among the pieces of a sheet, and the most that one piece says for a node: pieces of strokes look
+like letters."""
+LEGIBLE, LEGIBLE_COMPONENT = 0.6, 0.2
+"""Shares of nodes whose letters are written and read."""
 POLE_SIGNS = ("o", "p", "π")
 """What the pole of a plan is called in different schools."""
 
@@ -131,6 +136,29 @@ def _doubted(figure: Figure, names: Collection[str], construction: Construction,
         for name, read in figure.vectors.items()
     }
     return Figure(nodes, vectors)
+
+
+def fitting_letters(
+    name: str,
+    at: ComplexArray,
+    letters: Letters | None,
+    poles: Collection[str],
+    renamed: Mapping[str, str],
+) -> FloatArray:
+    """(j,) nats of each of some places for being the node of this name, by the letters near them."""
+    if letters is None or not len(letters):
+        return np.zeros(len(at))
+    signs = _signs(name, poles, renamed, letters)
+    high = letters.height_mm
+    gap = _gaps(letters.box_mm, at)
+    near = (gap.min(axis=1) < REACH_MM) & (high > LEAST_MM) & (high < MOST_MM)
+    chance = letters.probability[:, signs].sum(axis=1)[near]
+    if not len(chance):
+        return np.zeros(len(at))
+    fits = np.minimum(chance / (chance.mean() + LEAST_SHARE), CLEAREST)
+    beside = (fits[:, None] * np.exp(-gap[near] / FALL_MM)).max(axis=0)
+    legible = LEGIBLE_COMPONENT if name.startswith(COMPONENTS) else LEGIBLE
+    return np.asarray(np.log(1.0 - legible + legible * beside))
 
 
 def lettering(

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from grader.reading.expected import (
+    COST_OF_MISTAKE,
+    LEFT_OUT,
     REGULAR,
     DraftingErrors,
     Expected,
@@ -22,6 +24,7 @@ from grader.reading.expected import (
     tied,
     vectors_of,
 )
+from grader.reading.lettered_graph import lettered_graphs
 from grader.reading.lines import BoolArray, Lines
 from grader.reading.matching import (
     BEAM,
@@ -33,12 +36,18 @@ from grader.reading.matching import (
     assign_strokes,
 )
 from grader.reading.nodes import NodeFit, fit_nodes
-from reference.construction.graph import ancestors
+from grader.records import Letters
+from reference.construction.graph import ancestors, coincident
 from reference.construction.mistakes import Drawing, affected
 from reference.geometry import ComplexArray
 
 DRAFTING_ERRORS = DraftingErrors()
 END_PRIOR = EndPrior()
+BY_LETTERS = "by letters"
+"""Label of the hypotheses that follow letters and strokes instead of the construction."""
+COST_OF_GRAPH = 6.0
+LETTERED_MM = 1.0
+"""Nats for such a hypothesis, and standard error of its nodes along x and y before strokes are assigned."""
 QUARTERS = (np.pi / 2, -np.pi / 2, np.pi)
 """A plan may be turned as a whole: velocities are perpendicular to links."""
 COST_OF_TURN = 6.0
@@ -94,11 +103,15 @@ class PlanProblem:
     lines : of the sheet
     figure : which plan
     given : nodes already read (mechanism, velocity plan), complex mm, y up
+    letters : of the sheet, None where they were not looked for
+    renamed : what students write for a node, by name, where it is not the name
     """
 
     lines: Lines
     figure: str
     given: Mapping[str, ComplexArray]
+    letters: Letters | None = None
+    renamed: Mapping[str, str] = field(default_factory=dict)
 
     def expected(self, hypothesis: PlanHypothesis) -> Expected | None:
         """The plan about its own pole; None where it cannot be drawn."""
@@ -155,6 +168,7 @@ def regular_plans(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
         larger = Drawing(drawing.construction, resized(drawing, problem.figure, size))
         bases = [replace(base, cost=base.cost + COST_OF_SIZE) for base in regular(larger, problem.figure)]
         plans.extend(_anywhere(problem, bases))
+    plans.extend(_by_letters(problem, drawing))
     return sorted(plans, key=lambda plan: -plan.score)
 
 
@@ -162,11 +176,15 @@ def best_plan(problem: PlanProblem, plans: list[PlanReading]) -> PlanReading | N
     """The best of the regular plans and of the same with mistakes made; the others are its rivals."""
     if not plans:
         return None
-    bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
-    everything = [*plans, *_with_mistakes(problem, plans[0], list(bases.values()))]
-    best = max(everything, key=lambda plan: plan.score)
-    if best.hypothesis.label not in REGULAR and _leaves_long_ones(best):
-        everything.extend(_with_mistakes(problem, best, [best.hypothesis]))
+    import os
+    constructed = [plan for plan in plans if plan.hypothesis.label != BY_LETTERS]
+    everything = [*plans]
+    if constructed and "NOMIST" not in os.environ:
+        bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(constructed)}
+        everything = [*plans, *_with_mistakes(problem, constructed[0], list(bases.values()))]
+        best = max(everything, key=lambda plan: plan.score)
+        if best.hypothesis.label not in (*REGULAR, BY_LETTERS) and _leaves_long_ones(best):
+            everything.extend(_with_mistakes(problem, best, [best.hypothesis]))
     everything.sort(key=lambda plan: -plan.score)
     best = everything[0]
     return replace(best, rivals=(*everything[1:RIVALS], *_without_each_stroke(best)))
@@ -288,6 +306,30 @@ def _without_each_stroke(plan: PlanReading) -> list[PlanReading]:
     ]
 
 
+# Plans by their letters --------------------------------------------------------------------------
+
+
+def _by_letters(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
+    """Readings of the plan as a lettered graph, whatever the construction says of it."""
+    graphs = lettered_graphs(
+        problem.lines, problem.letters, drawing, problem.figure, problem.given, problem.renamed
+    )
+    cases = []
+    for graph in graphs:
+        cost = COST_OF_GRAPH + COST_OF_MISTAKE * graph.unexpected
+        absent = {node: LEFT_OUT.get(node[0], LEFT_OUT["n"]) for node in graph.absent}
+        hypothesis = PlanHypothesis(BY_LETTERS, drawing, absent, cost)
+        edges = vectors_of(tied(hypothesis), problem.figure, absent)
+        at = np.array([graph.at[step.node] for step in drawing.construction.figures[problem.figure]])
+        cov = LETTERED_MM**2 * np.eye(2 * len(at))
+        under = coincident(drawing.construction)
+        names = tuple(graph.at)
+        pairs = tuple((names.index(name), names.index(under[name])) for name in names if name in under)
+        expected = Expected(names, at, cov, edges, pairs)
+        cases.append(_PlanCase(hypothesis, expected, Pose(0j, 1.0, 0.0, 0.0)))
+    return _read(cases, problem.lines)
+
+
 # Strokes of a plan --------------------------------------------------------------------------------
 
 
@@ -313,6 +355,8 @@ class _PlanCase:
 
     def placed(self) -> Expected:
         """What is expected there, with the errors that the pose may have."""
+        if self.hypothesis.label == BY_LETTERS:
+            return self.expected
         return self.expected.placed(self.pose, Slack(relative=0.03 if self.has_expected_size else 0.08))
 
 

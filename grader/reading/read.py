@@ -81,21 +81,22 @@ def read_figures(
     """
     pages = [_PageReading(lines_of(ink), ink, sheet) for ink, sheet in zip(inks, sheets, strict=True)]
     own, others = _drawings(assignment, variant, scales)
+    renamed = assignment.file.names
     for page in pages:
-        letters_nats = partial(support, letters=page.ink.letters, renamed=assignment.file.names)
+        letters_nats = partial(support, letters=page.ink.letters, renamed=renamed)
         sketch = find_sketch(page.lines, page.ink.circles, own, others, letters_nats)
         if sketch is not None and sketch.score >= LEAST_SKETCH:
             page.sketch = sketch
     followed = [page.sketch.drawing for page in pages if page.sketch is not None] if variant is None else []
     drawing = _measurable((followed or own)[0], assignment, variant)
-    velocity = _find_plan(pages, [drawing], VELOCITY_PLAN, {})
+    velocity = _find_plan(pages, [drawing], VELOCITY_PLAN, {}, renamed)
     velocities = {} if velocity is None else _nodes(velocity)
     if _asks_accelerations(wanted, drawing):
         _set_apart(pages, velocity)
         at_scales = [drawing] if velocity is None else _at_velocity_scales(drawing, velocities)
-        _find_plan(pages, at_scales, ACCELERATION_PLAN, velocities)
+        _find_plan(pages, at_scales, ACCELERATION_PLAN, velocities, renamed)
     return [
-        lettered(reading, page.ink.letters, drawing.construction, assignment.file.names)
+        lettered(reading, page.ink.letters, drawing.construction, renamed)
         for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
     ]
 
@@ -156,7 +157,11 @@ def _at_velocity_scales(drawing: Drawing, at: Nodes) -> list[Drawing]:
 
 
 def _find_plan(
-    pages: Sequence[_PageReading], at_scales: Sequence[Drawing], figure: str, known: Nodes
+    pages: Sequence[_PageReading],
+    at_scales: Sequence[Drawing],
+    figure: str,
+    known: Nodes,
+    renamed: Mapping[str, str],
 ) -> PlanReading | None:
     """The plan on the sheet that explains it best; it is added to that page.
 
@@ -165,7 +170,7 @@ def _find_plan(
     laid: list[tuple[_PageReading, PlanProblem, list[PlanReading]]] = []
     for page in pages:
         joints, guide_turn = _sketched(page, pages)
-        problem = PlanProblem(page.lines, figure, {**joints, **known})
+        problem = PlanProblem(page.lines, figure, {**joints, **known}, page.ink.letters, renamed)
         for drawing in at_scales:
             parameters = {**drawing.parameters, "turn": np.asarray(guide_turn)}
             plans = regular_plans(problem, Drawing(drawing.construction, parameters))
