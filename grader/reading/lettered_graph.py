@@ -6,8 +6,8 @@ the nodes found before, and, as a prior that explains but is no condition, the p
 puts the node from those nodes. So a plan is read also where no known mistake explains it.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from grader.reading.lettering import fitting_letters
 from grader.reading.lines import BoolArray, Lines
 from grader.records import HEAD_AHEAD, HEAD_BACK, FloatArray, IntArray, Letters
 from reference.construction.elements import View
-from reference.construction.graph import Construction, evaluate
+from reference.construction.graph import Vector, evaluate
 from reference.construction.mistakes import Drawing
 from reference.construction.steps import Given, Step
 from reference.geometry import ComplexArray
@@ -113,6 +113,7 @@ def lettered_graphs(
     figure: str,
     given: Mapping[str, ComplexArray],
     renamed: Mapping[str, str],
+    left_out: Collection[str] = (),
     count: int = 6,
 ) -> list[LetteredGraph]:
     """The likeliest graphs of a plan, best first.
@@ -122,6 +123,7 @@ def lettered_graphs(
     drawing : its construction with the student's parameters
     given : nodes of other figures that are already read, complex mm
     renamed : what students write for a node, by name, where it is not the name
+    left_out : nodes that this construction does without
     """
     construction = drawing.construction
     steps = construction.figures[figure]
@@ -139,10 +141,25 @@ def lettered_graphs(
     graphs = _Graphs(
         {pole.node: junctions.at}, {pole.node: every}, np.zeros(len(every), np.int64), nats[pole.node]
     )
+    vectors = [v for v in construction.vectors_of(figure) if not {v.tail, v.head} & set(left_out)]
     for step in others:
-        graphs = _continued(graphs, step, construction, junctions, nats[step.node], drawing, known)
+        if step.node in left_out:
+            graphs = _without(graphs, step)
+            continue
+        graphs = _continued(graphs, step, vectors, junctions, nats[step.node], drawing, known)
     order = np.argsort(-graphs.nats, kind="stable")[:count]
     return [_graph(graphs, int(row), steps) for row in order]
+
+
+def _without(graphs: _Graphs, step: Step) -> _Graphs:
+    """The graphs with a node that the construction does without: it has a place, but nothing starts there."""
+    start = graphs.places[step.start] if isinstance(step, Given) else next(iter(graphs.places.values()))
+    nowhere = np.full(len(start), HIDDEN)
+    return replace(
+        graphs,
+        places={**graphs.places, step.node: start},
+        junction={**graphs.junction, step.node: nowhere},
+    )
 
 
 def _graph(graphs: _Graphs, row: int, steps: Sequence[Step]) -> LetteredGraph:
@@ -160,7 +177,7 @@ HIDDEN, ABSENT = -1, -2
 def _continued(
     graphs: _Graphs,
     step: Step,
-    construction: Construction,
+    vectors: Sequence[Vector],
     junctions: _Junctions,
     letter_nats: FloatArray,
     drawing: Drawing,
@@ -171,20 +188,21 @@ def _continued(
     known = {**{name: np.broadcast_to(at, count) for name, at in given.items()}, **graphs.places}
     with np.errstate(invalid="ignore", divide="ignore"):
         expected = np.broadcast_to(step.place(View(known, drawing.parameters, {})), count)
-    start = _start(step, graphs, construction)
+    start = _start(step, graphs, vectors)
     prior = _of_place(junctions.at, expected, start)
     is_first = len(graphs.places) == 1
     if is_first:
         size = np.abs(junctions.at - start[:, None])
         prior = np.where((size > FIRST_MM[0]) & (size < FIRST_MM[1]), prior, -np.inf)
-    vectors = [
+    ended = [
         (vector.tail, vector.head)
-        for vector in construction.vectors.values()
-        if step.node in (vector.tail, vector.head) and {vector.tail, vector.head} - {step.node} <= graphs.places.keys()
+        for vector in vectors
+        if step.node in (vector.tail, vector.head)
+        and {vector.tail, vector.head} - {step.node} <= graphs.places.keys()
     ]
     nats = graphs.nats[:, None] + letter_nats + prior
     without = np.zeros(count)
-    for tail, head in vectors:
+    for tail, head in ended:
         other = tail if head == step.node else head
         index = graphs.junction[other]
         joined = junctions.joined[index] if head == step.node else junctions.joined[:, index].T
@@ -215,11 +233,11 @@ def _continued(
     )  # fmt: skip
 
 
-def _start(step: Step, graphs: _Graphs, construction: Construction) -> ComplexArray:
+def _start(step: Step, graphs: _Graphs, vectors: Sequence[Vector]) -> ComplexArray:
     """(b,) the node that the step's node is drawn from."""
     if isinstance(step, Given):
         return graphs.places[step.start]
-    tails = [v.tail for v in construction.vectors.values() if v.head == step.node and v.tail in graphs.places]
+    tails = [v.tail for v in vectors if v.head == step.node and v.tail in graphs.places]
     return graphs.places[tails[0]] if tails else next(iter(graphs.places.values()))
 
 

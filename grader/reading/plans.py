@@ -25,6 +25,7 @@ from grader.reading.expected import (
     vectors_of,
 )
 from grader.reading.lettered_graph import lettered_graphs
+from grader.reading.lettering import lettering
 from grader.reading.lines import BoolArray, Lines
 from grader.reading.matching import (
     BEAM,
@@ -36,7 +37,7 @@ from grader.reading.matching import (
     assign_strokes,
 )
 from grader.reading.nodes import NodeFit, fit_nodes
-from grader.records import Letters
+from grader.records import IntArray, Letters
 from reference.construction.graph import ancestors, coincident
 from reference.construction.mistakes import Drawing, affected
 from reference.geometry import ComplexArray
@@ -46,8 +47,12 @@ END_PRIOR = EndPrior()
 BY_LETTERS = "by letters"
 """Label of the hypotheses that follow letters and strokes instead of the construction."""
 COST_OF_GRAPH = 6.0
-LETTERED_MM = 1.0
+LETTERED_MM = 2.0
 """Nats for such a hypothesis, and standard error of its nodes along x and y before strokes are assigned."""
+EXPLAINED = 0.85
+"""A regular plan supported over more of its length is what was drawn."""
+FAR_WORSE = 30.0
+"""Nats: letters do not make up for more."""
 QUARTERS = (np.pi / 2, -np.pi / 2, np.pi)
 """A plan may be turned as a whole: velocities are perpendicular to links."""
 COST_OF_TURN = 6.0
@@ -105,6 +110,7 @@ class PlanProblem:
     given : nodes already read (mechanism, velocity plan), complex mm, y up
     letters : of the sheet, None where they were not looked for
     renamed : what students write for a node, by name, where it is not the name
+    elsewhere : strokes, by their number, that belong to the sketch
     """
 
     lines: Lines
@@ -112,6 +118,12 @@ class PlanProblem:
     given: Mapping[str, ComplexArray]
     letters: Letters | None = None
     renamed: Mapping[str, str] = field(default_factory=dict)
+    elsewhere: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    @property
+    def free(self) -> Lines:
+        """The lines that no other figure needs."""
+        return self.lines.take(~np.isin(self.lines.members, self.elsewhere).any(axis=1))
 
     def expected(self, hypothesis: PlanHypothesis) -> Expected | None:
         """The plan about its own pole; None where it cannot be drawn."""
@@ -147,6 +159,12 @@ class PlanReading:
         return fit_nodes(self.assignment, self.lines)
 
     @property
+    def members(self) -> IntArray:
+        """The strokes that it takes, by their number."""
+        stroke = self.assignment.stroke
+        return np.unique(self.lines.members[stroke[stroke >= 0]])
+
+    @property
     def strokes(self) -> Hashable:
         """Which stroke it takes for which vector."""
         stroke = self.assignment.stroke
@@ -168,26 +186,31 @@ def regular_plans(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
         larger = Drawing(drawing.construction, resized(drawing, problem.figure, size))
         bases = [replace(base, cost=base.cost + COST_OF_SIZE) for base in regular(larger, problem.figure)]
         plans.extend(_anywhere(problem, bases))
-    plans.extend(_by_letters(problem, drawing))
     return sorted(plans, key=lambda plan: -plan.score)
 
 
-def best_plan(problem: PlanProblem, plans: list[PlanReading]) -> PlanReading | None:
-    """The best of the regular plans and of the same with mistakes made; the others are its rivals."""
-    if not plans:
-        return None
-    import os
-    constructed = [plan for plan in plans if plan.hypothesis.label != BY_LETTERS]
-    everything = [*plans]
-    if constructed and "NOMIST" not in os.environ:
-        bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(constructed)}
-        everything = [*plans, *_with_mistakes(problem, constructed[0], list(bases.values()))]
+def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) -> PlanReading | None:
+    """The best reading of a plan; the others are its rivals.
+
+    Where the regular plans leave something open, mistakes are made in the best of them, and the plan is
+    read as a lettered graph.
+
+    Arguments: `plans`, the regular ones, best first; `drawing`, what the student was to draw.
+    """
+    everything = list(plans)
+    if plans:
+        bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
+        everything.extend(_with_mistakes(problem, plans[0], list(bases.values())))
         best = max(everything, key=lambda plan: plan.score)
-        if best.hypothesis.label not in (*REGULAR, BY_LETTERS) and _leaves_long_ones(best):
+        if best.hypothesis.label not in REGULAR and _leaves_long_ones(best):
             everything.extend(_with_mistakes(problem, best, [best.hypothesis]))
-    everything.sort(key=lambda plan: -plan.score)
-    best = everything[0]
-    return replace(best, rivals=(*everything[1:RIVALS], *_without_each_stroke(best)))
+    if not plans or plans[0].pose.score < EXPLAINED or _suspects(plans[0]):
+        for base in regular(drawing, problem.figure):
+            everything.extend(_by_letters(problem, base))
+    if not everything:
+        return None
+    best, *rivals = _with_letters(problem, everything)
+    return replace(best, rivals=(*rivals[: RIVALS - 1], *_without_each_stroke(best)))
 
 
 # Where a plan may lie -----------------------------------------------------------------------------
@@ -309,25 +332,46 @@ def _without_each_stroke(plan: PlanReading) -> list[PlanReading]:
 # Plans by their letters --------------------------------------------------------------------------
 
 
-def _by_letters(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
+def _by_letters(problem: PlanProblem, base: PlanHypothesis) -> list[PlanReading]:
     """Readings of the plan as a lettered graph, whatever the construction says of it."""
     graphs = lettered_graphs(
-        problem.lines, problem.letters, drawing, problem.figure, problem.given, problem.renamed
-    )
+        problem.free, problem.letters, base.drawing, problem.figure, problem.given, problem.renamed,
+        frozenset(base.absent),
+    )  # fmt: skip
+    construction = base.drawing.construction
+    under = coincident(construction)
     cases = []
     for graph in graphs:
-        cost = COST_OF_GRAPH + COST_OF_MISTAKE * graph.unexpected
-        absent = {node: LEFT_OUT.get(node[0], LEFT_OUT["n"]) for node in graph.absent}
-        hypothesis = PlanHypothesis(BY_LETTERS, drawing, absent, cost)
-        edges = vectors_of(tied(hypothesis), problem.figure, absent)
-        at = np.array([graph.at[step.node] for step in drawing.construction.figures[problem.figure]])
-        cov = LETTERED_MM**2 * np.eye(2 * len(at))
-        under = coincident(drawing.construction)
+        absent = {**base.absent, **{node: LEFT_OUT.get(node[0], LEFT_OUT["n"]) for node in graph.absent}}
+        cost = base.cost + COST_OF_GRAPH + COST_OF_MISTAKE * graph.unexpected
+        hypothesis = PlanHypothesis(BY_LETTERS, base.drawing, absent, cost)
         names = tuple(graph.at)
         pairs = tuple((names.index(name), names.index(under[name])) for name in names if name in under)
+        at = np.array(list(graph.at.values()))
+        cov = LETTERED_MM**2 * np.eye(2 * len(at))
+        edges = vectors_of(tied(hypothesis), problem.figure, absent)
         expected = Expected(names, at, cov, edges, pairs)
         cases.append(_PlanCase(hypothesis, expected, Pose(0j, 1.0, 0.0, 0.0)))
-    return _read(cases, problem.lines)
+    return _read(cases, problem.free)
+
+
+def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[PlanReading]:
+    """The best of some readings with what the letters say of them in their scores, best first."""
+    poles = frozenset(plans[0].hypothesis.drawing.construction.poles.values())
+    best = max(plan.score for plan in plans)
+    scored: dict[Hashable, PlanReading] = {}
+    nats: dict[Hashable, float] = {}
+    for plan in sorted(plans, key=lambda plan: -plan.score):
+        if plan.score < best - FAR_WORSE:
+            break
+        strokes = plan.strokes
+        if strokes not in nats:
+            expected = plan.assignment.expected
+            at = {(problem.figure, name): complex(place) for name, place in zip(expected.names, expected.at, strict=True)}
+            writing = lettering(at, problem.letters, poles, problem.renamed)
+            nats[strokes] = 0.0 if writing is None else writing.log()
+            scored[strokes] = replace(plan, score=plan.score + nats[strokes])
+    return sorted(scored.values(), key=lambda plan: -plan.score)
 
 
 # Strokes of a plan --------------------------------------------------------------------------------
