@@ -131,9 +131,7 @@ def lettered_graphs(
     if len(junctions.at) < 2:
         return []
     poles = frozenset(construction.poles.values())
-    nats = {
-        step.node: fitting_letters(step.node, junctions.at, letters, poles, renamed) for step in steps
-    }
+    nats = {step.node: fitting_letters(step.node, junctions.at, letters, poles, renamed) for step in steps}
     exact = evaluate(construction, drawing.parameters, given=given)
     known = {name: exact[name].ravel() for name in exact.keys() - {step.node for step in steps}}
     pole, *others = steps
@@ -206,7 +204,9 @@ def _continued(
         other = tail if head == step.node else head
         index = graphs.junction[other]
         joined = junctions.joined[index] if head == step.node else junctions.joined[:, index].T
-        bare = np.log(1.0 - DRAWN) * np.minimum(np.abs(junctions.at - graphs.places[other][:, None]) / SHORT_MM, 1.0)
+        bare = np.log(1.0 - DRAWN) * np.minimum(
+            np.abs(junctions.at - graphs.places[other][:, None]) / SHORT_MM, 1.0
+        )
         nats = nats + np.where((index >= 0)[:, None] & np.isfinite(joined), joined, bare)
         away = np.abs(expected - graphs.places[other])
         without += np.log(1.0 - DRAWN) * np.minimum(np.nan_to_num(away, nan=SHORT_MM) / SHORT_MM, 1.0)
@@ -225,7 +225,11 @@ def _continued(
     size = len(junctions.at)
     is_junction = choice < size
     index = np.where(is_junction, choice, np.where(choice == size, HIDDEN, ABSENT))
-    at = np.where(is_junction, junctions.at[np.minimum(choice, size - 1)], np.where(choice == size, expected[row], start[row]))
+    at = np.where(
+        is_junction,
+        junctions.at[np.minimum(choice, size - 1)],
+        np.where(choice == size, expected[row], start[row]),
+    )
     unexpected = chosen.unexpected + (is_junction & (prior[row, np.minimum(choice, size - 1)] < 0.0))
     return _Graphs(
         {**chosen.places, step.node: at}, {**chosen.junction, step.node: index},
@@ -311,7 +315,8 @@ def _heads(place: FloatArray, lines: Lines, row: int) -> FloatArray:
     tip, kind, sure = lines.tip_along[row], lines.tip_kind[row], lines.tip_sure[row]
     near = np.abs(tip - place[:, None]) < HEAD_MM
     ahead, back = (
-        np.where(near & (kind == sort), sure, 0.0).max(axis=1, initial=0.0) for sort in (HEAD_AHEAD, HEAD_BACK)
+        np.where(near & (kind == sort), sure, 0.0).max(axis=1, initial=0.0)
+        for sort in (HEAD_AHEAD, HEAD_BACK)
     )
     forward = place > place[:, None]
     at_head = np.where(forward, ahead, back[None, :])

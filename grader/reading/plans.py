@@ -367,7 +367,10 @@ def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[Pl
         strokes = plan.strokes
         if strokes not in nats:
             expected = plan.assignment.expected
-            at = {(problem.figure, name): complex(place) for name, place in zip(expected.names, expected.at, strict=True)}
+            at = {
+                (problem.figure, name): complex(place)
+                for name, place in zip(expected.names, expected.at, strict=True)
+            }
             writing = lettering(at, problem.letters, poles, problem.renamed)
             nats[strokes] = 0.0 if writing is None else writing.log()
             scored[strokes] = replace(plan, score=plan.score + nats[strokes])
