@@ -101,16 +101,18 @@ def cut_out(
 # Segments and stretches of lines ------------------------------------------------------------------
 
 
-def reached(spans: FloatArray, start: FloatArray, gap: float) -> BoolArray:
-    """Which stretches of a line, (n, 2) low and high, are reached from another (2,) over gaps no wider."""
-    low, high = float(start[0]), float(start[1])
-    taken = np.zeros(len(spans), dtype=bool)
-    while True:
-        more = ~taken & (spans[:, 0] <= high + gap) & (spans[:, 1] >= low - gap)
-        if not more.any():
-            return taken
-        taken |= more
-        low, high = min(low, float(spans[more, 0].min())), max(high, float(spans[more, 1].max()))
+def reached(low: FloatArray, high: FloatArray, start: tuple[float, float], gap: float) -> BoolArray:
+    """Which stretches of a line, from `low` to `high` (n,), are reached from another over gaps no wider."""
+    at_once = (low <= start[1] + gap) & (high >= start[0] - gap)
+    if at_once.all():
+        return np.asarray(at_once)
+    lows, highs = np.append(low, start[0]), np.append(high, start[1])
+    order = lows.argsort()
+    # A stretch that begins beyond all before it, and a gap, begins another group.
+    far = np.maximum.accumulate(highs[order])
+    group = np.empty(len(order), dtype=np.intp)
+    group[order[0]], group[order[1:]] = 0, (lows[order[1:]] > far[:-1] + gap).cumsum()
+    return np.asarray(group[:-1] == group[-1])
 
 
 def lengths_and_directions(ends: FloatArray) -> tuple[FloatArray, FloatArray]:
