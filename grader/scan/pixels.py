@@ -324,10 +324,9 @@ def _borders(
     level32 = level.astype(np.float32)
     inked = contrast > level32[:, None]
     rows, count = np.arange(len(contrast)), len(across)
-    outward = np.argsort(np.abs(across), kind="stable")
-    nearest = (inked & near)[:, outward]
-    first = nearest.argmax(axis=1)
-    inked_there, middle = nearest[rows, first], outward[first]
+    off = np.where(inked & near, np.abs(across), np.float32(np.inf))
+    middle = off.argmin(axis=1)
+    inked_there = np.isfinite(off[rows, middle])
     # The run reaches from the last paper before its middle to the first paper after it.
     column = np.arange(count, dtype=np.int16)
     before = np.maximum.accumulate(np.where(inked, np.int16(-1), column), axis=1)[rows, middle]

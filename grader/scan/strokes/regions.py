@@ -378,21 +378,27 @@ def find_components(seeds: Seeds) -> Components:
     longest = np.zeros(len(box))
     length = lengths_and_directions(seeds.ends)[0] / PX_PER_MM
     np.maximum.at(longest, of_seed, length)
-    major, minor = _spread(labels.astype(np.int32, copy=False), len(box))
-    straight = (minor <= _THIN * seeds.pen_px) & (major >= _LONG * minor)
     small = longest < _LONG_SEED_MM
-    stroke_like = straight & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
+    stroke_like = small & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
+    inked = np.flatnonzero(seeds.mask)
+    label = labels.reshape(-1)[inked] - 1
+    of_these = stroke_like[label]
+    major, minor = _spread(inked[of_these], label[of_these], labels.shape[1], len(box))
+    stroke_like &= (minor <= _THIN * seeds.pen_px) & (major >= _LONG * minor)
     written = small & ~stroke_like & (size > 2.0 * _DUST_MM) & (size < _MARK_MM)
     text = small & stroke_like & (size < _LONE_MM)
     text[text] = _beside(box, written, np.flatnonzero(text))
     return Components(box, small & ~stroke_like, text, of_seed)
 
 
-def _spread(labels: NDArray[np.int32], count: int) -> tuple[FloatArray, FloatArray]:
-    """Standard deviations of each piece's pixels along and across it, (count,) each, px."""
-    inked = np.flatnonzero(labels > 0)
-    row, column = np.divmod(inked, labels.shape[1])
-    label = labels.reshape(-1)[inked] - 1
+def _spread(
+    place: NDArray[np.intp], label: NDArray[np.intp], wide: int, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Standard deviations of each piece's pixels along and across it, (count,) each, px.
+
+    Arguments: `place` of each pixel in a picture that is `wide` pixels wide, and which piece it is of.
+    """
+    row, column = np.divmod(place, wide)
     number = np.maximum(np.bincount(label, minlength=count), 1)
 
     def mean(values: FloatArray) -> FloatArray:
