@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw, ImageFont
 from grader.outcomes import Outcome
 from grader.overlay.scene import XY, Picture, Scene, between, layers_of, scene_of
 from grader.records import Backdrop, Box, GreyImage, Page, Reading, Sheet
-from grader.scan.pixels import cut_out, reduction
+from grader.scan.pixels import cut_out, reduction, shrink
 from reference.construction.graph import Vector
 from reference.drawing.canvas import Area, Curve, Label, Ring, Shape, Stroke, set_pieces
 
@@ -124,17 +124,9 @@ def _turned(page: Page, width_px: int) -> GreyImage:
 def _upright(grey: GreyImage, sheet: Sheet, width_px: int) -> GreyImage:
     """The sheet upright, the paper's width across `width_px`."""
     scale = width_px / sheet.page_mm[0]
-    shrink = max(1, int(sheet.px_per_mm / scale))
-    to_px = reduction(1.0 / shrink) @ sheet.mm_to_px
-    return cut_out(_averaged(grey, shrink), to_px, (0.0, 0.0, *sheet.page_mm), scale, outside=255)
-
-
-def _averaged(grey: GreyImage, shrink: int) -> GreyImage:
-    """Averages over squares of so many pixels: a warp alone would skip pixels, and with them thin lines."""
-    size = max(1, grey.shape[1] // shrink), max(1, grey.shape[0] // shrink)
-    # Squares that are all whole are averaged ten times faster.
-    whole = grey[: size[1] * shrink, : size[0] * shrink]
-    return grey if shrink == 1 else _grey(cv2.resize(whole, size, interpolation=cv2.INTER_AREA))
+    less = max(1, int(sheet.px_per_mm / scale))
+    to_px = reduction(1.0 / less) @ sheet.mm_to_px
+    return cut_out(shrink(grey, 1.0 / less), to_px, (0.0, 0.0, *sheet.page_mm), scale, outside=255)
 
 
 def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
@@ -148,8 +140,8 @@ def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
     """
     to_px, stored = (np.eye(3), 1.0) if sheet is None else (sheet.mm_to_px, sheet.px_per_mm)
     scale = min(px_per_mm, 2.0 * stored)
-    shrink = max(1, int(stored / scale))
-    part = cut_out(_averaged(page.grey, shrink), reduction(1.0 / shrink) @ to_px, box, scale, outside=255)
+    less = max(1, int(stored / scale))
+    part = cut_out(shrink(page.grey, 1.0 / less), reduction(1.0 / less) @ to_px, box, scale, outside=255)
     if not part.size:  # nothing of the page is there
         part = np.full((1, 1), 255, np.uint8)
     return _encode(".jpg", part, [cv2.IMWRITE_JPEG_QUALITY, CUT_QUALITY])

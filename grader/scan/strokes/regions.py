@@ -15,6 +15,7 @@ from grader.scan.pixels import (
     BoolArray,
     Float32Array,
     at_full_size,
+    connected,
     inverted,
     lengths_and_directions,
     mapped,
@@ -371,8 +372,7 @@ class Components:
 
 def find_components(seeds: Seeds) -> Components:
     """Label the ink and tell marks from what can hold strokes."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(seeds.mask, connectivity=8)
-    box = stats[1:, :4].astype(np.float64)
+    labels, box = connected(seeds.mask)
     of_seed = labels[seeds.border[:, 0], seeds.border[:, 1]].astype(np.intp) - 1
     size = np.hypot(box[:, 2], box[:, 3]) / PX_PER_MM
     longest = np.zeros(len(box))
@@ -380,7 +380,7 @@ def find_components(seeds: Seeds) -> Components:
     np.maximum.at(longest, of_seed, length)
     small = longest < _LONG_SEED_MM
     stroke_like = small & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
-    inked = np.flatnonzero(seeds.mask)
+    inked = np.flatnonzero(seeds.mask.view(bool))
     label = labels.reshape(-1)[inked] - 1
     of_these = stroke_like[label]
     major, minor = _spread(inked[of_these], label[of_these], labels.shape[1], len(box))

@@ -123,7 +123,7 @@ def _runs_of(mask: GreyImage, pen_px: float | None = None) -> _Runs:
 
 def dark_mask(soft: GreyImage, mask: GreyImage) -> GreyImage:
     """What is nearly as dark as the darkest strokes of the sheet, as 1."""
-    inked = soft[mask > 0]
+    inked = soft[mask.view(bool)]
     level = _DARK * float(np.quantile(inked[::7], _DARK_QUANTILE)) if len(inked) else 255.0
     return np.asarray((soft >= level).astype(np.uint8))
 
