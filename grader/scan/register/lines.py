@@ -251,7 +251,8 @@ def _grown(
         span = edges[members, 2].max() - edges[members, 0].min()
         within = min(_COLLINEAR_PX + _BENT_LINE_SHARE * span, _MOST_BENT_PX)
         near = np.flatnonzero(free & (off <= within))
-        grown = near[reached(edges[near][:, [0, 2]], edges[first, [0, 2]], _GAP_PX)]
+        start = edges[first, 0], edges[first, 2]
+        grown = near[reached(edges[near, 0], edges[near, 2], start, _GAP_PX)]
         if len(grown) == 0 or np.array_equal(grown, members):
             break
         members = grown

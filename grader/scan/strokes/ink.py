@@ -199,23 +199,28 @@ def distinct(fitted: Fitted, unit: float, covered_share: float = 1.0) -> BoolArr
     A stroke that lies along a longer one is the same ink; a short one mostly inside others is what
     a joint, an arrowhead or a letter left over.
     """
-    keep = np.zeros(len(fitted), dtype=bool)
+    keep = np.ones(len(fitted), dtype=bool)
     if len(fitted) == 0:
         return keep
-    inner = 0.6 * fitted.width
+    inner, order = 0.6 * fitted.width, np.argsort(-fitted.length)
     first, second = near_pairs(fitted.ends, fitted.ends, max(_SAME_MM * unit, float(inner.max())))
+    rank = np.argsort(order)
+    longer = rank[second] < rank[first]
+    first, second = first[longer], second[longer]
     off = np.concatenate(
         [distances(fitted.ends, first[part], second[part]) for part in parts(len(first), PROBES)]
+        or [np.zeros((0, PROBES))]
     )
     along = np.asarray((off < _SAME_MM * unit).all(axis=1))
     inside = np.asarray(off < inner[second, None])
-    short = fitted.length < _SHORT_MM * unit
+    short = (fitted.length < _SHORT_MM * unit) & (covered_share < 1.0)
     start = np.searchsorted(first, np.arange(len(fitted) + 1))
-    for row in np.argsort(-fitted.length):
+    doubted = np.bincount(first[along | short[first]], minlength=len(fitted)) > 0
+    for row in order[doubted[order]]:
         others = slice(start[row], start[row + 1])
-        longer = keep[second[others]]
-        covered = short[row] and inside[others][longer].any(axis=0).mean() > covered_share
-        keep[row] = not covered and not along[others][longer].any()
+        kept = keep[second[others]]
+        covered = short[row] and inside[others][kept].any(axis=0).mean() > covered_share
+        keep[row] = not covered and not along[others][kept].any()
     return keep
 
 

@@ -123,7 +123,7 @@ def _runs_of(mask: GreyImage, pen_px: float | None = None) -> _Runs:
 
 def dark_mask(soft: GreyImage, mask: GreyImage) -> GreyImage:
     """What is nearly as dark as the darkest strokes of the sheet, as 1."""
-    inked = soft[mask > 0]
+    inked = soft[mask.view(bool)]
     level = _DARK * float(np.quantile(inked[::7], _DARK_QUANTILE)) if len(inked) else 255.0
     return np.asarray((soft >= level).astype(np.uint8))
 
@@ -141,15 +141,18 @@ def ink_mask(soft: GreyImage) -> GreyImage:
 def _border_runs(mask: GreyImage) -> FloatArray:
     """(n, 2, 2) straight runs of the borders, with the ink on one fixed hand."""
     contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    runs = []
-    for contour in contours:
-        if len(contour) < 2 * _LEAST_PX:
-            continue
-        corners = cv2.approxPolyDP(contour, _POLYGON_PX, closed=True)[:, 0, :].astype(np.float64)
-        runs.append(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
-    if not runs:
+    polygons = [
+        cv2.approxPolyDP(contour, _POLYGON_PX, closed=True)
+        for contour in contours
+        if len(contour) >= 2 * _LEAST_PX
+    ]
+    if not polygons:
         return np.zeros((0, 2, 2))
-    edges = np.concatenate(runs)
+    corners = np.concatenate(polygons)[:, 0].astype(np.float64)
+    size = np.array([len(polygon) for polygon in polygons])
+    after = np.arange(1, len(corners) + 1)
+    after[np.cumsum(size) - 1] -= size
+    edges = np.stack([corners, corners[after]], axis=1)
     return np.asarray(edges[np.hypot(*(edges[:, 1] - edges[:, 0]).T) >= _LEAST_PX])
 
 
@@ -171,7 +174,7 @@ def _run(mask: GreyImage, points: FloatArray, normal: FloatArray, depth: FloatAr
     at = points[:, :, None, :] + depth[None, None, :, None] * normal[:, None, None, :]
     column = np.clip(np.rint(at[..., 0]), 0, mask.shape[1] - 1).astype(int)
     row = np.clip(np.rint(at[..., 1]), 0, mask.shape[0] - 1).astype(int)
-    return np.asarray(np.cumprod(mask[row, column], axis=2).sum(axis=2), dtype=np.float64)
+    return np.asarray(np.minimum.accumulate(mask[row, column], axis=2).sum(axis=2), dtype=np.float64)
 
 
 def _usual(width: FloatArray, weight: FloatArray) -> float:
