@@ -77,6 +77,7 @@ def measure_page(path: Path, truth: dict | None) -> PageFigures:
         row.problems = ("refused",)
     else:
         row.strokes = len(ink.strokes)
+        row.problems = tuple(problem.code for problem in ink.problems)
         row.letters = int((find_letters(ink).probability.max(axis=1, initial=0.0) > SURE).sum())
         if truth is not None:
             _count(row, ink, truth, sheet.px_per_mm)
