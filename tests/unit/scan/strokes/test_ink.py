@@ -465,11 +465,31 @@ def test_strokes_are_counted_before_any_is_fitted(monkeypatch):
     assert "straight strokes" in refusal(paper)
 
 
-def test_squared_paper_all_of_whose_lines_are_strokes_is_within_the_bound(monkeypatch):
-    monkeypatch.setattr("grader.scan.strokes.ink.without_squares", lambda contrast: contrast)
+@pytest.mark.parametrize("pitch", [5, 1])
+def test_squared_paper_is_told_and_its_squares_are_no_strokes(pitch):
     paper = Paper()
-    for step in range(25, 400, 5):
-        paper.line((step, 15), (step, 280), pen=0.2)
-    for step in range(15, 285, 5):
-        paper.line((25, step), (405, step), pen=0.2)
-    assert len(paper.ink().strokes) > 100
+    grey = paper.grey
+    for step in range(0, 420, pitch):
+        paper.line((step, 0), (step, 297), pen=0.12, dark=190)
+    for step in range(0, 297, pitch):
+        paper.line((0, step), (420, step), pen=0.12, dark=190)
+    for start, end in SEGMENTS:
+        paper.line(start, end)
+    ink = paper.ink()
+    assert [problem.code for problem in ink.problems] == ["squared_paper"]
+    assert f"{pitch}.0 mm" in ink.problems[0].message
+    assert len(ink.strokes) == len(SEGMENTS)
+    paper.grey = grey
+    assert paper.ink().problems == ()
+
+
+def test_an_area_larger_than_a_title_block_is_told_where_it_is_left_out():
+    paper = Paper()
+    for start, end in [
+        ((206, 218), (206, 292)),
+        ((206, 218), (415, 218)),
+        ((206, 240), (415, 240)),
+        ((206, 260), (415, 260)),
+    ]:
+        paper.line(start, end)
+    assert [problem.code for problem in paper.ink().problems] == ["title_block_unsure"]
