@@ -107,6 +107,8 @@ def _writing(cache: PageCache, refs: Sequence[PageRef]) -> list[Spotter]:
 
 _LIKELY = 0.2
 """Probability of a number that counts where the drawing looks more like its variant than like any other."""
+_AGREES = 0.5
+"""What a number's variant must match of the best one's lines: neighbours may lie a degree apart."""
 _MOST = 400
 """Variants that a drawing is compared with, those likeliest by the writing: 1.5 ms each."""
 _NAMED = 4
@@ -203,10 +205,11 @@ def chosen_variant(
     drawn = int(np.argmax(similar))
     shows = float(similar[drawn]) >= LIKE_MM
     near = np.flatnonzero(similar > CLEAR * similar[drawn]).tolist() if shows else []
+    agrees = shows and similar[likely] > _AGREES * similar[drawn]
     written = f"'{variants[likely]}' ({100 * chances[likely]:.0f} %)"
     looks = " or ".join(str(variants[index]) for index in near[:_NAMED]) if near else "no variant for certain"
     advice = "look, and enter the number in the roster"
-    if chances[likely] >= SURE and (likely in near or not shows):
+    if chances[likely] >= SURE and (agrees or not shows):
         said = "the drawing looks like it" if shows else "the drawing shows no variant for certain"
         return variants[likely], Problem("number_read", f"read on the sheet: {written}; {said}")
     if shows and chances[drawn] >= _LIKELY:

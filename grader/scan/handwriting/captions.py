@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from grader.inputs.scale_text import parse_scale
-from grader.records import FloatArray, InkMap, IntArray, Written
+from grader.records import InkMap, Written
 from grader.scan.handwriting.fields import meaning_of, placed, read_scale
 from grader.scan.handwriting.lines import Line, find_lines
 from grader.scan.handwriting.model import COLUMN, JUNK, Lattice
@@ -22,6 +22,8 @@ _SKIPPED = -3.0
 """A piece of ink within a word that is no letter of it: dust, a diacritic sign."""
 _UNKNOWN = -1.5
 """A letter that the recogniser has no sign for, against the likeliest sign."""
+_LOST, _EACH_LOST = -12.0, -0.5
+"""A word so much less likely than signs at will is not followed; for each letter of it so much less."""
 _TELLING, _ALIKE = 3.0, 1.5
 """Nats by which each letter of a word tells it from signs at will, of a form of its own and of another's."""
 _PLACES, _FIRSTS = 5.0, 3.0
@@ -36,6 +38,11 @@ _LOOKS: Mapping[str, str] = {
 """Signs of the recogniser that a letter may look like, where it has another form than they."""
 
 
+_Places = dict[int, tuple[float, int]]
+"""Log likelihood and first piece of what ends before a piece."""
+_NOWHERE = (-np.inf, -1)
+
+
 def spotters(where: InkMap) -> list["Spotter"]:
     """The lines of writing on a page, ready to be searched."""
     return [Spotter(line) for line in find_lines(where)]
@@ -46,70 +53,78 @@ class Spotter:
 
     Attributes
     ----------
-    free : (positions,) log likelihood of any signs in any order up to before each piece
+    log : (segments, signs) log likelihood of each segment as each sign
+    after : the segments that begin with each piece, by their row and the piece behind them
+    free : log likelihood of any signs in any order up to before each piece
     """
 
     def __init__(self, line: Line) -> None:
         known = placed(line.signs)
         self.line = line
-        self.first = np.array([segment.first for segment, _ in known], dtype=np.int64)
-        self.last = np.array([segment.last for segment, _ in known], dtype=np.int64)
-        logs = np.array([log for _, log in known])
-        self.log = np.logaddexp(logs, np.log(_STRANGE))
-        self.best = self.log[:, : COLUMN[JUNK]].max(axis=1)
-        self.free = np.full(line.signs.count + 1, -np.inf)
-        self.free[0] = 0.0
+        self.log = np.logaddexp(np.array([log for _, log in known]), np.log(_STRANGE))
         at_will = self.log.max(axis=1)
-        for index in np.argsort(self.first, kind="stable"):
-            through = self.free[self.first[index]] + at_will[index]
-            self.free[self.last[index]] = max(self.free[self.last[index]], through)
-        self.skipping = np.diff(self.free) + _SKIPPED
+        self.best = self.log[:, : COLUMN[JUNK]].max(axis=1)
+        self.after: list[list[tuple[int, int]]] = [[] for _ in range(line.signs.count)]
+        for row, (segment, _) in enumerate(known):
+            self.after[segment.first].append((row, segment.last))
+        free = [0.0, *(-np.inf for _ in self.after)]
+        for place, rows in enumerate(self.after):
+            for row, last in rows:
+                free[last] = max(free[last], free[place] + float(at_will[row]))
+        self.free = free
+        self._letters: dict[str, list[float]] = {}
+        self._spotted: dict[tuple[int | None, str], _Places] = {}
 
-    def spot(self, word: str, begin: int | None = None, least: float = -12.0) -> tuple[FloatArray, IntArray]:
-        """(positions,) evidence that the word ends before each piece, and the piece where it then begins.
+    def spot(self, word: str, begin: int | None = None) -> "_Places":
+        """Where the word may end: by the piece behind it, its log likelihood and the piece where it begins.
 
-        Arguments
-        ---------
-        begin : the piece before which the word begins, by default wherever one may
-        least : a word with less evidence is not followed
+        Arguments: the word begins before the piece `begin`, by default wherever one may.
         """
-        begins = self.line.begins if begin is None else np.arange(len(self.free)) == begin
-        score = np.where(begins, self.free, -np.inf)
-        origin = np.arange(len(score))
-        for letter in word:
-            score, origin = self._followed(score, origin, self._worth(letter), least)
-            if not (score > -np.inf).any():
-                break
-        return score - self.free, origin
+        key = begin, word
+        if key not in self._spotted:
+            if word:
+                before = self.spot(word[:-1], begin)
+                self._spotted[key] = self._followed(before, word) if before else {}
+            else:
+                begins = np.flatnonzero(self.line.begins).tolist() if begin is None else [begin]
+                self._spotted[key] = {place: (self.free[place], place) for place in begins}
+        return self._spotted[key]
 
-    def _worth(self, letter: str) -> FloatArray:
-        """(segments,) log likelihood of being this letter."""
-        columns = [COLUMN[sign] for sign in _LOOKS.get(letter, letter) if sign in COLUMN]
-        return np.asarray(self.log[:, columns].max(axis=1) if columns else self.best + _UNKNOWN)
+    def _worth(self, letter: str) -> list[float]:
+        """The log likelihood of each segment as this letter."""
+        if letter not in self._letters:
+            columns = [COLUMN[sign] for sign in _LOOKS.get(letter, letter) if sign in COLUMN]
+            worth = self.log[:, columns].max(axis=1) if columns else self.best + _UNKNOWN
+            self._letters[letter] = worth.tolist()
+        return self._letters[letter]
 
-    def _followed(
-        self, score: FloatArray, origin: IntArray, worth: FloatArray, least: float
-    ) -> tuple[FloatArray, IntArray]:
-        """Scores after one letter more; dust may stand behind it."""
-        new, whose = np.full_like(score, -np.inf), origin.copy()
-        through = score[self.first] + worth
-        for index in np.flatnonzero(through > self.free[self.last] + least):
-            place = self.last[index]
-            if through[index] > new[place]:
-                new[place], whose[place] = through[index], origin[self.first[index]]
-        for place in np.flatnonzero(new[:-1] > -np.inf):
-            if new[place] + self.skipping[place] > new[place + 1]:
-                new[place + 1], whose[place + 1] = new[place] + self.skipping[place], whose[place]
-        return new, whose
+    def _followed(self, before: "_Places", word: str) -> "_Places":
+        """Where a word may end by where it may without its last letter; dust may stand behind it."""
+        worth, least = self._worth(word[-1]), _LOST + _EACH_LOST * len(word)
+        behind: _Places = {}
+        for place, (log, origin) in before.items():
+            for row, last in self.after[place] if place < len(self.after) else ():
+                through = log + worth[row]
+                if through > self.free[last] + least and through > behind.get(last, _NOWHERE)[0]:
+                    behind[last] = through, origin
+        for place in sorted(behind):
+            log, origin = behind[place]
+            if place < len(self.after):
+                through = log + self.free[place + 1] - self.free[place] + _SKIPPED
+                if through > behind.get(place + 1, _NOWHERE)[0]:
+                    behind[place + 1] = through, origin
+        return behind
 
     def label(self, word: str) -> Iterable[tuple[int, float]]:
         """The pieces before which the word may end, and the logarithm of its odds there."""
         telling = sum(_TELLING if letter in COLUMN else _ALIKE * (letter in _LOOKS) for letter in word)
-        evidence, origin = self.spot(word, least=_DOUBTFUL + _FIRSTS - telling)
-        odds = evidence + telling - np.where(self.line.firsts[origin], _FIRSTS, _PLACES)
-        for place in np.flatnonzero(odds > _DOUBTFUL):
-            if not (odds[place + 1 :] >= odds[place]).any():
-                yield int(place), float(odds[place])
+        reached = -np.inf
+        for place, (log, origin) in sorted(self.spot(word).items(), reverse=True):
+            chances = _FIRSTS if self.line.firsts[origin] else _PLACES
+            odds = log - self.free[place] + telling - chances
+            if odds > max(_DOUBTFUL, reached):
+                yield place, odds
+            reached = max(reached, odds)
 
     def part(self, begin: int, end: int) -> Lattice:
         """The signs from one piece up to, not including, another."""
@@ -257,7 +272,8 @@ def _numbers_in(spotter: Spotter, numbers: Collection[int], words: Sequence[str]
         logs = {}
         for number in numbers if ends else ():
             written = (spotter.spot(f"{between}{number}", begin) for between in _BETWEEN)
-            logs[number] = max(float(evidence[ends[0]]) for evidence, _ in written)
+            found = [places[ends[0]][0] - spotter.free[ends[0]] for places in written if ends[0] in places]
+            logs[number] = max(found, default=-np.inf)
         anything = _ANYTHING + _EACH * sum(end - begin for end in ends)
         total = np.logaddexp.reduce([*logs.values(), anything])
         for number, log in logs.items():

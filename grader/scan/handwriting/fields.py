@@ -338,6 +338,8 @@ _FOREIGN = 0.25
 """Log likelihood by sign that a text may lack against signs at will, before it is doubted."""
 _LARGE, _HARDLY = 1000.0, -4.0
 """From here on, a number lost its decimal point more likely than that anybody chose the scale."""
+_RARE, _RARE_UNITS = -2.0, ("mm/s", "cm/s", "cm/mm", "mm/mm", "/cm", "·cm", "*cm")
+"""Scales that few people write: for each such unit in the text."""
 _MOST_TEXTS = 200
 """The likeliest, among which those that mean the same are put together."""
 _DIGITS = "0123456789"
@@ -397,6 +399,7 @@ def _by_meaning(texts: list[ScaleText], name: str, bare_unit: str | None) -> dic
         if meaning is None:
             continue
         unlikely = _HARDLY if isinstance(meaning, float) and meaning >= _LARGE else 0.0
+        unlikely += _RARE * sum(rare in candidate.text for rare in _RARE_UNITS)
         text, log = meanings.get(meaning, (candidate.text, -np.inf))
         meanings[meaning] = (text, float(np.logaddexp(log, candidate.log + unlikely)))
     return meanings
