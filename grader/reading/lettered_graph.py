@@ -6,14 +6,13 @@ the nodes found before, and, as a prior that explains but is no condition, the p
 puts the node from those nodes. So a plan is read also where no known mistake explains it.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.reading.lettering import fitting_letters
-from grader.reading.lines import BoolArray, Lines
-from grader.records import HEAD_AHEAD, HEAD_BACK, FloatArray, IntArray, Letters
+from grader.reading.lines import Lines
+from grader.records import HEAD_AHEAD, HEAD_BACK, FloatArray, IntArray
 from reference.construction.elements import View
 from reference.construction.graph import Vector, evaluate
 from reference.construction.mistakes import Drawing
@@ -50,14 +49,16 @@ DIRECTION_RAD = float(np.radians(2.0))
 """Standard error of a direction of a short vector."""
 AREA_MM2 = 120.0**2
 """Of a plan: the other places where a node may be."""
-HIDDEN_NATS = -2.5
-"""For a node without a junction: the strokes that meet there could not be told apart."""
+HIDDEN_NATS = 0.7
+"""For a node where the construction puts it, without a junction: half of what speaks for one that is seen."""
 ABSENT_NATS = -5.0
 """For a component that is left out: one normal of a hundred."""
 SAME_POINT_NATS = -1.0
 """For two nodes at one junction: vectors of length zero are rare."""
 FIRST_MM = (5.0, 210.0)
 """Length of the first vector: its scale was chosen so that it can be measured on a sheet."""
+BEST = 6
+"""Graphs that are tried with strokes: they differ in a node or two."""
 BEAM = 60
 """Partial graphs that are continued: a letter not read costs one rank, a crossing line some ten."""
 SHORT_MM = 3.0
@@ -105,144 +106,142 @@ class _Graphs:
         junction = {name: index[rows] for name, index in self.junction.items()}
         return _Graphs(places, junction, self.unexpected[rows], self.nats[rows])
 
+    def with_node(self, name: str, at: ComplexArray, junction: IntArray) -> "_Graphs":
+        """The same with one node more."""
+        places, junctions = {**self.places, name: at}, {**self.junction, name: junction}
+        return replace(self, places=places, junction=junctions)
+
 
 def lettered_graphs(
     lines: Lines,
-    letters: Letters | None,
+    letter_nats: Callable[[str, ComplexArray], FloatArray],
     drawing: Drawing,
     figure: str,
     given: Mapping[str, ComplexArray],
-    renamed: Mapping[str, str],
     left_out: Collection[str] = (),
-    count: int = 6,
 ) -> list[LetteredGraph]:
     """The likeliest graphs of a plan, best first.
 
     Arguments
     ---------
+    letter_nats : what the letters say for each of some places (j,) as the node of a name
     drawing : its construction with the student's parameters
     given : nodes of other figures that are already read, complex mm
-    renamed : what students write for a node, by name, where it is not the name
     left_out : nodes that this construction does without
     """
-    construction = drawing.construction
-    steps = construction.figures[figure]
+    steps = drawing.construction.figures[figure]
     junctions = _junctions(lines)
     if len(junctions.at) < 2:
         return []
-    poles = frozenset(construction.poles.values())
-    nats = {step.node: fitting_letters(step.node, junctions.at, letters, poles, renamed) for step in steps}
-    exact = evaluate(construction, drawing.parameters, given=given)
+    exact = evaluate(drawing.construction, drawing.parameters, given=given)
     known = {name: exact[name].ravel() for name in exact.keys() - {step.node for step in steps}}
+    vectors = [v for v in drawing.construction.vectors_of(figure) if not {v.tail, v.head} & set(left_out)]
+    search = _GraphSearch(drawing, known, vectors, junctions)
     pole, *others = steps
     every = np.arange(len(junctions.at))
-    graphs = _Graphs(
-        {pole.node: junctions.at}, {pole.node: every}, np.zeros(len(every), np.int64), nats[pole.node]
-    )
-    vectors = [v for v in construction.vectors_of(figure) if not {v.tail, v.head} & set(left_out)]
+    score = letter_nats(pole.node, junctions.at)
+    graphs = _Graphs({pole.node: junctions.at}, {pole.node: every}, np.zeros_like(every), score)
     for step in others:
         if step.node in left_out:
-            graphs = _without(graphs, step)
-            continue
-        graphs = _continued(graphs, step, vectors, junctions, nats[step.node], drawing, known)
-    order = np.argsort(-graphs.nats, kind="stable")[:count]
-    return [_graph(graphs, int(row), steps) for row in order]
-
-
-def _without(graphs: _Graphs, step: Step) -> _Graphs:
-    """The graphs with a node that the construction does without: it has a place, but nothing starts there."""
-    start = graphs.places[step.start] if isinstance(step, Given) else next(iter(graphs.places.values()))
-    nowhere = np.full(len(start), HIDDEN)
-    return replace(
-        graphs,
-        places={**graphs.places, step.node: start},
-        junction={**graphs.junction, step.node: nowhere},
-    )
+            nowhere = np.full(len(graphs.nats), HIDDEN)
+            graphs = graphs.with_node(step.node, search.start(step, graphs), nowhere)
+        else:
+            graphs = search.continued(graphs, step, letter_nats(step.node, junctions.at))
+    best = np.argsort(-graphs.nats, kind="stable")[:BEST]
+    return [_graph(graphs, row, steps) for row in best.tolist()]
 
 
 def _graph(graphs: _Graphs, row: int, steps: Sequence[Step]) -> LetteredGraph:
     at = {name: complex(places[row]) for name, places in graphs.places.items()}
-    absent = {s.node for s in steps if isinstance(s, Given) and graphs.junction[s.node][row] == ABSENT}
-    return LetteredGraph(at, frozenset(absent), int(graphs.unexpected[row]), float(graphs.nats[row]))
+    absent = frozenset(step.node for step in steps if graphs.junction[step.node][row] == ABSENT)
+    return LetteredGraph(at, absent, int(graphs.unexpected[row]), float(graphs.nats[row]))
 
 
 # One node more -------------------------------------------------------------------------------------
 
 HIDDEN, ABSENT = -1, -2
-"""In place of a junction."""
+"""In place of a junction: where none is seen, and for a component that is left out."""
 
 
-def _continued(
-    graphs: _Graphs,
-    step: Step,
-    vectors: Sequence[Vector],
-    junctions: _Junctions,
-    letter_nats: FloatArray,
-    drawing: Drawing,
-    given: Mapping[str, ComplexArray],
-) -> _Graphs:
-    """The best graphs with the step's node: at any junction, where it is expected, or left out."""
-    count = len(graphs.nats)
-    known = {**{name: np.broadcast_to(at, count) for name, at in given.items()}, **graphs.places}
-    with np.errstate(invalid="ignore", divide="ignore"):
-        expected = np.broadcast_to(step.place(View(known, drawing.parameters, {})), count)
-    start = _start(step, graphs, vectors)
-    prior = _of_place(junctions.at, expected, start)
-    is_first = len(graphs.places) == 1
-    if is_first:
-        size = np.abs(junctions.at - start[:, None])
-        prior = np.where((size > FIRST_MM[0]) & (size < FIRST_MM[1]), prior, -np.inf)
-    ended = [
-        (vector.tail, vector.head)
-        for vector in vectors
-        if step.node in (vector.tail, vector.head)
-        and {vector.tail, vector.head} - {step.node} <= graphs.places.keys()
-    ]
-    nats = graphs.nats[:, None] + letter_nats + prior
-    without = np.zeros(count)
-    for tail, head in ended:
-        other = tail if head == step.node else head
-        index = graphs.junction[other]
-        joined = junctions.joined[index] if head == step.node else junctions.joined[:, index].T
-        bare = np.log(1.0 - DRAWN) * np.minimum(
-            np.abs(junctions.at - graphs.places[other][:, None]) / SHORT_MM, 1.0
-        )
-        nats = nats + np.where((index >= 0)[:, None] & np.isfinite(joined), joined, bare)
-        away = np.abs(expected - graphs.places[other])
-        without += np.log(1.0 - DRAWN) * np.minimum(np.nan_to_num(away, nan=SHORT_MM) / SHORT_MM, 1.0)
-    hidden = graphs.nats + without + HIDDEN_NATS + _of_place_itself()
-    hidden = np.where(np.isfinite(expected), hidden, -np.inf)
-    absent = np.full(count, -np.inf)
-    if isinstance(step, Given) and not is_first:
-        absent = graphs.nats + ABSENT_NATS
-    if is_first:
-        hidden[:] = -np.inf
-    everything = np.column_stack([nats, hidden, absent])
-    flat = np.argsort(-everything, axis=None, kind="stable")[:BEAM]
-    flat = flat[np.isfinite(everything.ravel()[flat])]
-    row, choice = np.divmod(flat, everything.shape[1])
-    chosen = graphs.take(row)
-    size = len(junctions.at)
-    is_junction = choice < size
-    index = np.where(is_junction, choice, np.where(choice == size, HIDDEN, ABSENT))
-    at = np.where(
-        is_junction,
-        junctions.at[np.minimum(choice, size - 1)],
-        np.where(choice == size, expected[row], start[row]),
+@dataclass(frozen=True, slots=True)
+class _GraphSearch:
+    """What stays: the drawing, nodes of other figures, the plan's vectors, the junctions."""
+
+    drawing: Drawing
+    known: Mapping[str, ComplexArray]
+    vectors: Sequence[Vector]
+    junctions: _Junctions
+
+    def start(self, step: Step, graphs: _Graphs) -> ComplexArray:
+        """(b,) the node that the step's node is drawn from."""
+        if isinstance(step, Given):
+            return graphs.places[step.start]
+        tails = [v.tail for v in self.vectors if v.head == step.node and v.tail in graphs.places]
+        return graphs.places[tails[0]] if tails else next(iter(graphs.places.values()))
+
+    def continued(self, graphs: _Graphs, step: Step, letter_nats: FloatArray) -> _Graphs:
+        """The best graphs with the step's node: at any junction, where it is expected, or left out."""
+        at, count = self.junctions.at, len(graphs.nats)
+        here = {
+            **{name: np.broadcast_to(place, count) for name, place in self.known.items()},
+            **graphs.places,
+        }
+        with np.errstate(invalid="ignore", divide="ignore"):
+            expected = np.broadcast_to(step.place(View(here, self.drawing.parameters, {})), count)
+        start = self.start(step, graphs)
+        prior = _of_place(at, expected, start)
+        hidden, absent = np.full(count, -np.inf), np.full(count, -np.inf)
+        if len(graphs.places) == 1:
+            size = np.abs(at - start[:, None])
+            prior = np.where((size > FIRST_MM[0]) & (size < FIRST_MM[1]), prior, -np.inf)
+        else:
+            drawn = np.isfinite(expected)
+            unseen = graphs.nats + self._bare(graphs, step.node, expected) + HIDDEN_NATS
+            hidden = np.where(drawn, unseen, -np.inf)
+            if isinstance(step, Given):
+                absent = graphs.nats + ABSENT_NATS
+        seen = graphs.nats[:, None] + letter_nats + prior + self._joined(graphs, step.node)
+        everything = np.column_stack([seen, hidden, absent])
+        best = np.argsort(-everything, axis=None, kind="stable")[:BEAM]
+        best = best[np.isfinite(everything.ravel()[best])]
+        row, choice = np.divmod(best, everything.shape[1])
+        junction = np.where(choice < len(at), choice, np.where(choice == len(at), HIDDEN, ABSENT))
+        place = np.where(junction == HIDDEN, expected[row], start[row])
+        is_seen = junction >= 0
+        place[is_seen] = at[junction[is_seen]]
+        chosen = graphs.take(row).with_node(step.node, place, junction)
+        odd = is_seen & (prior[row, np.maximum(junction, 0)] < 0.0)
+        return replace(chosen, unexpected=chosen.unexpected + odd, nats=everything.ravel()[best])
+
+    def _ended(self, graphs: _Graphs, node: str) -> Iterator[tuple[str, bool]]:
+        """The other ends of vectors that join a node to the graphs, and whether the node is their head."""
+        for vector in self.vectors:
+            if vector.head == node and vector.tail in graphs.places:
+                yield vector.tail, True
+            elif vector.tail == node and vector.head in graphs.places:
+                yield vector.head, False
+
+    def _joined(self, graphs: _Graphs, node: str) -> FloatArray:
+        """(b, j) nats of the strokes that join each junction, as this node, to the graphs."""
+        total = np.zeros((len(graphs.nats), len(self.junctions.at)))
+        for other, is_head in self._ended(graphs, node):
+            index = graphs.junction[other]
+            joined = self.junctions.joined[index] if is_head else self.junctions.joined[:, index].T
+            bare = _without_stroke(self.junctions.at - graphs.places[other][:, None])
+            total += np.where((index >= 0)[:, None] & np.isfinite(joined), joined, bare)
+        return total
+
+    def _bare(self, graphs: _Graphs, node: str, at: ComplexArray) -> FloatArray:
+        """(b,) nats of the node's vectors without any stroke, the node at its place."""
+        ends = [graphs.places[other] for other, _ in self._ended(graphs, node)]
+        return sum((_without_stroke(at - end) for end in ends), np.zeros(len(at)))
+
+
+def _without_stroke(span: ComplexArray) -> FloatArray:
+    """Nats of vectors that have no stroke; short ones have none more often."""
+    return np.asarray(
+        np.log(1.0 - DRAWN) * np.minimum(np.nan_to_num(np.abs(span), nan=SHORT_MM) / SHORT_MM, 1.0)
     )
-    unexpected = chosen.unexpected + (is_junction & (prior[row, np.minimum(choice, size - 1)] < 0.0))
-    return _Graphs(
-        {**chosen.places, step.node: at}, {**chosen.junction, step.node: index},
-        unexpected, everything.ravel()[flat],
-    )  # fmt: skip
-
-
-def _start(step: Step, graphs: _Graphs, vectors: Sequence[Vector]) -> ComplexArray:
-    """(b,) the node that the step's node is drawn from."""
-    if isinstance(step, Given):
-        return graphs.places[step.start]
-    tails = [v.tail for v in vectors if v.head == step.node and v.tail in graphs.places]
-    return graphs.places[tails[0]] if tails else next(iter(graphs.places.values()))
 
 
 def _of_place(at: ComplexArray, expected: ComplexArray, start: ComplexArray) -> FloatArray:
@@ -259,11 +258,6 @@ def _of_place(at: ComplexArray, expected: ComplexArray, start: ComplexArray) -> 
     known = np.isfinite(place) & np.isfinite(along)
     density = np.where(known, EXPECTED * place + NEAR_LINE * along + ANYWHERE, 1.0)
     return np.asarray(np.log(density))
-
-
-def _of_place_itself() -> float:
-    """Nats of a node at the very place where it is expected."""
-    return float(np.log(EXPECTED * AREA_MM2 / (2.0 * np.pi * PLACE_MM**2))) / 2.0
 
 
 # Junctions -----------------------------------------------------------------------------------------
@@ -295,7 +289,7 @@ def _joined(at: ComplexArray, lines: Lines) -> FloatArray:
     from_start = (at - lines.start[:, None]) * np.conj(lines.along)[:, None]
     on = (np.abs(from_start.imag) < ON_LINE_MM) & (from_start.real > -PAST_END_MM)
     on &= from_start.real < lines.length[:, None] + PAST_END_MM
-    usual = np.log(DRAWN * len(at) ** 2 / (2.0 * max(len(lines), 1)))
+    usual = np.log(DRAWN * max(len(at), 1) ** 2 / (2.0 * max(len(lines), 1)))
     for row in range(len(lines)):
         nodes = np.flatnonzero(on[row])
         if len(nodes) < 2:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from grader.reading.expected import (
     vectors_of,
 )
 from grader.reading.lettered_graph import lettered_graphs
-from grader.reading.lettering import lettering
+from grader.reading.lettering import fitting_letters, lettering
 from grader.reading.lines import BoolArray, Lines
 from grader.reading.matching import (
     BEAM,
@@ -123,7 +124,7 @@ class PlanProblem:
     @property
     def free(self) -> Lines:
         """The lines that no other figure needs."""
-        return self.lines.take(~np.isin(self.lines.members, self.elsewhere).any(axis=1))
+        return self.lines.take(np.flatnonzero(~np.isin(self.lines.members, self.elsewhere).any(axis=1)))
 
     def expected(self, hypothesis: PlanHypothesis) -> Expected | None:
         """The plan about its own pole; None where it cannot be drawn."""
@@ -334,11 +335,10 @@ def _without_each_stroke(plan: PlanReading) -> list[PlanReading]:
 
 def _by_letters(problem: PlanProblem, base: PlanHypothesis) -> list[PlanReading]:
     """Readings of the plan as a lettered graph, whatever the construction says of it."""
-    graphs = lettered_graphs(
-        problem.free, problem.letters, base.drawing, problem.figure, problem.given, problem.renamed,
-        frozenset(base.absent),
-    )  # fmt: skip
     construction = base.drawing.construction
+    poles = frozenset(construction.poles.values())
+    nats = partial(fitting_letters, letters=problem.letters, poles=poles, renamed=problem.renamed)
+    graphs = lettered_graphs(problem.free, nats, base.drawing, problem.figure, problem.given, base.absent)
     under = coincident(construction)
     cases = []
     for graph in graphs:
@@ -356,24 +356,18 @@ def _by_letters(problem: PlanProblem, base: PlanHypothesis) -> list[PlanReading]
 
 
 def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[PlanReading]:
-    """The best of some readings with what the letters say of them in their scores, best first."""
+    """The best readings, what the letters say in their scores, best first, each set of strokes once."""
     poles = frozenset(plans[0].hypothesis.drawing.construction.poles.values())
-    best = max(plan.score for plan in plans)
+    least = max(plan.score for plan in plans) - FAR_WORSE
     scored: dict[Hashable, PlanReading] = {}
-    nats: dict[Hashable, float] = {}
     for plan in sorted(plans, key=lambda plan: -plan.score):
-        if plan.score < best - FAR_WORSE:
-            break
-        strokes = plan.strokes
-        if strokes not in nats:
+        if plan.score >= least and plan.strokes not in scored:
             expected = plan.assignment.expected
-            at = {
-                (problem.figure, name): complex(place)
-                for name, place in zip(expected.names, expected.at, strict=True)
-            }
+            nodes = ((problem.figure, name) for name in expected.names)
+            at = dict(zip(nodes, expected.at.tolist(), strict=True))
             writing = lettering(at, problem.letters, poles, problem.renamed)
-            nats[strokes] = 0.0 if writing is None else writing.log()
-            scored[strokes] = replace(plan, score=plan.score + nats[strokes])
+            nats = 0.0 if writing is None else writing.log()
+            scored[plan.strokes] = replace(plan, score=plan.score + nats)
     return sorted(scored.values(), key=lambda plan: -plan.score)
 
 
