@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 
 from grader.reading.expected import (
-    COST_OF_MISTAKE,
     LEFT_OUT,
     REGULAR,
     DraftingErrors,
@@ -50,6 +49,8 @@ BY_LETTERS = "by letters"
 COST_OF_GRAPH = 6.0
 LETTERED_MM = 2.0
 """Nats for such a hypothesis, and standard error of its nodes along x and y before strokes are assigned."""
+COST_OF_ODD_NODE = 4.0
+"""Nats for a node that is not where the construction puts it from the student's own: one of fifty."""
 EXPLAINED = 0.85
 """A regular plan supported over more of its length is what was drawn."""
 FAR_WORSE = 30.0
@@ -343,7 +344,7 @@ def _by_letters(problem: PlanProblem, base: PlanHypothesis) -> list[PlanReading]
     cases = []
     for graph in graphs:
         absent = {**base.absent, **{node: LEFT_OUT.get(node[0], LEFT_OUT["n"]) for node in graph.absent}}
-        cost = base.cost + COST_OF_GRAPH + COST_OF_MISTAKE * graph.unexpected
+        cost = base.cost + COST_OF_GRAPH + COST_OF_ODD_NODE * graph.unexpected
         hypothesis = PlanHypothesis(BY_LETTERS, base.drawing, absent, cost)
         names = tuple(graph.at)
         pairs = tuple((names.index(name), names.index(under[name])) for name in names if name in under)
