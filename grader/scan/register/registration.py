@@ -14,7 +14,7 @@ from grader.records import FloatArray, Identity, Page, Problem, Sheet, Unread
 from grader.scan.pixels import Flat, flatten, inverted, local_axes, mapped, through_corners
 from grader.scan.register import markers
 from grader.scan.register.distortion import find_lens
-from grader.scan.register.fitting import Fit, affine_of, affine_params, fit_sides, log_scale
+from grader.scan.register.fitting import Fit, affine_of, affine_params, fit_sides
 from grader.scan.register.homography import (
     HALVES_ADVICE,
     PAPER,
@@ -304,7 +304,7 @@ def _doubt(best: Hypothesis, fit: Fit, block_mm: float, *, stated_a3: bool, stat
 
 def _is_at_another_scale(fit: Fit, dpi: tuple[float, float], block_mm: float) -> bool:
     """Whether a fit has another scale than a scanner's resolution without looking like a copy."""
-    off = abs(log_scale(fit.mm_to_px) - np.log(np.array(dpi) / MM_PER_INCH).mean())
+    off = np.abs(affine_params(fit.mm_to_px)[:2] - np.log(np.array(dpi) / MM_PER_INCH)).max()
     return bool(off > _SCANNED_SE) and (block_mm == 0.0 or fit.chi2 > _BAD_FIT * fit.freedom)
 
 

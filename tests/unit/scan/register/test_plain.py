@@ -168,6 +168,13 @@ def test_an_image_of_exactly_a3s_pixels_has_that_resolution_where_none_is_stated
     assert sheet.px_per_mm == pytest.approx(PX_PER_MM, rel=0.003)
 
 
+def test_a_frame_at_the_scanners_scale_tells_which_way_up_without_a_title_block():
+    matrix, shape = scanner(turns=2)
+    sheet = rectify(Page("scan.png", 1, painted(matrix, shape, block=False), (150.0, 150.0)))
+    assert off_mm(sheet, matrix) < RULED_MM
+    assert "frame_missing" not in {problem.code for problem in sheet.problems}
+
+
 @pytest.mark.parametrize("dpi", [None, (72.0, 72.0)])
 def test_a_cameras_picture_is_not_taken_for_a_scan_of_a_larger_window(dpi):
     """Of 4 to 3: at 240 dpi as wide as A3, and 20 mm higher."""
