@@ -231,7 +231,7 @@ def connected(mask: GreyImage) -> tuple[NDArray[np.int32], FloatArray]:
     """
     count, labels = cv2.connectedComponents(mask, connectivity=8)
     inked = np.flatnonzero(mask.view(bool))
-    piece = labels.reshape(-1)[inked] - 1
+    piece = np.asarray(labels.reshape(-1)[inked] - 1, dtype=np.intp)
     row, column = np.divmod(inked, mask.shape[1])
     low, high = np.full((2, count - 1), max(mask.shape)), np.zeros((2, count - 1), dtype=np.intp)
     for axis, at in enumerate((column, row)):
