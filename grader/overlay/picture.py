@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw, ImageFont
 from grader.outcomes import Outcome
 from grader.overlay.scene import XY, Picture, Scene, between, layers_of, scene_of
 from grader.records import Backdrop, Box, GreyImage, Page, Reading, Sheet
-from grader.scan.pixels import cut_out, reduction, shrink
+from grader.scan.pixels import averaged, cut_out, reduction
 from reference.construction.graph import Vector
 from reference.drawing.canvas import Area, Curve, Label, Ring, Shape, Stroke, set_pieces
 
@@ -126,7 +126,7 @@ def _upright(grey: GreyImage, sheet: Sheet, width_px: int) -> GreyImage:
     scale = width_px / sheet.page_mm[0]
     less = max(1, int(sheet.px_per_mm / scale))
     to_px = reduction(1.0 / less) @ sheet.mm_to_px
-    return cut_out(shrink(grey, 1.0 / less), to_px, (0.0, 0.0, *sheet.page_mm), scale, outside=255)
+    return cut_out(averaged(grey, less), to_px, (0.0, 0.0, *sheet.page_mm), scale, outside=255)
 
 
 def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
@@ -141,7 +141,7 @@ def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
     to_px, stored = (np.eye(3), 1.0) if sheet is None else (sheet.mm_to_px, sheet.px_per_mm)
     scale = min(px_per_mm, 2.0 * stored)
     less = max(1, int(stored / scale))
-    part = cut_out(shrink(page.grey, 1.0 / less), reduction(1.0 / less) @ to_px, box, scale, outside=255)
+    part = cut_out(averaged(page.grey, less), reduction(1.0 / less) @ to_px, box, scale, outside=255)
     if not part.size:  # nothing of the page is there
         part = np.full((1, 1), 255, np.uint8)
     return _encode(".jpg", part, [cv2.IMWRITE_JPEG_QUALITY, CUT_QUALITY])

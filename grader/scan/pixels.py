@@ -30,8 +30,6 @@ _ACROSS_STEP_PX = (0.5, 2.0)
 """Finer steps than half a pixel say nothing new; coarser ones than two miss a stroke."""
 _ACROSS_STEPS = 16
 """Samples to one side of a cut, where that is neither finer nor coarser than the steps allow."""
-_WHOLE = 1e-9
-"""Of a reduction: nearer to a whole number than this it is one."""
 _REMAP_ROWS = 32000
 """Image maps may not have more rows."""
 _PART = 1 << 21
@@ -224,19 +222,16 @@ def flatten(grey: GreyImage) -> Flat:
 def shrink(grey: GreyImage, scale: float) -> GreyImage:
     """The image at `scale` <= 1 times its resolution, averaged over areas.
 
-    By a whole number, squares of pixels are averaged, and what is left over at the right and below is left
-    out: thirty times faster than averages over areas of another size. So else halvings go first, and one
-    interpolation makes the rest of the way. Then the whole image spans the whole result, so a pixel's
+    Exact halvings are thirty times faster than an average over areas of another size: they go first, and
+    one interpolation makes the rest of the way. The whole image spans the whole result, so a pixel's
     centre lies at (x + 0.5) times the ratio of the sizes, less 0.5.
     """
     if scale >= 1.0:
         return grey
-    if abs(1.0 / scale - round(1.0 / scale)) < _WHOLE:
-        return _averaged(grey, round(1.0 / scale))
     wide, high = max(1, round(grey.shape[1] * scale)), max(1, round(grey.shape[0] * scale))
     half, halvings = grey, 0
     while wide <= half.shape[1] // 2 and high <= half.shape[0] // 2:
-        half = _averaged(half, 2)
+        half = averaged(half, 2)
         halvings += 1
     if halvings == 0:
         return np.asarray(cv2.resize(grey, (wide, high), interpolation=cv2.INTER_AREA), dtype=np.uint8)
@@ -250,8 +245,8 @@ def shrink(grey: GreyImage, scale: float) -> GreyImage:
     )
 
 
-def _averaged(grey: GreyImage, side: int) -> GreyImage:
-    """Averages over squares of so many pixels."""
+def averaged(grey: GreyImage, side: int) -> GreyImage:
+    """Averages over squares of so many pixels; what is left over at the right and below is left out."""
     size = max(1, grey.shape[1] // side), max(1, grey.shape[0] // side)
     squares = grey[: size[1] * side, : size[0] * side]
     return np.asarray(cv2.resize(squares, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
@@ -267,7 +262,7 @@ def connected(mask: GreyImage) -> tuple[NDArray[np.int32], FloatArray]:
     """
     count, labels = cv2.connectedComponents(mask, connectivity=8)
     inked = np.flatnonzero(mask.view(bool))
-    piece = labels.reshape(-1)[inked] - 1
+    piece = np.asarray(labels.reshape(-1)[inked] - 1, dtype=np.intp)
     row, column = np.divmod(inked, mask.shape[1])
     low, high = np.full((2, count - 1), max(mask.shape)), np.zeros((2, count - 1), dtype=np.intp)
     for axis, at in enumerate((column, row)):

@@ -243,7 +243,7 @@ def distinct(fitted: Fitted, unit: float, covered_share: float = 1.0) -> BoolArr
     first, second = first[longer], second[longer]
     off = np.concatenate(
         [distances(fitted.ends, first[part], second[part]) for part in parts(len(first), PROBES)]
-        or [np.zeros((0, PROBES))]
+        or [np.zeros((0, PROBES), dtype=np.float32)]
     )
     along = np.asarray((off < _SAME_MM * unit).all(axis=1))
     inside = np.asarray(off < inner[second, None])

@@ -159,7 +159,7 @@ def _on_line(
     off = np.abs(ux * middle[1] - uy * middle[0] - (ux * y - uy * x))
     rows = (free & (off <= _MOST_OFF * off_px)).nonzero()[0]
     near, low, high = _lying_on(points[:, :, rows] - line[0][:, None, None], (ux, uy, size), off_px)
-    return rows[near][reached(low[near], high[near], (0.0, size), gap_px)]
+    return np.asarray(rows[near][reached(low[near], high[near], (0.0, size), gap_px)])
 
 
 def _lying_on(
@@ -381,7 +381,7 @@ def find_components(seeds: Seeds) -> Components:
     small = longest < _LONG_SEED_MM
     stroke_like = small & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
     inked = np.flatnonzero(seeds.mask.view(bool))
-    label = labels.reshape(-1)[inked] - 1
+    label = np.asarray(labels.reshape(-1)[inked] - 1, dtype=np.intp)
     of_these = stroke_like[label]
     major, minor = _spread(inked[of_these], label[of_these], labels.shape[1], len(box))
     stroke_like &= (minor <= _THIN * seeds.pen_px) & (major >= _LONG * minor)
