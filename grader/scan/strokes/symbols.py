@@ -108,8 +108,8 @@ def _beside(strokes: Strokes, u: FloatArray, at: tuple[float, float]) -> tuple[F
 def _holes(seeds: Seeds, where: BoolArray) -> FloatArray:
     """(g, 2) working pixels, middles of paper enclosed by ink, as large and as round as a ring's inside."""
     contours, nested = cv2.findContours(seeds.mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-    parent = np.zeros(0) if nested is None else np.asarray(nested)[0, :, 3]
-    holes = [contours[row] for row in np.flatnonzero(parent >= 0)]
+    inner = np.reshape(nested, (-1, 4))[:, 3] >= 0 if contours else ()
+    holes = [contours[int(row)] for row in np.flatnonzero(inner)]
     # A hole's contour runs along the ink around it.
     box = np.array([cv2.boundingRect(contour) for contour in holes], dtype=np.float64).reshape(-1, 4)
     left, top, wide, high = (box + np.array([1.0, 1.0, -2.0, -2.0])).T
