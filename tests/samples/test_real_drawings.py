@@ -5,7 +5,7 @@ import pytest
 from tests.bench.real_paper import measure
 from tests.samples.test_foreign_images import REAL
 
-SEGMENTS, TIPS, CIRCLES = 34, 7, 5
+SEGMENTS, TIPS, CIRCLES = 34, 8, 12
 """Of 37, 12 and 18."""
 
 

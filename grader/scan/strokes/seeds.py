@@ -33,7 +33,7 @@ _PEN_PX = 2.0
 """A pen of 0.35 mm, where a sheet has no long stroke to tell."""
 _BUNDLE = 1.6
 """An ink band this many pens wide is more than one stroke."""
-_STRIP_MM, _STRIPS, _EVERY = 4.0, 7, 2
+_STRIP_MM, _STRIPS, _EVERY = 4.0, 5, 2
 """Strips narrow enough that a line 2 degrees askew stays within its own width over half of one."""
 _LEAST_PEAK = 6.0
 """Of 255: fainter squares do not disturb."""

@@ -228,7 +228,7 @@ def test_standard_errors_of_hand_drawn_lines_are_honest():
         assert np.sqrt(np.mean(ses**2)) > 0.2
 
 
-@pytest.mark.parametrize("radius", [1.0, 1.5, 2.5])
+@pytest.mark.parametrize("radius", [1.0, 1.5, 2.5, 3.8])
 def test_a_joint_is_a_circle_and_links_stop_short_of_it(radius):
     paper = Paper()
     joint = np.array([150.0, 120.0])
@@ -241,6 +241,26 @@ def test_a_joint_is_a_circle_and_links_stop_short_of_it(radius):
     assert np.abs(ink.circles[0] - [*joint, radius]).max() < 0.1
     assert len(ink.strokes) == 3
     assert np.hypot(*(ink.strokes.ends - joint).reshape(-1, 2).T).min() > radius - 0.6
+
+
+def test_a_small_ring_with_the_compass_point_in_it_is_a_circle():
+    paper = Paper()
+    paper.ring((150, 120), 0.85)
+    paper.line((149.93, 120), (150.07, 120), pen=0.14)
+    for end in ((190, 120), (140, 170)):
+        u = (np.array(end) - [150, 120]) / np.hypot(*(np.array(end) - [150, 120]))
+        paper.line([150, 120] + 0.85 * u, end)
+    circles = paper.ink().circles
+    assert circles.shape == (1, 3)
+    assert np.abs(circles[0] - [150, 120, 0.85]).max() < 0.1
+
+
+def test_a_loop_of_a_letter_beside_a_line_is_no_circle():
+    paper = Paper()
+    paper.line((110, 123), (190, 123))
+    for column, word in enumerate(("a", "b", "d", "g", "6", "8", "B", "D")):
+        paper.text(word, (115 + 9 * column, 121.5), size=0.8)
+    assert len(paper.ink().circles) == 0
 
 
 def test_a_joint_with_links_through_it_is_a_circle():
