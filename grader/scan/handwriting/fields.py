@@ -224,45 +224,80 @@ def texts_of(lattice: Lattice, name: str) -> tuple[list[ScaleText], float]:
     The second value is what the ink would be worth if any signs might stand in any order: a text that
     is much less likely than that was read into the ink.
     """
-    after = placed(lattice)
+    by_piece: list[list[_Candidate]] = [[] for _ in range(lattice.count)]
     high = _BAR * _line(lattice)[0]
+    for segment, log in placed(lattice):
+        by_piece[segment.first].append(_candidate(segment, log, dust=segment.box[3] < high))
+    free = [0.0, *(-np.inf for _ in by_piece)]
+    for piece, candidates in enumerate(by_piece):
+        for sign in candidates:
+            free[sign.last] = max(free[sign.last], free[piece] + sign.best, free[piece] + sign.alone)
     beams: list[dict[tuple[State, str], float]] = [{} for _ in range(lattice.count + 1)]
     beams[0][start(name), ""] = 0.0
-    free = np.full(lattice.count + 1, -np.inf)
-    free[0] = 0.0
-    for piece in range(lattice.count):
-        likely = [item for item in beams[piece].items() if item[1] > free[piece] - _FAR]
-        best = sorted(likely, key=lambda item: -item[1])[:_BEAM]
-        for segment, log in after:
-            if segment.first != piece:
-                continue
-            skipped = segment.last == piece + 1
-            dust = segment.box[3] < high
-            alone = float(segment.log[COLUMN[JUNK]]) + (_SKIPPED if dust else _SIGN_SKIPPED)
-            free[segment.last] = max(
-                free[segment.last], free[piece] + float(log[: COLUMN[JUNK]].max()), free[piece] + alone
-            )
-            misshapen = float(log[: COLUMN[JUNK]].max()) + _MISSHAPEN
+    for piece, candidates in enumerate(by_piece):
+        best = sorted(beams[piece].items(), key=lambda item: -item[1])[:_BEAM]
+        for sign in candidates:
+            target, least = beams[sign.last], free[sign.last] - _FAR
             for (state, text), score in best:
-                target = beams[segment.last]
-                for move in moves(name, state):
-                    worth = float(log[COLUMN[move.sign]]) + move.cost
-                    if move.in_tail:
-                        worth = max(worth, misshapen)
-                    _keep(target, (move.state, text + move.text), score + worth)
-                    if skipped and move.in_tail:
-                        for touching in moves(name, move.state):
-                            if touching.in_tail:
-                                both = text + move.text + touching.text
-                                _keep(target, (touching.state, both), score + misshapen)
-                if skipped:
-                    _keep(target, (state, text), score + alone)
+                for column, added, after, cost, in_tail in _steps(name, state):
+                    worth = score + (sign.log[column] + cost if column >= 0 else -np.inf)
+                    if in_tail and (column >= 0 or sign.is_one):
+                        worth = max(worth, score + sign.best + _MISSHAPEN)
+                    if worth > least:
+                        _keep(target, (after, text + added), worth)
+                if score + sign.alone > least:
+                    _keep(target, (state, text), score + sign.alone)
     ended: dict[str, float] = {}
     for (state, text), score in beams[-1].items():
         if state.is_end:
             ended[text] = max(score, ended.get(text, -np.inf))
     texts = sorted((ScaleText(text, score) for text, score in ended.items()), key=lambda text: -text.log)
     return texts, float(free[-1])
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """A sign that pieces may make up.
+
+    Attributes
+    ----------
+    last : the piece behind it
+    log : log likelihood of each sign
+    best : of the likeliest
+    alone : of a piece that is no sign; minus infinity for several
+    is_one : whether it is one piece, so that two letters may touch in it
+    """
+
+    last: int
+    log: list[float]
+    best: float
+    alone: float
+    is_one: bool
+
+
+def _candidate(segment: Segment, log: FloatArray, *, dust: bool) -> _Candidate:
+    is_one = segment.last == segment.first + 1
+    none = float(segment.log[COLUMN[JUNK]]) + (_SKIPPED if dust else _SIGN_SKIPPED)
+    best = float(log[: COLUMN[JUNK]].max())
+    return _Candidate(segment.last, log.tolist(), best, none if is_one else -np.inf, is_one)
+
+
+@cache
+def _steps(name: str, state: State) -> tuple[tuple[int, str, State, float, bool], ...]:
+    """What may come next: the sign's column, its text, the state after it, its cost, whether in a unit.
+
+    Two letters of a unit that touch have no column.
+    """
+    first = moves(name, state)
+    single = [(COLUMN[move.sign], move.text, move.state, move.cost, move.in_tail) for move in first]
+    pairs = [
+        (-1, move.text + touching.text, touching.state, 0.0, True)
+        for move in first
+        if move.in_tail
+        for touching in moves(name, move.state)
+        if touching.in_tail
+    ]
+    return (*single, *pairs)
 
 
 def _keep(target: dict[tuple[State, str], float], key: tuple[State, str], score: float) -> None:

@@ -19,8 +19,9 @@ _SHARE = 0.4
 """Of the darkest ink in a letter's surroundings: fainter is its blur."""
 _PEAK_MM = 3.0
 """Surroundings of a letter: its neighbours are as dark."""
-_RULED_MM = 11.0
-"""Longer runs along a row or a column of pixels are ruled lines: no letter is so long."""
+_ACROSS_MM, _UPRIGHT_MM = 16.0, 8.0
+"""Longer runs of ink along a row and along a column of pixels are ruled lines: letters of a broad pen touch
+along the first, none is as high as the second."""
 _LEAST_MM, _HIGHEST_MM, _LONGEST_MM = 1.0, 9.0, 25.0
 """Letters are higher, and lower; so long may a word be whose letters touch."""
 _LEVEL = 0.45
@@ -102,9 +103,10 @@ def _pieces(where: InkMap) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     grey = cv2.resize(where.ink, size, interpolation=cv2.INTER_AREA)
     unit = where.px_per_mm / _COARSE
     whole = np.asarray(grey >= _FAINT, dtype=np.uint8)
-    run, ruled = round(_RULED_MM * unit), np.zeros_like(whole)
+    ruled = np.zeros_like(whole)
+    across, upright = round(_ACROSS_MM * unit), round(_UPRIGHT_MM * unit)
     # A pencil's grain breaks ruled lines: they are thickened across, which closes no gap between letters.
-    for thick, long in (((3, 1), (1, run)), ((1, 3), (run, 1))):
+    for thick, long in (((3, 1), (1, across)), ((1, 3), (upright, 1))):
         thickened = cv2.dilate(whole, np.ones(thick, np.uint8))
         runs = cv2.morphologyEx(thickened, cv2.MORPH_OPEN, np.ones(long, np.uint8))
         ruled = np.maximum(ruled, np.asarray(runs, dtype=np.uint8))
