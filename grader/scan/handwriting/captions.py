@@ -243,10 +243,8 @@ POSITION_WORDS = (
     "position", "Position", "pos", "Pos", "pozitia", "Pozitia", "poz", "Poz", "положение", "Положение",
 )  # fmt: skip
 _BETWEEN = ("", ".", ":", "=", ".:")
-_ANYTHING, _EACH = -2.0, -3.0
-"""Log likelihood that what stands behind the word is none of the numbers, and for each sign of it."""
-_MOST_SIGNS = 3
-"""Of a number with what stands before it: more tell nothing more."""
+_ANYTHING = -5.5
+"""Log likelihood that what stands behind the word is none of the numbers."""
 
 
 def written_number(
@@ -282,8 +280,7 @@ def _numbers_in(spotter: Spotter, numbers: Collection[int], words: Sequence[str]
             written = (spotter.spot(f"{between}{number}", begin) for between in _BETWEEN)
             found = [places[ends[0]][0] - spotter.free[ends[0]] for places in written if ends[0] in places]
             logs[number] = max(found, default=-np.inf)
-        anything = _ANYTHING + _EACH * min(sum(end - begin for end in ends), _MOST_SIGNS)
-        total = np.logaddexp.reduce([*logs.values(), anything])
+        total = np.logaddexp.reduce([*logs.values(), _ANYTHING])
         for number, log in logs.items():
             chance = _chance(odds) * float(np.exp(log - total))
             if chance > _LEAST:
