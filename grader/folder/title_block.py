@@ -83,7 +83,7 @@ def _spellings(row: RosterRow) -> Iterator[str]:
         sign for sign in unicodedata.normalize("NFKD", row.name) if not unicodedata.combining(sign)
     )
     words = [word for word in plain.replace("-", " ").replace(".", " ").split() if word]
-    if len(words) == 1:
+    if len(words) == 1 and len(words[0]) >= _LEAST_LETTERS:
         yield words[0]
     for first, second in permutations(words[:3], 2):
         yield first + second
