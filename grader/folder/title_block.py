@@ -24,12 +24,12 @@ from grader.folder.workers import Pool
 from grader.inputs.measurements import StudentSubmission
 from grader.inputs.roster import Roster, RosterRow
 from grader.inputs.scale_text import SURE
+from grader.pipeline import writing_on
 from grader.records import FloatArray, PageRef, Problem, Written
 from grader.scan.handwriting.captions import (
     NUMBER_WORDS,
     POSITION_WORDS,
     Spotter,
-    spotters,
     written_name,
     written_number,
 )
@@ -98,9 +98,7 @@ def _spellings(row: RosterRow) -> Iterator[str]:
 
 def _writing(cache: PageCache, refs: Sequence[PageRef]) -> list[Spotter]:
     """The lines of writing on plain pages."""
-    pages = [cache.page(ref) for ref in refs]
-    inks = [page.ink for page in pages if page.ink is not None and page.sheet and not page.sheet.zones]
-    return [spotter for ink in inks for spotter in spotters(ink.where)]
+    return [spotter for ref in refs for spotter in writing_on(cache.page(ref))]
 
 
 # Which number -------------------------------------------------------------------------------------

@@ -23,12 +23,11 @@ from grader.folder.batch import Batch, graded
 from grader.folder.title_block import SURELY, names_of
 from grader.inputs.roster import read_roster
 from grader.inputs.scale_text import Declared, parse_scale
-from grader.pipeline import open_page
+from grader.pipeline import open_page, writing_on
 from grader.records import PageRef, ScannedPage
 from grader.scan.handwriting.captions import (
     NUMBER_WORDS,
     captioned_scales,
-    spotters,
     written_name,
     written_number,
 )
@@ -136,10 +135,8 @@ def _count_page(
     tally: CaptionTally, student: PlainStudent, page: ScannedPage, names: Mapping[str, Collection[str]]
 ) -> None:
     """A page's name, and the processor time of reading all that its captions say."""
-    if page.ink is None:
-        return
     start = time.process_time()
-    lines = spotters(page.ink.where)
+    lines = writing_on(replace(page, image=None))
     owner, chance = written_name(lines, names)
     named = time.process_time()
     captioned_scales(lines, SCALE_NAMES)

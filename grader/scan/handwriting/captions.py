@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from grader.inputs.scale_text import parse_scale
-from grader.records import InkMap, Written
+from grader.records import InkMap, Page, Sheet, Written
 from grader.scan.handwriting.fields import meaning_of, placed, read_scale
 from grader.scan.handwriting.lines import Line, find_lines
 from grader.scan.handwriting.model import COLUMN, JUNK, Lattice
@@ -45,9 +45,9 @@ _Places = dict[int, tuple[float, int]]
 _NOWHERE = (-np.inf, -1)
 
 
-def spotters(where: InkMap) -> list["Spotter"]:
+def spotters(page: Page, sheet: Sheet, where: InkMap) -> list["Spotter"]:
     """The lines of writing on a page, ready to be searched."""
-    return [Spotter(line) for line in find_lines(where)]
+    return [Spotter(line) for line in find_lines(page, sheet, where)]
 
 
 class Spotter:

@@ -363,7 +363,7 @@ def _placed(
 
 # Scales -------------------------------------------------------------------------------------------
 
-_PX_PER_MM = 12.0
+PX_PER_MM = 12.0
 """Resolution at which writing is read: a digit of 3 mm is as high as the recogniser's picture, and more."""
 _BORDER_MM, _CELL_BORDER_MM = 0.55, 0.4
 """Inside of a box's and of a cell's printed line, with the print's and the registration's error."""
@@ -404,7 +404,7 @@ def written_scales(page: Page, sheet: Sheet, units: Mapping[str, str] | None = N
         return {}
     scales = {}
     for name in names:
-        lattice = lattice_of(_writing(page, sheet, SCALE_BOXES[name], _BORDER_MM), _PX_PER_MM)
+        lattice = lattice_of(writing(page, sheet, SCALE_BOXES[name], _BORDER_MM), PX_PER_MM)
         if lattice.count:
             scales[name] = read_scale(lattice, name, (units or {}).get(name))
     return scales
@@ -451,11 +451,11 @@ def meaning_of(parsed: ParsedScale) -> object | None:
             return None
 
 
-def _writing(page: Page, sheet: Sheet, box: Box, border_mm: float) -> GreyImage:
+def writing(page: Page, sheet: Sheet, box: Box, border_mm: float) -> GreyImage:
     """Contrast inside a printed box without its border, upright, 12 px/mm; empty outside of the picture."""
     x, y, wide, high = box
     inner = x + border_mm, y + border_mm, wide - 2.0 * border_mm, high - 2.0 * border_mm
-    grey = cut_out(page.grey, sheet.mm_to_px, inner, _PX_PER_MM)
+    grey = cut_out(page.grey, sheet.mm_to_px, inner, PX_PER_MM)
     if grey.size == 0:
         return grey
     paper = max(float(np.quantile(grey, _PAPER)), 1.0)
@@ -479,7 +479,7 @@ def written_lengths(
     for name, boxes in cells.items():
         filled[name] = []
         for box in boxes:
-            sign = _sign(_writing(page, sheet, box, _CELL_BORDER_MM))
+            sign = _sign(writing(page, sheet, box, _CELL_BORDER_MM))
             filled[name].append(None if sign is None else len(pictures))
             if sign is not None:
                 pictures.append(normalised(sign))
@@ -496,11 +496,11 @@ def _sign(grey: GreyImage) -> GreyImage | None:
     """What is written in a cell, cut out; None where it is empty."""
     if grey.size == 0 or grey.max() < _LEAST_PEAK:
         return None
-    soft = cv2.GaussianBlur(grey, (0, 0), _SOFTEN_MM * _PX_PER_MM)
+    soft = cv2.GaussianBlur(grey, (0, 0), _SOFTEN_MM * PX_PER_MM)
     full = max(float(np.quantile(soft, _FULL)), 1.0)
     even = np.asarray(np.clip(soft * (255.0 / full), 0.0, 255.0), dtype=np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats((even > _INK * 255.0).astype(np.uint8))
-    heights = stats[1:, cv2.CC_STAT_HEIGHT] / _PX_PER_MM
+    heights = stats[1:, cv2.CC_STAT_HEIGHT] / PX_PER_MM
     if count == 1 or heights.max() < _LEAST_MM:
         return None
     rows, columns = np.nonzero(np.isin(labels, 1 + np.flatnonzero(heights >= _DUST_MM)))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from grader.inputs.scale_text import SURE, parse_scale
-from grader.records import InkMap
+from grader.records import InkMap, Page, Sheet
 from grader.scan.handwriting.captions import (
     NUMBER_WORDS,
     captioned_scales,
@@ -17,7 +17,7 @@ from grader.scan.handwriting.lines import find_lines
 from samples.simulation.lettering import Handwriting, write
 from samples.simulation.strokes import PenWidth
 
-UNIT = 6.0
+UNIT, FINE = 6.0, 12.0
 HAND = Handwriting(slant=0.1, aspect=0.9, jitter=0.01, unevenness=0.02, gap=0.24)
 PEN = PenWidth("line", 0.4, 0.9, 0.0, 0.0)
 NAMES = {
@@ -27,33 +27,35 @@ NAMES = {
 }
 
 
-def page(*texts: str, ruled: bool = False, height_mm: float = 4.0, seed: int = 5) -> InkMap:
-    """A map of a page with lines of writing, in the cells of a title block or not."""
-    grey = np.zeros((round(100 * UNIT), round(200 * UNIT)), dtype=np.uint8)
+def page(*texts: str, ruled: bool = False, height_mm: float = 4.0, seed: int = 5):
+    """A page with lines of writing, in the cells of a title block or not: its pixels, sheet and ink map."""
+    ink = np.zeros((round(100 * FINE), round(200 * FINE)), dtype=np.uint8)
     rng = np.random.default_rng(seed)
     for row, text in enumerate(texts):
         base = complex(20.0, -(20.0 + 11.0 * row))
         for stroke in write(rng, PEN, text, height_mm, HAND).moved(base).strokes:
-            at = np.column_stack([stroke.points.real, -stroke.points.imag]) * UNIT * 16
-            cv2.polylines(
-                grey,
-                [np.rint(at).astype(np.int32)],
-                isClosed=False,
-                color=230,
-                thickness=2,
-                lineType=cv2.LINE_AA,
-                shift=4,
-            )
+            at = np.column_stack([stroke.points.real, -stroke.points.imag]) * FINE * 16
+            line = [np.rint(at).astype(np.int32)]
+            cv2.polylines(ink, line, isClosed=False, color=230, thickness=4, lineType=cv2.LINE_AA, shift=4)
         if ruled:
             left, top, right, bottom = (
-                round(side * UNIT) for side in (17, 13 + 11 * row, 120, 24 + 11 * row)
+                round(side * FINE) for side in (17, 13 + 11 * row, 120, 24 + 11 * row)
             )
-            cv2.rectangle(grey, (left, top), (right, bottom), 230, 3)
-    return InkMap(grey, UNIT)
+            cv2.rectangle(ink, (left, top), (right, bottom), 230, 5)
+    return on_paper(ink)
+
+
+def on_paper(ink):
+    size = round(ink.shape[1] * UNIT / FINE), round(ink.shape[0] * UNIT / FINE)
+    where = InkMap(cv2.resize(ink, size, interpolation=cv2.INTER_AREA), UNIT)
+    sheet = Sheet(
+        np.diag([FINE, FINE, 1.0]), (200.0, 100.0), "combined", FINE, 0.0, 0.0, 0.0, (0, 0, 200, 100)
+    )
+    return Page("page.png", 1, 255 - ink), sheet, where
 
 
 def scales(*texts: str, names=("kL", "kv", "ka"), **how):
-    return captioned_scales(spotters(page(*texts, **how)), names)
+    return captioned_scales(spotters(*page(*texts, **how)), names)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +108,7 @@ def test_two_captions_of_one_scale_support_each_other_and_contradict_each_other(
 
 
 def number(*texts: str, numbers=range(1, 31)):
-    return written_number(spotters(page(*texts)), numbers, NUMBER_WORDS)
+    return written_number(spotters(*page(*texts)), numbers, NUMBER_WORDS)
 
 
 @pytest.mark.parametrize(
@@ -142,19 +144,19 @@ def test_two_numbers_leave_it_open():
 
 @pytest.mark.parametrize(("text", "student"), [("Nume: Popescu Ana", "s1"), ("Ion Popescu", "s2")])
 def test_a_name_of_the_roster_is_told_from_others_like_it(text, student):
-    found, chance = written_name(spotters(page("Mecanism", text)), NAMES)
+    found, chance = written_name(spotters(*page("Mecanism", text)), NAMES)
     assert found == student
     assert chance > 0.97
 
 
 @pytest.mark.parametrize("text", ["Nume: Ursu Vasile", "Nume: Popescu Mihai", "Grupa M2-04"])
 def test_a_name_that_is_not_on_the_roster_is_nobodys(text):
-    _, chance = written_name(spotters(page("Mecanism", text)), NAMES)
+    _, chance = written_name(spotters(*page("Mecanism", text)), NAMES)
     assert chance < 0.97
 
 
 def test_lines_are_found_with_their_powers_and_points_and_without_ruled_lines():
-    plain, ruled = (find_lines(page("k_a = 5,6 (m/s^2)/mm", ruled=ruled)) for ruled in (False, True))
+    plain, ruled = (find_lines(*page("k_a = 5,6 (m/s^2)/mm", ruled=ruled)) for ruled in (False, True))
     assert len(plain) == len(ruled) == 1
     assert abs(plain[0].signs.count - ruled[0].signs.count) <= 1
     x, y, wide, high = plain[0].box
@@ -163,12 +165,12 @@ def test_lines_are_found_with_their_powers_and_points_and_without_ruled_lines():
 
 
 def test_letters_of_nodes_and_an_empty_page_are_no_lines():
-    assert find_lines(page("A", "B")) == []
-    assert find_lines(InkMap(np.zeros((600, 900), np.uint8), UNIT)) == []
+    assert find_lines(*page("A", "B")) == []
+    assert find_lines(*on_paper(np.zeros((1200, 1800), np.uint8))) == []
 
 
 def test_pieces_without_end_are_no_writing():
-    grey = np.zeros((1200, 1200), dtype=np.uint8)
+    grey = np.zeros((2400, 2400), dtype=np.uint8)
     grey[::12, :] = 200
     grey[:, ::7] = 0
-    assert find_lines(InkMap(grey, UNIT)) == []
+    assert find_lines(*on_paper(grey)) == []
