@@ -189,7 +189,9 @@ def lettering(
     density = np.exp(-gap[rows] / FALL_MM)
     total = density.sum(axis=1) + STRAY
     chance = np.column_stack([letters.probability[rows][:, own].sum(axis=1) for own in signs])
-    fits = chance / np.maximum(known[rows], 1e-6)[:, None] * len(columns) / [max(len(own), 1) for own in signs]
+    fits = (
+        chance / np.maximum(known[rows], 1e-6)[:, None] * len(columns) / [max(len(own), 1) for own in signs]
+    )
     return Lettering(
         tuple(nodes), density / total[:, None], STRAY / total, fits, np.minimum(known[rows], 1.0)
     )
