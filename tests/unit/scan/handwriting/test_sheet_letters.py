@@ -13,7 +13,7 @@ from grader.scan.strokes.ink import find_ink
 from reference.authored.assignment import load_assignment
 from samples.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate
 
-READ_SHARE, TOUCHING_SHARE = 0.85, 0.7
+READ_SHARE, TOUCHING_SHARE = 0.85, 0.45
 """Of the letters of nodes of a careful drawing that are to be read; of those that touch lines."""
 
 
