@@ -29,7 +29,7 @@ BATCH, SIGNS_BATCH = 24, 64
 STEM, HIDDEN = (10, 28), 56
 SHIFT_PX = 8
 """Windows are moved by up to so much, that places within a cell are learnt alike."""
-SHEETS = 60
+SHEETS = 40
 DIGITS = 3000
 
 
@@ -207,7 +207,7 @@ def found_in(data: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     return np.concatenate(pictures), np.concatenate(odds), np.concatenate(signs), missed
 
 
-def train_signs(paths: list[Path], steps: int, out: Path) -> None:
+def train_signs(paths: list[Path], steps: int, out: Path, start: Path | None) -> None:
     """Fit the network that names what the detector finds, and store it."""
     import torch  # noqa: PLC0415 - not needed for drawing windows
     from torch import nn  # noqa: PLC0415
@@ -216,7 +216,6 @@ def train_signs(paths: list[Path], steps: int, out: Path) -> None:
     torch.set_num_threads(1)
     torch.manual_seed(0)
     found = [found_in(path) for path in paths]
-    np.savez(out.with_suffix(".npz"), *found[0][:3])
     pictures = np.concatenate([one[0] for one in found])
     signs = np.concatenate([one[2] for one in found])
     print(len(signs), "places,", (signs < len(DETECTED)).sum(), "signs", flush=True)
@@ -224,6 +223,8 @@ def train_signs(paths: list[Path], steps: int, out: Path) -> None:
     weight = np.bincount(signs, minlength=len(DETECTED) + 1)[signs] ** -0.5
     cumulated = np.cumsum(weight) / weight.sum()
     network = signs_network_of(nn)
+    if start is not None:
+        network.load_state_dict(torch.load(start))
     optimiser = torch.optim.AdamW(network.parameters(), 2e-3, weight_decay=3e-3)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 4e-3, total_steps=steps, pct_start=0.15)
     rng = np.random.default_rng(2)
@@ -240,8 +241,9 @@ def train_signs(paths: list[Path], steps: int, out: Path) -> None:
         if step % 250 == 249:
             print(step + 1, f"{np.mean(losses):.3f}", f"{time.process_time() - began:.0f} s", flush=True)
             losses = []
-            stored_as(network, out, letters.CROP_PX)
+            torch.save(network.state_dict(), out.with_suffix(".pt"))
     stored_as(network, out, letters.CROP_PX)
+    torch.save(network.state_dict(), out.with_suffix(".pt"))
 
 
 def _varied(pictures: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -320,13 +322,14 @@ def main() -> None:
     naming.add_argument("data", type=Path, nargs="+")
     naming.add_argument("--steps", type=int, default=6000)
     naming.add_argument("--out", type=Path, required=True)
+    naming.add_argument("--start", type=Path)
     checking = acts.add_parser("check")
     checking.add_argument("data", type=Path)
     asked = parser.parse_args()
     if asked.act == "windows":
         windows(asked.folder, asked.data, asked.count, asked.seed, LEFT_OUT if asked.left_out else TRAINED_ON)
     elif asked.act == "signs":
-        train_signs(asked.data, asked.steps, asked.out)
+        train_signs(asked.data, asked.steps, asked.out, asked.start)
     elif asked.act == "check":
         calibrated(asked.data)
     else:
