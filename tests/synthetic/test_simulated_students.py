@@ -70,6 +70,17 @@ def told(sheets):
     return vectors, letters, sheets[0].truth["scales"]["declared"]
 
 
+def test_the_signs_of_a_label_fill_its_box():
+    assignment = load_assignment("pump")
+    (sheet, *_) = simulate(assignment, assignment.variant(9), 1, Settings(hand=PERFECT, scan=TINY))
+    labels = [label for label in sheet.truth["labels"] if label["names"]]
+    assert {"A", "o", "b"} <= {label["signs"][0][0] for label in labels}
+    for label in labels:
+        boxes = np.array([sign[1:] for sign in label["signs"]])
+        corners = [*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0)]
+        np.testing.assert_allclose(corners, label["box_mm"], atol=1e-3)
+
+
 def test_a_mistake_is_followed_through():
     assignment = load_assignment("pump")
     student = Student(mistakes=("sense_reversed",))

@@ -2,67 +2,83 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
-from grader.records import Box, FloatArray, GreyImage, Ink, Letters
-from grader.scan.handwriting.model import COLUMN, COOLING, STRANGE, normalised, recognise
-from grader.scan.pixels import lengths_and_directions
+from grader.records import Box, FloatArray, GreyImage, Ink, IntArray, Letters
+from grader.scan.handwriting.model import COLUMN, JUNK, SIGNS
+from grader.scan.pixels import BoolArray, Float32Array, lengths_and_directions
 
-_LEAST_MM, _MOST_MM = 1.0, 9.0
-"""Longer side of what can be a letter: less is a point or a prime, more two letters run together."""
+DETECTED = (*"o123456789", *"aAbBcdDeEfFgGhHJkLmMnNprRstTuvxyz", *"πωεμ", "'")
+"""The signs that the detector knows; points, dashes and brackets are too like ends and pieces of lines."""
+PX_PER_MM = 6.0
+"""Of the ink map that it looks at."""
+CELL_PX = 4
+"""Side of the cells for which it answers."""
+TILE_PX, _MARGIN_PX = 96, 16
+"""It looks at tiles of this side; what lies nearer to a tile's border is left to the neighbour."""
+_AT_ONCE = 16
+"""Tiles whose planes fit into the processor's cache together."""
+UNIT_PX = 8.0
+"""Its distances to a sign's borders are in this unit."""
+_LEAST = -2.0
+"""Places with lower log odds are no sign's middle."""
+CROP_PX, _AROUND, _LEAST_CROP_PX = 32, 1.4, 9.0
+"""A box with its surroundings is brought to this size; a prime has at least so many pixels about it."""
+_COOLING, _STRANGE = 1.05, 0.005
+"""In hands that nobody has seen: what the scores of the signs are multiplied by, and the share of signs of
+which nothing is known. Fitted to fonts left out."""
+_WEIGHTS = (1.26, 0.64, -0.35)
+"""Of the detector's and the other network's log odds that it is a sign, and what is added. Fitted as well."""
+_SAME = 0.5
+"""Boxes that share so much of the smaller one's area are one sign."""
 _FAINT = 20
 """Of 255: fainter is paper."""
 _SHARE = 0.2
 """Of the usual darkness of the sheet's ink: fainter is squared paper, or the back showing through."""
-_PEAK_MM = 0.9
-"""Window of the darkest ink close by: three strokes wide."""
 _GROWN_MM = 0.16
 """Strokes are taken out with so much more than their width: the hand's wobble and the blur."""
 _LONG_MM = 6.0
 """Shorter strokes may be the letters' own."""
-_STUB_MM = 0.9
-"""Smaller pieces that strokes leave are their frayed borders."""
-_TOUCHED = 0.08
-"""A piece is cut free of strokes as well where so much of its ink is theirs."""
-_THIN = 0.13
-"""Of the longer side: thinner is a piece of a line."""
+_REST_PX, _REST = 8, 0.1
+"""A square of this side is looked at where so much of it is ink that no long stroke explains."""
+_ABOUT_MM = 9.0
+"""Letters of nodes are no farther from a long stroke."""
 _GAP, _LEVEL = 0.9, 0.4
 """Signs of one line of writing: so many heights apart, so much of the lower one's height at one level."""
 _WORDS = 7
 """More signs in a line are words or a calculation, no letter of a node."""
-_MOST = 1000
-"""No drawing has more signs: squared paper has, or a picture."""
 
 
 def find_letters(ink: Ink, boxes: Sequence[Box] | None = None) -> Letters:
-    """Every piece of ink that can be a letter of a node, with its probabilities; no words or calculations.
+    """Every sign that can be a node's letter, with its probabilities, also where lines run through it.
 
-    A piece that touches strokes is given as it is and as it remains without them.
+    Words and calculations are left out.
 
     Arguments: `boxes` is where to look, sheet mm; the whole sheet by default.
     """
     unit = ink.where.px_per_mm
     left, top, grey = _window(ink, boxes)
-    mask = _mask(grey, unit)
-    drawn = _drawn(ink, (left, top), mask.shape)
-    pieces = _pieces(mask, unit, _LEAST_MM)
-    rest = mask.copy()
-    for piece in pieces:
-        if drawn[piece.window][piece.own > 0].mean() < _TOUCHED:
-            rest[piece.window] &= 1 - piece.own
-    pieces = _but_words(pieces)
-    cut = _pieces(_without(rest, drawn, _usual_px(ink)), unit, _STUB_MM)
-    whole = np.arange(len(pieces) + len(cut)) < len(pieces)
-    pieces = [*pieces, *cut]
-    box = np.array([piece.box for piece in pieces], dtype=np.float64).reshape(-1, 4)
-    pictures = [normalised(grey[piece.window] * piece.own) for piece in pieces]
-    probability = recognise(pictures, box[:, 2:], COOLING, STRANGE)
-    # A box's edge lies between pixels; the centre of pixel q is at q / unit mm.
-    box[:, :2] += [left - 0.5, top - 0.5]
-    return Letters(box / unit, probability, whole, COLUMN)
+    drawn = _drawn(ink, (left, top), grey.shape)
+    box, probability = _signs(grey, _tiles(grey, drawn))
+    likely = np.flatnonzero(probability[:, COLUMN[JUNK]] < 0.5)
+    alone = np.setdiff1d(np.arange(len(box)), likely[_in_words(box[likely])])
+    box, probability = box[alone], probability[alone]
+    x, y, right, low = np.column_stack([box[:, :2], box[:, :2] + box[:, 2:] + 1]).astype(np.int64).clip(0).T
+    touched = [drawn[part].any() for part in map(_part, y, low, x, right)]
+    # The centre of the map's pixel q is at q / unit mm.
+    box[:, :2] += [left, top]
+    return Letters(box / unit, probability, ~np.array(touched, dtype=bool), COLUMN)
+
+
+def _part(top: int, low: int, left: int, right: int) -> tuple[slice, slice]:
+    return slice(top, low), slice(left, right)
 
 
 def _window(ink: Ink, boxes: Sequence[Box] | None) -> tuple[int, int, GreyImage]:
@@ -75,61 +91,154 @@ def _window(ink: Ink, boxes: Sequence[Box] | None) -> tuple[int, int, GreyImage]
     return left, top, picture[top : max(top, bottom), left : max(left, right)]
 
 
-def _mask(grey: GreyImage, unit: float) -> GreyImage:
-    """Ink as 1: at least half as dark as the darkest ink close by, so that faint letters are whole."""
-    if grey.size == 0:
-        return np.zeros((1, 1), dtype=np.uint8)
+def _tiles(grey: GreyImage, drawn: GreyImage) -> list[tuple[int, int]]:
+    """Left columns and top rows of tiles that hold all ink that long strokes and rings do not explain."""
     some = grey[::11, ::11]
     some = some[some > 2 * _FAINT]
-    least = max(_FAINT, round(_SHARE * float(np.median(some)))) if len(some) else 255
-    side = 2 * round(_PEAK_MM * unit / 2.0) + 1
-    peak = np.asarray(cv2.dilate(grey, np.ones((side, side), np.uint8)), dtype=np.uint8)
-    half = np.maximum(peak >> 1, np.uint8(least))
-    return np.asarray((grey >= half).view(np.uint8))
+    if len(some) == 0:
+        return []
+    least = max(2 * _FAINT, round(_SHARE * float(np.median(some))))
+    dark = cv2.threshold(grey, least, 255, cv2.THRESH_BINARY)[1]
+    rest = _coarse(np.asarray(cv2.subtract(dark, drawn), dtype=np.uint8)) > 255 * _REST
+    # The long side of a square's neighbourhood is odd.
+    about = 2 * round(_ABOUT_MM * PX_PER_MM / _REST_PX) + 1
+    near = cv2.dilate(_coarse(drawn), np.ones((about, about), np.uint8)) > 0
+    wanted = rest & near
+    inner = (TILE_PX - 2 * _MARGIN_PX) // _REST_PX
+    tiles = []
+    for row in range(0, wanted.shape[0], inner):
+        columns = np.flatnonzero(wanted[row : row + inner].any(axis=0))
+        while len(columns):
+            tiles.append((int(columns[0]) * _REST_PX - _MARGIN_PX, row * _REST_PX - _MARGIN_PX))
+            columns = columns[columns >= columns[0] + inner]
+    return tiles
+
+
+def _coarse(plane: GreyImage) -> GreyImage:
+    """Means over squares, those at the right and lower border with paper beyond."""
+    beyond = [-side % _REST_PX for side in plane.shape]
+    whole = cv2.copyMakeBorder(plane, 0, beyond[0], 0, beyond[1], cv2.BORDER_CONSTANT)
+    size = whole.shape[1] // _REST_PX, whole.shape[0] // _REST_PX
+    return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+@cache
+def network(name: str) -> cv2.dnn.Net:
+    """One of the two networks: `detector` or `signs`."""
+    # OpenCV 5's other engine, its default, takes twice as long.
+    classic = {"engine": cv2.dnn.ENGINE_CLASSIC} if hasattr(cv2.dnn, "ENGINE_CLASSIC") else {}
+    return cv2.dnn.readNetFromONNX(str(Path(__file__).with_name(f"{name}.onnx")), **classic)
+
+
+def answers(name: str, pictures: NDArray[np.uint8]) -> Float32Array:
+    """What a network says of (n, h, w) pictures, 255 = ink."""
+    of = network(name)
+    parts = []
+    for first in range(0, len(pictures), _AT_ONCE):
+        of.setInput(pictures[first : first + _AT_ONCE, None].astype(np.float32) / np.float32(255.0))
+        parts.append(np.array(of.forward(), dtype=np.float32))
+    return np.concatenate(parts)
+
+
+def _signs(grey: GreyImage, tiles: Sequence[tuple[int, int]]) -> tuple[FloatArray, FloatArray]:
+    """Boxes (k, 4) x, y, w, h in pixels of `grey`, and (k, signs) probabilities of the signs in the tiles."""
+    if not tiles:
+        return np.zeros((0, 4)), np.zeros((0, len(SIGNS)))
+    around = np.pad(grey, TILE_PX)
+    corners = np.array(tiles)
+    pictures = np.stack([around[y : y + TILE_PX, x : x + TILE_PX] for x, y in corners + TILE_PX])
+    found = peaks(spread(answers("detector", pictures)), _MARGIN_PX // CELL_PX)
+    box = found.box + np.pad(corners[found.tile], ((0, 0), (0, 2)))
+    once = _distinct(box, found.odds)
+    box = box[once]
+    if not len(box):
+        return box, np.zeros((0, len(SIGNS)))
+    return box, probabilities(found.odds[once], answers("signs", crops(grey, box)))
+
+
+def crops(grey: GreyImage, box: FloatArray) -> NDArray[np.uint8]:
+    """(k, 32, 32) pictures of what stands in boxes (k, 4) x, y, w, h, with a margin."""
+    side = np.maximum(_AROUND * box[:, 2:].max(axis=1), _LEAST_CROP_PX)
+    corner = box[:, :2] + box[:, 2:] / 2.0 - side[:, None] / 2.0
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    size = (CROP_PX, CROP_PX)
+    pictures = []
+    for (x, y), scale in zip(corner.tolist(), (side / CROP_PX).tolist(), strict=True):
+        # Pixel q of the crop covers q to q + 1 of its side.
+        to_grey = np.array([[scale, 0.0, x + 0.5 * scale], [0.0, scale, y + 0.5 * scale]])
+        pictures.append(cv2.warpAffine(grey, to_grey, size, flags=flags, borderMode=cv2.BORDER_CONSTANT))
+    return np.array(pictures, dtype=np.uint8).reshape(-1, CROP_PX, CROP_PX)
+
+
+def spread(told: Float32Array) -> Float32Array:
+    """(n, planes, high, wide) answers by cell: the network gives those of two by two cells at one place."""
+    count, planes, high, wide = told.shape
+    told = told.reshape(count, planes // 4, 2, 2, high, wide).transpose(0, 1, 4, 2, 5, 3)
+    return np.ascontiguousarray(told).reshape(count, planes // 4, 2 * high, 2 * wide)
 
 
 @dataclass(frozen=True, slots=True)
-class _InkPiece:
-    """A connected piece of ink: left, top, width, height in pixels, and 1 where it has ink."""
+class Peaks:
+    """Places that are likelier the middle of a sign than those about them.
 
-    box: tuple[int, int, int, int]
-    own: GreyImage
+    Attributes
+    ----------
+    tile : (k,) in which tile
+    box : (k, 4) x, y, w, h of the sign in the tile's pixels
+    odds : (k,) log odds that it is a sign
+    """
 
-    @property
-    def window(self) -> tuple[slice, slice]:
-        x, y, w, h = self.box
-        return slice(y, y + h), slice(x, x + w)
-
-
-def _pieces(mask: GreyImage, unit: float, least_mm: float) -> list[_InkPiece]:
-    """The pieces of a mask that are neither too small nor too large for a sign."""
-    contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-    pieces: list[_InkPiece] = []
-    for index, contour in enumerate(contours):
-        if hierarchy[0, index, 3] >= 0:
-            continue
-        x, y, w, h = cv2.boundingRect(contour)
-        if not least_mm * unit <= max(w, h) <= _MOST_MM * unit or min(w, h) < _THIN * max(w, h):
-            continue
-        own = np.zeros((h, w), dtype=np.uint8)
-        cv2.drawContours(own, [contour], 0, 1, cv2.FILLED, offset=(-x, -y))
-        pieces.append(_InkPiece((x, y, w, h), own & mask[y : y + h, x : x + w]))
-    return pieces if len(pieces) <= _MOST else []
+    tile: IntArray
+    box: FloatArray
+    odds: FloatArray
 
 
-def _but_words(pieces: list[_InkPiece]) -> list[_InkPiece]:
-    """The pieces without those that stand in a line with many others."""
-    if len(pieces) <= _WORDS:
-        return pieces
-    x, y, w, h = np.array([piece.box for piece in pieces], dtype=np.float32).T[:, :, None]
+def peaks(told: Float32Array, margin: int) -> Peaks:
+    """The peaks in tiles; `told` as `spread` gives it, `margin` cells at the border are left out."""
+    odds = told[:, 0]
+    highest = np.stack([cv2.dilate(plane, np.ones((3, 3), np.uint8)) for plane in odds])
+    inner = np.zeros(odds.shape[1:], dtype=bool)
+    inner[margin:-margin, margin:-margin] = True
+    tile, row, column = np.nonzero((odds >= highest) & (odds > _LEAST) & inner)
+    border = told[tile, 1:5, row, column].astype(np.float64)
+    middle = CELL_PX * np.column_stack([column, row]) + (CELL_PX - 1) / 2.0
+    low, far = middle - UNIT_PX * border[:, :2], middle + UNIT_PX * border[:, 2:]
+    box = np.concatenate([low, np.maximum(far - low, 1.0)], axis=1)
+    return Peaks(tile, box, odds[tile, row, column].astype(np.float64))
+
+
+def probabilities(odds: FloatArray, scores: Float32Array) -> FloatArray:
+    """(k, signs) of every sign: the two networks' words together, tempered."""
+    named = np.exp(_COOLING * (scores[:, :-1] - scores[:, :-1].max(axis=1, keepdims=True)).astype(np.float64))
+    against = np.logaddexp.reduce(scores[:, :-1].astype(np.float64), axis=1) - scores[:, -1]
+    sign = 1.0 / (1.0 + np.exp(-(_WEIGHTS[0] * odds + _WEIGHTS[1] * against + _WEIGHTS[2])))
+    share = (1.0 - _STRANGE) * named / named.sum(axis=1, keepdims=True) + _STRANGE / len(DETECTED)
+    probability = np.zeros((len(scores), len(SIGNS)))
+    probability[:, [COLUMN[name] for name in DETECTED]] = sign[:, None] * share
+    probability[:, COLUMN[JUNK]] = 1.0 - sign
+    return probability
+
+
+def _distinct(box: FloatArray, odds: FloatArray) -> IntArray:
+    """One row for each sign: of boxes that overlap the one that is likeliest a sign."""
+    order = np.argsort(-odds, kind="stable")
+    low, far = box[order, :2], box[order, :2] + box[order, 2:]
+    shared = np.maximum(np.minimum(far[:, None], far) - np.maximum(low[:, None], low), 0.0).prod(axis=2)
+    area = box[order, 2:].prod(axis=1)
+    same = shared > _SAME * np.minimum(area[:, None], area)
+    kept = np.zeros(len(order), dtype=bool)
+    for row in range(len(order)):
+        kept[row] = not (same[row] & kept).any()
+    return np.asarray(order[kept], dtype=np.int64)
+
+
+def _in_words(box: FloatArray) -> BoolArray:
+    """Which boxes stand in a line with many others."""
+    x, y, w, h = box.T[:, :, None]
     beside = x.T - x - w < _GAP * np.maximum(h, h.T)
     level = np.minimum(y + h, (y + h).T) - np.maximum(y, y.T) > _LEVEL * np.minimum(h, h.T)
-    line = np.arange(len(pieces))
-    for first, second in np.argwhere(beside & level & (x < x.T)):
-        if line[first] != line[second]:
-            line[line == line[second]] = line[first]
-    many = np.bincount(line)[line] > _WORDS
-    return [piece for piece, is_word in zip(pieces, many, strict=True) if not is_word]
+    line = connected_components(coo_matrix(beside & level & (x < x.T)), directed=False)[1]
+    return np.asarray(np.bincount(line, minlength=1)[line] > _WORDS)
 
 
 def _usual_px(ink: Ink) -> float:
@@ -138,7 +247,7 @@ def _usual_px(ink: Ink) -> float:
 
 
 def _drawn(ink: Ink, corner: tuple[int, int], shape: Sequence[int]) -> GreyImage:
-    """1 where a long fitted stroke or a ring runs."""
+    """255 where a long fitted stroke or a ring runs."""
     unit, shift = ink.where.px_per_mm, 4
     fine = 1 << shift
     drawn = np.zeros(tuple(shape), dtype=np.uint8)
@@ -149,17 +258,8 @@ def _drawn(ink: Ink, corner: tuple[int, int], shape: Sequence[int]) -> GreyImage
     long = lengths_and_directions(ink.strokes.ends)[0] >= _LONG_MM
     for ends, width in zip(px(ink.strokes.ends[long]), ink.strokes.width[long], strict=True):
         pen = max(1, round((width + _GROWN_MM) * unit))
-        cv2.line(drawn, ends[0].tolist(), ends[1].tolist(), 1, pen, cv2.LINE_8, shift)
+        cv2.line(drawn, ends[0].tolist(), ends[1].tolist(), 255, pen, cv2.LINE_8, shift)
     pen = max(1, round(_usual_px(ink)))
     for (x, y), radius in zip(px(ink.circles[:, :2]).tolist(), ink.circles[:, 2], strict=True):
-        cv2.circle(drawn, (x, y), round(radius * unit * fine), 1, pen, cv2.LINE_8, shift)
+        cv2.circle(drawn, (x, y), round(radius * unit * fine), 255, pen, cv2.LINE_8, shift)
     return drawn
-
-
-def _without(mask: GreyImage, drawn: GreyImage, pen_px: float) -> GreyImage:
-    """Ink left when strokes are taken out; across a stroke, ink between ink is put back."""
-    rest = cv2.subtract(mask, drawn)
-    across = round(pen_px) + 2
-    bridged = cv2.morphologyEx(rest, cv2.MORPH_CLOSE, np.ones((across, across), np.uint8))
-    back = cv2.bitwise_and(cv2.bitwise_and(bridged, drawn), mask)
-    return np.asarray(cv2.bitwise_or(rest, back), dtype=np.uint8)

@@ -1,7 +1,7 @@
 """The letter recogniser: alphabet, features, a linear model over them, and letters of a line."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -133,9 +133,6 @@ def _weights(cells: int) -> Float32Array:
 
 # The network --------------------------------------------------------------------------------------
 
-COOLING, STRANGE = 0.43, 0.02
-"""On a drawing, in hands that nobody has seen: what scores are multiplied by, and the share of signs of
-which nothing is known. Fitted to eight handwriting fonts that the network does not know."""
 MODEL = Path(__file__).with_name("letters.npz")
 
 
@@ -190,25 +187,16 @@ def shipped() -> Model:
     return Model.load(MODEL)
 
 
-def recognise(
-    pictures: NDArray[np.uint8] | list[GreyImage],
-    sizes_px: FloatArray,
-    cooling: float | None = None,
-    strange: float = 0.0,
-) -> FloatArray:
+def recognise(pictures: NDArray[np.uint8] | list[GreyImage], sizes_px: FloatArray) -> FloatArray:
     """(n, signs) probability of each sign of `SIGNS` for (n, 28, 28) normalised pictures.
 
     Arguments
     ---------
     sizes_px : (n, 2) width and height of what was cut out
-    cooling : what scores are multiplied by, as the model has it by default
-    strange : share of signs of which nothing is known: any may be meant
     """
     if len(pictures) == 0:
         return np.zeros((0, len(SIGNS)))
-    model = shipped() if cooling is None else replace(shipped(), cooling=cooling)
-    known = model.probability(features(pictures, sizes_px))
-    return (1.0 - strange) * known + strange / len(SIGNS)
+    return shipped().probability(features(pictures, sizes_px))
 
 
 # Signs of a line ----------------------------------------------------------------------------------

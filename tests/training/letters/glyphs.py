@@ -13,6 +13,17 @@ from skimage.morphology import skeletonize
 
 from grader.scan.handwriting.model import JUNK, SIGNS, TWINS
 
+LEFT_OUT = (
+    "cedarville-cursive", "indie-flower", "kalam", "neucha", "playpen-sans", "reenie-beanie", "schoolbell",
+    "the-girl-next-door",
+)  # fmt: skip
+TRAINED_ON = (
+    "annie-use-your-telescope", "architects-daughter", "bad-script", "caveat", "caveat-brush", "chilanka",
+    "comfortaa", "covered-by-your-grace", "delicious-handrawn", "delius", "gaegu", "gloria-hallelujah",
+    "gochi-hand", "handlee", "itim", "long-cang", "mansalva", "marck-script", "nanum-pen-script",
+    "patrick-hand", "poor-story", "shadows-into-light", "short-stack", "sriracha", "sue-ellen-francisco",
+    "swanky-and-moo-moo", "yomogi", "zen-kurenaido", "zhi-mang-xing",
+)  # fmt: skip
 SIZE_PX = 96
 """Type size of the pictures: large against what is scanned, so that pens can be made thick and thin."""
 

@@ -14,22 +14,11 @@ import numpy as np
 from sklearn.neural_network import MLPClassifier
 
 from grader.scan.handwriting.model import JUNK, MODEL, SIGNS, Model, features
-from tests.training.letters.glyphs import Glyph, digits, glyphs_of
+from tests.training.letters.glyphs import LEFT_OUT, TRAINED_ON, Glyph, digits, glyphs_of
 from tests.training.letters.junk import junk
 from tests.training.letters.scans import CLEAR, HARD, Trouble, scanned
 from tests.training.letters.tables import written_tables
 
-LEFT_OUT = (
-    "cedarville-cursive", "indie-flower", "kalam", "neucha", "playpen-sans", "reenie-beanie", "schoolbell",
-    "the-girl-next-door",
-)  # fmt: skip
-TRAINED_ON = (
-    "annie-use-your-telescope", "architects-daughter", "bad-script", "caveat", "caveat-brush", "chilanka",
-    "comfortaa", "covered-by-your-grace", "delicious-handrawn", "delius", "gaegu", "gloria-hallelujah",
-    "gochi-hand", "handlee", "itim", "long-cang", "mansalva", "marck-script", "nanum-pen-script",
-    "patrick-hand", "poor-story", "shadows-into-light", "short-stack", "sriracha", "sue-ellen-francisco",
-    "swanky-and-moo-moo", "yomogi", "zen-kurenaido", "zhi-mang-xing",
-)  # fmt: skip
 CALIBRATED_ON = ("architects-daughter", "handlee", "mansalva", "patrick-hand", "shadows-into-light", "caveat")
 PER_SIGN, JUNK_SHARE, DIGITS = 1500, 0.12, 6000
 HIDDEN = (224, 96)
