@@ -34,12 +34,13 @@ from grader.reading.read import read_figures
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
 from grader.rubric import Asked, RubricFile
 from grader.scan.decode.pages import decode, is_blank
+from grader.scan.handwriting.captions import captioned_scales, spotters
 from grader.scan.handwriting.fields import written_lengths, written_scales
 from grader.scan.handwriting.letters import find_letters
 from grader.scan.register.distortion import straighten
 from grader.scan.register.registration import register
 from grader.scan.strokes.ink import find_ink
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.graph import Construction
 from reference.errors import InputFileError, MechanismError
 
@@ -102,7 +103,8 @@ def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
             if isinstance(ink, Unread):
                 why = f"{ref.file}: page {ref.page} is no drawing: {ink.reason}"
                 return _refused(page, "page_not_a_drawing", why)
-            page = replace(page, ink=replace(ink, letters=find_letters(ink, boxes)))
+            problems += tuple(replace(problem, file=ref.file) for problem in ink.problems)
+            page = replace(page, ink=replace(ink, letters=find_letters(ink, boxes)), problems=problems)
         reading = Reading({}, written=written_scales(image, sheet))
     return replace(page, reading=reading, narrowed=boxes is not None)
 
@@ -118,6 +120,7 @@ def read_submission(
     submission: StudentSubmission, pages: Sequence[ScannedPage], assignment: Assignment, asked: Asked
 ) -> list[ScannedPage]:
     """The submission's pages with every vector of the figures that are asked for."""
+    pages = [_with_captions(page, assignment, missing_scales(submission)) for page in pages]
     read = read_pages(pages, assignment, submission.variant, submission.declared, asked.vectors)
     drawn = {figure for page in read for figure in page.reading.figures}
     if any(page.narrowed for page in pages) and not asked.figures <= drawn:
@@ -126,6 +129,21 @@ def read_submission(
         whole = [scan(page.ref, all_of_it) if page.narrowed else page for page in pages]
         read = read_pages(whole, assignment, submission.variant, submission.declared, asked.vectors)
     return read
+
+
+def missing_scales(submission: StudentSubmission) -> tuple[str, ...]:
+    """The scales that neither the roster nor measurements declare: those are looked for on plain paper."""
+    measured = {} if submission.measured is None else submission.measured.scales
+    return tuple(name for name in SCALE_NAMES if name not in submission.declared and name not in measured)
+
+
+def _with_captions(page: ScannedPage, assignment: Assignment, names: Collection[str]) -> ScannedPage:
+    """A plain page with the scales of these names that are written on it; a printed sheet has boxes."""
+    if not names or page.ink is None or page.sheet is None or page.sheet.zones:
+        return page
+    units: Mapping[str, str] = dict(assignment.file.scales.bare_units.items())
+    written = captioned_scales(spotters(page.ink.where), names, units)
+    return replace(page, reading=replace(page.reading, written=written))
 
 
 def read_pages(

@@ -308,6 +308,7 @@ class Ink:
     where : the ink map
     letters : what can be written signs, None where they were not looked for
     tips : where vectors end along the strokes
+    problems : what of the page was left out, or may be
     """
 
     strokes: Strokes
@@ -316,6 +317,7 @@ class Ink:
     where: InkMap
     letters: Letters | None = None
     tips: Tips = NO_TIPS
+    problems: tuple[Problem, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -367,12 +369,12 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What was written into a printed box for a scale.
+    """What was written: a scale in its printed box or behind its label on plain paper, or a number.
 
     Attributes
     ----------
     text : the likeliest text; empty where nothing could be read
-    confidence : probability that this is the scale written, whatever its spelling
+    confidence : probability that this is what was written, whatever its spelling
     others : texts of other meaning with their probabilities, likeliest first
     """
 
@@ -415,7 +417,8 @@ class Reading:
     figures : by `mechanism`, `velocity_plan`, `acceleration_plan`; absent where not on the sheet
     unread : what was asked for and not read
     problems : what a person should know
-    written : what stands in the printed boxes, by scale; empty boxes are left out
+    written : what stands in the printed boxes, or in captions on plain paper, by scale; empty boxes are left
+        out
     lengths : measured lengths that stand in the printed cells, mm, and the probability of it, by vector
     swapped : letters that stand at each other's node; the figures keep the construction's names
     """

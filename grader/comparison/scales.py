@@ -287,7 +287,7 @@ Source = Literal["roster", "measurements", "box"]
 SOURCES: Mapping[Source, str] = {
     "roster": "the roster",
     "measurements": "the measurements",
-    "box": "the box",
+    "box": "the sheet",
 }
 """What messages call them."""
 
@@ -357,17 +357,27 @@ def _believed(
         return None, []
     best = max(boxes, key=lambda box: box.confidence)
     if not best.text:
-        message = f"{name}'s box could not be read; enter {name} in the roster or with the measurements"
+        message = (
+            f"{name} on the sheet could not be read; enter {name} in the roster or with the measurements"
+        )
         return None, [Problem("scale_box_unread", message)]
-    message = f"{name}'s box seems to read '{best.text}' ({100 * best.confidence:.0f} %)"
-    very = best.confidence >= LIKELY and _is_borne_out(task, evidence, name, best.text, known, SAME)
-    if best.confidence < SURE and not very:
-        why = "too unsure to be used"
-        return None, [Problem("scale_box_doubtful", f"{message}, {why}; look, and enter {name}")]
+    message = f"{name} on the sheet seems to read '{best.text}' ({100 * best.confidence:.0f} %)"
+    if best.confidence < SURE:
+        likely = (
+            Written(*read) for read in ((best.text, best.confidence), *best.others) if read[1] >= LIKELY
+        )
+        very = (one for one in likely if _is_borne_out(task, evidence, name, one.text, known, SAME))
+        chosen = next(very, None)
+        if chosen is None:
+            why = "too unsure to be used"
+            return None, [Problem("scale_box_doubtful", f"{message}, {why}; look, and enter {name}")]
+        best = chosen
     sure = [box for box in boxes if box.confidence >= SURE]
     if any(not _is_same(task, name, box.text, best.text, known) for box in sure):
         each = " and ".join(f"'{box.text}'" for box in sure)
-        return None, [Problem("scale_box_disagrees", f"{name}'s boxes read {each}: none is used; look")]
+        return None, [
+            Problem("scale_box_disagrees", f"{name} reads {each} on the sheets: none is used; look")
+        ]
     if _is_borne_out(task, evidence, name, best.text, known):
         return best, []
     if best.confidence < BEYOND_DOUBT:
@@ -377,7 +387,7 @@ def _believed(
 
 
 def _contradicts(name: str, box: Written, text: str, source: Source) -> Problem:
-    message = f"{name}'s box reads '{box.text}' ({100 * box.confidence:.0f} %)"
+    message = f"{name} on the sheet reads '{box.text}' ({100 * box.confidence:.0f} %)"
     return Problem("scale_box_disagrees", f"{message}, {SOURCES[source]} '{text}', which is used")
 
 

@@ -34,7 +34,7 @@ METHODS = {
 SOURCES = {
     "roster": N_("from the roster"),
     "measurements": N_("from the measurements"),
-    "box": N_("read in the sheet's box"),
+    "box": N_("read on the sheet"),
 }
 DARK_COLOURS = {
     "full": "#4fc3ad",
@@ -131,6 +131,10 @@ PROBLEMS: dict[str, str] = {
     "page_not_a_drawing": N_(
         "The page is no drawing: it has far too many lines, or its tones are inverted. Scan it in greyscale."
     ),
+    "squared_paper": N_(
+        "The paper is squared: what is drawn no darker than its printed lines was left out. Use plain paper."
+    ),
+    "title_block_unsure": N_("A large area at the lower right was taken for the title block and left out."),
     "calibration_page": N_("This is the calibration page, not a drawing."),
     "print_scaled": N_("The sheet was printed or copied at another scale than 1:1."),
     "resolution_wrong": N_("The resolution that the file states is wrong."),
@@ -162,9 +166,9 @@ PROBLEMS: dict[str, str] = {
     "measurement_not_used": N_("A measured value is not asked for in this assignment."),
     "roster_columns": N_("Columns of the roster without meaning here were passed over."),
     "scale_refused": N_("A declared scale could not be understood."),
-    "scale_box_unread": N_("A scale written in its box could not be read."),
-    "scale_box_doubtful": N_("A scale written in its box could not be read surely; it was not used."),
-    "scale_box_disagrees": N_("A scale written in its box contradicts another declaration of it."),
+    "scale_box_unread": N_("A scale written on the sheet could not be read."),
+    "scale_box_doubtful": N_("A scale written on the sheet could not be read surely; it was not used."),
+    "scale_box_disagrees": N_("A scale written on the sheet contradicts another declaration of it."),
     "scale_disagrees": N_("Sources disagree about a scale; none of them is used."),
     "measurements_twice": N_("There are several sets of measurements; they were taken together."),
     "measurements_disagree": N_("Sets of measurements disagree; what they disagree about is not used."),

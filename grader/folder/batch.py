@@ -2,6 +2,7 @@
 
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -40,12 +41,13 @@ from grader.folder.decisions import ClassDecisions, class_decisions, decisions_p
 from grader.folder.inventory import FileContent, Progress, submissions, take_inventory
 from grader.folder.owners import Unmatched, assign_pages
 from grader.folder.submissions import Unusable, submissions_of
+from grader.folder.title_block import with_written_numbers, written_owners
 from grader.folder.workers import ENDED, Limits, Pool, Workers
 from grader.inputs.measurements import StudentSubmission, names_of
 from grader.inputs.roster import Roster, read_roster
 from grader.lms.table import write_summary
 from grader.marking.report import unjudged_report
-from grader.pipeline import mark, read_submission
+from grader.pipeline import mark, missing_scales, read_submission
 from grader.records import PageRef, Problem, ScannedPage
 from grader.rubric import RubricFile, asked_of, rubric_of
 from grader.similarity.groups import find_similar
@@ -150,7 +152,7 @@ def _graded(
     notes = batch.out / CACHE_FOLDER
     names, cache = names_of(batch.assignment), _page_cache(batch)
     contents = take_inventory(files, batch.folder, names, workers, progress, cache, decisions.place)
-    students, unmatched = _submissions(batch, roster, contents, decisions)
+    students, unmatched = _submissions(batch, (roster, decisions), contents, cache, workers)
     if not students and not unmatched:
         raise _nothing(batch)
     before = earlier(batch.out / "results.json", batch.assignment.id)
@@ -234,11 +236,17 @@ def _files(batch: Batch) -> list[Path]:
 
 
 def _submissions(
-    batch: Batch, roster: Roster | None, contents: Sequence[FileContent], decisions: ClassDecisions
+    batch: Batch,
+    listed: tuple[Roster | None, ClassDecisions],
+    contents: Sequence[FileContent],
+    cache: PageCache,
+    workers: Pool,
 ) -> tuple[list[StudentSubmission], list[UnmatchedDocument]]:
     """Every student's submission, and what is nobody's."""
+    roster, decisions = listed
     measured = [row for content in contents for row in content.measurements]
-    owners = assign_pages(
+    assigned = partial(
+        assign_pages,
         [page for content in contents for page in content.pages],
         roster,
         batch.assignment.id,
@@ -246,6 +254,9 @@ def _submissions(
         student_ids=[row.student_id for row in measured if row.student_id],
         decided=decisions.owners(roster),
     )
+    owners = assigned()
+    written = written_owners(owners.unmatched, roster, cache, workers)
+    owners = assigned(written=written) if written else owners
     refused = [(content.refused, content.students) for content in contents if content.refused is not None]
     unusable = [Unusable((Problem(file.code, file.message, file.file),), who) for file, who in refused]
     students, strangers = submissions_of(
@@ -256,6 +267,7 @@ def _submissions(
         UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
         for problem in owners.problems
     ]
+    students = with_written_numbers(students, roster, batch.assignment, cache, workers)
     students = decisions.give(students, batch.assignment, batch.rubric)
     return students, [*(file for file, _ in refused), *unmatched, *strangers, *missing]
 
@@ -360,7 +372,8 @@ def _job(submission: StudentSubmission, folder: str, depends: tuple[str, str]) -
         (page.file, page.page, page.digest, page.problem, page.turn_deg, page.corners_px)
         for page in submission.pages
     ]
-    reading_key = digest_of((read, submission.variant, sorted(submission.declared.items()), pages))
+    declared = (sorted(submission.declared.items()), missing_scales(submission))
+    reading_key = digest_of((read, submission.variant, declared, pages))
     key = digest_of((marked, reading_key, replace(submission, pages=())))
     return Job(submission, folder, reading_key, key)
 

@@ -65,7 +65,7 @@ SCAN_STAGE = (
 CELL_STAGE = ("grader.printed.layout",)
 """What says where a printed sheet's cells are, beside `CELLS_OF`."""
 CELLS_OF = ("grader.printed.answer_sheet",)
-READ_STAGE = ("grader.reading.read", "grader.inputs.scale_text")
+READ_STAGE = ("grader.reading.read", "grader.inputs.scale_text", "grader.scan.handwriting.captions")
 """What `grader.pipeline.read_submission` calls beside them."""
 MARK_STAGE = ("grader.folder.batch",)
 """What marks and writes, with all that it rests on."""

@@ -33,9 +33,9 @@ from reference.errors import CallError
 from reference.geometry import ComplexArray
 
 SURE, CHECK = "yes", "check"
-_LIKE_MM = 150.0
+LIKE_MM = 150.0
 """Length of lines matched, less half of those missed, from which a suggestion is made."""
-_CLEAR = 0.75
+CLEAR = 0.75
 """The next best variant must match this share of it, or less, to be told apart."""
 _NAMED = 6
 
@@ -134,10 +134,10 @@ def _by_similarity(
     if strokes is None or len(variants) < 2:
         return None
     matched = figure_similarity(strokes, assignment, list(variants))
-    if matched.max() < _LIKE_MM:
+    if matched.max() < LIKE_MM:
         return None
     near = [
-        variant for variant, score in zip(variants, matched, strict=True) if score > _CLEAR * matched.max()
+        variant for variant, score in zip(variants, matched, strict=True) if score > CLEAR * matched.max()
     ]
     rows = [row for variant in near for row in variants[variant]]
     names = ", ".join(_who(row) for row in rows[:_NAMED]) + (", ..." if len(rows) > _NAMED else "")

@@ -2,7 +2,8 @@
 
 Sources, the first that speaks decides: the page's QR code; the roster's `scans`; the roster's order
 over one class file (`--pages-per-student`); the file's name. All that speak must agree: a page on
-which two disagree is unmatched, and the problem names both. What a person decided goes before all.
+which two disagree is unmatched, and the problem names both. Where none of them speaks, a name of the
+roster that surely stands on the page decides. What a person decided goes before all.
 Codes of the problems:
 
 | code | meaning |
@@ -36,6 +37,7 @@ class How(Enum):
     SCANS = "roster's scans"
     ORDER = "roster's order"
     NAME = "file name"
+    WRITTEN = "name on the sheet"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +85,7 @@ class _Claim:
     text: str
 
 
-def assign_pages(
+def assign_pages(  # noqa: PLR0913 - a source of owners each
     pages: Sequence[PageRef],
     roster: Roster | None,
     assignment_id: str,
@@ -91,6 +93,7 @@ def assign_pages(
     pages_per_student: int | None = None,
     student_ids: Iterable[str] = (),
     decided: Mapping[tuple[str, int], RosterRow] = MappingProxyType({}),
+    written: Mapping[tuple[str, int], str] = MappingProxyType({}),
 ) -> PageOwners:
     """Give every page its owner.
 
@@ -100,6 +103,7 @@ def assign_pages(
         `student_ids` (of measurement files, for example) name
     pages_per_student : pages that each student has in the one class file, blank ones not counted
     decided : the owners that a person gave, by file and page
+    written : the students whose names stand on pages, by file and page
     """
     owners = [row.student_id for row in decided.values()]
     listed = roster if roster is not None else _improvised(pages, [*student_ids, *owners])
@@ -119,6 +123,9 @@ def assign_pages(
             blank.append(page)
             continue
         claims = [*certain[index], *([order[index]] if index in order else [])]
+        name = written.get((page.file, page.page))
+        if name is not None and not claims:
+            claims = [_Claim(How.WRITTEN, listed.rows_of(name), f"the name on the sheet: {name}")]
         settled = _settle(page, claims, listed, assignment_id, refusals.get(page.file))
         if isinstance(settled, Owned):
             owned.append(settled)

@@ -36,6 +36,10 @@ REPORTED = 0.5
 """Probability from which a swap is reported."""
 COMPONENTS = ("n_", "k_")
 """How names of ends of normal and Coriolis components begin: few write them, and they share a letter."""
+USUAL_SHARE = 0.04
+"""Of a sign among the pieces of a sheet: one in some 25."""
+LEGIBLE, LEGIBLE_COMPONENT = 0.6, 0.2
+"""Shares of nodes whose letters are written and read."""
 POLE_SIGNS = ("o", "p", "π")
 """What the pole of a plan is called in different schools."""
 
@@ -107,12 +111,12 @@ def lettered(
     figures, swaps = dict(reading.figures), []
     for first, second, nats in writing.swaps():
         (figure, p), (_, q) = writing.nodes[first], writing.nodes[second]
-        if figure == MECHANISM or any(name in poles or name.startswith(COMPONENTS) for name in (p, q)):
+        if figure == MECHANISM or any(name.startswith(COMPONENTS) for name in (p, q)):
             continue
         chance = 1.0 / (1.0 + math.exp(RARE_NATS - nats))
         left = min(1.0, (1.0 - chance) / (1.0 - PRIOR_OF_SWAP))
         figures[figure] = _doubted(figures[figure], {p, q}, construction, left)
-        if chance >= REPORTED:
+        if chance >= REPORTED and not {p, q} & poles:
             swaps.append(Swapped(figure, p, q, chance))
     swaps.sort(key=lambda swap: -swap.confidence)
     return replace(reading, figures=figures, swapped=tuple(swaps))
@@ -131,6 +135,29 @@ def _doubted(figure: Figure, names: Collection[str], construction: Construction,
         for name, read in figure.vectors.items()
     }
     return Figure(nodes, vectors)
+
+
+def fitting_letters(
+    name: str,
+    at: ComplexArray,
+    letters: Letters | None,
+    poles: Collection[str],
+    renamed: Mapping[str, str],
+) -> FloatArray:
+    """(j,) nats of each of some places for being the node of this name, by the letters near them."""
+    if letters is None or not len(letters):
+        return np.zeros(len(at))
+    signs = _signs(name, poles, renamed, letters)
+    high = letters.height_mm
+    gap = _gaps(letters.box_mm, at)
+    near = (gap.min(axis=1) < REACH_MM) & (high > LEAST_MM) & (high < MOST_MM)
+    chance = letters.probability[:, signs].sum(axis=1)[near]
+    if not len(chance):
+        return np.zeros(len(at))
+    fits = chance / USUAL_SHARE
+    beside = (fits[:, None] * np.exp(-gap[near] / FALL_MM)).max(axis=0)
+    legible = LEGIBLE_COMPONENT if name.startswith(COMPONENTS) else LEGIBLE
+    return np.asarray(np.log(1.0 - legible + legible * beside))
 
 
 def lettering(
@@ -162,7 +189,7 @@ def lettering(
     density = np.exp(-gap[rows] / FALL_MM)
     total = density.sum(axis=1) + STRAY
     chance = np.column_stack([letters.probability[rows][:, own].sum(axis=1) for own in signs])
-    fits = chance / np.maximum(known[rows], 1e-6)[:, None] * len(columns) / [len(own) for own in signs]
+    fits = chance / np.maximum(known[rows], 1e-6)[:, None] * len(columns) / [max(len(own), 1) for own in signs]
     return Lettering(
         tuple(nodes), density / total[:, None], STRAY / total, fits, np.minimum(known[rows], 1.0)
     )

@@ -83,7 +83,8 @@ class Desk:
         frame = page.draw_frame(sketch)
         room, taken = self._room()
         corner = frame.corners[2] if frame.corners else complex(room[0] + room[2], -room[1] - room[3])
-        rows = wording.title_rows(self.task, self.settings.page, sketch.rng, written)
+        in_title = written if self.settings.page.title_block != "none" else {}
+        rows = wording.title_rows(self.task, self.settings.page, sketch.rng, in_title)
         words = wording.WORDS[self.settings.page.language]
         rows[1].insert(0, f"{words['name']}: {self.student_id}")
         rows[-1].append(f"{words['sheet']} {number[0]}/{number[1]}")

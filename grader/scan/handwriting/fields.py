@@ -11,7 +11,16 @@ import numpy as np
 from grader.inputs.scale_text import ByRule, Declared, ParsedScale, parse_scale
 from grader.printed.layout import SCALE_BOXES, SCALE_OF
 from grader.records import Box, FloatArray, GreyImage, Page, Sheet, Written
-from grader.scan.handwriting.model import COLUMN, JUNK, Lattice, Segment, lattice_of, normalised, recognise
+from grader.scan.handwriting.model import (
+    COLUMN,
+    JUNK,
+    SIGNS,
+    Lattice,
+    Segment,
+    lattice_of,
+    normalised,
+    recognise,
+)
 from grader.scan.pixels import cut_out
 
 # What may stand in a scale's box, sign by sign ----------------------------------------------------
@@ -34,8 +43,15 @@ _MOST_DIGITS = 7
 """Of a number, its decimals included; more are not followed."""
 _BEAM = 60
 """The likeliest texts up to a piece of ink, which are followed further."""
-_SKIPPED = -2.0
-"""A piece of ink taken for no sign: beside its own probability of being none."""
+_MISSHAPEN = -4.0
+"""A letter of a unit that looks like none, or two that touch, against the likeliest sign."""
+_MARK_LOST = -3.0
+"""A decimal mark behind a leading nought that left no ink."""
+_FAR = 18.0
+"""Nats: texts so much less likely than signs at will are not followed."""
+_SKIPPED, _SIGN_SKIPPED = -2.0, -5.0
+"""A piece of ink taken for no sign, as low as a point and as high as a sign: beside its own probability of
+being none."""
 _MISPLACED = -4.0
 """A sign whose size or place in the line is another sign's."""
 _SMALL = 0.35
@@ -49,6 +65,8 @@ _LOW, _HIGH = 0.72, 0.35
 _FOOT = 0.45
 """Of the line's height: what is smaller and low in the line is a point or a comma, of this probability."""
 _CERTAIN = float(np.log(0.95))
+_BAR, _WIDE_BAR, _HIGHEST_PAIR = 0.3, 0.3, 0.95
+"""Of the line's height: lower are bars and points; bars are wider; so high are two over each other."""
 _MERGED = -0.7
 """For each further piece of ink that a sign is taken to be made of."""
 
@@ -60,6 +78,8 @@ class Move:
     sign: str
     text: str
     state: "State"
+    in_tail: bool = False
+    cost: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +122,7 @@ class State:
 def units(name: str) -> tuple[str, ...]:
     """The units of a scale as people write them, and none."""
     spellings = [""]
-    for real, paper in product(_LENGTHS, _LENGTHS):
+    for real, paper in product(_LENGTHS, _LENGTHS[1:]):
         if name == "kL":
             spellings.append(f"{real}/{paper}")
             continue
@@ -156,6 +176,10 @@ def _digits(state: State) -> Iterable[Move]:
         nought = replace(after, is_nought=state.digits == 0)
         for digit, sign in _DIGIT_SIGNS.items():
             yield Move(sign, digit, nought if digit == "0" else after)
+    if state.is_nought and not state.marked:
+        behind = State("number", state.digits + 1, marked=True, after=state.after)
+        for digit, sign in _DIGIT_SIGNS.items():
+            yield Move(sign, f".{digit}", behind, cost=_MARK_LOST)
     if state.digits and not state.marked:
         marked = State("number", state.digits, marked=True, bare_mark=True, after=state.after)
         for text, sign in _MARKS.items():
@@ -174,13 +198,13 @@ def _tails(name: str, after: tuple[str, ...]) -> Iterable[Move]:
         if first == "^":
             # The raised 2 alone is written; the sign for a power is only ours.
             for rest in rests:
-                yield Move(rest[0], f"^{rest[0]}", State("tail", after=(rest[1:],)))
+                yield Move(rest[0], f"^{rest[0]}", State("tail", after=(rest[1:],)), in_tail=True)
             continue
         if first == ":":
             yield Move(":", ":", State("tail", after=tuple("#:" for _ in rests)))
             continue
         for sign in _SPELT.get(first, (first,)):
-            yield Move(sign, first, State("tail", after=tuple(rests)))
+            yield Move(sign, first, State("tail", after=tuple(rests)), in_tail=True)
 
 
 # The likeliest texts ------------------------------------------------------------------------------
@@ -200,24 +224,37 @@ def texts_of(lattice: Lattice, name: str) -> tuple[list[ScaleText], float]:
     The second value is what the ink would be worth if any signs might stand in any order: a text that
     is much less likely than that was read into the ink.
     """
-    line = _line(lattice)
+    after = placed(lattice)
+    high = _BAR * _line(lattice)[0]
     beams: list[dict[tuple[State, str], float]] = [{} for _ in range(lattice.count + 1)]
     beams[0][start(name), ""] = 0.0
     free = np.full(lattice.count + 1, -np.inf)
     free[0] = 0.0
     for piece in range(lattice.count):
-        best = sorted(beams[piece].items(), key=lambda item: -item[1])[:_BEAM]
-        for segment in lattice.starting(piece):
-            log = _placed(segment, line) + _MERGED * (segment.last - piece - 1)
+        likely = [item for item in beams[piece].items() if item[1] > free[piece] - _FAR]
+        best = sorted(likely, key=lambda item: -item[1])[:_BEAM]
+        for segment, log in after:
+            if segment.first != piece:
+                continue
             skipped = segment.last == piece + 1
-            alone = float(segment.log[COLUMN[JUNK]]) + _SKIPPED
+            dust = segment.box[3] < high
+            alone = float(segment.log[COLUMN[JUNK]]) + (_SKIPPED if dust else _SIGN_SKIPPED)
             free[segment.last] = max(
                 free[segment.last], free[piece] + float(log[: COLUMN[JUNK]].max()), free[piece] + alone
             )
+            misshapen = float(log[: COLUMN[JUNK]].max()) + _MISSHAPEN
             for (state, text), score in best:
                 target = beams[segment.last]
                 for move in moves(name, state):
-                    _keep(target, (move.state, text + move.text), score + float(log[COLUMN[move.sign]]))
+                    worth = float(log[COLUMN[move.sign]]) + move.cost
+                    if move.in_tail:
+                        worth = max(worth, misshapen)
+                    _keep(target, (move.state, text + move.text), score + worth)
+                    if skipped and move.in_tail:
+                        for touching in moves(name, move.state):
+                            if touching.in_tail:
+                                both = text + move.text + touching.text
+                                _keep(target, (touching.state, both), score + misshapen)
                 if skipped:
                     _keep(target, (state, text), score + alone)
     ended: dict[str, float] = {}
@@ -243,28 +280,50 @@ def _line(lattice: Lattice) -> tuple[float, float, float]:
     return high, float(np.median(tall[:, 1])), float(np.median(tall[:, 1] + tall[:, 3]))
 
 
-def _placed(segment: Segment, line: tuple[float, float, float]) -> FloatArray:
-    """(signs,) log probabilities with what size and place in the line say of each sign.
+def placed(lattice: Lattice) -> list[tuple[Segment, FloatArray]]:
+    """Each segment with (signs,) log probabilities, with what size and place in the line say of each sign.
 
     Shapes alone do not tell a point from an o: a small mark at the foot of the line is a point or a
-    comma, whatever it looks like.
+    comma, whatever it looks like; two small marks over each other are a colon or an equals sign.
     """
-    high, top, bottom = line
-    _, y, _, h = segment.box
-    share = h / max(high, 1.0)
+    line = _line(lattice)
+    high = max(line[0], 1.0)
+    alone = {s.first: s.box for s in lattice.segments if s.last == s.first + 1}
+    return [
+        (
+            segment,
+            _placed(segment, [alone[piece] for piece in range(segment.first, segment.last)], line, high),
+        )
+        for segment in lattice.segments
+    ]
+
+
+def _placed(
+    segment: Segment,
+    pieces: Sequence[tuple[int, int, int, int]],
+    line: tuple[float, float, float],
+    high: float,
+) -> FloatArray:
+    _, top, bottom = line
+    _, y, w, h = segment.box
+    share = h / high
     middle = (y + h / 2.0 - top) / max(bottom - top, 1.0)
-    log = segment.log.copy()
-    if share < _FOOT and middle > _LOW:
-        log[[COLUMN[sign] for sign in _DOTS]] = _CERTAIN
-    for sign, column in _COLUMNS.items():
-        if sign in _DOTS:
+    log = segment.log + _MERGED * (len(pieces) - 1)
+    sure = ""
+    if len(pieces) == 1 and share < _FOOT and middle > _LOW:
+        sure = ".'"
+    elif len(pieces) == 1 and share < _BAR and _HIGH < middle < _LOW:
+        sure = "-" if w > _WIDE_BAR * high else "."
+    elif len(pieces) == 2 and max(piece[3] for piece in pieces) < _BAR * high and share < _HIGHEST_PAIR:
+        sure = "=" if w > _WIDE_BAR * high else ":"
+    for column, sign in enumerate(SIGNS[: COLUMN[JUNK]]):
+        if sign in sure:
+            log[column] = _CERTAIN
+        elif sign in _DOTS:
             log[column] += _MISPLACED * (float(share > _TALL) + float(middle < _HIGH))
         elif sign not in _FLAT and share < _SMALL:
             log[column] += _MISPLACED
     return log
-
-
-_COLUMNS: Mapping[str, int] = {sign: column for sign, column in COLUMN.items() if sign}
 
 
 # Scales -------------------------------------------------------------------------------------------
@@ -279,6 +338,8 @@ _FOREIGN = 0.25
 """Log likelihood by sign that a text may lack against signs at will, before it is doubted."""
 _LARGE, _HARDLY = 1000.0, -4.0
 """From here on, a number lost its decimal point more likely than that anybody chose the scale."""
+_RARE, _RARE_UNITS = -2.0, ("mm/s", "cm/s", "cm/mm", "mm/mm", "/cm", "·cm", "*cm")
+"""Scales that few people write: for each such unit in the text."""
 _MOST_TEXTS = 200
 """The likeliest, among which those that mean the same are put together."""
 _DIGITS = "0123456789"
@@ -334,16 +395,18 @@ def _by_meaning(texts: list[ScaleText], name: str, bare_unit: str | None) -> dic
     """Texts that mean the same put together: the likeliest spelling, and the log of their sum."""
     meanings: dict[object, tuple[str, float]] = {}
     for candidate in texts:
-        meaning = _meaning(parse_scale(name, candidate.text, bare_unit=bare_unit))
+        meaning = meaning_of(parse_scale(name, candidate.text, bare_unit=bare_unit))
         if meaning is None:
             continue
         unlikely = _HARDLY if isinstance(meaning, float) and meaning >= _LARGE else 0.0
+        unlikely += _RARE * sum(rare in candidate.text for rare in _RARE_UNITS)
         text, log = meanings.get(meaning, (candidate.text, -np.inf))
         meanings[meaning] = (text, float(np.logaddexp(log, candidate.log + unlikely)))
     return meanings
 
 
-def _meaning(parsed: ParsedScale) -> object | None:
+def meaning_of(parsed: ParsedScale) -> object | None:
+    """What is the same for all texts that declare the same scale; None for those that declare none."""
     match parsed:
         case Declared(per_mm=value):
             return float(f"{value:.9g}")

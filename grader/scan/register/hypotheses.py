@@ -62,10 +62,14 @@ class Hypothesis:
 
 @dataclass(frozen=True, slots=True)
 class Resolution:
-    """The resolution to go by: as stated, or as the image's size and a usual dpi suggest."""
+    """The resolution to go by: as stated, or as the image's size and a usual dpi suggest.
+
+    `is_sure` where it is stated, and where the image has exactly A3's pixels by it.
+    """
 
     dpi: tuple[float, float]
     stated: bool
+    is_sure: bool
 
 
 def hypotheses(
@@ -164,7 +168,7 @@ def _is_scan(resolution: Resolution | None, shape: tuple[int, int]) -> bool:
     camera's picture seldom has the shape of the sheet.
     """
     is_sheet = abs(np.log(max(shape) / min(shape) * PAGE_MM[1] / PAGE_MM[0])) < _SCANNED_WITHIN
-    return resolution is not None and resolution.stated and bool(is_sheet)
+    return resolution is not None and resolution.is_sure and bool(is_sheet)
 
 
 def _is_possible(params: FloatArray, resolution: Resolution) -> bool:
@@ -210,7 +214,7 @@ def _scan_misfit(params: FloatArray, resolution: Resolution | None) -> float:
     unequal = (params[0] - params[1]) / _UNEQUAL_SE
     penalty = 0.5 * unequal**2
     if resolution is not None:
-        se, most = (_DPI_SE, 3.0) if resolution.stated else (_WINDOW_SE, 1.5)
+        se, most = (_DPI_SE, 3.0) if resolution.is_sure else (_WINDOW_SE, 1.5)
         wrong = (params[:2] - np.log(np.array(resolution.dpi) / MM_PER_INCH)) / se
         penalty += min(most, 0.25 * float(wrong @ wrong))
     return float(penalty)

@@ -1,0 +1,224 @@
+"""What stands in the title block of plain paper: whose page it is, and the number of the variant.
+
+Writing alone decides nothing: a name counts where it is surely one of the roster's, a number where the
+drawing looks like that number's variant. Codes of the problems:
+
+| code | meaning |
+|---|---|
+| number_read | the number is as written on the sheet, and the drawing looks like it |
+| number_contradicted | the drawing looks like another number's |
+| number_doubtful | the number could not be read, or not surely |
+"""
+
+import unicodedata
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+
+from grader.folder.cache import PageCache
+from grader.folder.draft_roster import CLEAR, LIKE_MM, figure_similarity
+from grader.folder.owners import Unmatched
+from grader.folder.workers import Pool
+from grader.inputs.measurements import StudentSubmission
+from grader.inputs.roster import Roster, RosterRow
+from grader.inputs.scale_text import SURE
+from grader.records import FloatArray, PageRef, Problem, Written
+from grader.scan.handwriting.captions import (
+    NUMBER_WORDS,
+    POSITION_WORDS,
+    Spotter,
+    spotters,
+    written_name,
+    written_number,
+)
+from reference.authored.assignment import Assignment, Variant
+
+# Whose page it is ---------------------------------------------------------------------------------
+
+_SURELY = 0.97
+"""Probability from which a name read on a page is one of the roster's."""
+_LEAST_LETTERS = 4
+"""A shorter name may be any word."""
+
+
+def written_owners(
+    unmatched: Sequence[Unmatched], roster: Roster | None, cache: PageCache, workers: Pool
+) -> dict[tuple[str, int], str]:
+    """The students whose names surely stand on pages of which nothing else says whose they are.
+
+    By file and page. A name that two students of the roster share is nobody's.
+    """
+    names = {} if roster is None else _names(roster)
+    pages = [
+        one.source for one in unmatched if one.problem.code == "owner_unknown" and not one.source.problem
+    ]
+    if not names or not pages:
+        return {}
+    found = workers.run(_owner, [(cache, page, names) for page in pages])
+    return {
+        (pages[index].file, pages[index].page): student
+        for index, student in found
+        if isinstance(student, str)
+    }
+
+
+def _owner(cache: PageCache, ref: PageRef, names: Mapping[str, Collection[str]]) -> str | None:
+    """The student whose name surely stands on a plain page."""
+    student, chance = written_name(_writing(cache, [ref]), names)
+    return student if chance >= _SURELY else None
+
+
+def _names(roster: Roster) -> dict[str, list[str]]:
+    """The ways in which each student may write the name, or the id, by student."""
+    rows: dict[str, RosterRow] = {row.student_id: row for row in roster.rows}
+    spelt = {student: [*dict.fromkeys(_spellings(row))] for student, row in rows.items()}
+    return {student: ways for student, ways in spelt.items() if ways}
+
+
+def _spellings(row: RosterRow) -> Iterator[str]:
+    """First names before and behind the surname, in full and by initials, without diacritic signs."""
+    plain = "".join(
+        sign for sign in unicodedata.normalize("NFKD", row.name) if not unicodedata.combining(sign)
+    )
+    words = [word for word in plain.replace("-", " ").replace(".", " ").split() if word]
+    if len(words) == 1:
+        yield words[0]
+    for first, second in permutations(words[:3], 2):
+        yield first + second
+        if len(first) >= _LEAST_LETTERS:
+            yield first + second[0]
+            yield second[0] + first
+    if len(words) > 2:
+        yield "".join(words)
+    if len(row.student_id) >= _LEAST_LETTERS:
+        yield row.student_id
+
+
+def _writing(cache: PageCache, refs: Sequence[PageRef]) -> list[Spotter]:
+    """The lines of writing on plain pages."""
+    pages = [cache.page(ref) for ref in refs]
+    inks = [page.ink for page in pages if page.ink is not None and page.sheet and not page.sheet.zones]
+    return [spotter for ink in inks for spotter in spotters(ink.where)]
+
+
+# Which number -------------------------------------------------------------------------------------
+
+_LIKELY = 0.2
+"""Probability of a number that counts where the drawing looks more like its variant than like any other."""
+_AGREES = 0.5
+"""What a number's variant must match of the best one's lines: neighbours may lie a degree apart."""
+_MOST = 400
+"""Variants that a drawing is compared with, those likeliest by the writing: 1.5 ms each."""
+_NAMED = 4
+_MISSING = frozenset({"n_needed", "position_needed"})
+"""Problems that a number read on the sheet solves."""
+
+
+def with_written_numbers(
+    students: Sequence[StudentSubmission],
+    roster: Roster | None,
+    assignment: Assignment,
+    cache: PageCache,
+    workers: Pool,
+) -> list[StudentSubmission]:
+    """The submissions, those without a number with the number on their sheets, or why it does not count."""
+    lacking = [index for index, student in enumerate(students) if _lacks_number(student)]
+    calls = [
+        (cache, students[index].pages, assignment, _possible(students[index], roster, assignment))
+        for index in lacking
+    ]
+    result = list(students)
+    for place, read in workers.run(_number, calls):
+        if not isinstance(read, Problem):
+            variant, problem = read
+            student = students[lacking[place]]
+            problems = [one for one in student.problems if variant is None or one.code not in _MISSING]
+            told = replace(student, variant=variant, problems=(*problems, problem))
+            result[lacking[place]] = told
+    return result
+
+
+def _lacks_number(student: StudentSubmission) -> bool:
+    """Whether a number is missing that may stand on the student's pages, and none is disputed."""
+    codes = {problem.code for problem in student.problems}
+    disputed = any(code.endswith("_disagrees") for code in codes)
+    return student.variant is None and bool(student.pages) and bool(codes & _MISSING) and not disputed
+
+
+def _possible(student: StudentSubmission, roster: Roster | None, assignment: Assignment) -> list[Variant]:
+    """The variants that the roster leaves open."""
+    rows = () if roster is None else roster.rows_of(student.student_id)
+    row = rows[0] if len(rows) == 1 else RosterRow(student.student_id)
+    return [
+        variant
+        for variant in assignment.variants()
+        if row.n in {None, variant.n} and row.position in {None, variant.position}
+    ]
+
+
+def _number(
+    cache: PageCache, refs: Sequence[PageRef], assignment: Assignment, possible: Sequence[Variant]
+) -> tuple[Variant | None, Problem]:
+    """As `chosen_variant`, of what is written and drawn on some pages."""
+    lines = _writing(cache, refs)
+    numbers = {variant.n for variant in possible}, {variant.position for variant in possible}
+    both = all(len(each) > 1 for each in numbers)
+    words = NUMBER_WORDS, POSITION_WORDS if both else (*NUMBER_WORDS, *POSITION_WORDS)
+    read = [
+        written_number(lines, [one for one in each if one is not None], spelt) if len(each) > 1 else None
+        for each, spelt in zip(numbers, words, strict=True)
+    ]
+    chances = [
+        _chance(read[0], variant.n, numbers[0]) * _chance(read[1], variant.position, numbers[1])
+        for variant in possible
+    ]
+    order = np.argsort(-np.array(chances), kind="stable")[:_MOST]
+    compared, chance = [possible[index] for index in order], [chances[index] for index in order]
+    pages = [page.ink.strokes.ends for page in map(cache.page, refs) if page.ink is not None]
+    similar = sum(
+        (figure_similarity(ends, assignment, compared) for ends in pages), start=np.zeros(len(compared))
+    )
+    return chosen_variant(compared, chance, similar)
+
+
+def _chance(read: Written | None, number: int | None, numbers: Collection[int | None]) -> float:
+    """The probability that this number is written; 1 where there is but one."""
+    if len(numbers) == 1:
+        return 1.0
+    known = () if read is None else ((read.text, read.confidence), *read.others)
+    return next((chance for text, chance in known if text == str(number)), 0.0)
+
+
+def chosen_variant(
+    variants: Sequence[Variant], chances: Sequence[float], similar: FloatArray
+) -> tuple[Variant | None, Problem]:
+    """The variant whose number is written and drawn, None where that is open; and what is to be told.
+
+    Arguments
+    ---------
+    chances : the probability of each variant's number by the writing
+    similar : how much the drawing looks like each variant, as `figure_similarity` has it
+    """
+    likely = int(np.argmax(chances))
+    drawn = int(np.argmax(similar))
+    shows = float(similar[drawn]) >= LIKE_MM
+    near = np.flatnonzero(similar > CLEAR * similar[drawn]).tolist() if shows else []
+    agrees = shows and similar[likely] > _AGREES * similar[drawn]
+    written = f"'{variants[likely]}' ({100 * chances[likely]:.0f} %)"
+    looks = " or ".join(str(variants[index]) for index in near[:_NAMED]) if near else "no variant for certain"
+    advice = "look, and enter the number in the roster"
+    if chances[likely] >= SURE and (agrees or not shows):
+        said = "the drawing looks like it" if shows else "the drawing shows no variant for certain"
+        return variants[likely], Problem("number_read", f"read on the sheet: {written}; {said}")
+    if shows and chances[drawn] >= _LIKELY:
+        read = f"'{variants[drawn]}' ({100 * chances[drawn]:.0f} %)"
+        return variants[drawn], Problem(
+            "number_read", f"read on the sheet: {read}; the drawing looks like it"
+        )
+    if chances[likely] >= _LIKELY:
+        message = f"the sheet seems to read {written}, the drawing looks like {looks}: {advice}"
+        return None, Problem("number_contradicted" if near else "number_doubtful", message)
+    message = f"no number could be read on the sheet, the drawing looks like {looks}: {advice}"
+    return None, Problem("number_doubtful", message)

@@ -1,0 +1,189 @@
+"""Lines of writing on plain paper: pieces of ink in a row that belong to no drawn line."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from grader.records import Box, FloatArray, GreyImage, InkMap
+from grader.scan.handwriting.model import Lattice, lattice_of
+from grader.scan.pixels import BoolArray
+
+_COARSE = 2
+"""The map is reduced so much to find lines: letters of one word may touch there."""
+_FAINT = 30
+"""Of 255: fainter is paper, or the back showing through."""
+_SHARE = 0.4
+"""Of the darkest ink in a letter's surroundings: fainter is its blur."""
+_PEAK_MM = 3.0
+"""Surroundings of a letter: its neighbours are as dark."""
+_RULED_MM = 11.0
+"""Longer runs along a row or a column of pixels are ruled lines: no letter is so long."""
+_LEAST_MM, _HIGHEST_MM, _LONGEST_MM = 1.0, 9.0, 25.0
+"""Letters are higher, and lower; so long may a word be whose letters touch."""
+_LEVEL = 0.45
+"""Neighbours in a line share so much of the lower one's height."""
+_LIKE = 3.0
+"""Neighbours in a line differ in height by this factor at most: indices are two thirds."""
+_GAP = 2.6
+"""Of the higher neighbour's height: wider gaps part two lines of writing."""
+_AROUND = 0.45
+"""Of a line's height, above and below it: raised powers and lowered indices."""
+_LEAST_SIGNS = 3
+"""Shorter lines are letters of nodes and vectors; `n=7` has three signs."""
+_MOST_PIECES, _MOST_LINES = 1500, 80
+"""No drawing has more: squared paper and hatching have."""
+_FINER = 2
+"""A line is enlarged so much before its signs are told apart: they lie a pixel from each other."""
+_THIN = 0.25
+"""Of a line's height: wider pieces are no remains of a ruled line."""
+_WORD, _TEXT = 0.32, 1.3
+"""Of a line's height: wider gaps part words, and texts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of writing.
+
+    Attributes
+    ----------
+    box : where it stands, sheet mm
+    signs : what its signs may be, in the order of writing
+    gaps : (signs.count + 1,) free room before each piece, of the line's height; infinite at both ends
+    thin : (signs.count + 1,) whether a thin piece stands before, which may be left of a ruled line
+    """
+
+    box: Box
+    signs: Lattice
+    gaps: FloatArray
+    thin: BoolArray
+
+    @property
+    def firsts(self) -> BoolArray:
+        """(signs.count + 1,) whether a text may begin before this piece."""
+        behind = np.concatenate([[False], self.parts[:-1]])
+        return self.parts | (behind & self.thin)
+
+    @property
+    def begins(self) -> BoolArray:
+        """(signs.count + 1,) whether a word may begin, or end, before this piece."""
+        return (self.gaps > _WORD) | self.firsts
+
+    @property
+    def parts(self) -> BoolArray:
+        """(signs.count + 1,) whether a text of several words may begin, or end, before this piece."""
+        return self.gaps > _TEXT
+
+
+def find_lines(where: InkMap) -> list[Line]:
+    """The lines of writing on a page, in no order."""
+    unit = where.px_per_mm
+    labels, stats = _pieces(where)
+    lines = []
+    for row in _rows(stats, unit / _COARSE):
+        lattice = lattice_of(_cut(where, labels, row), unit * _FINER)
+        if lattice.count >= _LEAST_SIGNS:
+            wide, high = row.box[2] - row.box[0], row.box[3] - row.box[1]
+            left, top = row.box[:2]
+            scale = _COARSE / unit
+            box = scale * left, scale * top, scale * wide, scale * high
+            lines.append(_line(box, lattice, row.high * _COARSE * _FINER))
+    return lines
+
+
+def _pieces(where: InkMap) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """The labels of the pieces of ink on a coarse map without its ruled lines, and (n, 5) their extents.
+
+    Extents are left, top, right and bottom, px, and the label.
+    """
+    size = where.ink.shape[1] // _COARSE, where.ink.shape[0] // _COARSE
+    grey = cv2.resize(where.ink, size, interpolation=cv2.INTER_AREA)
+    unit = where.px_per_mm / _COARSE
+    whole = np.asarray(grey >= _FAINT, dtype=np.uint8)
+    run, ruled = round(_RULED_MM * unit), np.zeros_like(whole)
+    # A pencil's grain breaks ruled lines: they are thickened across, which closes no gap between letters.
+    for thick, long in (((3, 1), (1, run)), ((1, 3), (run, 1))):
+        thickened = cv2.dilate(whole, np.ones(thick, np.uint8))
+        runs = cv2.morphologyEx(thickened, cv2.MORPH_OPEN, np.ones(long, np.uint8))
+        ruled = np.maximum(ruled, np.asarray(runs, dtype=np.uint8))
+    grey[cv2.dilate(ruled, np.ones((5, 5), np.uint8)) > 0] = 0
+    side = 2 * round(_PEAK_MM * unit / 2.0) + 1
+    peak = cv2.dilate(grey, np.ones((side, side), np.uint8))
+    ink = np.asarray(grey >= np.maximum(peak * np.float32(_SHARE), np.float32(_FAINT)), dtype=np.uint8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(ink, connectivity=8)
+    wide, high = stats[:, 2] / unit, stats[:, 3] / unit
+    labels_kept = np.flatnonzero((high <= _HIGHEST_MM) & (wide <= _LONGEST_MM))
+    labels_kept = labels_kept[labels_kept > 0]
+    extents = np.column_stack([stats[labels_kept, :4], labels_kept])
+    extents[:, 2:4] += extents[:, :2]
+    return np.asarray(labels, dtype=np.int32), np.asarray(extents, dtype=np.int32)
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """Pieces in a row: their labels, and left, top, right and bottom of the larger ones, coarse px."""
+
+    labels: NDArray[np.int32]
+    box: tuple[int, int, int, int]
+    high: int
+
+
+def _rows(pieces: NDArray[np.int32], unit: float) -> list[_Row]:
+    """Pieces that stand in a row, each with the points, signs and indices about it."""
+    is_letter = pieces[:, 3] - pieces[:, 1] >= _LEAST_MM * unit
+    letters, small = pieces[is_letter], pieces[~is_letter]
+    if not 0 < len(letters) <= _MOST_PIECES:
+        return []
+    left, top, right, bottom = letters[:, :4].astype(np.float32).T[:, :, None]
+    high = bottom - top
+    lower, higher = np.minimum(high, high.T), np.maximum(high, high.T)
+    beside = np.maximum(left, left.T) - np.minimum(right, right.T) < _GAP * higher
+    level = np.minimum(bottom, bottom.T) - np.maximum(top, top.T) > _LEVEL * lower
+    count, of_row = connected_components(beside & level & (higher < _LIKE * lower), directed=False)
+    own = [letters[of_row == number] for number in range(count)]
+    boxes = [(*some[:, :2].min(axis=0).tolist(), *some[:, 2:4].max(axis=0).tolist()) for some in own]
+    several = np.array([len(some) > 1 for some in own])
+    is_row = several & np.array([box[2] - box[0] > box[3] - box[1] for box in boxes])
+    loose = np.concatenate([small, letters[~is_row[of_row]]])
+    middle = (loose[:, :2] + loose[:, 2:4]) / 2.0
+    whose, nearest = np.full(len(loose), -1), np.full(len(loose), np.inf)
+    for number in np.flatnonzero(is_row):
+        x, y, right, bottom = boxes[number]
+        high = bottom - y
+        off = np.abs(middle[:, 1] - (y + bottom) / 2.0)
+        inside = (middle[:, 0] > x - high) & (middle[:, 0] < right + high)
+        near = inside & (off < (0.5 + _AROUND) * high) & (loose[:, 3] - loose[:, 1] < high) & (off < nearest)
+        whose[near], nearest[near] = number, off[near]
+    rows = []
+    for number in np.flatnonzero(is_row):
+        every = np.concatenate([own[number], loose[whose == number]])
+        whole = (*(every[:, :2].min(axis=0) - 1).clip(0).tolist(), *(every[:, 2:4].max(axis=0) + 1).tolist())
+        rows.append(_Row(every[:, 4], whole, boxes[number][3] - boxes[number][1]))
+    return rows if len(rows) <= _MOST_LINES else []
+
+
+def _cut(where: InkMap, labels: NDArray[np.int32], row: _Row) -> GreyImage:
+    """A row's own ink, enlarged."""
+    left, top, right, bottom = row.box
+    part = labels[top:bottom, left:right]
+    own = cv2.dilate(np.isin(part, row.labels).astype(np.uint8), np.ones((3, 3), np.uint8))
+    grey = where.ink[_COARSE * top : _COARSE * bottom, _COARSE * left : _COARSE * right]
+    mask = cv2.resize(own, grey.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    size = _FINER * grey.shape[1], _FINER * grey.shape[0]
+    return np.asarray(
+        cv2.resize(cv2.multiply(grey, mask), size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8
+    )
+
+
+def _line(box: Box, signs: Lattice, high: float) -> Line:
+    """A line, with the free room between its pieces, `high` px of which are its height."""
+    alone = {s.first: s.box for s in signs.segments if s.last == s.first + 1}
+    gaps, thin = np.full(signs.count + 1, np.inf), np.zeros(signs.count + 1, dtype=np.bool_)
+    reached = -np.inf
+    for piece in range(signs.count):
+        left, _, wide, _ = alone[piece]
+        gaps[piece], thin[piece + 1] = (left - reached) / high, wide < _THIN * high
+        reached = max(reached, left + wide)
+    return Line(box, signs, gaps, thin)
