@@ -34,7 +34,7 @@ from grader.reading.read import read_figures
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
 from grader.rubric import Asked, RubricFile
 from grader.scan.decode.pages import decode, is_blank
-from grader.scan.handwriting.captions import captioned_scales, spotters
+from grader.scan.handwriting.captions import Spotter, captioned_scales, spotters
 from grader.scan.handwriting.fields import written_lengths, written_scales
 from grader.scan.handwriting.letters import find_letters
 from grader.scan.register.distortion import straighten
@@ -137,12 +137,27 @@ def missing_scales(submission: StudentSubmission) -> tuple[str, ...]:
     return tuple(name for name in SCALE_NAMES if name not in submission.declared and name not in measured)
 
 
+def writing_on(page: ScannedPage) -> list[Spotter]:
+    """The lines of writing on a plain page; none on a printed sheet, which has boxes, and on one refused.
+
+    The page is decoded again where its pixels were left behind: few pages need to be.
+    """
+    if page.ink is None or page.sheet is None or page.sheet.zones:
+        return []
+    try:
+        image = page.image or straighten(decode(page.ref), page.sheet)[0]
+    except InputFileError:
+        return []
+    return spotters(image, page.sheet, page.ink.where)
+
+
 def _with_captions(page: ScannedPage, assignment: Assignment, names: Collection[str]) -> ScannedPage:
-    """A plain page with the scales of these names that are written on it; a printed sheet has boxes."""
-    if not names or page.ink is None or page.sheet is None or page.sheet.zones:
+    """A plain page with the scales of these names that are written on it."""
+    lines = writing_on(page) if names else []
+    if not lines:
         return page
     units: Mapping[str, str] = dict(assignment.file.scales.bare_units.items())
-    written = captioned_scales(spotters(page.ink.where), names, units)
+    written = captioned_scales(lines, names, units)
     return replace(page, reading=replace(page.reading, written=written))
 
 

@@ -24,12 +24,12 @@ from grader.folder.workers import Pool
 from grader.inputs.measurements import StudentSubmission
 from grader.inputs.roster import Roster, RosterRow
 from grader.inputs.scale_text import SURE
+from grader.pipeline import writing_on
 from grader.records import FloatArray, PageRef, Problem, Written
 from grader.scan.handwriting.captions import (
     NUMBER_WORDS,
     POSITION_WORDS,
     Spotter,
-    spotters,
     written_name,
     written_number,
 )
@@ -37,7 +37,7 @@ from reference.authored.assignment import Assignment, Variant
 
 # Whose page it is ---------------------------------------------------------------------------------
 
-_SURELY = 0.97
+SURELY = 0.97
 """Probability from which a name read on a page is one of the roster's."""
 _LEAST_LETTERS = 4
 """A shorter name may be any word."""
@@ -50,7 +50,7 @@ def written_owners(
 
     By file and page. A name that two students of the roster share is nobody's.
     """
-    names = {} if roster is None else _names(roster)
+    names = {} if roster is None else names_of(roster)
     pages = [
         one.source for one in unmatched if one.problem.code == "owner_unknown" and not one.source.problem
     ]
@@ -67,10 +67,10 @@ def written_owners(
 def _owner(cache: PageCache, ref: PageRef, names: Mapping[str, Collection[str]]) -> str | None:
     """The student whose name surely stands on a plain page."""
     student, chance = written_name(_writing(cache, [ref]), names)
-    return student if chance >= _SURELY else None
+    return student if chance >= SURELY else None
 
 
-def _names(roster: Roster) -> dict[str, list[str]]:
+def names_of(roster: Roster) -> dict[str, list[str]]:
     """The ways in which each student may write the name, or the id, by student."""
     rows: dict[str, RosterRow] = {row.student_id: row for row in roster.rows}
     spelt = {student: [*dict.fromkeys(_spellings(row))] for student, row in rows.items()}
@@ -83,7 +83,7 @@ def _spellings(row: RosterRow) -> Iterator[str]:
         sign for sign in unicodedata.normalize("NFKD", row.name) if not unicodedata.combining(sign)
     )
     words = [word for word in plain.replace("-", " ").replace(".", " ").split() if word]
-    if len(words) == 1:
+    if len(words) == 1 and len(words[0]) >= _LEAST_LETTERS:
         yield words[0]
     for first, second in permutations(words[:3], 2):
         yield first + second
@@ -98,9 +98,7 @@ def _spellings(row: RosterRow) -> Iterator[str]:
 
 def _writing(cache: PageCache, refs: Sequence[PageRef]) -> list[Spotter]:
     """The lines of writing on plain pages."""
-    pages = [cache.page(ref) for ref in refs]
-    inks = [page.ink for page in pages if page.ink is not None and page.sheet and not page.sheet.zones]
-    return [spotter for ink in inks for spotter in spotters(ink.where)]
+    return [spotter for ref in refs for spotter in writing_on(cache.page(ref))]
 
 
 # Which number -------------------------------------------------------------------------------------

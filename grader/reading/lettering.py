@@ -111,12 +111,12 @@ def lettered(
     figures, swaps = dict(reading.figures), []
     for first, second, nats in writing.swaps():
         (figure, p), (_, q) = writing.nodes[first], writing.nodes[second]
-        if figure == MECHANISM or any(name.startswith(COMPONENTS) for name in (p, q)):
+        if figure == MECHANISM or any(name in poles or name.startswith(COMPONENTS) for name in (p, q)):
             continue
         chance = 1.0 / (1.0 + math.exp(RARE_NATS - nats))
         left = min(1.0, (1.0 - chance) / (1.0 - PRIOR_OF_SWAP))
         figures[figure] = _doubted(figures[figure], {p, q}, construction, left)
-        if chance >= REPORTED and not {p, q} & poles:
+        if chance >= REPORTED:
             swaps.append(Swapped(figure, p, q, chance))
     swaps.sort(key=lambda swap: -swap.confidence)
     return replace(reading, figures=figures, swapped=tuple(swaps))

@@ -2,9 +2,9 @@
 
     python -m tests.bench.captions [--seed S] [--scenes pump,press,engine] [--students 12,6,2]
 
-Each student's sheets are files whose names say nothing. The roster has the students' names, those of as
-many others, and nothing else: whose a page is, the number of the variant and the scales can only come
-from what stands on the sheets. Counted is what was used and what was told.
+The roster has the students' names, those of as many others, and nothing else: the number of the variant
+and the scales can only come from what stands on the sheets. Counted is what was used and what was told;
+and names, as they are read where a file's name does not say whose it is.
 """
 
 import argparse
@@ -12,7 +12,7 @@ import contextlib
 import csv
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -20,10 +20,17 @@ import numpy as np
 
 from grader.documents import ReportDocument
 from grader.folder.batch import Batch, graded
+from grader.folder.title_block import SURELY, names_of
+from grader.inputs.roster import read_roster
 from grader.inputs.scale_text import Declared, parse_scale
-from grader.pipeline import open_page
-from grader.records import PageRef
-from grader.scan.handwriting.captions import NUMBER_WORDS, captioned_scales, spotters, written_number
+from grader.pipeline import open_page, writing_on
+from grader.records import PageRef, ScannedPage
+from grader.scan.handwriting.captions import (
+    NUMBER_WORDS,
+    captioned_scales,
+    written_name,
+    written_number,
+)
 from reference.authored.assignment import SCALE_NAMES, Variant
 from samples.simulation import CAREFUL, SLOPPY, TYPICAL, SimulatedSheet, any_settings, simulate
 from tests.bench.plain_text import Table, as_text
@@ -65,6 +72,7 @@ class CaptionTally:
     scales_wrong: int = 0
     scales_told: int = 0
     ms: list[float] = field(default_factory=list)
+    name_ms: list[float] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,71 +109,59 @@ def _name(language: str, lot: np.random.Generator) -> str:
     return f"{lot.choice(FAMILY[language])} {lot.choice(GIVEN[language])}"
 
 
-def measure(scene: str, count: int, first_seed: int, folder: Path, *, named: bool = False) -> CaptionTally:
-    """A class graded with a roster of names alone.
+def measure(scene: str, count: int, first_seed: int, folder: Path) -> CaptionTally:
+    """A class graded by its sheets, in files named by the students' ids, and a roster of names alone.
 
-    Arguments: `named` files have the students' ids as names; else only the sheets say whose they are.
+    Names on sheets are read as for files whose names say nothing.
     """
-    tally, students, files = CaptionTally(scene), [], {}
+    tally, students = CaptionTally(scene), list(plain_class(scene, count, first_seed))
     scans = folder / scene
     scans.mkdir(parents=True)
-    for student in plain_class(scene, count, first_seed):
-        students.append(student)
-        for number, sheet in enumerate(student.sheets, start=1):
-            stem = f"{student.student_id}_{number}" if named else f"scan{len(files) + 1:03d}"
-            path = sheet.save(scans / stem)
-            files[path.name] = student
-            tally.ms.append(_spent_ms(path, scene))
     _write_roster(scans / "roster.csv", students, first_seed)
+    names = names_of(read_roster(scans / "roster.csv"))
+    for student in students:
+        for number, sheet in enumerate(student.sheets, start=1):
+            path = sheet.save(scans / f"{student.student_id}_{number}")
+            _count_page(tally, student, open_page(PageRef(path.name, path=path)), names)
     assignment, rubric = task_named(scene)
     batch = Batch(assignment, rubric, scans, folder / f"{scene}-results")
     reports = {report.student_id: report for report in graded(batch, lambda *_: None).results.reports}
-    owners = {
-        document.source: report.student_id
-        for report in reports.values()
-        for document in (report.reading.sheets)
-    }
     for student in students:
         _count(tally, student, reports[student.student_id])
-    for name, student in files.items():
-        tally.sheets += 1
-        if student.has_title:
-            tally.names += 1
-            tally.names_right += owners.get(name) == student.student_id
-        tally.names_wrong += name in owners and owners[name] != student.student_id
     return tally
 
 
-def _spent_ms(path: Path, scene: str) -> float:
-    """Processor time of reading all that captions say on a page."""
-    page = open_page(PageRef(path.name, path=path))
-    if page.ink is None:
-        return 0.0
-    spec = task_named(scene)[0].file.variant
-    numbers = (spec.n or spec.position).values if spec.n or spec.position else ()
+def _count_page(
+    tally: CaptionTally, student: PlainStudent, page: ScannedPage, names: Mapping[str, Collection[str]]
+) -> None:
+    """A page's name, and the processor time of reading all that its captions say."""
     start = time.process_time()
-    lines = spotters(page.ink.where)
+    lines = writing_on(replace(page, image=None))
+    owner, chance = written_name(lines, names)
+    named = time.process_time()
     captioned_scales(lines, SCALE_NAMES)
-    written_number(lines, numbers, NUMBER_WORDS)
-    return 1000.0 * (time.process_time() - start)
+    written_number(lines, range(1, 31), NUMBER_WORDS)
+    tally.ms.append(1000.0 * (time.process_time() - start))
+    tally.name_ms.append(1000.0 * (named - start))
+    owner = owner if chance >= SURELY else None
+    tally.sheets += 1
+    tally.names += student.has_title
+    tally.names_right += owner == student.student_id
+    tally.names_wrong += owner not in {None, student.student_id}
 
 
 def _write_roster(path: Path, students: Sequence[PlainStudent], seed: int) -> None:
-    """The students' names and as many others', by the alphabet of their ids."""
+    """The students' names and as many others'."""
     lot = np.random.default_rng([seed, 21])
-    names = {student.name for student in students}
-    others = []
-    for student in students:
-        language = next(lang for lang, given in GIVEN.items() if student.name.split()[1] in given)
-        other = _name(language, lot)
-        if other not in names:
-            names.add(other)
-            others.append(other)
+    names = [student.name for student in students]
+    languages = [next(lang for lang, given in GIVEN.items() if name.split()[1] in given) for name in names]
+    others = dict.fromkeys(_name(language, lot) for language in languages)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["student_id", "name"])
         writer.writerows([student.student_id, student.name] for student in students)
-        writer.writerows([f"z{number:02d}", name] for number, name in enumerate(others, start=1))
+        absent = [name for name in others if name not in names]
+        writer.writerows([f"z{number:02d}", name] for number, name in enumerate(absent, start=1))
 
 
 def _count(tally: CaptionTally, student: PlainStudent, report: ReportDocument) -> None:
@@ -176,7 +172,7 @@ def _count(tally: CaptionTally, student: PlainStudent, report: ReportDocument) -
     tally.person += report.status != "graded"
     if student.has_title:
         tally.numbers += 1
-    used = report.variant.get("n" if student.variant.n is not None else "position")
+    used = report.variant.get("n") if student.variant.n is not None else report.position
     true = student.variant.n if student.variant.n is not None else student.variant.position
     tally.numbers_right += used == true
     tally.numbers_wrong += used not in {None, true}
@@ -196,7 +192,7 @@ def _count(tally: CaptionTally, student: PlainStudent, report: ReportDocument) -
 def table(tallies: Sequence[CaptionTally]) -> Table:
     """The tallies, a row each."""
     heads = [
-        "class", "students", "graded", "names: right", "wrong", "numbers: right", "wrong", "told",
+        "class", "students", "settled", "names: right", "wrong", "numbers: right", "wrong", "told",
         "scales: right", "wrong", "told", "ms a page",
     ]  # fmt: skip
     rows = [
@@ -218,13 +214,12 @@ def main() -> None:
     parser.add_argument("--scenes", default="pump,press,engine,piston,shaper")
     parser.add_argument("--students", default="12,6,2,2,2")
     parser.add_argument("--keep", type=Path)
-    parser.add_argument("--named", action="store_true", help="file names say whose the pages are")
     options = parser.parse_args()
     with contextlib.ExitStack() as stack:
         folder = options.keep or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         counts = map(int, options.students.split(","))
         tallies = [
-            measure(scene, count, options.seed, folder, named=options.named)
+            measure(scene, count, options.seed, folder)
             for scene, count in zip(options.scenes.split(","), counts, strict=True)
         ]
     print(as_text([table(tallies)]))

@@ -11,15 +11,17 @@ from dataclasses import replace
 import numpy as np
 
 from grader.inputs.scale_text import parse_scale
-from grader.records import InkMap, Written
+from grader.records import InkMap, Page, Sheet, Written
 from grader.scan.handwriting.fields import meaning_of, placed, read_scale
 from grader.scan.handwriting.lines import Line, find_lines
 from grader.scan.handwriting.model import COLUMN, JUNK, Lattice
 
 _STRANGE = 3e-4
 """Probability that a sign is written in a way that the recogniser does not know, for each sign."""
-_SKIPPED = -3.0
-"""A piece of ink within a word that is no letter of it: dust, a diacritic sign."""
+_SKIPPED, _SIGN_SKIPPED = -3.0, -14.0
+"""A piece of ink within a word that is no letter of it: dust or a diacritic sign, one as high as a letter."""
+_LOW = 0.35
+"""Of a line's height: lower pieces may be dust or diacritic signs."""
 _UNKNOWN = -1.5
 """A letter that the recogniser has no sign for, against the likeliest sign."""
 _LOST, _EACH_LOST = -12.0, -0.5
@@ -33,7 +35,7 @@ _DOUBTFUL = -2.0
 _LOOKS: Mapping[str, str] = {
     "и": "uH", "й": "uH", "н": "H", "т": "Tm", "к": "k", "в": "B", "г": "r", "л": "nπ", "п": "πn",
     "м": "Mm", "μ": "μum", "К": "k", "l": "1", "I": "1", "i": "1", "=": "=-", "W": "ω", "w": "ω", "5": "5s",
-    "Y": "y", "У": "y", "Г": "r", "П": "πn", "И": "uH", "Н": "H",
+    "Y": "y", "L": "L1", "У": "y", "Г": "r", "П": "πn", "И": "uH", "Н": "H",
 }  # fmt: skip
 """Signs of the recogniser that a letter may look like, where it has another form than they."""
 
@@ -43,9 +45,9 @@ _Places = dict[int, tuple[float, int]]
 _NOWHERE = (-np.inf, -1)
 
 
-def spotters(where: InkMap) -> list["Spotter"]:
+def spotters(page: Page, sheet: Sheet, where: InkMap) -> list["Spotter"]:
     """The lines of writing on a page, ready to be searched."""
-    return [Spotter(line) for line in find_lines(where)]
+    return [Spotter(line) for line in find_lines(page, sheet, where)]
 
 
 class Spotter:
@@ -56,6 +58,7 @@ class Spotter:
     log : (segments, signs) log likelihood of each segment as each sign
     after : the segments that begin with each piece, by their row and the piece behind them
     free : log likelihood of any signs in any order up to before each piece
+    skipped : the cost of each piece that is no letter of a word
     """
 
     def __init__(self, line: Line) -> None:
@@ -67,6 +70,9 @@ class Spotter:
         self.after: list[list[tuple[int, int]]] = [[] for _ in range(line.signs.count)]
         for row, (segment, _) in enumerate(known):
             self.after[segment.first].append((row, segment.last))
+        alone = {s.first: s.box[3] for s in line.signs.segments if s.last == s.first + 1}
+        low = _LOW * float(np.quantile(list(alone.values()), 0.75))
+        self.skipped = [_SKIPPED if alone[place] < low else _SIGN_SKIPPED for place in sorted(alone)]
         free = [0.0, *(-np.inf for _ in self.after)]
         for place, rows in enumerate(self.after):
             for row, last in rows:
@@ -110,7 +116,7 @@ class Spotter:
         for place in sorted(behind):
             log, origin = behind[place]
             if place < len(self.after):
-                through = log + self.free[place + 1] - self.free[place] + _SKIPPED
+                through = log + self.free[place + 1] - self.free[place] + self.skipped[place]
                 if through > behind.get(place + 1, _NOWHERE)[0]:
                     behind[place + 1] = through, origin
         return behind
@@ -237,8 +243,8 @@ POSITION_WORDS = (
     "position", "Position", "pos", "Pos", "pozitia", "Pozitia", "poz", "Poz", "положение", "Положение",
 )  # fmt: skip
 _BETWEEN = ("", ".", ":", "=", ".:")
-_ANYTHING, _EACH = -2.0, -3.0
-"""Log likelihood that what stands behind the word is none of the numbers, and for each sign of it."""
+_ANYTHING = -5.5
+"""Log likelihood that what stands behind the word is none of the numbers."""
 
 
 def written_number(
@@ -274,8 +280,7 @@ def _numbers_in(spotter: Spotter, numbers: Collection[int], words: Sequence[str]
             written = (spotter.spot(f"{between}{number}", begin) for between in _BETWEEN)
             found = [places[ends[0]][0] - spotter.free[ends[0]] for places in written if ends[0] in places]
             logs[number] = max(found, default=-np.inf)
-        anything = _ANYTHING + _EACH * sum(end - begin for end in ends)
-        total = np.logaddexp.reduce([*logs.values(), anything])
+        total = np.logaddexp.reduce([*logs.values(), _ANYTHING])
         for number, log in logs.items():
             chance = _chance(odds) * float(np.exp(log - total))
             if chance > _LEAST:

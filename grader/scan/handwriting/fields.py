@@ -224,45 +224,80 @@ def texts_of(lattice: Lattice, name: str) -> tuple[list[ScaleText], float]:
     The second value is what the ink would be worth if any signs might stand in any order: a text that
     is much less likely than that was read into the ink.
     """
-    after = placed(lattice)
+    by_piece: list[list[_Candidate]] = [[] for _ in range(lattice.count)]
     high = _BAR * _line(lattice)[0]
+    for segment, log in placed(lattice):
+        by_piece[segment.first].append(_candidate(segment, log, dust=segment.box[3] < high))
+    free = [0.0, *(-np.inf for _ in by_piece)]
+    for piece, candidates in enumerate(by_piece):
+        for sign in candidates:
+            free[sign.last] = max(free[sign.last], free[piece] + sign.best, free[piece] + sign.alone)
     beams: list[dict[tuple[State, str], float]] = [{} for _ in range(lattice.count + 1)]
     beams[0][start(name), ""] = 0.0
-    free = np.full(lattice.count + 1, -np.inf)
-    free[0] = 0.0
-    for piece in range(lattice.count):
-        likely = [item for item in beams[piece].items() if item[1] > free[piece] - _FAR]
-        best = sorted(likely, key=lambda item: -item[1])[:_BEAM]
-        for segment, log in after:
-            if segment.first != piece:
-                continue
-            skipped = segment.last == piece + 1
-            dust = segment.box[3] < high
-            alone = float(segment.log[COLUMN[JUNK]]) + (_SKIPPED if dust else _SIGN_SKIPPED)
-            free[segment.last] = max(
-                free[segment.last], free[piece] + float(log[: COLUMN[JUNK]].max()), free[piece] + alone
-            )
-            misshapen = float(log[: COLUMN[JUNK]].max()) + _MISSHAPEN
+    for piece, candidates in enumerate(by_piece):
+        best = sorted(beams[piece].items(), key=lambda item: -item[1])[:_BEAM]
+        for sign in candidates:
+            target, least = beams[sign.last], free[sign.last] - _FAR
             for (state, text), score in best:
-                target = beams[segment.last]
-                for move in moves(name, state):
-                    worth = float(log[COLUMN[move.sign]]) + move.cost
-                    if move.in_tail:
-                        worth = max(worth, misshapen)
-                    _keep(target, (move.state, text + move.text), score + worth)
-                    if skipped and move.in_tail:
-                        for touching in moves(name, move.state):
-                            if touching.in_tail:
-                                both = text + move.text + touching.text
-                                _keep(target, (touching.state, both), score + misshapen)
-                if skipped:
-                    _keep(target, (state, text), score + alone)
+                for column, added, after, cost, in_tail in _steps(name, state):
+                    worth = score + (sign.log[column] + cost if column >= 0 else -np.inf)
+                    if in_tail and (column >= 0 or sign.is_one):
+                        worth = max(worth, score + sign.best + _MISSHAPEN)
+                    if worth > least:
+                        _keep(target, (after, text + added), worth)
+                if score + sign.alone > least:
+                    _keep(target, (state, text), score + sign.alone)
     ended: dict[str, float] = {}
     for (state, text), score in beams[-1].items():
         if state.is_end:
             ended[text] = max(score, ended.get(text, -np.inf))
     texts = sorted((ScaleText(text, score) for text, score in ended.items()), key=lambda text: -text.log)
     return texts, float(free[-1])
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """A sign that pieces may make up.
+
+    Attributes
+    ----------
+    last : the piece behind it
+    log : log likelihood of each sign
+    best : of the likeliest
+    alone : of a piece that is no sign; minus infinity for several
+    is_one : whether it is one piece, so that two letters may touch in it
+    """
+
+    last: int
+    log: list[float]
+    best: float
+    alone: float
+    is_one: bool
+
+
+def _candidate(segment: Segment, log: FloatArray, *, dust: bool) -> _Candidate:
+    is_one = segment.last == segment.first + 1
+    none = float(segment.log[COLUMN[JUNK]]) + (_SKIPPED if dust else _SIGN_SKIPPED)
+    best = float(log[: COLUMN[JUNK]].max())
+    return _Candidate(segment.last, log.tolist(), best, none if is_one else -np.inf, is_one)
+
+
+@cache
+def _steps(name: str, state: State) -> tuple[tuple[int, str, State, float, bool], ...]:
+    """What may come next: the sign's column, its text, the state after it, its cost, whether in a unit.
+
+    Two letters of a unit that touch have no column.
+    """
+    first = moves(name, state)
+    single = [(COLUMN[move.sign], move.text, move.state, move.cost, move.in_tail) for move in first]
+    pairs = [
+        (-1, move.text + touching.text, touching.state, 0.0, True)
+        for move in first
+        if move.in_tail
+        for touching in moves(name, move.state)
+        if touching.in_tail
+    ]
+    return (*single, *pairs)
 
 
 def _keep(target: dict[tuple[State, str], float], key: tuple[State, str], score: float) -> None:
@@ -328,7 +363,7 @@ def _placed(
 
 # Scales -------------------------------------------------------------------------------------------
 
-_PX_PER_MM = 12.0
+PX_PER_MM = 12.0
 """Resolution at which writing is read: a digit of 3 mm is as high as the recogniser's picture, and more."""
 _BORDER_MM, _CELL_BORDER_MM = 0.55, 0.4
 """Inside of a box's and of a cell's printed line, with the print's and the registration's error."""
@@ -369,7 +404,7 @@ def written_scales(page: Page, sheet: Sheet, units: Mapping[str, str] | None = N
         return {}
     scales = {}
     for name in names:
-        lattice = lattice_of(_writing(page, sheet, SCALE_BOXES[name], _BORDER_MM), _PX_PER_MM)
+        lattice = lattice_of(writing(page, sheet, SCALE_BOXES[name], _BORDER_MM), PX_PER_MM)
         if lattice.count:
             scales[name] = read_scale(lattice, name, (units or {}).get(name))
     return scales
@@ -416,11 +451,11 @@ def meaning_of(parsed: ParsedScale) -> object | None:
             return None
 
 
-def _writing(page: Page, sheet: Sheet, box: Box, border_mm: float) -> GreyImage:
+def writing(page: Page, sheet: Sheet, box: Box, border_mm: float) -> GreyImage:
     """Contrast inside a printed box without its border, upright, 12 px/mm; empty outside of the picture."""
     x, y, wide, high = box
     inner = x + border_mm, y + border_mm, wide - 2.0 * border_mm, high - 2.0 * border_mm
-    grey = cut_out(page.grey, sheet.mm_to_px, inner, _PX_PER_MM)
+    grey = cut_out(page.grey, sheet.mm_to_px, inner, PX_PER_MM)
     if grey.size == 0:
         return grey
     paper = max(float(np.quantile(grey, _PAPER)), 1.0)
@@ -444,7 +479,7 @@ def written_lengths(
     for name, boxes in cells.items():
         filled[name] = []
         for box in boxes:
-            sign = _sign(_writing(page, sheet, box, _CELL_BORDER_MM))
+            sign = _sign(writing(page, sheet, box, _CELL_BORDER_MM))
             filled[name].append(None if sign is None else len(pictures))
             if sign is not None:
                 pictures.append(normalised(sign))
@@ -461,11 +496,11 @@ def _sign(grey: GreyImage) -> GreyImage | None:
     """What is written in a cell, cut out; None where it is empty."""
     if grey.size == 0 or grey.max() < _LEAST_PEAK:
         return None
-    soft = cv2.GaussianBlur(grey, (0, 0), _SOFTEN_MM * _PX_PER_MM)
+    soft = cv2.GaussianBlur(grey, (0, 0), _SOFTEN_MM * PX_PER_MM)
     full = max(float(np.quantile(soft, _FULL)), 1.0)
     even = np.asarray(np.clip(soft * (255.0 / full), 0.0, 255.0), dtype=np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats((even > _INK * 255.0).astype(np.uint8))
-    heights = stats[1:, cv2.CC_STAT_HEIGHT] / _PX_PER_MM
+    heights = stats[1:, cv2.CC_STAT_HEIGHT] / PX_PER_MM
     if count == 1 or heights.max() < _LEAST_MM:
         return None
     rows, columns = np.nonzero(np.isin(labels, 1 + np.flatnonzero(heights >= _DUST_MM)))

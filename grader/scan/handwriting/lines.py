@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from grader.records import Box, FloatArray, GreyImage, InkMap
+from grader.records import Box, FloatArray, InkMap, Page, Sheet
+from grader.scan.handwriting.fields import PX_PER_MM, writing
 from grader.scan.handwriting.model import Lattice, lattice_of
 from grader.scan.pixels import BoolArray
 
@@ -19,8 +20,9 @@ _SHARE = 0.4
 """Of the darkest ink in a letter's surroundings: fainter is its blur."""
 _PEAK_MM = 3.0
 """Surroundings of a letter: its neighbours are as dark."""
-_RULED_MM = 11.0
-"""Longer runs along a row or a column of pixels are ruled lines: no letter is so long."""
+_ACROSS_MM, _UPRIGHT_MM = 16.0, 8.0
+"""Longer runs of ink along a row and along a column of pixels are ruled lines: letters of a broad pen touch
+along the first, none is as high as the second."""
 _LEAST_MM, _HIGHEST_MM, _LONGEST_MM = 1.0, 9.0, 25.0
 """Letters are higher, and lower; so long may a word be whose letters touch."""
 _LEVEL = 0.45
@@ -35,8 +37,6 @@ _LEAST_SIGNS = 3
 """Shorter lines are letters of nodes and vectors; `n=7` has three signs."""
 _MOST_PIECES, _MOST_LINES = 1500, 80
 """No drawing has more: squared paper and hatching have."""
-_FINER = 2
-"""A line is enlarged so much before its signs are told apart: they lie a pixel from each other."""
 _THIN = 0.25
 """Of a line's height: wider pieces are no remains of a ruled line."""
 _WORD, _TEXT = 0.32, 1.3
@@ -77,19 +77,25 @@ class Line:
         return self.gaps > _TEXT
 
 
-def find_lines(where: InkMap) -> list[Line]:
-    """The lines of writing on a page, in no order."""
-    unit = where.px_per_mm
-    labels, stats = _pieces(where)
+def find_lines(page: Page, sheet: Sheet, where: InkMap) -> list[Line]:
+    """The lines of writing on a page, in no order.
+
+    Arguments: lines are found on the map; their signs, which lie a pixel from each other there, on the page.
+    """
+    unit = where.px_per_mm / _COARSE
+    labels, pieces = _pieces(where)
     lines = []
-    for row in _rows(stats, unit / _COARSE):
-        lattice = lattice_of(_cut(where, labels, row), unit * _FINER)
-        if lattice.count >= _LEAST_SIGNS:
-            wide, high = row.box[2] - row.box[0], row.box[3] - row.box[1]
-            left, top = row.box[:2]
-            scale = _COARSE / unit
-            box = scale * left, scale * top, scale * wide, scale * high
-            lines.append(_line(box, lattice, row.high * _COARSE * _FINER))
+    for row in _rows(pieces, unit):
+        left, top, right, bottom = row.box
+        box = left / unit, top / unit, (right - left) / unit, (bottom - top) / unit
+        grey = writing(page, sheet, box, 0.0)
+        if grey.size:
+            own = np.isin(labels[top:bottom, left:right], row.labels).astype(np.uint8)
+            own = np.asarray(cv2.dilate(own, np.ones((3, 3), np.uint8)), dtype=np.uint8)
+            mask = cv2.resize(own, grey.shape[::-1], interpolation=cv2.INTER_NEAREST)
+            lattice = lattice_of(np.asarray(cv2.multiply(grey, mask), dtype=np.uint8), PX_PER_MM)
+            if lattice.count >= _LEAST_SIGNS:
+                lines.append(_line(box, lattice, PX_PER_MM * row.high / unit))
     return lines
 
 
@@ -102,9 +108,10 @@ def _pieces(where: InkMap) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     grey = cv2.resize(where.ink, size, interpolation=cv2.INTER_AREA)
     unit = where.px_per_mm / _COARSE
     whole = np.asarray(grey >= _FAINT, dtype=np.uint8)
-    run, ruled = round(_RULED_MM * unit), np.zeros_like(whole)
+    ruled = np.zeros_like(whole)
+    across, upright = round(_ACROSS_MM * unit), round(_UPRIGHT_MM * unit)
     # A pencil's grain breaks ruled lines: they are thickened across, which closes no gap between letters.
-    for thick, long in (((3, 1), (1, run)), ((1, 3), (run, 1))):
+    for thick, long in (((3, 1), (1, across)), ((1, 3), (upright, 1))):
         thickened = cv2.dilate(whole, np.ones(thick, np.uint8))
         runs = cv2.morphologyEx(thickened, cv2.MORPH_OPEN, np.ones(long, np.uint8))
         ruled = np.maximum(ruled, np.asarray(runs, dtype=np.uint8))
@@ -162,19 +169,6 @@ def _rows(pieces: NDArray[np.int32], unit: float) -> list[_Row]:
         whole = (*(every[:, :2].min(axis=0) - 1).clip(0).tolist(), *(every[:, 2:4].max(axis=0) + 1).tolist())
         rows.append(_Row(every[:, 4], whole, boxes[number][3] - boxes[number][1]))
     return rows if len(rows) <= _MOST_LINES else []
-
-
-def _cut(where: InkMap, labels: NDArray[np.int32], row: _Row) -> GreyImage:
-    """A row's own ink, enlarged."""
-    left, top, right, bottom = row.box
-    part = labels[top:bottom, left:right]
-    own = cv2.dilate(np.isin(part, row.labels).astype(np.uint8), np.ones((3, 3), np.uint8))
-    grey = where.ink[_COARSE * top : _COARSE * bottom, _COARSE * left : _COARSE * right]
-    mask = cv2.resize(own, grey.shape[::-1], interpolation=cv2.INTER_NEAREST)
-    size = _FINER * grey.shape[1], _FINER * grey.shape[0]
-    return np.asarray(
-        cv2.resize(cv2.multiply(grey, mask), size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8
-    )
 
 
 def _line(box: Box, signs: Lattice, high: float) -> Line:

@@ -332,7 +332,7 @@ def sources(tmp_path_factory):
     ("file", "stale"),
     [
         ("grader/scan/strokes/tips.onnx", {"scan", "mark"}),
-        ("grader/scan/handwriting/letters.npz", {"scan", "mark"}),
+        ("grader/scan/handwriting/letters.npz", {"scan", "read", "mark"}),
         ("grader/scan/decode/pictures.py", {"scan", "mark"}),
         ("grader/records.py", {"scan", "cells", "read", "mark"}),
         ("grader/pipeline.py", {"scan", "read", "mark"}),
