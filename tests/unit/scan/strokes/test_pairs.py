@@ -1,13 +1,19 @@
-"""Neighbours by a k-d tree and neighbours by comparing every two strokes are the same; memory is bounded."""
+"""Neighbours by a k-d tree and neighbours by comparing every two strokes are the same; memory is bounded.
+
+So are pieces joined block by block, stretches reached and pieces of ink, against what is plainly computed.
+"""
 
 import tracemalloc
 
+import cv2
 import numpy as np
 import pytest
 
-from grader.scan.strokes.centreline import Fitted, Pen, _neighbours, crossings
+from grader.scan.pixels import connected, reached
+from grader.scan.strokes import regions
+from grader.scan.strokes.centreline import Fitted, Pen, _neighbours, crossings, rejoined
 from grader.scan.strokes.ink import _family_size, _linked, distinct
-from grader.scan.strokes.regions import PROBES, distances, near_pairs
+from grader.scan.strokes.regions import PROBES, distances, join, near_pairs
 
 UNIT = 12.0
 """Pixels in a millimetre, about 300 dpi."""
@@ -127,3 +133,55 @@ def test_twenty_thousand_strokes_are_compared_in_bounded_memory():
     assert peak < MOST_MEGABYTES * MEGABYTE
     assert (beside >= 0).any()
     assert keep.any()
+
+
+# Joined -------------------------------------------------------------------------------------------
+
+
+def broken(rng, count=40):
+    """Strokes cut into three pieces each, with gaps of 1 mm, and a little noise."""
+    whole = segments(count, rng, 60.0)
+    cuts = np.array([[0.0, 0.3], [0.33, 0.6], [0.63, 1.0]])
+    span = (whole[:, 1] - whole[:, 0])[:, None, None]
+    pieces = whole[:, None, None, 0] + cuts[..., None] * span
+    return pieces.reshape(-1, 2, 2) + rng.normal(0.0, 0.2, (3 * count, 2, 2))
+
+
+def test_pieces_are_joined_alike_whether_lone_ones_are_passed_over_or_searched(monkeypatch):
+    ends = broken(np.random.default_rng(5))
+    width = np.full(len(ends), 4.0)
+    at_once = join(ends, width, 0.25 * UNIT, 2.3 * UNIT)
+    monkeypatch.setattr(regions, "_BLOCK", 1)
+    one_by_one = join(ends, width, 0.25 * UNIT, 2.3 * UNIT)
+    assert [list(rows) for rows in at_once.members] == [list(rows) for rows in one_by_one.members]
+    assert np.array_equal(at_once.ends, one_by_one.ends)
+    assert max(len(rows) for rows in at_once.members) >= 3
+    assert sorted(np.concatenate(at_once.members)) == list(range(len(ends)))
+
+
+def test_stretches_are_reached_over_gaps_one_after_another():
+    rng = np.random.default_rng(6)
+    for _ in range(200):
+        low = rng.uniform(-50.0, 50.0, 12)
+        high = low + rng.uniform(0.0, 6.0, 12)
+        taken, (near, far) = np.zeros(12, dtype=bool), (0.0, 3.0)
+        for _ in range(12):
+            taken |= (low <= far + 2.0) & (high >= near - 2.0)
+            near, far = min([near, *low[taken]]), max([far, *high[taken]])
+        assert np.array_equal(reached(low, high, (0.0, 3.0), 2.0), taken)
+
+
+def test_pieces_of_ink_have_the_labels_and_boxes_of_opencv():
+    mask = (np.random.default_rng(7).uniform(size=(120, 170)) < 0.2).astype(np.uint8)
+    labels, boxes = connected(mask)
+    _, expected, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    assert np.array_equal(labels, expected)
+    assert np.array_equal(boxes, stats[1:, :4])
+    assert connected(np.zeros((4, 5), np.uint8))[1].shape == (0, 4)
+
+
+def test_strokes_that_overlap_on_one_line_are_one_and_those_that_abut_stay():
+    line = np.array([[[0.0, 0.0], [30.0, 0.0]], [[20.0, 0.05], [60.0, 0.05]], [[61.0, 0.0], [90.0, 0.0]]])
+    ends, stay = rejoined(strokes(UNIT * line, np.random.default_rng(8)), UNIT)
+    assert stay.tolist() == [False, True, True]
+    assert ends[1] == pytest.approx(UNIT * np.array([[0.0, 0.05], [60.0, 0.05]]))
