@@ -1,7 +1,7 @@
 """Measure and put the figures into benchmarks.md: `python -m docs.make_benchmarks`, some half an hour.
 
-With `solver`, `reading`, `lines`, `judging` or `settling` only that part is measured and replaced; a number
-is that of students: for each scene, for each kind, hand and mechanism, for each kind of sheet.
+With `solver`, `reading`, `curve`, `lines`, `judging` or `settling` only that part is measured and replaced;
+a number is that of students: for each scene, for each kind, hand and mechanism, for each kind of sheet.
 """
 
 import re
@@ -16,7 +16,7 @@ from tests.bench.judging_scans import SHEET_KINDS
 from tests.bench.judging_tally import judging_tables
 from tests.bench.lines import lines_tables, measure_lines
 from tests.bench.plain_text import Table, as_text
-from tests.bench.reading import STUDENTS, measure_reading
+from tests.bench.reading import STUDENTS, curve_picture, curve_tables, measure_curve, measure_reading
 from tests.bench.reading_scenes import foreign_tables, measure_foreign
 from tests.bench.reading_tally import reading_tables
 from tests.bench.settling import measure
@@ -29,6 +29,13 @@ def _reading(students: int | None) -> Iterable[Table]:
     cv2.setNumThreads(1)
     rows = tuple(measure_reading(students=students or STUDENTS))
     return [*reading_tables(rows), *foreign_tables(tuple(measure_foreign()))]
+
+
+def _curve(students: int | None) -> Iterable[Table]:
+    cv2.setNumThreads(1)
+    rows = tuple(measure_curve(students or STUDENTS))
+    curve_picture(rows, PAGE.with_name("reading-time.svg"))
+    return curve_tables(rows)
 
 
 def _lines(_: int | None) -> Iterable[Table]:
@@ -51,6 +58,7 @@ def _settling(students: int | None) -> Iterable[Table]:
 PARTS: dict[str, Callable[[int | None], Iterable[Table]]] = {
     "solver": lambda _: solver_tables(measure_solver()),
     "reading": _reading,
+    "curve": _curve,
     "lines": _lines,
     "judging": _judging,
     "settling": _settling,

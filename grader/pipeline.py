@@ -103,7 +103,8 @@ def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
             if isinstance(ink, Unread):
                 why = f"{ref.file}: page {ref.page} is no drawing: {ink.reason}"
                 return _refused(page, "page_not_a_drawing", why)
-            page = replace(page, ink=replace(ink, letters=find_letters(ink, boxes)))
+            problems += tuple(replace(problem, file=ref.file) for problem in ink.problems)
+            page = replace(page, ink=replace(ink, letters=find_letters(ink, boxes)), problems=problems)
         reading = Reading({}, written=written_scales(image, sheet))
     return replace(page, reading=reading, narrowed=boxes is not None)
 

@@ -308,6 +308,7 @@ class Ink:
     where : the ink map
     letters : what can be written signs, None where they were not looked for
     tips : where vectors end along the strokes
+    problems : what of the page was left out, or may be
     """
 
     strokes: Strokes
@@ -316,6 +317,7 @@ class Ink:
     where: InkMap
     letters: Letters | None = None
     tips: Tips = NO_TIPS
+    problems: tuple[Problem, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

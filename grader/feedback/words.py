@@ -131,6 +131,10 @@ PROBLEMS: dict[str, str] = {
     "page_not_a_drawing": N_(
         "The page is no drawing: it has far too many lines, or its tones are inverted. Scan it in greyscale."
     ),
+    "squared_paper": N_(
+        "The paper is squared: what is drawn no darker than its printed lines was left out. Use plain paper."
+    ),
+    "title_block_unsure": N_("A large area at the lower right was taken for the title block and left out."),
     "calibration_page": N_("This is the calibration page, not a drawing."),
     "print_scaled": N_("The sheet was printed or copied at another scale than 1:1."),
     "resolution_wrong": N_("The resolution that the file states is wrong."),

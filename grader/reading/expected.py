@@ -139,19 +139,18 @@ def expect(
     construction, parameters = drawing.construction, drawing.parameters
     steps = construction.figures[figure]
     names = tuple(step.node for step in steps)
-    exact = evaluate(construction, parameters, given=given, wanted=names)
-    place = {name: complex(np.ravel(at)[0]) for name, at in exact.items()}
-    deviation = {
-        (step.node, slot, kind): errors.of(step, kind, _size_mm(step, place))
-        for step in steps
-        for slot, kind in acts_of(step)
-    }
-    tried = dict(zip(deviation, STEP_OF_DERIVATIVE * np.eye(len(deviation)), strict=True))
+    acts = [(step, slot, kind) for step in steps for slot, kind in acts_of(step)]
+    # The first column is drawn without an error, each other with one.
+    columns = STEP_OF_DERIVATIVE * np.eye(len(acts), len(acts) + 1, 1)
+    tried = {(step.node, slot, kind): row for (step, slot, kind), row in zip(acts, columns, strict=True)}
     bent = evaluate(construction, parameters, given=given, errors=tried, wanted=names)
+    place = {name: complex(np.ravel(at)[0]) for name, at in bent.items()}
+    deviation = [errors.of(step, kind, _size_mm(step, place)) for step, _, kind in acts]
     at = np.array([place[name] for name in names])
     with np.errstate(invalid="ignore"):
-        moves = np.stack([np.broadcast_to(bent[name], len(tried)) for name in names]) - at[:, None]
-    moves = np.where(np.isfinite(moves), moves, 0.0) / STEP_OF_DERIVATIVE * list(deviation.values())
+        drawn = np.stack([np.broadcast_to(bent[name], len(acts) + 1) for name in names])
+        moves = drawn[:, 1:] - at[:, None]
+    moves = np.where(np.isfinite(moves), moves, 0.0) / STEP_OF_DERIVATIVE * deviation
     slopes = np.stack([moves.real, moves.imag], axis=1).reshape(2 * len(names), -1)
     under = coincident(construction)
     tied = tuple((names.index(name), names.index(under[name])) for name in names if name in under)
@@ -302,8 +301,8 @@ SAME_POSE_MM = 4.0
 """Poses that differ at no node by more than this are the same."""
 PAIRS = 1 << 13
 """Of segments and strokes compared at a time: their arrays stay in a processor's own cache."""
-FARTHEST_SQUARED = 1500.0
-"""Of sigma: the fit of a stroke so far off is zero, its exponential is less than the smallest number."""
+FARTHEST_SQUARED = 40.0
+"""Of sigma: the fit of a stroke so far off is less than 3e-9."""
 SPECK_MM = 2.0
 """Shorter edges have no direction to speak of."""
 
@@ -398,30 +397,41 @@ def _scores(expected: Expected, lines: Lines, proposed: FloatArray, edges: Seque
             continue
         weight = np.minimum(size, HIGHEST_WEIGHT_MM) * (size > SPECK_MM)
         farthest = np.maximum(np.abs(tail - origin), np.abs(head - origin))
-        long = lines.take(lines.length > 0.3 * size.min())
-        total += weight * _support(long, tail, head, RESIDUAL_MM + RESIDUAL_PER_MM * farthest)
+        long = lines.length > 0.3 * size.min()
+        strokes = lines.start[long], lines.along[long], lines.length[long]
+        total += weight * _support(strokes, tail, head, RESIDUAL_MM + RESIDUAL_PER_MM * farthest)
         weights += weight
     return np.asarray(total / np.maximum(weights, 1e-9))
 
 
-def _support(lines: Lines, tail: ComplexArray, head: ComplexArray, sigma: FloatArray) -> FloatArray:
-    """How well the best stroke lies under each segment, 0..1. Arguments: segments (m,), sigma mm (m,)."""
+def _support(
+    strokes: tuple[ComplexArray, ComplexArray, FloatArray],
+    tail: ComplexArray,
+    head: ComplexArray,
+    sigma: FloatArray,
+) -> FloatArray:
+    """How well the best stroke lies under each segment, 0..1.
+
+    Arguments: strokes' starts, directions and lengths (n,); segments (m,) with sigma mm (m,).
+    """
+    start, along, length = strokes
     support = np.zeros(len(tail))
-    rows = max(1, PAIRS // max(1, len(lines)))
+    ends = np.stack([tail, head])
+    # Distances of the ends from each stroke's line, less its own from the origin.
+    across, off = np.stack([-along.imag, along.real]), (start * np.conj(along)).imag
+    rows = max(1, PAIRS // max(1, len(start)))
     for first in range(0, len(tail), rows):
         part = slice(first, first + rows)
-        from_start = (tail[part, None] - lines.start) * np.conj(lines.along)
-        to_end = (head[part, None] - lines.start) * np.conj(lines.along)
-        squared = from_start.imag**2 + to_end.imag**2
-        low = np.minimum(from_start.real, to_end.real)
-        high = np.maximum(from_start.real, to_end.real)
-        shared = np.minimum(high, lines.length) - np.maximum(low, 0.0)
-        at = np.nonzero((shared > 0.0) & (squared < FARTHEST_SQUARED * sigma[part, None] ** 2))
-        span = np.maximum(high[at] - low[at], 1e-6)
-        true_span = np.abs(head[part] - tail[part])[at[0]]
-        share = np.clip(shared[at] / np.maximum(true_span, span), 0.0, 1.0)
-        fit = np.exp(-0.5 * squared[at] / sigma[part][at[0]] ** 2) * share
-        np.maximum.at(support[part], at[0], fit)
+        from_tail, from_head = (xy(node[part]).reshape(-1, 2) @ across - off for node in ends)
+        squared = from_tail**2 + from_head**2
+        segment, stroke = np.nonzero(squared < FARTHEST_SQUARED * sigma[part, None] ** 2)
+        places = ((ends[:, part][:, segment] - start[stroke]) * np.conj(along[stroke])).real
+        low, high = places.min(axis=0), places.max(axis=0)
+        shared = np.minimum(high, length[stroke]) - np.maximum(low, 0.0)
+        true_span = np.abs(head[part] - tail[part])[segment]
+        share = np.clip(shared / np.maximum(true_span, np.maximum(high - low, 1e-6)), 0.0, 1.0)
+        fit = np.exp(-0.5 * squared[segment, stroke] / sigma[part][segment] ** 2) * share
+        np.maximum.at(support[part], segment, fit)
     return support
 
 

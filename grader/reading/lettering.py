@@ -36,6 +36,10 @@ REPORTED = 0.5
 """Probability from which a swap is reported."""
 COMPONENTS = ("n_", "k_")
 """How names of ends of normal and Coriolis components begin: few write them, and they share a letter."""
+USUAL_SHARE = 0.04
+"""Of a sign among the pieces of a sheet: one in some 25."""
+LEGIBLE, LEGIBLE_COMPONENT = 0.6, 0.2
+"""Shares of nodes whose letters are written and read."""
 POLE_SIGNS = ("o", "p", "π")
 """What the pole of a plan is called in different schools."""
 
@@ -133,6 +137,29 @@ def _doubted(figure: Figure, names: Collection[str], construction: Construction,
     return Figure(nodes, vectors)
 
 
+def fitting_letters(
+    name: str,
+    at: ComplexArray,
+    letters: Letters | None,
+    poles: Collection[str],
+    renamed: Mapping[str, str],
+) -> FloatArray:
+    """(j,) nats of each of some places for being the node of this name, by the letters near them."""
+    if letters is None or not len(letters):
+        return np.zeros(len(at))
+    signs = _signs(name, poles, renamed, letters)
+    high = letters.height_mm
+    gap = _gaps(letters.box_mm, at)
+    near = (gap.min(axis=1) < REACH_MM) & (high > LEAST_MM) & (high < MOST_MM)
+    chance = letters.probability[:, signs].sum(axis=1)[near]
+    if not len(chance):
+        return np.zeros(len(at))
+    fits = chance / USUAL_SHARE
+    beside = (fits[:, None] * np.exp(-gap[near] / FALL_MM)).max(axis=0)
+    legible = LEGIBLE_COMPONENT if name.startswith(COMPONENTS) else LEGIBLE
+    return np.asarray(np.log(1.0 - legible + legible * beside))
+
+
 def lettering(
     nodes: Mapping[tuple[str, str], complex],
     letters: Letters | None,
@@ -162,7 +189,7 @@ def lettering(
     density = np.exp(-gap[rows] / FALL_MM)
     total = density.sum(axis=1) + STRAY
     chance = np.column_stack([letters.probability[rows][:, own].sum(axis=1) for own in signs])
-    fits = chance / np.maximum(known[rows], 1e-6)[:, None] * len(columns) / [len(own) for own in signs]
+    fits = chance / np.maximum(known[rows], 1e-6)[:, None] * len(columns) / [max(len(own), 1) for own in signs]
     return Lettering(
         tuple(nodes), density / total[:, None], STRAY / total, fits, np.minimum(known[rows], 1.0)
     )

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from grader.reading.expected import (
+    LEFT_OUT,
     REGULAR,
     DraftingErrors,
     Expected,
@@ -22,6 +24,8 @@ from grader.reading.expected import (
     tied,
     vectors_of,
 )
+from grader.reading.lettered_graph import lettered_graphs
+from grader.reading.lettering import fitting_letters, lettering
 from grader.reading.lines import BoolArray, Lines
 from grader.reading.matching import (
     BEAM,
@@ -33,12 +37,24 @@ from grader.reading.matching import (
     assign_strokes,
 )
 from grader.reading.nodes import NodeFit, fit_nodes
-from reference.construction.graph import ancestors
+from grader.records import IntArray, Letters
+from reference.construction.graph import ancestors, coincident
 from reference.construction.mistakes import Drawing, affected
 from reference.geometry import ComplexArray
 
 DRAFTING_ERRORS = DraftingErrors()
 END_PRIOR = EndPrior()
+BY_LETTERS = "by letters"
+"""Label of the hypotheses that follow letters and strokes instead of the construction."""
+COST_OF_GRAPH = 6.0
+LETTERED_MM = 2.0
+"""Nats for such a hypothesis, and standard error of its nodes along x and y before strokes are assigned."""
+COST_OF_ODD_NODE = 4.0
+"""Nats for a node that is not where the construction puts it from the student's own: one of fifty."""
+EXPLAINED = 0.85
+"""A regular plan supported over more of its length is what was drawn."""
+FAR_WORSE = 30.0
+"""Nats: letters do not make up for more."""
 QUARTERS = (np.pi / 2, -np.pi / 2, np.pi)
 """A plan may be turned as a whole: velocities are perpendicular to links."""
 COST_OF_TURN = 6.0
@@ -94,11 +110,22 @@ class PlanProblem:
     lines : of the sheet
     figure : which plan
     given : nodes already read (mechanism, velocity plan), complex mm, y up
+    letters : of the sheet, None where they were not looked for
+    renamed : what students write for a node, by name, where it is not the name
+    elsewhere : strokes, by their number, that belong to the sketch
     """
 
     lines: Lines
     figure: str
     given: Mapping[str, ComplexArray]
+    letters: Letters | None = None
+    renamed: Mapping[str, str] = field(default_factory=dict)
+    elsewhere: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    @property
+    def free(self) -> Lines:
+        """The lines that no other figure needs."""
+        return self.lines.take(np.flatnonzero(~np.isin(self.lines.members, self.elsewhere).any(axis=1)))
 
     def expected(self, hypothesis: PlanHypothesis) -> Expected | None:
         """The plan about its own pole; None where it cannot be drawn."""
@@ -134,6 +161,12 @@ class PlanReading:
         return fit_nodes(self.assignment, self.lines)
 
     @property
+    def members(self) -> IntArray:
+        """The strokes that it takes, by their number."""
+        stroke = self.assignment.stroke
+        return np.unique(self.lines.members[stroke[stroke >= 0]])
+
+    @property
     def strokes(self) -> Hashable:
         """Which stroke it takes for which vector."""
         stroke = self.assignment.stroke
@@ -158,18 +191,28 @@ def regular_plans(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
     return sorted(plans, key=lambda plan: -plan.score)
 
 
-def best_plan(problem: PlanProblem, plans: list[PlanReading]) -> PlanReading | None:
-    """The best of the regular plans and of the same with mistakes made; the others are its rivals."""
-    if not plans:
+def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) -> PlanReading | None:
+    """The best reading of a plan; the others are its rivals.
+
+    Where the regular plans leave something open, mistakes are made in the best of them, and the plan is
+    read as a lettered graph.
+
+    Arguments: `plans`, the regular ones, best first; `drawing`, what the student was to draw.
+    """
+    everything = list(plans)
+    if plans:
+        bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
+        everything.extend(_with_mistakes(problem, plans[0], list(bases.values())))
+        best = max(everything, key=lambda plan: plan.score)
+        if best.hypothesis.label not in REGULAR and _leaves_long_ones(best):
+            everything.extend(_with_mistakes(problem, best, [best.hypothesis]))
+    if not plans or plans[0].pose.score < EXPLAINED or _suspects(plans[0]):
+        for base in regular(drawing, problem.figure):
+            everything.extend(_by_letters(problem, base))
+    if not everything:
         return None
-    bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
-    everything = [*plans, *_with_mistakes(problem, plans[0], list(bases.values()))]
-    best = max(everything, key=lambda plan: plan.score)
-    if best.hypothesis.label not in REGULAR and _leaves_long_ones(best):
-        everything.extend(_with_mistakes(problem, best, [best.hypothesis]))
-    everything.sort(key=lambda plan: -plan.score)
-    best = everything[0]
-    return replace(best, rivals=(*everything[1:RIVALS], *_without_each_stroke(best)))
+    best, *rivals = _with_letters(problem, everything)
+    return replace(best, rivals=(*rivals[: RIVALS - 1], *_without_each_stroke(best)))
 
 
 # Where a plan may lie -----------------------------------------------------------------------------
@@ -288,6 +331,47 @@ def _without_each_stroke(plan: PlanReading) -> list[PlanReading]:
     ]
 
 
+# Plans by their letters --------------------------------------------------------------------------
+
+
+def _by_letters(problem: PlanProblem, base: PlanHypothesis) -> list[PlanReading]:
+    """Readings of the plan as a lettered graph, whatever the construction says of it."""
+    construction = base.drawing.construction
+    poles = frozenset(construction.poles.values())
+    nats = partial(fitting_letters, letters=problem.letters, poles=poles, renamed=problem.renamed)
+    graphs = lettered_graphs(problem.free, nats, base.drawing, problem.figure, problem.given, base.absent)
+    under = coincident(construction)
+    cases = []
+    for graph in graphs:
+        absent = {**base.absent, **{node: LEFT_OUT.get(node[0], LEFT_OUT["n"]) for node in graph.absent}}
+        cost = base.cost + COST_OF_GRAPH + COST_OF_ODD_NODE * graph.unexpected
+        hypothesis = PlanHypothesis(BY_LETTERS, base.drawing, absent, cost)
+        names = tuple(graph.at)
+        pairs = tuple((names.index(name), names.index(under[name])) for name in names if name in under)
+        at = np.array(list(graph.at.values()))
+        cov = LETTERED_MM**2 * np.eye(2 * len(at))
+        edges = vectors_of(tied(hypothesis), problem.figure, absent)
+        expected = Expected(names, at, cov, edges, pairs)
+        cases.append(_PlanCase(hypothesis, expected, Pose(0j, 1.0, 0.0, 0.0)))
+    return _read(cases, problem.free)
+
+
+def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[PlanReading]:
+    """The best readings, what the letters say in their scores, best first, each set of strokes once."""
+    poles = frozenset(plans[0].hypothesis.drawing.construction.poles.values())
+    least = max(plan.score for plan in plans) - FAR_WORSE
+    scored: dict[Hashable, PlanReading] = {}
+    for plan in sorted(plans, key=lambda plan: -plan.score):
+        if plan.score >= least and plan.strokes not in scored:
+            expected = plan.assignment.expected
+            nodes = ((problem.figure, name) for name in expected.names)
+            at = dict(zip(nodes, expected.at.tolist(), strict=True))
+            writing = lettering(at, problem.letters, poles, problem.renamed)
+            nats = 0.0 if writing is None else writing.log()
+            scored[plan.strokes] = replace(plan, score=plan.score + nats)
+    return sorted(scored.values(), key=lambda plan: -plan.score)
+
+
 # Strokes of a plan --------------------------------------------------------------------------------
 
 
@@ -313,6 +397,8 @@ class _PlanCase:
 
     def placed(self) -> Expected:
         """What is expected there, with the errors that the pose may have."""
+        if self.hypothesis.label == BY_LETTERS:
+            return self.expected
         return self.expected.placed(self.pose, Slack(relative=0.03 if self.has_expected_size else 0.08))
 
 

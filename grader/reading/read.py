@@ -12,7 +12,7 @@ from grader.reading.expected import REGULAR, Edge
 from grader.reading.lettering import lettered, support
 from grader.reading.lines import Lines, lines_of
 from grader.reading.nodes import NodeFit
-from grader.reading.plans import PlanProblem, PlanReading, best_plan, regular_plans
+from grader.reading.plans import EXPLAINED, PlanProblem, PlanReading, best_plan, regular_plans
 from grader.reading.sketch import SketchReading, drawings, find_sketch
 from grader.records import (
     ACCELERATION_PLAN,
@@ -37,8 +37,6 @@ LEAST_PLAN = 12.0
 """Nats: a figure with a smaller score may be chance."""
 SURE_PLAN = 40.0
 """Nats from which a plan's strokes belong to no other plan."""
-CLEAR = 0.85
-"""A regular plan supported over more of its length is on that sheet, and on no other."""
 LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
 """Of the vectors given at the start of a plan: what fits on a sheet and can be measured."""
 SAME_SCALE = 0.95
@@ -81,21 +79,22 @@ def read_figures(
     """
     pages = [_PageReading(lines_of(ink), ink, sheet) for ink, sheet in zip(inks, sheets, strict=True)]
     own, others = _drawings(assignment, variant, scales)
+    renamed = assignment.file.names
     for page in pages:
-        letters_nats = partial(support, letters=page.ink.letters, renamed=assignment.file.names)
+        letters_nats = partial(support, letters=page.ink.letters, renamed=renamed)
         sketch = find_sketch(page.lines, page.ink.circles, own, others, letters_nats)
         if sketch is not None and sketch.score >= LEAST_SKETCH:
             page.sketch = sketch
     followed = [page.sketch.drawing for page in pages if page.sketch is not None] if variant is None else []
     drawing = _measurable((followed or own)[0], assignment, variant)
-    velocity = _find_plan(pages, [drawing], VELOCITY_PLAN, {})
+    velocity = _find_plan(pages, [drawing], VELOCITY_PLAN, {}, renamed)
     velocities = {} if velocity is None else _nodes(velocity)
     if _asks_accelerations(wanted, drawing):
         _set_apart(pages, velocity)
         at_scales = [drawing] if velocity is None else _at_velocity_scales(drawing, velocities)
-        _find_plan(pages, at_scales, ACCELERATION_PLAN, velocities)
+        _find_plan(pages, at_scales, ACCELERATION_PLAN, velocities, renamed)
     return [
-        lettered(reading, page.ink.letters, drawing.construction, assignment.file.names)
+        lettered(reading, page.ink.letters, drawing.construction, renamed)
         for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
     ]
 
@@ -156,33 +155,63 @@ def _at_velocity_scales(drawing: Drawing, at: Nodes) -> list[Drawing]:
 
 
 def _find_plan(
-    pages: Sequence[_PageReading], at_scales: Sequence[Drawing], figure: str, known: Nodes
+    pages: Sequence[_PageReading],
+    at_scales: Sequence[Drawing],
+    figure: str,
+    known: Nodes,
+    renamed: Mapping[str, str],
 ) -> PlanReading | None:
     """The plan on the sheet that explains it best; it is added to that page.
 
     Arguments: `at_scales`, the drawing at likely scales; `known`, nodes of the plan before.
     """
-    laid: list[tuple[_PageReading, PlanProblem, list[PlanReading]]] = []
+    laid: list[_LaidPlan] = []
     for page in pages:
         joints, guide_turn = _sketched(page, pages)
-        problem = PlanProblem(page.lines, figure, {**joints, **known})
+        links = page.sketch.members if page.sketch is not None else np.zeros(0, np.int64)
+        problem = PlanProblem(page.lines, figure, {**joints, **known}, page.ink.letters, renamed, links)
         for drawing in at_scales:
-            parameters = {**drawing.parameters, "turn": np.asarray(guide_turn)}
-            plans = regular_plans(problem, Drawing(drawing.construction, parameters))
-            if plans:
-                laid.append((page, problem, plans))
-    laid.sort(key=lambda entry: -entry[2][0].score)
+            turned = Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(guide_turn)})
+            laid.append(_LaidPlan(page, problem, turned, regular_plans(problem, turned)))
+    laid.sort(key=lambda one: -one.score)
     # Where no sheet shows the plan as it should be, a mistaken one may be on either.
-    clear = bool(laid) and laid[0][2][0].pose.score > CLEAR
+    if laid and laid[0].plans and laid[0].plans[0].pose.score > EXPLAINED:
+        laid = laid[:1]
+    elif figure == VELOCITY_PLAN:
+        laid = [_without_accelerations(one) for one in laid]
     best: tuple[_PageReading, PlanReading] | None = None
-    for page, problem, plans in laid[:1] if clear else laid:
-        plan = best_plan(problem, plans)
+    for one in laid:
+        plan = best_plan(one.problem, one.drawing, one.plans)
         if plan is not None and (best is None or plan.score > best[1].score):
-            best = page, plan
+            best = one.page, plan
     if best is None or best[1].score < LEAST_PLAN:
         return None
     best[0].plans[figure] = best[1]
     return best[1]
+
+
+@dataclass(frozen=True, slots=True)
+class _LaidPlan:
+    """The regular readings of a plan on one page at one scale, best first."""
+
+    page: _PageReading
+    problem: PlanProblem
+    drawing: Drawing
+    plans: list[PlanReading]
+
+    @property
+    def score(self) -> float:
+        """Of the best one."""
+        return self.plans[0].score if self.plans else -math.inf
+
+
+def _without_accelerations(laid: _LaidPlan) -> _LaidPlan:
+    """The same where the strokes of a surely read acceleration plan are no velocities."""
+    accelerations = regular_plans(replace(laid.problem, figure=ACCELERATION_PLAN), laid.drawing)
+    if not accelerations or accelerations[0].score < max(SURE_PLAN, laid.score):
+        return laid
+    elsewhere = np.concatenate([laid.problem.elsewhere, accelerations[0].members])
+    return replace(laid, problem=replace(laid.problem, elsewhere=elsewhere))
 
 
 def _sketched(page: _PageReading, pages: Sequence[_PageReading]) -> tuple[Nodes, float]:
@@ -204,8 +233,7 @@ def _set_apart(pages: Sequence[_PageReading], plan: PlanReading | None) -> None:
     page = next((page for page in pages if plan is not None and plan in page.plans.values()), None)
     if plan is None or page is None or plan.score < SURE_PLAN:
         return
-    stroke = plan.assignment.stroke
-    used = np.isin(page.lines.members, plan.lines.members[stroke[stroke >= 0]])
+    used = np.isin(page.lines.members, plan.members)
     page.lines = page.lines.take(np.flatnonzero(~used.any(axis=1)))
 
 

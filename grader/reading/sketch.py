@@ -9,7 +9,7 @@ from grader.reading.expected import DraftingErrors, Expected, Pose, Search, Slac
 from grader.reading.lines import BoolArray, Lines
 from grader.reading.matching import EndPrior, StrokeAssignment, assign_groups
 from grader.reading.nodes import LINK_ENDS, NodeFit, fit_nodes
-from grader.records import MECHANISM, FloatArray
+from grader.records import MECHANISM, FloatArray, IntArray
 from reference.authored.assignment import Assignment, Scales, Variant
 from reference.construction.derive import construction_of
 from reference.construction.elements import FixedLine
@@ -66,6 +66,7 @@ class SketchReading:
     ----------
     drawing : the construction and parameters of the variant that the sketch follows
     assignment, fit : its strokes and its joints
+    members : the strokes of its links, by their number
     guide_turn_rad : how its guides are turned, by the guides where they are drawn
     score : nats for it: strokes, circles, less what is unlikely beforehand
     """
@@ -73,6 +74,7 @@ class SketchReading:
     drawing: Drawing
     assignment: StrokeAssignment
     fit: NodeFit
+    members: IntArray
     guide_turn_rad: float
     score: float
 
@@ -218,7 +220,9 @@ def _fitted(sketch: _Assigned, lines: Lines) -> SketchReading:
     """The sketch with its joints fitted."""
     fit = fit_nodes(sketch.assignment, sketch.lines, LINK_ENDS, sketch.centres)
     guide_turn = _guide_turn(sketch.drawing, fit, lines)
-    return SketchReading(sketch.drawing, sketch.assignment, fit, guide_turn, sketch.score)
+    stroke = sketch.assignment.stroke
+    members = np.unique(sketch.lines.members[stroke[stroke >= 0]])
+    return SketchReading(sketch.drawing, sketch.assignment, fit, members, guide_turn, sketch.score)
 
 
 def _guide_turn(drawing: Drawing, fit: NodeFit, lines: Lines) -> float:

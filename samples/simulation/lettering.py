@@ -3,7 +3,7 @@
 Markup: ``_x`` or ``_{xy}`` lowers, ``^x`` or ``^{xy}`` raises; everything else is written as it is.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,17 +55,28 @@ def any_handwriting(rng: Rng) -> Handwriting:
 
 
 @dataclass(frozen=True, slots=True)
+class WrittenSign:
+    """One sign of a text, as in the alphabet, and its box."""
+
+    sign: str
+    low: complex
+    high: complex
+
+
+@dataclass(frozen=True, slots=True)
 class WrittenText:
-    """Strokes of a text and its box: (left, bottom), (right, top), complex sheet millimetres."""
+    """Strokes of a text, its box and its signs: (left, bottom), (right, top), complex sheet millimetres."""
 
     strokes: tuple[InkStroke, ...]
     low: complex
     high: complex
+    signs: tuple[WrittenSign, ...] = ()
 
     def moved(self, by: complex) -> "WrittenText":
         """The same text elsewhere."""
         strokes = tuple(InkStroke(s.points + by, s.width, s.dark, s.layer) for s in self.strokes)
-        return WrittenText(strokes, self.low + by, self.high + by)
+        signs = tuple(WrittenSign(s.sign, s.low + by, s.high + by) for s in self.signs)
+        return WrittenText(strokes, self.low + by, self.high + by, signs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +116,7 @@ def _strokes_of(sign: str, forms: dict[str, int]) -> list[tuple[bool, ComplexArr
 def write(rng: Rng, pen: PenWidth, text: str, height_mm: float, style: Handwriting) -> WrittenText:
     """A text whose base line starts at 0."""
     forms = dict(style.forms)
-    at, strokes = 0.0, []
+    at, strokes, signs = 0.0, [], []
     for letter in _letters(text):
         if letter.sign == " ":
             at += _SPACE * letter.size
@@ -114,7 +125,7 @@ def write(rng: Rng, pen: PenWidth, text: str, height_mm: float, style: Handwriti
             at -= 0.55 * style.aspect + style.gap
         size = letter.size * (1.0 + style.unevenness * rng.standard_normal())
         lift = letter.lift + 0.4 * style.unevenness * rng.standard_normal()
-        right = at
+        right, before = at, len(strokes)
         for curved, corners in _strokes_of(letter.sign, forms):
             shape = corners + style.jitter * (
                 rng.standard_normal(len(corners)) + 1j * rng.standard_normal(len(corners))
@@ -126,12 +137,14 @@ def write(rng: Rng, pen: PenWidth, text: str, height_mm: float, style: Handwriti
             strokes.append(inked(rng, pen, np.asarray(place)))
             right = max(right, float(x.max()))
         at = right + style.gap * letter.size
-    return _boxed(strokes)
-
-
-def _boxed(strokes: list[InkStroke]) -> WrittenText:
+        if strokes[before:]:
+            signs.append(WrittenSign(letter.sign, *_box_of(strokes[before:])))
     if not strokes:
         return WrittenText((), 0j, 0j)
+    return WrittenText(tuple(strokes), *_box_of(strokes), tuple(signs))
+
+
+def _box_of(strokes: Sequence[InkStroke]) -> tuple[complex, complex]:
     points = np.concatenate([stroke.points for stroke in strokes])
     low = complex(points.real.min(), points.imag.min())
-    return WrittenText(tuple(strokes), low, complex(points.real.max(), points.imag.max()))
+    return low, complex(points.real.max(), points.imag.max())

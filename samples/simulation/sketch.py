@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from samples.simulation.lettering import Handwriting, WrittenText, write
+from samples.simulation.lettering import Handwriting, WrittenSign, WrittenText, write
 from samples.simulation.settings import HandStyle, PageStyle, PenStyle
 from samples.simulation.strokes import ComplexArray, Dash, InkStroke, PenWidth, Rng, dashed, inked, straight
 
@@ -17,12 +17,13 @@ DASHES = Dash(4.0, 1.8)
 
 @dataclass(frozen=True, slots=True)
 class WrittenLabel:
-    """A text on the sheet: what it names, and its box (low, high corners)."""
+    """A text on the sheet: what it names, its box (low, high corners) and its signs."""
 
     text: str
     names: str
     low: complex
     high: complex
+    signs: tuple[WrittenSign, ...] = ()
 
 
 @dataclass(slots=True)
@@ -92,7 +93,7 @@ class SheetSketch:
         """Write a text with its base line's start at a point."""
         written = write(self.rng, self.pen("text"), text, height_mm, self.writing).moved(at)
         self.strokes.extend(written.strokes)
-        self.labels.append(WrittenLabel(text, names, written.low, written.high))
+        self.labels.append(WrittenLabel(text, names, written.low, written.high, written.signs))
         return written
 
     def letter(self, near: complex, text: str, height_mm: float, *, names: str, distance_mm: float) -> None:
@@ -107,7 +108,7 @@ class SheetSketch:
         centre = max(tried, key=self._room())
         placed = written.moved(centre - middle)
         self.strokes.extend(placed.strokes)
-        self.labels.append(WrittenLabel(text, names, placed.low, placed.high))
+        self.labels.append(WrittenLabel(text, names, placed.low, placed.high, placed.signs))
 
     def _room(self) -> Callable[[complex], float]:
         """How far the nearest ink is, with a person's carelessness; a letter's width is enough."""

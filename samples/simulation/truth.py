@@ -14,6 +14,7 @@ import numpy as np
 
 from samples.simulation.figures import at_origin, pole_text
 from samples.simulation.hand import DrawingTask, DrawnFigure, DrawnSheet
+from samples.simulation.lettering import WrittenSign
 from samples.simulation.mistakes import StudentMistake
 from samples.simulation.page import Frame
 from samples.simulation.settings import MECHANISM, Settings
@@ -62,8 +63,13 @@ def drawing_truth(
 
 
 def _label(label: WrittenLabel) -> dict[str, Any]:
-    top_left, low_right = complex(label.low.real, label.high.imag), complex(label.high.real, label.low.imag)
-    return {"text": label.text, "names": label.names, "box_mm": [*xy(top_left), *xy(low_right)]}
+    signs = [[sign.sign, *_box(sign)] for sign in label.signs]
+    return {"text": label.text, "names": label.names, "box_mm": _box(label), "signs": signs}
+
+
+def _box(of: WrittenLabel | WrittenSign) -> list[float]:
+    """Left, top, right, bottom."""
+    return [*xy(complex(of.low.real, of.high.imag)), *xy(complex(of.high.real, of.low.imag))]
 
 
 def _rounded(scales: Mapping[str, float]) -> dict[str, float]:

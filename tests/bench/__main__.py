@@ -16,13 +16,13 @@ from tests.bench.judging import JudgingBench
 from tests.bench.judging_tally import JudgingFigures, judging_tables
 from tests.bench.lines import LinesFigures, lines_tables
 from tests.bench.plain_text import as_text
-from tests.bench.reading import ReadingBench
+from tests.bench.reading import CurveRow, ReadingBench, curve_tables
 from tests.bench.reading_scenes import ForeignRow, foreign_tables
 from tests.bench.reading_tally import SceneRow, reading_tables
 from tests.bench.solver import SolverBench, SolverFigures, solver_tables
 
 PARTS = ("solver", "reading", "judging")
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +32,7 @@ class Report:
     solver: SolverFigures | None = None
     reading: tuple[SceneRow, ...] = ()
     foreign: tuple[ForeignRow, ...] = ()
+    curve: tuple[CurveRow, ...] = ()
     lines: LinesFigures | None = None
     judging: JudgingFigures | None = None
 
@@ -47,6 +48,7 @@ class Report:
             "solver": None if self.solver is None else self.solver.as_json(),
             "reading": [asdict(row) for row in self.reading],
             "foreign": [asdict(row) for row in self.foreign],
+            "curve": [asdict(row) for row in self.curve],
             "lines": None if self.lines is None else asdict(self.lines),
             "judging": None if self.judging is None else self.judging.as_json(),
         }
@@ -55,7 +57,10 @@ class Report:
         """Tables that read well in a terminal and in Markdown."""
         solver = [] if self.solver is None else solver_tables(self.solver)
         judging = [] if self.judging is None else judging_tables(self.judging)
-        reading = (reading_tables(self.reading), foreign_tables(self.foreign), lines_tables(self.lines))
+        reading = (
+            reading_tables(self.reading), curve_tables(self.curve), foreign_tables(self.foreign),
+            lines_tables(self.lines),
+        )  # fmt: skip
         return as_text(chain(solver, *reading, judging))
 
 
@@ -81,6 +86,7 @@ def main(arguments: list[str]) -> None:
         None if solver is None else solver.figures,
         () if reading is None else tuple(reading.rows),
         () if reading is None else tuple(reading.foreign),
+        () if reading is None else tuple(reading.curve),
         None if reading is None else reading.lines,
         None if judging is None else judging.figures,
     )

@@ -6,15 +6,27 @@ What counts as right, and what as a silent misread, stands in `tests.bench.readi
 
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
+from unittest.mock import patch
 
 import cv2
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
 
-from grader.pipeline import open_page, read_pages
+from grader.feedback.student_page import About, write_feedback
+from grader.inputs.measurements import StudentSubmission
+from grader.overlay.picture import backdrop
+from grader.pipeline import mark, open_page, read_pages, report_on
+from grader.reading import expected
 from grader.records import PageRef, ScannedPage
+from grader.rubric import asked_of
 from reference.construction.derive import construction_of
 from tests.bench.lines import LinesFigures, measure_lines
+from tests.bench.plain_text import Table
 from tests.bench.reading_memory import peak_mb
 from tests.bench.reading_scenes import (
     BREAKDOWNS,
@@ -23,9 +35,10 @@ from tests.bench.reading_scenes import (
     ReadingScene,
     SceneWork,
     measure_foreign,
+    scene_named,
     works,
 )
-from tests.bench.reading_tally import STAGES, ReadingTally, SceneRow, row_of
+from tests.bench.reading_tally import STAGES, ReadingTally, SceneRow, pair, percent, row_of
 from tests.bench.reading_truth import figures_of
 
 __all__ = ["SCENES", "STAGES", "STUDENTS", "ReadingBench", "SceneRow", "measure_reading"]
@@ -46,8 +59,9 @@ class ReadingBench:
         self.scenes = tuple(scene for scene in SCENES if not quick or scene.name in SCENES_QUICK)
         self.rows: list[SceneRow] = []
         self.foreign: list[ForeignRow] = []
+        self.curve: list[CurveRow] = []
         self.lines: LinesFigures | None = None
-        self.steps = len(self.scenes) + 2
+        self.steps = len(self.scenes) + 3
 
     def run(self) -> Iterator[str]:
         """Measure, naming what was measured."""
@@ -60,6 +74,8 @@ class ReadingBench:
                 yield f"reading: {scene.title}"
             self.foreign.extend(measure_foreign(quick=self.quick))
             yield "reading: foreign pages"
+            self.curve.extend(measure_curve(1 if self.quick else self.students, quick=self.quick))
+            yield "reading: time against error"
             self.lines = measure_lines(quick=self.quick)
             yield "lines"
         finally:
@@ -75,31 +91,61 @@ def measure_reading(
 
 
 def measure_scene(
-    scene: ReadingScene, students: int, first_seed: int = 1, *, memory: bool = True
+    scene: ReadingScene,
+    students: int,
+    first_seed: int = 1,
+    *,
+    memory: bool = True,
+    narrowed: bool = False,
 ) -> SceneRow:
-    """Every student of a scene simulated, read and held against the truth; peak memory of the first."""
+    """Every student of a scene simulated, read and held against the truth; peak memory of the first.
+
+    Arguments: `narrowed` to the zones of the figures that the rubric asks for, as a class is graded.
+    """
     tally, peak = ReadingTally(), None
     with tempfile.TemporaryDirectory() as folder:
         for work in works(scene, students, first_seed):
             paths = [sheet.save(Path(folder) / f"{number}") for number, sheet in enumerate(work.sheets)]
-            _read_one(tally, work, paths)
+            _read_one(tally, work, paths, narrowed=narrowed)
             if memory and peak is None:
                 peak = peak_mb(scene.assignment, work.variant, paths)
     return row_of(scene.name, scene.title, tally, peak)
 
 
-def _read_one(tally: ReadingTally, work: SceneWork, paths: Sequence[Path]) -> None:
+def _read_one(tally: ReadingTally, work: SceneWork, paths: Sequence[Path], *, narrowed: bool) -> None:
     start, clock = time.process_time(), time.perf_counter()
-    scans = [open_page(PageRef(path.name, path=path)) for path in paths]
+    figures = asked_of(work.assignment, work.rubric).figures if narrowed else ()
+    scans = [open_page(PageRef(path.name, path=path), figures) for path in paths]
     pages, failed = read_all(scans, work)
+    marking = {} if failed else _marking_ms(work, pages, paths[0].parent / "marked")
     spent, passed = time.process_time() - start, time.perf_counter() - clock
     construction = construction_of(work.assignment.mechanism([work.variant]))
     tally.students += 1
     tally.failed += failed
     for sheet, page in zip(work.sheets, pages, strict=True):
-        tally.add_times(page.timing_ms, spent / passed, 1000.0 * spent / len(pages))
-        figures = figures_of(sheet.truth, construction)
-        tally.add_sheet(sheet.truth, figures, work.rubric.vectors, page, page.reading)
+        tally.add_times({**page.timing_ms, **marking}, spent / passed, 1000.0 * spent / len(pages))
+        true = figures_of(sheet.truth, construction)
+        tally.add_sheet(sheet.truth, true, work.rubric.vectors, page, page.reading)
+
+
+def _marking_ms(work: SceneWork, pages: Sequence[ScannedPage], out: Path) -> dict[str, float]:
+    """What judging, the pictures and the student's page take for each sheet, by the clock."""
+    refs = tuple(page.ref for page in pages)
+    submission = StudentSubmission("s01", work.variant, refs, work.declared)
+    clock = [time.perf_counter()]
+    report_on(submission, pages, work.assignment, work.rubric)
+    clock.append(time.perf_counter())
+    shown = [
+        page if page.image is None else replace(page, backdrop=backdrop(page.image, page.sheet))
+        for page in pages
+    ]
+    report, pictures = mark(submission, shown, work.assignment, work.rubric)
+    clock.append(time.perf_counter())
+    about = About(work.assignment.file.title.in_language("en"), "s01", work.assignment.file.names)
+    write_feedback(report, pictures, out, "en", "full", about)
+    clock.append(time.perf_counter())
+    judging, judging_and_picture, page_ms = (1000.0 / len(pages) * np.diff(clock)).tolist()
+    return {"judging": judging, "picture": max(judging_and_picture - judging, 0.0), "page": page_ms}
 
 
 def read_all(pages: Sequence[ScannedPage], work: SceneWork) -> tuple[list[ScannedPage], bool]:
@@ -109,3 +155,80 @@ def read_all(pages: Sequence[ScannedPage], work: SceneWork) -> tuple[list[Scanne
         return read_pages(pages, work.assignment, work.variant, work.declared, wanted), False
     except BREAKDOWNS:
         return list(pages), True
+
+
+# Time against error -------------------------------------------------------------------------------
+
+RESOLUTIONS = (150, 200, 300, 400, 600)
+RESOLUTIONS_QUICK = (150,)
+
+
+@dataclass(frozen=True, slots=True)
+class CurveRow:
+    """A kind of sheet at one resolution, in one way.
+
+    Attributes
+    ----------
+    way : which shortcut is left out, or that none is
+    row : the figures of its sheets
+    """
+
+    way: str
+    dpi: int
+    row: SceneRow
+
+
+def _every_stroke() -> AbstractContextManager[object]:
+    """No stroke is left out as too far off when poses of figures are weighed."""
+    return patch.object(expected, "FARTHEST_SQUARED", 1500.0)
+
+
+WAYS: Sequence[tuple[str, str, bool, Callable[[], AbstractContextManager[object]]]] = (
+    ("plain sheet", "plain", False, nullcontext),
+    ("plain sheet, far strokes weighed too", "plain", False, _every_stroke),
+    ("answer sheet, zones asked for", "printed", True, nullcontext),
+    ("answer sheet, all of it", "printed", False, nullcontext),
+)
+"""What the curves are called, their scene, whether it is narrowed to zones, and what is switched."""
+
+
+def measure_curve(students: int, *, quick: bool = False) -> Iterator[CurveRow]:
+    """Each kind of sheet in each way at each resolution, the same students."""
+    for way, scene, narrowed, switched in WAYS:
+        for dpi in RESOLUTIONS_QUICK if quick else RESOLUTIONS:
+            at = replace(scene_named(scene), dpi=float(dpi))
+            with switched():
+                row = measure_scene(at, students, memory=False, narrowed=narrowed)
+            yield CurveRow(way, dpi, row)
+
+
+def curve_tables(rows: Sequence[CurveRow]) -> Iterator[Table]:
+    """The curves as a table, where any was measured."""
+    if rows:
+        heads = ["sheet", "dpi", "ms a page", "node, mm (median / p95)", "right", "confident", "misreads"]
+        cells = [
+            [
+                one.way, str(one.dpi), f"{one.row.processor_ms:.0f}", pair(one.row.node_mm),
+                percent(one.row.right), percent(one.row.confident), str(one.row.misreads),
+            ]
+            for one in rows
+        ]  # fmt: skip
+        yield "Reading: time against error by resolution, all stages", heads, cells
+
+
+def curve_picture(rows: Sequence[CurveRow], path: Path) -> None:
+    """The curves as a picture: median error of nodes over processor time."""
+    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
+    axes = figure.subplots()
+    for way in dict.fromkeys(one.way for one in rows):
+        known = [(one.row, one.dpi) for one in rows if one.way == way]
+        time_ms = [row.processor_ms for row, _ in known]
+        error_mm = [np.nan if row.node_mm[0] is None else row.node_mm[0] for row, _ in known]
+        axes.plot(time_ms, error_mm, marker="o", label=way)
+        for x, y, (_, dpi) in zip(time_ms, error_mm, known, strict=True):
+            axes.annotate(str(dpi), (x, y), textcoords="offset points", xytext=(4, 4), fontsize=8)
+    axes.set(xlabel="processor time per page, ms", ylabel="median error of a node, mm", xlim=(0, None))
+    axes.set_ylim(bottom=0)
+    axes.legend()
+    with rc_context({"svg.hashsalt": "curve", "svg.fonttype": "none"}):
+        figure.savefig(path, metadata={"Date": None})

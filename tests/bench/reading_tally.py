@@ -83,7 +83,8 @@ class Honesty:
     confidence: Sequence[Bin]
 
 
-STAGES = ("decode", "sheet", "ink", "reading")
+STAGES = ("decode", "sheet", "ink", "reading", "judging", "picture", "page")
+"""Of a page, from its file to the student's page; the test for blankness is in the sum alone."""
 UPRIGHT_DEG = 45.0
 SCALE_SHARE = 0.01
 
@@ -300,38 +301,40 @@ def _table(title: str, rows: Sequence[SceneRow], columns: Sequence[Column]) -> T
     return title, [head for head, _ in columns], [[cell(row) for _, cell in columns] for row in rows]
 
 
-def _percent(share: float | None) -> str:
+def percent(share: float | None) -> str:
+    """A share in per cent, where there is one."""
     return NOTHING if share is None else f"{100 * share:.0f} %"
 
 
-def _pair(pair: tuple[float | None, float | None]) -> str:
-    return NOTHING if pair[0] is None else f"{pair[0]:.3f} / {pair[1]:.3f}"
+def pair(errors: tuple[float | None, float | None]) -> str:
+    """Median and p95, where there are any."""
+    return NOTHING if errors[0] is None else f"{errors[0]:.3f} / {errors[1]:.3f}"
 
 
 def _spread(spread: ErrorSpread) -> str:
     if spread.rms is None:
         return NOTHING
-    return f"{_percent(spread.under_1)}, {_percent(spread.under_196)}, {spread.rms:.2f}"
+    return f"{percent(spread.under_1)}, {percent(spread.under_196)}, {spread.rms:.2f}"
 
 
 _SCENE: Column = ("scene", lambda row: row.title)
 _VECTORS: Sequence[Column] = (
     _SCENE,
     ("sheets", lambda row: str(row.sheets)),
-    ("entirely right", lambda row: _percent(row.sheets_right)),
+    ("entirely right", lambda row: percent(row.sheets_right)),
     ("vectors", lambda row: str(row.vectors)),
-    ("right", lambda row: _percent(row.right)),
-    ("confident", lambda row: _percent(row.confident)),
-    ("doubtful", lambda row: _percent(row.doubtful)),
-    ("unread", lambda row: _percent(row.unread)),
-    ("under 5 mm: right", lambda row: f"{_percent(row.short_right)} of {row.short}"),
+    ("right", lambda row: percent(row.right)),
+    ("confident", lambda row: percent(row.confident)),
+    ("doubtful", lambda row: percent(row.doubtful)),
+    ("unread", lambda row: percent(row.unread)),
+    ("under 5 mm: right", lambda row: f"{percent(row.short_right)} of {row.short}"),
     ("silent misreads", lambda row: f"{row.misreads} of {row.confidently}"),
 )
 _NODES: Sequence[Column] = (
     _SCENE,
-    ("from the node", lambda row: _pair(row.node_mm)),
-    ("from the node or its strokes' ends", lambda row: _pair(row.near_mm)),
-    ("joints of the sketch", lambda row: _pair(row.joint_mm)),
+    ("from the node", lambda row: pair(row.node_mm)),
+    ("from the node or its strokes' ends", lambda row: pair(row.near_mm)),
+    ("joints of the sketch", lambda row: pair(row.joint_mm)),
 )
 _SPREADS: Sequence[Column] = (
     _SCENE,

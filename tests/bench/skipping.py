@@ -3,9 +3,9 @@
     python -m tests.bench.skipping [--students N] [--seed S]
 
 A class on printed sheets of `pump`, a page for the velocities and one for the accelerations, is
-graded; then again after each kind of change, and by a rubric that asks for velocities alone.
-Processor seconds of the whole run; every row says whether its reports are those of a run that
-skips nothing.
+graded; then again after each kind of change, and by a rubric that asks for velocities alone; last a node
+is moved in the review, and the marks that follow are waited for. Processor seconds of the whole run; every
+row says whether its reports are those of a run that skips nothing.
 """
 
 import argparse
@@ -18,8 +18,10 @@ import numpy as np
 
 from grader.folder import batch
 from grader.folder.batch import Batch, grade
+from grader.inputs.decision_texts import place_text
 from grader.inputs.roster import RosterRow
 from grader.printed.answer_sheet import make_sheets
+from grader.review.session import Answer, Session, mark_of
 from grader.rubric import Asked, load_rubric
 from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
@@ -28,6 +30,8 @@ from tests.inline import Inline
 
 PUMP = load_assignment("pump")
 HEAD = "student_id,name,n,kL,kv,ka"
+PLAN, NODE = "velocity_plan", "b"
+MOVES = 5
 
 
 def draw(folder: Path, student: str, n: int, seed: int) -> str:
@@ -72,6 +76,25 @@ def shares(one: list, other: list) -> str:
     lengths = [[c[3] or 0.0 for *_, told in reports for c in told] for reports in (one, other)]
     apart = float(np.max(np.abs(np.subtract(*lengths)))) if len(lengths[0]) == len(lengths[1]) else np.nan
     return f"{'yes' if verdicts[0] == verdicts[1] else 'NO'}, lengths within {apart:.2g} mm"
+
+
+def moved_node(batch: Batch) -> tuple[list, float]:
+    """The reports after a node was moved in the review of a class that is graded, and the seconds for it."""
+    session = Session(batch, Inline())
+    session.bring_up_to_date(lambda *_: None)
+    student = session.students[0]
+    sheets = enumerate(student.report.reading.sheets)
+    number, nodes = next((k, sheet.figures[PLAN].nodes) for k, sheet in sheets if PLAN in sheet.figures)
+    node = nodes[NODE]
+    spent = []
+    for step in range(MOVES):
+        start = time.process_time()
+        at = session.snapped(student.key, number, PLAN, (node.x_mm + 5.0 * step, node.y_mm))
+        there = session.standing().of(student, f"node:{PLAN}:{NODE}")
+        moved = Answer(student.key, f"node:{PLAN}:{NODE}", place_text(*at), seen=mark_of(there))
+        session.move(moved, "", "bench")
+        spent.append(time.process_time() - start)
+    return [_verdicts(one.report) for one in session.students], float(np.median(spent))
 
 
 def without_narrowing(run):
@@ -121,6 +144,8 @@ def main() -> None:
         lines.append(draw(folder, "s9", 20, told.seed + 90))
         added = fresh("out", wider, lines)
         row("one student's scans added", (added[0][:-1], added[1]), whole)
+        moved = moved_node(Batch(PUMP, wider, folder, top / "out"))
+        row("a node moved in the review", moved, fresh("moved", wider, lines))
 
 
 if __name__ == "__main__":

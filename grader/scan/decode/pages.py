@@ -12,7 +12,7 @@ import numpy as np
 from grader.records import Page, PageRef
 from grader.scan.decode import pdf, pictures, tiff
 from grader.scan.decode.limits import Door, InputFile, changed, kind_of, load
-from grader.scan.pixels import shrink
+from grader.scan.pixels import connected, shrink
 from reference.errors import InputFileError
 
 _DOORS: dict[str, Door] = {"jpeg": pictures.JPEG, "png": pictures.PNG, "tiff": tiff.TIFF, "pdf": pdf.PDF}
@@ -109,7 +109,6 @@ def is_blank(page: Page) -> bool:
     if rim > 0:
         share = share[rim:-rim, rim:-rim]
     inner = np.ascontiguousarray(share < (1.0 - _DARK) * 255).astype(np.uint8)
-    _, _, stats, _ = cv2.connectedComponentsWithStats(inner, connectivity=8)
-    extent = np.hypot(stats[1:, cv2.CC_STAT_WIDTH], stats[1:, cv2.CC_STAT_HEIGHT])
+    extent = np.hypot(*connected(inner)[1][:, 2:].T)
     long_side = max(small.shape)
     return bool(extent[extent > _LONG * long_side].sum() < _ENOUGH * long_side)

@@ -37,6 +37,17 @@ _SHOWN = 0.94
 _SQUARE = 1e-3
 """Of the image's size: by more than rounding askew, it is resampled by what renders the page."""
 _PAINTS = frozenset(("S", "s", "f", "F", "f*", "B", "B*", "b", "b*", "sh", "BI", "INLINE IMAGE"))
+_TAKEN_OUT = frozenset(("/DeviceGray", "/CalGray", "/DeviceRGB", "/CalRGB", "/ICCBased", "/Indexed"))
+"""Colour spaces whose stored values are grey or colours of light."""
+_RENDERED = frozenset(("/DeviceCMYK", "/Lab", "/Separation", "/DeviceN"))
+"""Those whose values are inks, or no colours of a screen: what renders the page knows what they look like."""
+_INKS = frozenset(("/Separation", "/DeviceN"))
+"""Those with a formula for their colours, which may be one that cannot be carried out."""
+_TAKEN_OUT_BITS = frozenset((1, 2, 4, 8))
+"""Bits of a value that Pillow keeps; it clips longer ones."""
+_FOUR_INKS = 4
+_MOST_SPACES = 3
+"""A colour space, and those that it rests on."""
 _INVISIBLE_TEXT = 3
 """Text mode of what optical character recognition lays over a scan."""
 
@@ -84,6 +95,10 @@ def _page(file: InputFile, number: int) -> Page | None:
                     # What renders the page would fill the rest of a damaged one without a word.
                     pictures.decode(file, number, image.read_raw_bytes())
             taken = _rendered(file, number, len(leaves), _repaired(file, document))
+            if int(taken.grey.min()) == int(taken.grey.max()) and any(
+                _INKS.intersection(_colour_spaces(image)) for image in drawn.images.values()
+            ):
+                raise _unreadable(file, number, "nothing is shown of a picture in inks of its own")
     return replace(taken, damage=drawn.damage)
 
 
@@ -145,21 +160,41 @@ def _taken_out(file: InputFile, number: int, placement: Placement) -> Page | Non
 
 
 def _decoded(file: InputFile, number: int, image: pikepdf.PdfImage) -> GreyImage | None:
+    spaces = _colour_spaces(cast("pikepdf.Stream", image.obj))
+    unknown = [name for name in spaces if name not in _TAKEN_OUT | _RENDERED]
+    if unknown:
+        raise _unreadable(file, number, f"the colour space {unknown[0]} is none that a picture can have")
     plain = "/Decode" not in image.obj and "/SMask" not in image.obj and "/Mask" not in image.obj
-    four_inks = image.colorspace in ("/DeviceCMYK", "/DeviceN", "/Separation")
-    if list(image.filters) == ["/DCTDecode"] and plain and not four_inks:
-        return pictures.decode(file, number, image.obj.read_raw_bytes())
-    if not plain or four_inks or "/JBIG2Decode" in image.filters:
+    if not plain or _RENDERED.intersection(spaces) or "/JBIG2Decode" in image.filters:
         return None
+    if list(image.filters) == ["/DCTDecode"]:
+        return pictures.decode(file, number, image.obj.read_raw_bytes())
     pixels = plain_pixels(file, number, image)
     if pixels is not None:
         return to_grey(pixels, rgb=True)
+    if image.bits_per_component not in _TAKEN_OUT_BITS:
+        return None
     try:
         picture = image.as_pil_image()
         check_memory(file, number, picture.width * picture.height, 0)
         return from_pillow(picture)
     except (pikepdf.PdfError, pikepdf.UnsupportedImageTypeError, OSError, ValueError, NotImplementedError):
         return None
+
+
+def _colour_spaces(image: pikepdf.Stream) -> list[str]:
+    """Names of an image's colour space and of those that it rests on; empty for a mask, and for JPEG 2000."""
+    names: list[str] = []
+    space = image.get("/ColorSpace")
+    while space is not None and len(names) < _MOST_SPACES:
+        family = space[0] if isinstance(space, pikepdf.Array) and len(space) else space
+        names.append(str(family))
+        if str(family) == "/ICCBased" and isinstance(space, pikepdf.Array) and len(space) > 1:
+            names += ["/DeviceCMYK"] if int(space[1].get("/N", 3)) == _FOUR_INKS else []
+        based = str(family) == "/Indexed" and isinstance(space, pikepdf.Array) and len(space) > 1
+        space = space[1] if based else None
+    masked = bool(image.get("/ImageMask", False)) or "/JPXDecode" in filters_of(image)
+    return names if names or masked else ["(none)"]
 
 
 def _repaired(file: InputFile, document: pikepdf.Pdf) -> bytes:

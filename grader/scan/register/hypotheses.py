@@ -62,10 +62,14 @@ class Hypothesis:
 
 @dataclass(frozen=True, slots=True)
 class Resolution:
-    """The resolution to go by: as stated, or as the image's size and a usual dpi suggest."""
+    """The resolution to go by: as stated, or as the image's size and a usual dpi suggest.
+
+    `is_sure` where it is stated, and where the image has exactly A3's pixels by it.
+    """
 
     dpi: tuple[float, float]
     stated: bool
+    is_sure: bool
 
 
 def hypotheses(
@@ -136,14 +140,18 @@ def _in_each_turn(
 ) -> list[Hypothesis]:
     """Readings of four corners (left top, clockwise) as those of a model; half turns look alike."""
     readings = []
+    sides_px = _sides(corners)
+    known = resolution if _is_scan(resolution, shape) else None
     for turns in (0, 1):
+        if known is not None and not _may_be_as_large(np.roll(sides_px, turns), model, known):
+            continue
         map_px = _quad_map(model, np.roll(corners, turns, axis=0))
         params = None if map_px is None else affine_params(map_px)
         if map_px is None or params is None or not np.all(np.isfinite(params)):
             continue
         bend = np.abs(mapped(affine_of(params), model.corners()) - mapped(map_px, model.corners())).max()
         perspective = bool(bend / np.exp(params[:2].mean()) > _SCAN_BEND_MM)
-        if resolution is not None and not _is_possible(params, resolution, shape, perspective=perspective):
+        if known is not None and (perspective or not _is_possible(params, known)):
             continue
         penalty = _camera_misfit(map_px, shape) if perspective else _scan_misfit(params, resolution)
         if penalty < _HOPELESS:
@@ -153,19 +161,34 @@ def _in_each_turn(
     return readings
 
 
-def _is_possible(
-    params: FloatArray, resolution: Resolution, shape: tuple[int, int], *, perspective: bool
-) -> bool:
-    """Whether a map may be that of a page of which the file states a resolution by which it is A3.
+def _is_scan(resolution: Resolution | None, shape: tuple[int, int]) -> bool:
+    """Whether the file states a resolution by which the page is A3, and the page has the sheet's shape.
 
     Long lines of a drawing may be taken for a frame; the page itself says that it was scanned as it is. A
     camera's picture seldom has the shape of the sheet.
     """
     is_sheet = abs(np.log(max(shape) / min(shape) * PAGE_MM[1] / PAGE_MM[0])) < _SCANNED_WITHIN
-    if not resolution.stated or not is_sheet:
-        return True
+    return resolution is not None and resolution.is_sure and bool(is_sheet)
+
+
+def _is_possible(params: FloatArray, resolution: Resolution) -> bool:
+    """Whether a map has the scale of a scan of this resolution."""
     off = params[:2] - np.log(np.array(resolution.dpi) / MM_PER_INCH)
-    return not perspective and bool(np.all(np.abs(off) < _SCANNED_WITHIN))
+    return bool(np.all(np.abs(off) < _SCANNED_WITHIN))
+
+
+def _may_be_as_large(sides_px: FloatArray, model: Outline, resolution: Resolution) -> bool:
+    """Whether a quadrilateral's sides leave room for such a map: most do not, and need no map to be made."""
+    px_per_mm = np.array(resolution.dpi) / MM_PER_INCH
+    least, most = px_per_mm.min() * np.exp(-_SCANNED_WITHIN), px_per_mm.max() * np.exp(_SCANNED_WITHIN)
+    sides_mm = _sides(model.corners())
+    long_enough = sides_px >= least * (sides_mm - 2.0 * _SCAN_BEND_MM)
+    return bool(np.all(long_enough & (sides_px <= most * (sides_mm + 2.0 * _SCAN_BEND_MM))))
+
+
+def _sides(corners: FloatArray) -> FloatArray:
+    """(4,) lengths of the sides from each of four corners to the next."""
+    return np.asarray(np.hypot(*(corners[[1, 2, 3, 0]] - corners).T))
 
 
 def _quad_map(model: Outline, corners: FloatArray) -> FloatArray | None:
@@ -182,16 +205,16 @@ def _corners(quad: tuple[LongLine, ...]) -> FloatArray:
 
 def _meet(a: LongLine, b: LongLine) -> FloatArray:
     p, u = a.ends[0], a.ends[1] - a.ends[0]
-    q, v = b.ends[0], b.ends[1] - b.ends[0]
-    s = np.linalg.solve(np.column_stack([u, -v]), q - p)
-    return np.asarray(p + s[0] * u)
+    (x, y), (vx, vy) = (b.ends[0] - p).tolist(), (b.ends[1] - b.ends[0]).tolist()
+    ux, uy = u.tolist()
+    return np.asarray(p + (x * vy - y * vx) / (ux * vy - uy * vx) * u)
 
 
 def _scan_misfit(params: FloatArray, resolution: Resolution | None) -> float:
     unequal = (params[0] - params[1]) / _UNEQUAL_SE
     penalty = 0.5 * unequal**2
     if resolution is not None:
-        se, most = (_DPI_SE, 3.0) if resolution.stated else (_WINDOW_SE, 1.5)
+        se, most = (_DPI_SE, 3.0) if resolution.is_sure else (_WINDOW_SE, 1.5)
         wrong = (params[:2] - np.log(np.array(resolution.dpi) / MM_PER_INCH)) / se
         penalty += min(most, 0.25 * float(wrong @ wrong))
     return float(penalty)

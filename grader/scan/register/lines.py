@@ -12,6 +12,7 @@ from grader.scan.pixels import (
     Flat,
     at_full_size,
     cut_across,
+    lattice,
     lengths_and_directions,
     reached,
     robust_lines,
@@ -71,14 +72,10 @@ _STRONG = 0.4
 
 _LEAST_LINES = 8
 """Fewer lines at equal distances are a title block's."""
-_ON_LATTICE = 0.12
-"""Of the pitch: a line farther off is no line of the grid."""
 _MOSTLY = 0.6
 """Share of the lines of one direction that a grid has at least."""
 _DARKER = 1.35
 """A drawn line on a grid line is so much darker than the grid is."""
-_FOLLOWS = 0.3
-"""How fast the local pitch follows the distances met, which a photo's perspective changes."""
 _STRAYS, _FINE_PX = 4.0, 0.3
 """A line beside the lattice by more than four times the usual is a drawn one near it."""
 
@@ -251,7 +248,8 @@ def _grown(
         span = edges[members, 2].max() - edges[members, 0].min()
         within = min(_COLLINEAR_PX + _BENT_LINE_SHARE * span, _MOST_BENT_PX)
         near = np.flatnonzero(free & (off <= within))
-        grown = near[reached(edges[near][:, [0, 2]], edges[first, [0, 2]], _GAP_PX)]
+        start = edges[first, 0], edges[first, 2]
+        grown = near[reached(edges[near, 0], edges[near, 2], start, _GAP_PX)]
         if len(grown) == 0 or np.array_equal(grown, members):
             break
         members = grown
@@ -381,7 +379,7 @@ def _equally_spaced(
         return None
     at = np.array([lines[k].at(shape[1 if across else 0] / 2.0) for k in which])
     which, at = which[np.argsort(at)], np.sort(at)
-    index = _lattice(at)
+    index = lattice(at)
     on = index >= 0
     if np.count_nonzero(on) < max(_LEAST_LINES, _MOSTLY * len(at)):
         return None
@@ -390,35 +388,3 @@ def _equally_spaced(
     member = np.zeros(len(lines), dtype=bool)
     member[which[on]] = True
     return member
-
-
-def _lattice(at: FloatArray) -> FloatArray:
-    """(n,) number of each place on the lattice that most of them make, -1 for those beside it."""
-    best = np.full(len(at), -1.0)
-    gaps = np.diff(at)
-    gaps = gaps[gaps > 2.0]
-    if len(gaps) < _LEAST_LINES - 1:
-        return best
-    pitch = _commonest(gaps)
-    start = len(at) // 2
-    for first in range(max(0, start - 3), min(len(at), start + 4)):
-        index = np.full(len(at), np.nan)
-        index[first] = 0.0
-        for step in (1, -1):
-            last, here = first, pitch
-            for k in range(first + step, len(at) if step > 0 else -1, step):
-                ratio = abs(at[k] - at[last]) / here
-                whole = round(ratio)
-                if whole >= 1 and abs(ratio - whole) < _ON_LATTICE:
-                    index[k] = index[last] + step * whole
-                    here += _FOLLOWS * (abs(at[k] - at[last]) / whole - here)
-                    last = k
-        if np.count_nonzero(np.isfinite(index)) > np.count_nonzero(best >= 0):
-            best = np.where(np.isfinite(index), index - np.nanmin(index), -1.0)
-    return best
-
-
-def _commonest(gaps: FloatArray) -> float:
-    """The gap that most gaps are near to."""
-    near = np.abs(gaps[:, None] / gaps[None, :] - 1.0) < _ON_LATTICE
-    return float(np.median(gaps[near[:, near.sum(axis=0).argmax()]]))

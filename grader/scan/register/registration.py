@@ -14,7 +14,7 @@ from grader.records import FloatArray, Identity, Page, Problem, Sheet, Unread
 from grader.scan.pixels import Flat, flatten, inverted, local_axes, mapped, through_corners
 from grader.scan.register import markers
 from grader.scan.register.distortion import find_lens
-from grader.scan.register.fitting import Fit, affine_of, fit_sides
+from grader.scan.register.fitting import Fit, affine_of, affine_params, fit_sides
 from grader.scan.register.homography import (
     HALVES_ADVICE,
     PAPER,
@@ -84,6 +84,16 @@ _USUAL_DPI = (100.0, 150.0, 200.0, 240.0, 250.0, 300.0, 400.0, 500.0, 600.0, 800
 """Resolutions that scanners and copiers for A3 offer."""
 _DEFAULT_DPI = (72.0, 96.0)
 """What programs write when they do not know; no evidence either way."""
+_DPI_ROUNDING = 0.5
+"""PNG stores pixels a metre, TIFF fractions: 72 may come back as 72.009."""
+_WINDOW_SHAPE = 0.03
+"""Of the logarithm of the sides' ratio: windows of A3 scanners; cameras (4:3, 3:2) differ by 0.06."""
+_SCANNED_SE = 0.008
+"""Largest relative error of a scale: of a scanner 0.2 %, of a frame ruled by hand to a millimetre, thrice."""
+_EDGE_SE = 0.002
+"""Relative error of a stated resolution: edges that ask for another scale are none."""
+_SAME_PX = 2.0
+"""Scanners round A3's size in pixels up or down."""
 _A3_SLACK_MM = (40.0, 22.0)
 """A scanner's window may be this much larger than the sheet; paper that is cut off is not A3."""
 _A3_SHORT_MM = 5.0
@@ -130,16 +140,21 @@ def register_plain(page: Page) -> Sheet | Unread:
     lines = without_grid(long_lines(flat), shape)
     problems: list[Problem] = []
     resolution = _resolution(page, problems)
-    dpi = resolution.dpi if resolution is not None and resolution.stated else None
+    dpi = resolution.dpi if resolution is not None and resolution.is_sure else None
     ranked = hypotheses(lines, shape, resolution)
     if page.turn_is_sure:
         ranked = [
             reading for reading in ranked if off_turn_deg(reading.mm_to_px, page.turn_deg) < _NEAR_TURN_DEG
         ]
+    if dpi is not None and not _is_copy(page):
+        ranked = _as_scanned(ranked, dpi)
     if ranked:
         rival = None if dpi is not None else _rival_scale(ranked)
         best = _turned_as_stated(ranked, page.turn_deg)
-        sheet = _from_lines(page, best, lines, dpi, problems)
+        told = list(problems)
+        sheet = _from_lines(page, best, lines, dpi, told)
+        if isinstance(sheet, Unread) and resolution is not None and dpi is not None:
+            return _from_resolution(page, resolution, lines, problems)
         if isinstance(sheet, Sheet) and rival is not None:
             sheet = _with_rival(sheet, rival)
         if isinstance(sheet, Unread) or not best.perspective:
@@ -148,6 +163,22 @@ def register_plain(page: Page) -> Sheet | Unread:
     if resolution is None:
         return Unread("sheet", "no drawing frame, no paper edges and no resolution that fits A3 were found")
     return _from_resolution(page, resolution, lines, problems)
+
+
+def _as_scanned(ranked: list[Hypothesis], dpi: tuple[float, float]) -> list[Hypothesis]:
+    """The readings that have the stated scale along both axes; without one, whole frames at one other scale.
+
+    Lines of a drawing, a frame of another standard or a shadow may be taken for the sheet's sides. A copy
+    that was scanned has a whole frame, larger or smaller along both axes alike.
+    """
+    off = [affine_params(reading.mm_to_px)[:2] - np.log(np.array(dpi) / MM_PER_INCH) for reading in ranked]
+    stated = [reading for reading, axes in zip(ranked, off, strict=True) if np.abs(axes).max() < _SCANNED_SE]
+    return stated or [
+        reading
+        for reading, axes in zip(ranked, off, strict=True)
+        if abs(axes[0] - axes[1]) < _SCANNED_SE / 2.0
+        and sum(side.model is not PAPER for side in reading.sides) == _ALL_SIDES
+    ]
 
 
 def _turned_as_stated(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
@@ -186,17 +217,24 @@ def _with_rival(sheet: Sheet, rival: float) -> Sheet:
 
 
 def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
-    """The stated resolution where the page is about A3 by it, else a usual one by which it is."""
+    """The stated resolution where the page is about A3 by it, else a usual one by which it is.
+
+    An image of exactly A3's pixels at a usual resolution comes from a scanner that was set to both.
+    """
     if page.dpi is not None and _is_a3(page, page.dpi):
-        return Resolution(page.dpi, stated=True)
-    if page.dpi is not None and page.dpi[0] not in _DEFAULT_DPI:
+        return Resolution(page.dpi, stated=True, is_sure=True)
+    if page.dpi is not None and not np.isclose(page.dpi[0], _DEFAULT_DPI, atol=_DPI_ROUNDING).any():
         high, wide = page.grey.shape
         size = f"{wide / page.dpi[0] * MM_PER_INCH:.0f} x {high / page.dpi[1] * MM_PER_INCH:.0f}"
         message = f"by its stated resolution the page is {size} mm, not A3"
         problems.append(Problem("resolution_wrong", message, page.source))
-    for usual in _USUAL_DPI:
+    high, wide = page.grey.shape
+    has_shape = abs(np.log(max(high, wide) / min(high, wide) * PAGE_MM[1] / PAGE_MM[0])) < _WINDOW_SHAPE
+    for usual in _USUAL_DPI if has_shape else ():
         if _is_a3(page, (usual, usual)):
-            return Resolution((usual, usual), stated=False)
+            larger_px = np.subtract(size_mm(page, (usual, usual)), PAGE_MM) * usual / MM_PER_INCH
+            is_exact = bool(np.abs(larger_px).max() < _SAME_PX)
+            return Resolution((usual, usual), stated=False, is_sure=is_exact)
     return None
 
 
@@ -218,7 +256,10 @@ def _from_lines(
     except np.linalg.LinAlgError:
         return Unread("sheet", "the long lines found do not make one sheet")
     block_mm = title_block_mm(fit.mm_to_px, drawn_ends(lines))
-    doubt = _doubt(best, fit, block_mm, stated_a3=dpi is not None, stated_other=bool(problems))
+    stated_a3 = page.dpi is not None and page.dpi == dpi
+    doubt = _doubt(best, fit, block_mm, stated_a3=stated_a3, stated_other=bool(problems))
+    if doubt is None and dpi is not None and not copied and _is_at_another_scale(fit, dpi, block_mm):
+        doubt = "what could be a frame has another scale than the resolution"
     if doubt is not None:
         return Unread("sheet", doubt)
     if block_mm == 0.0 and not page.turn_is_sure:
@@ -259,6 +300,12 @@ def _doubt(best: Hypothesis, fit: Fit, block_mm: float, *, stated_a3: bool, stat
     if stated_other and not (of_frame >= _MOST_SIDES and block_mm > 0.0):
         return "by its resolution the page is not A3, and no frame with a title block says otherwise"
     return None
+
+
+def _is_at_another_scale(fit: Fit, dpi: tuple[float, float], block_mm: float) -> bool:
+    """Whether a fit has another scale than a scanner's resolution without looking like a copy."""
+    off = np.abs(affine_params(fit.mm_to_px)[:2] - np.log(np.array(dpi) / MM_PER_INCH)).max()
+    return bool(off > _SCANNED_SE) and (block_mm == 0.0 or fit.chi2 > _BAD_FIT * fit.freedom)
 
 
 def _unsure_upright(page: Page) -> Problem:
@@ -334,7 +381,10 @@ def _placed(matrix: FloatArray, resolution: Resolution, lines: list[LongLine], s
     edges = on_sides(inverted(matrix), PAPER, lines, _EDGE_WITHIN_MM)
     if not edges:
         return Fit(matrix, 0.0, 0, 0.0, scale_se, np.zeros(0))
-    return fit_sides(matrix, edges, resolution.dpi, perspective=False)
+    fit = fit_sides(matrix, edges, resolution.dpi, perspective=False)
+    axes = affine_params(fit.mm_to_px)[:2] - affine_params(matrix)[:2]
+    # A shadow or the scanner's border is no edge of the paper: it would pull the scale.
+    return replace(fit, mm_to_px=matrix) if np.abs(axes).max() > _EDGE_SE else fit
 
 
 def _tilt(lines: list[LongLine]) -> float:

@@ -184,24 +184,39 @@ def rejoined(fitted: Fitted, px_per_mm: float) -> tuple[FloatArray, BoolArray]:
     """
     ends, stay = fitted.ends.copy(), np.ones(len(fitted), dtype=bool)
     length = fitted.length
+    may_join = length > _LEAST_JOINED_MM * px_per_mm
+    doubted = np.zeros(len(ends), dtype=bool)
+    for part in parts(len(ends), 4 * len(ends)):
+        doubted[part] = (_goes_on(ends[part, None], ends, px_per_mm)[0] & may_join).any(axis=1)
     for row in np.argsort(-length):
-        if not stay[row]:
+        if not stay[row] or not doubted[row]:
             continue
-        (reach,), (u,) = lengths_and_directions(ends[row][None])
-        relative = ends - ends[row, 0]
-        t = np.sort(relative @ u, axis=1)
-        off = np.abs(relative @ np.array([-u[1], u[0]]))
-        overlap = np.minimum(t[:, 1], reach) - np.maximum(t[:, 0], 0.0)
-        beyond = np.maximum(-t[:, 0], t[:, 1] - reach)
+        same, t = _goes_on(ends[row], ends, px_per_mm)
         ratio = fitted.darkness / max(float(fitted.darkness[row]), 1e-9)
-        same = stay & (off < _SAME_MM * px_per_mm).all(axis=1) & (overlap > px_per_mm) & (beyond > px_per_mm)
-        same &= (length > _LEAST_JOINED_MM * px_per_mm) & (ratio < _ALIKE) & (ratio > 1.0 / _ALIKE)
-        same[row] = False
+        same &= stay & may_join & (ratio < _ALIKE) & (ratio > 1.0 / _ALIKE)
         if same.any():
+            (reach,), (u,) = lengths_and_directions(ends[row][None])
             low, high = min(0.0, float(t[same].min())), max(reach, float(t[same].max()))
             ends[row] = ends[row, 0] + np.array([[low], [high]]) * u
             stay[same] = False
+            doubted |= _goes_on(ends, ends[row], px_per_mm)[0]
     return ends, stay
+
+
+def _goes_on(own: FloatArray, others: FloatArray, px_per_mm: float) -> tuple[BoolArray, FloatArray]:
+    """Whether others lie on their segment's line, beside it and beyond its end; their ends along it.
+
+    Arguments: segments (..., 2, 2) in pairs. A segment does not go on as itself.
+    """
+    reach, u = lengths_and_directions(own)
+    relative = others - own[..., :1, :]
+    x, y, ux, uy = relative[..., 0], relative[..., 1], u[..., :1], u[..., 1:]
+    t, off = x * ux + y * uy, np.abs(y * ux - x * uy)
+    low, high = t.min(axis=-1), t.max(axis=-1)
+    overlap = np.minimum(high, reach) - np.maximum(low, 0.0)
+    beyond = np.maximum(-low, high - reach)
+    near = (off < _SAME_MM * px_per_mm).all(axis=-1)
+    return near & (overlap > px_per_mm) & (beyond > px_per_mm), t
 
 
 def _by_length(

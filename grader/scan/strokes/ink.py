@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from grader.records import Box, FloatArray, GreyImage, Ink, InkMap, Page, Sheet, Strokes, Unread
+from grader.records import Box, FloatArray, GreyImage, Ink, InkMap, Page, Problem, Sheet, Strokes, Unread
 from grader.scan.pixels import (
     BoolArray,
     Flat,
@@ -34,11 +34,22 @@ from grader.scan.strokes.regions import (
     mark_boxes,
     near_pairs,
 )
-from grader.scan.strokes.seeds import PX_PER_MM, Seeds, find_seeds, without_squares, working_scale
+from grader.scan.strokes.seeds import (
+    PX_PER_MM,
+    Seeds,
+    Squares,
+    find_seeds,
+    find_squares,
+    without_squares,
+    working_scale,
+)
 from grader.scan.strokes.symbols import arcs, find_circles, led_to
 
 _DARK = 64.0
 """Of 255, a quarter of white: paper in photos is brighter than 130, a negative's darker than 20."""
+_USUAL_BLOCK_MM = (200.0, 72.0)
+"""From the paper's edges: the largest title blocks, of ISO 7200 and GOST 2.104, are 180 and 185 x 55 mm, in a
+frame up to 10 mm from the edge."""
 _MAP_PX_PER_MM = 6.0
 """Resolution of the ink map: a stroke of 0.3 mm is two pixels wide."""
 
@@ -57,7 +68,9 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
         )
     flat = flatten(page.grey)
     scale = working_scale(sheet.px_per_mm)
-    contrast = without_squares(flat.reduced(scale))
+    reduced = flat.reduced(scale)
+    squares = find_squares(reduced)
+    contrast = without_squares(reduced, squares)
     seeds = find_seeds(contrast)
     components = find_components(seeds)
     field = field_of(seeds, sheet, scale, boxes)
@@ -71,7 +84,27 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     marks = np.concatenate([mark_boxes(components, field), boxes_around(strokes, hatched)])
     strokes = take(strokes, ~hatched)
     tips = find_tips(flat, strokes, sheet.mm_to_px)
-    return Ink(strokes, circles, marks, _ink_map(contrast, scale, sheet), tips=tips)
+    problems = _left_out(squares, field, page.source)
+    return Ink(strokes, circles, marks, _ink_map(contrast, scale, sheet), tips=tips, problems=problems)
+
+
+def _left_out(squares: Squares | None, field: Field, file: str) -> tuple[Problem, ...]:
+    """What a person must know: that faint strokes went with printed squares, or that an area was left out."""
+    problems = []
+    if squares is not None:
+        pitch = squares.pitch_px / field.scale / field.sheet.px_per_mm
+        message = (
+            f"the paper has printed squares of {pitch:.1f} mm: what is no darker than they are was left out"
+        )
+        problems.append(Problem("squared_paper", message, file))
+    if field.block is not None:
+        wide, high = field.block[2:]
+        if squares is not None or wide > _USUAL_BLOCK_MM[0] or high > _USUAL_BLOCK_MM[1]:
+            message = (
+                f"{wide:.0f} x {high:.0f} mm at the lower right were taken for the title block and left out"
+            )
+            problems.append(Problem("title_block_unsure", message, file))
+    return tuple(problems)
 
 
 def _ink_map(contrast: GreyImage, scale: float, sheet: Sheet) -> InkMap:
@@ -96,10 +129,12 @@ _LEAST_DASHED_MM = 7.0
 """A shorter row of dashes beside letters is a text."""
 _LEAST_MM = 1.0
 """Shorter strokes have no direction."""
-_MOST_STROKES = 6000
-"""On a sheet: drawings of a class have up to 530 before fitting, real ones on A3 covered with ink 2,100,
-and 5,300 where the lines of 1 mm squared paper are all taken for strokes."""
-_RUNS_OF_STROKE = 8
+_MOST_STROKES = 3000
+"""On a sheet: drawings of a class have up to 530 before fitting, real ones on A3 covered with ink 2,100."""
+_MOST_RUNS = 16_000
+"""Straight runs of border on a sheet: drawings have up to 2,300, A3 covered with ink 6,000, and the time to
+join them grows with their square."""
+_RUNS_OF_STROKE = 4
 """Straight runs of border per stroke: 2 to 7 were counted on scans of drawings, squared paper and text."""
 _LEAST_SUPPORT = 0.3
 """Share of the cuts that must agree with a stroke's line."""
@@ -120,9 +155,8 @@ def find_strokes(flat: Flat, seeds: Seeds, components: Components, field: Field)
     """Straight strokes in the field, in sheet mm; false where they are more than a drawing has."""
     full = at_full_size(seeds.ends, field.scale)
     usable = field.holds(field.to_mm(full.mean(axis=1))) & ~components.mark[components.of_seed]
-    least = int(usable.sum()) // _RUNS_OF_STROKE
-    if least > _MOST_STROKES:
-        return _too_many(least)
+    if usable.sum() > _MOST_RUNS:
+        return _too_many(int(usable.sum()) // _RUNS_OF_STROKE)
     pieces = _lines(full, seeds, components, usable, field.scale)
     if len(pieces.width) > _MOST_STROKES:
         return _too_many(len(pieces.width))
@@ -199,23 +233,28 @@ def distinct(fitted: Fitted, unit: float, covered_share: float = 1.0) -> BoolArr
     A stroke that lies along a longer one is the same ink; a short one mostly inside others is what
     a joint, an arrowhead or a letter left over.
     """
-    keep = np.zeros(len(fitted), dtype=bool)
+    keep = np.ones(len(fitted), dtype=bool)
     if len(fitted) == 0:
         return keep
-    inner = 0.6 * fitted.width
+    inner, order = 0.6 * fitted.width, np.argsort(-fitted.length)
     first, second = near_pairs(fitted.ends, fitted.ends, max(_SAME_MM * unit, float(inner.max())))
+    rank = np.argsort(order)
+    longer = rank[second] < rank[first]
+    first, second = first[longer], second[longer]
     off = np.concatenate(
         [distances(fitted.ends, first[part], second[part]) for part in parts(len(first), PROBES)]
+        or [np.zeros((0, PROBES), dtype=np.float32)]
     )
     along = np.asarray((off < _SAME_MM * unit).all(axis=1))
     inside = np.asarray(off < inner[second, None])
-    short = fitted.length < _SHORT_MM * unit
+    short = (fitted.length < _SHORT_MM * unit) & (covered_share < 1.0)
     start = np.searchsorted(first, np.arange(len(fitted) + 1))
-    for row in np.argsort(-fitted.length):
+    doubted = np.bincount(first[along | short[first]], minlength=len(fitted)) > 0
+    for row in order[doubted[order]]:
         others = slice(start[row], start[row + 1])
-        longer = keep[second[others]]
-        covered = short[row] and inside[others][longer].any(axis=0).mean() > covered_share
-        keep[row] = not covered and not along[others][longer].any()
+        kept = keep[second[others]]
+        covered = short[row] and inside[others][kept].any(axis=0).mean() > covered_share
+        keep[row] = not covered and not along[others][kept].any()
     return keep
 
 

@@ -1,5 +1,6 @@
 """Connected regions of ink, and pieces joined over gaps and crossings."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -14,6 +15,7 @@ from grader.scan.pixels import (
     BoolArray,
     Float32Array,
     at_full_size,
+    connected,
     inverted,
     lengths_and_directions,
     mapped,
@@ -28,6 +30,8 @@ _ROUNDS = 6
 """A line grows as it becomes better known."""
 _MOST_OFF = 1.7
 """Of the distance allowed beside a line: so far off are pieces that lie far beyond its ends."""
+_BLOCK = 64
+"""Pieces of which it is found at once whether anything lies on their lines."""
 PROBES = 13
 """Places along a segment at which its distance from another is taken."""
 _SLACK_PX = 1.0
@@ -106,62 +110,84 @@ class Pieces:
 
 def join(ends: FloatArray, width: FloatArray, off_px: float, gap_px: float) -> Pieces:
     """Join, longest first, all free pieces within `off_px` of its line and no gap over `gap_px`."""
-    length = lengths_and_directions(ends)[0]
+    length, way = lengths_and_directions(ends)
     free = np.ones(len(ends), dtype=bool)
-    middle = ends.mean(axis=1)
     joined = np.zeros((len(ends), 2, 2))
     widths = np.zeros(len(ends))
     groups: list[NDArray[np.intp]] = []
-    for first in map(int, np.argsort(-length)):
-        if not free[first]:
-            continue
-        line, members = ends[first], np.array([first])
-        for _ in range(_ROUNDS):
-            candidates = np.flatnonzero(free & _may_lie_on(middle, line, off_px))
-            grown = candidates[_on_line(ends[candidates], line, off_px, gap_px)]
-            grown = grown if first in grown else np.sort(np.append(grown, first))
-            if np.array_equal(grown, members):
-                break
-            members, line = grown, _fitted(ends[grown], length[grown])
-        free[members] = False
-        joined[len(groups)] = line
-        widths[len(groups)] = width[members] @ length[members] / length[members].sum()
-        groups.append(members)
+    # Coordinates row by row, (x and y, first and second end, n): many short computations follow.
+    points = np.ascontiguousarray(ends.transpose(2, 1, 0))
+    middle = points.mean(axis=1)
+    order = np.argsort(-length)
+    for start in range(0, len(order), _BLOCK):
+        block = order[start : start + _BLOCK]
+        block = block[free[block]]
+        # Pieces with nothing free on their line need no search.
+        off = way[block, :1] * middle[1] - way[block, 1:] * middle[0]
+        off -= off[np.arange(len(block)), block][:, None]
+        row, second = (free & (np.abs(off) <= _MOST_OFF * off_px)).nonzero()
+        own = block[row]
+        lines = way[own, 0], way[own, 1], length[own]
+        near, low, high = _lying_on(points[:, :, second] - points[:, :1, own], lines, off_px)
+        near &= (low <= length[own] + gap_px) & (high >= -gap_px) & (own != second)
+        search = np.bincount(row[near], minlength=len(block)) > 0
+        for first, has_others in zip(block.tolist(), search.tolist(), strict=True):
+            if not free[first]:
+                continue
+            line, members = ends[first], np.array([first])
+            for _ in range(_ROUNDS if has_others else 0):
+                grown = _on_line(points, middle, free, line, (off_px, gap_px))
+                grown = grown if first in grown else np.sort(np.append(grown, first))
+                if np.array_equal(grown, members):
+                    break
+                members, line = grown, _fitted(points[:, :, grown], length[grown])
+            free[members] = False
+            joined[len(groups)] = line
+            widths[len(groups)] = width[members] @ length[members] / length[members].sum()
+            groups.append(members)
     return Pieces(joined[: len(groups)], widths[: len(groups)], tuple(groups))
 
 
-def _may_lie_on(middle: FloatArray, line: FloatArray, off_px: float) -> BoolArray:
-    """Which pieces, by their middles, are near enough to a line (2, 2) to be looked at."""
-    u = line[1] - line[0]
-    v = np.array([-u[1], u[0]]) / float(np.sqrt(u @ u))
-    return np.asarray(np.abs(middle @ v - float(line[0] @ v)) <= _MOST_OFF * off_px)
+def _on_line(
+    points: FloatArray, middle: FloatArray, free: BoolArray, line: FloatArray, limits: tuple[float, float]
+) -> NDArray[np.intp]:
+    """Rows of the free pieces near a line (2, 2) and reached from it without too large a gap."""
+    (x, y), (dx, dy) = line[0].tolist(), (line[1] - line[0]).tolist()
+    size, (off_px, gap_px) = math.hypot(dx, dy), limits
+    ux, uy = dx / size, dy / size
+    # By their middles, which pieces are near enough to be looked at.
+    off = np.abs(ux * middle[1] - uy * middle[0] - (ux * y - uy * x))
+    rows = (free & (off <= _MOST_OFF * off_px)).nonzero()[0]
+    near, low, high = _lying_on(points[:, :, rows] - line[0][:, None, None], (ux, uy, size), off_px)
+    return np.asarray(rows[near][reached(low[near], high[near], (0.0, size), gap_px)])
 
 
-def _on_line(ends: FloatArray, line: FloatArray, off_px: float, gap_px: float) -> NDArray[np.intp]:
-    """Rows of the pieces near a line and reached from it without too large a gap."""
-    u = line[1] - line[0]
-    size = float(np.sqrt(u @ u))
-    u = u / size
-    relative = ends - line[0]
-    t, d = relative @ u, relative @ np.array([-u[1], u[0]])
-    turn = np.abs(d[:, 1] - d[:, 0]) <= _TURN * np.abs(t[:, 1] - t[:, 0])
+def _lying_on(
+    apart: FloatArray, line: tuple[float | FloatArray, ...], off_px: float
+) -> tuple[BoolArray, FloatArray, FloatArray]:
+    """Which pieces lie near a line, and from where to where along it, (n,) each.
+
+    Arguments: `apart` (2, 2, n) of both ends from the line's start; `line` its direction and length.
+    """
+    ux, uy, size = line
+    t, d = ux * apart[0] + uy * apart[1], ux * apart[1] - uy * apart[0]
+    turn = np.abs(d[1] - d[0]) <= _TURN * np.abs(t[1] - t[0])
     # A short line does not know its direction: allow for half a pixel at its ends, growing outward.
-    beyond = np.maximum(np.maximum(-t, t - size), 0.0)
-    allowed = off_px + np.minimum(0.5 * beyond / size, (_MOST_OFF - 1.0) * off_px)
-    near = np.flatnonzero(turn & (np.abs(d) <= allowed).all(axis=1))
-    return near[reached(np.sort(t[near], axis=1), np.array([0.0, size]), gap_px)]
+    beyond = np.maximum(np.abs(t - 0.5 * size) - 0.5 * size, 0.0)
+    near = np.abs(d) <= off_px + np.minimum(beyond * (0.5 / size), (_MOST_OFF - 1.0) * off_px)
+    return turn & near[0] & near[1], np.minimum(t[0], t[1]), np.maximum(t[0], t[1])
 
 
-def _fitted(ends: FloatArray, length: FloatArray) -> FloatArray:
-    """Line by weighted total least squares through the pieces, ending where they end."""
-    points = ends.reshape(-1, 2)
-    weight = np.repeat(length, 2)
-    centre = weight @ points / weight.sum()
-    off = points - centre
-    spread = (off * weight[:, None]).T @ off
-    angle = 0.5 * np.arctan2(2.0 * spread[0, 1], spread[0, 0] - spread[1, 1])
-    u = np.array([np.cos(angle), np.sin(angle)])
-    t = off @ u
+def _fitted(points: FloatArray, length: FloatArray) -> FloatArray:
+    """Line by weighted total least squares through pieces (2, 2, n), ending where they end."""
+    at, weight = points.reshape(2, -1), np.concatenate([length, length])
+    weight /= weight.sum()
+    centre = at @ weight
+    off = at - centre[:, None]
+    (xx, product), (_, yy) = ((off * weight) @ off.T).tolist()
+    angle = 0.5 * math.atan2(2.0 * product, xx - yy)
+    u = np.array([math.cos(angle), math.sin(angle)])
+    t = u @ off
     return np.stack([centre + t.min() * u, centre + t.max() * u])
 
 
@@ -346,28 +372,33 @@ class Components:
 
 def find_components(seeds: Seeds) -> Components:
     """Label the ink and tell marks from what can hold strokes."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(seeds.mask, connectivity=8)
-    box = stats[1:, :4].astype(np.float64)
+    labels, box = connected(seeds.mask)
     of_seed = labels[seeds.border[:, 0], seeds.border[:, 1]].astype(np.intp) - 1
     size = np.hypot(box[:, 2], box[:, 3]) / PX_PER_MM
     longest = np.zeros(len(box))
     length = lengths_and_directions(seeds.ends)[0] / PX_PER_MM
     np.maximum.at(longest, of_seed, length)
-    major, minor = _spread(labels.astype(np.int32, copy=False), len(box))
-    straight = (minor <= _THIN * seeds.pen_px) & (major >= _LONG * minor)
     small = longest < _LONG_SEED_MM
-    stroke_like = straight & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
+    stroke_like = small & (size >= _LEAST_STROKE_MM) & (longest >= 0.6 * size)
+    inked = np.flatnonzero(seeds.mask.view(bool))
+    label = np.asarray(labels.reshape(-1)[inked] - 1, dtype=np.intp)
+    of_these = stroke_like[label]
+    major, minor = _spread(inked[of_these], label[of_these], labels.shape[1], len(box))
+    stroke_like &= (minor <= _THIN * seeds.pen_px) & (major >= _LONG * minor)
     written = small & ~stroke_like & (size > 2.0 * _DUST_MM) & (size < _MARK_MM)
     text = small & stroke_like & (size < _LONE_MM)
     text[text] = _beside(box, written, np.flatnonzero(text))
     return Components(box, small & ~stroke_like, text, of_seed)
 
 
-def _spread(labels: NDArray[np.int32], count: int) -> tuple[FloatArray, FloatArray]:
-    """Standard deviations of each piece's pixels along and across it, (count,) each, px."""
-    inked = np.flatnonzero(labels > 0)
-    row, column = np.divmod(inked, labels.shape[1])
-    label = labels.reshape(-1)[inked] - 1
+def _spread(
+    place: NDArray[np.intp], label: NDArray[np.intp], wide: int, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Standard deviations of each piece's pixels along and across it, (count,) each, px.
+
+    Arguments: `place` of each pixel in a picture that is `wide` pixels wide, and which piece it is of.
+    """
+    row, column = np.divmod(place, wide)
     number = np.maximum(np.bincount(label, minlength=count), 1)
 
     def mean(values: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.records import FloatArray, GreyImage
-from grader.scan.pixels import Float32Array, lengths_and_directions, parts
+from grader.scan.pixels import Float32Array, lattice, lengths_and_directions, parts
 
 PX_PER_MM = 6.0
 """Resolution at which ink is looked for; strokes of 0.3 mm are two pixels wide."""
@@ -33,14 +33,16 @@ _PEN_PX = 2.0
 """A pen of 0.35 mm, where a sheet has no long stroke to tell."""
 _BUNDLE = 1.6
 """An ink band this many pens wide is more than one stroke."""
-_STRIP_MM, _STRIPS, _EVERY = 10.0, 5, 3
-"""Strips narrow enough that a skewed line stays within its own width over most of one."""
+_STRIP_MM, _STRIPS, _EVERY = 4.0, 5, 2
+"""Strips narrow enough that a line 2 degrees askew stays within its own width over half of one."""
 _LEAST_PEAK = 6.0
 """Of 255: fainter squares do not disturb."""
 _LEAST_LINES = 12
 """A table has fewer lines; 10 mm of a strip have as many squares."""
-_REGULAR, _ALIKE = 0.6, 0.2
-"""Share of the distances that are whole numbers of squares, to within this share of one."""
+_FILLED = 0.75
+"""Share of a lattice's places that have a line: what is drawn hides some, and adds others between."""
+_SPANNED = 0.6
+"""Of a strip's length, from the first to the last line of the lattice."""
 _DARKER = 1.35
 """Drawn lines are so much darker than printed squares."""
 _DARKEST = 0.9
@@ -123,7 +125,7 @@ def _runs_of(mask: GreyImage, pen_px: float | None = None) -> _Runs:
 
 def dark_mask(soft: GreyImage, mask: GreyImage) -> GreyImage:
     """What is nearly as dark as the darkest strokes of the sheet, as 1."""
-    inked = soft[mask > 0]
+    inked = soft[mask.view(bool)]
     level = _DARK * float(np.quantile(inked[::7], _DARK_QUANTILE)) if len(inked) else 255.0
     return np.asarray((soft >= level).astype(np.uint8))
 
@@ -141,15 +143,18 @@ def ink_mask(soft: GreyImage) -> GreyImage:
 def _border_runs(mask: GreyImage) -> FloatArray:
     """(n, 2, 2) straight runs of the borders, with the ink on one fixed hand."""
     contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    runs = []
-    for contour in contours:
-        if len(contour) < 2 * _LEAST_PX:
-            continue
-        corners = cv2.approxPolyDP(contour, _POLYGON_PX, closed=True)[:, 0, :].astype(np.float64)
-        runs.append(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
-    if not runs:
+    polygons = [
+        cv2.approxPolyDP(contour, _POLYGON_PX, closed=True)
+        for contour in contours
+        if len(contour) >= 2 * _LEAST_PX
+    ]
+    if not polygons:
         return np.zeros((0, 2, 2))
-    edges = np.concatenate(runs)
+    corners = np.concatenate(polygons)[:, 0].astype(np.float64)
+    size = np.array([len(polygon) for polygon in polygons])
+    after = np.arange(1, len(corners) + 1)
+    after[np.cumsum(size) - 1] -= size
+    edges = np.stack([corners, corners[after]], axis=1)
     return np.asarray(edges[np.hypot(*(edges[:, 1] - edges[:, 0]).T) >= _LEAST_PX])
 
 
@@ -171,7 +176,7 @@ def _run(mask: GreyImage, points: FloatArray, normal: FloatArray, depth: FloatAr
     at = points[:, :, None, :] + depth[None, None, :, None] * normal[:, None, None, :]
     column = np.clip(np.rint(at[..., 0]), 0, mask.shape[1] - 1).astype(int)
     row = np.clip(np.rint(at[..., 1]), 0, mask.shape[0] - 1).astype(int)
-    return np.asarray(np.cumprod(mask[row, column], axis=2).sum(axis=2), dtype=np.float64)
+    return np.asarray(np.minimum.accumulate(mask[row, column], axis=2).sum(axis=2), dtype=np.float64)
 
 
 def _usual(width: FloatArray, weight: FloatArray) -> float:
@@ -184,49 +189,75 @@ def _usual(width: FloatArray, weight: FloatArray) -> float:
 # Graph paper --------------------------------------------------------------------------------------
 
 
-def squares_darkness(contrast: GreyImage) -> float:
-    """Darkness of printed squares, 0..255 of contrast, 0 where there are none.
+@dataclass(frozen=True, slots=True)
+class Squares:
+    """The printed squares of graph paper.
+
+    Attributes
+    ----------
+    dark : 0..255, the contrast of their darker lines
+    pitch_px : distance of two lines, the smaller of both directions
+    """
+
+    dark: float
+    pitch_px: float
+
+
+def find_squares(contrast: GreyImage) -> Squares | None:
+    """Printed squares, None where there are none.
 
     Arguments: `contrast` is 0 (paper) to 255 (black), at about 6 px/mm.
 
     Lines that fill most of a strip, at equal distances, in most strips of both directions. Slanted
     strokes never fill a strip, and a table's lines are too few.
     """
-    return min(_of_strips(contrast), _of_strips(np.ascontiguousarray(contrast.T)))
+    level, upright = _of_strips(contrast), _of_strips(np.ascontiguousarray(contrast.T))
+    if level is None or upright is None:
+        return None
+    return Squares(min(level.dark, upright.dark), min(level.pitch_px, upright.pitch_px))
 
 
-def without_squares(contrast: GreyImage) -> GreyImage:
+def without_squares(contrast: GreyImage, squares: Squares | None) -> GreyImage:
     """Contrast with all that is no darker than printed squares left out; as given where there are none."""
-    dark = squares_darkness(contrast)
-    if dark == 0.0:
+    if squares is None:
         return contrast
-    _, drawn = cv2.threshold(contrast, _DARKER * dark, 0, cv2.THRESH_TOZERO)
+    _, drawn = cv2.threshold(contrast, _DARKER * squares.dark, 0, cv2.THRESH_TOZERO)
     return np.asarray(drawn, dtype=np.uint8)
 
 
-def _of_strips(contrast: GreyImage) -> float:
-    """Darkness of lines at equal distances in most strips across the picture, else 0."""
+def _of_strips(contrast: GreyImage) -> Squares | None:
+    """Lines at equal distances in most strips across the picture."""
     high = contrast.shape[0]
     deep = round(_STRIP_MM * PX_PER_MM)
     strips = []
     for top in np.linspace(0.08 * high, 0.92 * high - deep, _STRIPS).astype(int):
         strip = contrast[top : top + deep : _EVERY]
         strips.append(_regular_peaks(np.median(strip, axis=0).astype(np.float32)))
-    squared = [dark for dark in strips if dark > 0.0]
-    return float(np.median(squared)) if 2 * len(squared) > len(strips) else 0.0
+    squared = [squares for squares in strips if squares is not None]
+    if 2 * len(squared) <= len(strips):
+        return None
+    middle = np.median([(squares.dark, squares.pitch_px) for squares in squared], axis=0)
+    return Squares(float(middle[0]), float(middle[1]))
 
 
-def _regular_peaks(profile: Float32Array) -> float:
-    """Darkness of the peaks of a profile where they are many and at equal distances, else 0."""
+def _regular_peaks(profile: Float32Array) -> Squares | None:
+    """The peaks of a profile that are at equal distances, where they are many and few are missing."""
     above = profile - _floor(profile)
     inner = above[1:-1]
     at = 1 + np.flatnonzero((inner >= _LEAST_PEAK) & (inner >= above[:-2]) & (inner > above[2:]))
     if len(at) < _LEAST_LINES:
-        return 0.0
-    gaps = np.diff(at).astype(np.float64)
-    usual = np.median(gaps)
-    off = np.abs(gaps / usual - np.maximum(np.rint(gaps / usual), 1.0))
-    return float(np.quantile(profile[at], _DARKEST)) if np.mean(off < _ALIKE) > _REGULAR else 0.0
+        return None
+    before, after = above[at - 1], above[at + 1]
+    place = at + (after - before) / (before + above[at] + after)
+    index = lattice(place)
+    on = index >= 0.0
+    found, places = np.count_nonzero(on), index.max() + 1.0
+    if found < max(_LEAST_LINES, _FILLED * places):
+        return None
+    first, last = place[on][[0, -1]]
+    if last - first < _SPANNED * len(profile):
+        return None
+    return Squares(float(np.quantile(profile[at[on]], _DARKEST)), float(last - first) / (places - 1.0))
 
 
 def _floor(profile: Float32Array) -> FloatArray:

@@ -9,22 +9,29 @@ from grader.scan.pixels import BoolArray, Flat, Float32Array, at_full_size, leng
 from grader.scan.strokes.regions import Components, Field
 from grader.scan.strokes.seeds import PX_PER_MM, Seeds
 
-_RADIUS_MM = (0.6, 3.4)
+_RADIUS_MM = (0.5, 4.0)
 """Of joints and poles as people draw them."""
+_LEAST_HOLE_MM = 0.4
+"""Inside a ring of the least radius, drawn with a pen."""
+_LONG_HOLE = 1.7
+"""Longer over shorter side of a ring's inside, drawn by hand."""
 _CELL_PX = 2
 """Side of a cell in which normals are counted."""
 _EVERY = 2
 """Every second border pixel votes."""
 _VOTES = 0.3
 """Share of a full circle of the least radius whose normals must meet."""
-_MOST = 250
+_MOST = 120
+"""Places at which most normals meet; the holes of the ink are tried too."""
 _ANGLES = 48
 """Rays around a centre."""
 _ROUNDS = 3
-_RADIAL_MM = np.arange(0.3, 4.0, 0.1)
+_RADIAL_MM = np.arange(0.3, 4.6, 0.1)
 """Distances from a centre at which ink is looked for."""
 _ROUND_MM = 0.11
 """Rms distance of a hand-drawn ring from a circle, at most."""
+_ROUND, _GRAIN_MM = 0.085, 0.04
+"""The same of a small one: a share of its radius, and the pixels' grain. Letters' loops are less round."""
 _DRAWN = 0.75
 """Share of the circle that is inked and round, but for where strokes cross it."""
 _DRAWN_ALONE = 0.5
@@ -58,7 +65,8 @@ def find_circles(flat: Flat, seeds: Seeds, components: Components, field: Field)
     Rings that are part of a letter are left out.
     """
     unit = field.sheet.px_per_mm
-    guesses = at_full_size(_meeting_points(seeds, field.mask(seeds.mask.shape)), field.scale)
+    where = field.mask(seeds.mask.shape)
+    guesses = at_full_size(np.concatenate([_holes(seeds, where), _meeting_points(seeds, where)]), field.scale)
     if len(guesses) == 0:
         return np.zeros((0, 3))
     rings = _distinct(_refined(flat, guesses, unit))
@@ -95,6 +103,22 @@ def _beside(strokes: Strokes, u: FloatArray, at: tuple[float, float]) -> tuple[F
     """How far along each stroke a point lies, and how far beside it; `u` are the strokes' directions."""
     relative = np.array(at) - strokes.ends[:, 0]
     return (relative * u).sum(axis=1), np.abs(relative[:, 0] * u[:, 1] - relative[:, 1] * u[:, 0])
+
+
+def _holes(seeds: Seeds, where: BoolArray) -> FloatArray:
+    """(g, 2) working pixels, middles of paper enclosed by ink, as large and as round as a ring's inside."""
+    contours, nested = cv2.findContours(seeds.mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+    inner = np.reshape(nested, (-1, 4))[:, 3] >= 0 if contours else ()
+    holes = [contours[int(row)] for row in np.flatnonzero(inner)]
+    # A hole's contour runs along the ink around it.
+    box = np.array([cv2.boundingRect(contour) for contour in holes], dtype=np.float64).reshape(-1, 4)
+    left, top, wide, high = (box + np.array([1.0, 1.0, -2.0, -2.0])).T
+    longer, shorter = np.maximum(wide, high), np.minimum(wide, high)
+    good = (longer < 2.0 * _RADIUS_MM[1] * PX_PER_MM) & (shorter > _LEAST_HOLE_MM * PX_PER_MM)
+    good &= longer < _LONG_HOLE * shorter + 1
+    middle = np.column_stack([left + (wide - 1) / 2.0, top + (high - 1) / 2.0])[good]
+    column, row = np.rint(middle).astype(np.intp).T
+    return np.asarray(middle[where[row, column]])
 
 
 def _meeting_points(seeds: Seeds, where: BoolArray) -> FloatArray:
@@ -149,7 +173,8 @@ def _refined(flat: Flat, centres: FloatArray, px_per_mm: float) -> FloatArray:
         drawn = good.sum(axis=1) / np.maximum(_ANGLES - crossed.sum(axis=1), 1)
         last = round_number == _ROUNDS - 1
         sound = (drawn >= (_DRAWN if last else 0.5)) & (good.mean(axis=1) >= (_DRAWN_ALONE if last else 0.35))
-        sound &= rms < (_ROUND_MM if last else 2.0 * _ROUND_MM) * px_per_mm
+        most = np.minimum(_ROUND_MM * px_per_mm, np.hypot(_GRAIN_MM * px_per_mm, _ROUND * radius))
+        sound &= rms < (most if last else 2.0 * most)
         sound &= (radius > _RADIUS_MM[0] * px_per_mm) & (radius < _RADIUS_MM[1] * px_per_mm) | (not last)
         centres, radius, inked = centres[sound], radius[sound], inked[sound]
     at = np.searchsorted(radial, _HOLLOW_AT * radius).clip(0, len(radial) - 1)

@@ -1,5 +1,7 @@
 """The benchmark of reading: its rules of right and misread, its spreads, its strokes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,8 @@ from tests.bench.lines import (
     measure_noiseless,
     measure_resolution,
 )
+from tests.bench.reading import CurveRow, curve_picture, curve_tables, measure_scene
+from tests.bench.reading_scenes import scene_named
 from tests.bench.reading_tally import NORMAL_SHARES, ErrorSpread, ReadingTally, calibration, row_of, whitened
 from tests.bench.reading_truth import (
     LEAST_MM,
@@ -176,3 +180,19 @@ def test_strokes_are_measured_against_the_pencil_strokes_that_were_drawn():
     assert row.offset_mm[0] < OFFSET_MM
     assert row.fragments < 2.0
     assert str(row.spurious) in next(lines_tables(LinesFigures([row], IDEAL)))[2][0]
+
+
+def test_a_scene_is_timed_from_the_file_to_the_students_page():
+    row = measure_scene(replace(scene_named("plain"), dpi=100.0), 1, memory=False)
+    assert all(spent > 0.0 for spent in row.times_ms.values())
+    assert sum(row.times_ms.values()) < row.processor_ms * 1.2
+
+
+def test_the_curve_of_time_against_error_is_a_table_and_a_picture(tmp_path):
+    row = row_of("plain", "a scene", ReadingTally(node_errors_mm=[0.1, 0.3], processor_ms=[800.0]), None)
+    rows = [CurveRow("one way", dpi, row) for dpi in (150, 300)]
+    ((_, heads, cells),) = curve_tables(rows)
+    assert cells[1][:4] == ["one way", "300", "800", "0.200 / 0.290"]
+    assert len(heads) == len(cells[0])
+    curve_picture(rows, tmp_path / "curve.svg")
+    assert "one way" in (tmp_path / "curve.svg").read_text(encoding="utf-8")

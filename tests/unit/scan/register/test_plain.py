@@ -160,6 +160,28 @@ def test_a_usual_resolution_is_assumed_where_none_is_stated_and_said_to_be(dpi):
     assert sheet.scale_se >= 3e-3
 
 
+def test_an_image_of_exactly_a3s_pixels_has_that_resolution_where_none_is_stated():
+    """A scanner was set to both; the title block says that it is a drawing."""
+    matrix, shape = scanner()
+    grey = painted(matrix, shape, frame=None)
+    sheet = rectify(Page("scan.png", 1, grey))
+    assert sheet.px_per_mm == pytest.approx(PX_PER_MM, rel=0.003)
+
+
+def test_a_frame_at_the_scanners_scale_tells_which_way_up_without_a_title_block():
+    matrix, shape = scanner(turns=2, bed_mm=6)
+    sheet = rectify(Page("scan.png", 1, painted(matrix, shape, block=False, bed=215), (150.0, 150.0)))
+    assert off_mm(sheet, matrix) < HAND_MM
+    assert "frame_missing" not in {problem.code for problem in sheet.problems}
+
+
+@pytest.mark.parametrize("dpi", [None, (72.0, 72.0)])
+def test_a_cameras_picture_is_not_taken_for_a_scan_of_a_larger_window(dpi):
+    """Of 4 to 3: at 240 dpi as wide as A3, and 20 mm higher."""
+    matrix = np.array([[8.4, 0.02, 250.0], [0.03, 8.2, 300.0], [0.0, 0.0, 1.0]])
+    assert not rectify(Page("photo.jpg", 1, painted(matrix, (2992, 3990), frame=None), dpi))
+
+
 def photo():
     corners = np.float32([(310, 160), (2700, 240), (2790, 1990), (190, 1900)])
     outline = np.float32([(0, 0), (420, 0), (420, 297), (0, 297)])

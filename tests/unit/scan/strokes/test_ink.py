@@ -228,7 +228,7 @@ def test_standard_errors_of_hand_drawn_lines_are_honest():
         assert np.sqrt(np.mean(ses**2)) > 0.2
 
 
-@pytest.mark.parametrize("radius", [1.0, 1.5, 2.5])
+@pytest.mark.parametrize("radius", [1.0, 1.5, 2.5, 3.8])
 def test_a_joint_is_a_circle_and_links_stop_short_of_it(radius):
     paper = Paper()
     joint = np.array([150.0, 120.0])
@@ -241,6 +241,26 @@ def test_a_joint_is_a_circle_and_links_stop_short_of_it(radius):
     assert np.abs(ink.circles[0] - [*joint, radius]).max() < 0.1
     assert len(ink.strokes) == 3
     assert np.hypot(*(ink.strokes.ends - joint).reshape(-1, 2).T).min() > radius - 0.6
+
+
+def test_a_small_ring_with_the_compass_point_in_it_is_a_circle():
+    paper = Paper()
+    paper.ring((150, 120), 0.85)
+    paper.line((149.93, 120), (150.07, 120), pen=0.14)
+    for end in ((190, 120), (140, 170)):
+        u = (np.array(end) - [150, 120]) / np.hypot(*(np.array(end) - [150, 120]))
+        paper.line([150, 120] + 0.85 * u, end)
+    circles = paper.ink().circles
+    assert circles.shape == (1, 3)
+    assert np.abs(circles[0] - [150, 120, 0.85]).max() < 0.1
+
+
+def test_a_loop_of_a_letter_beside_a_line_is_no_circle():
+    paper = Paper()
+    paper.line((110, 123), (190, 123))
+    for column, word in enumerate(("a", "b", "d", "g", "6", "8", "B", "D")):
+        paper.text(word, (115 + 9 * column, 121.5), size=0.8)
+    assert len(paper.ink().circles) == 0
 
 
 def test_a_joint_with_links_through_it_is_a_circle():
@@ -465,11 +485,31 @@ def test_strokes_are_counted_before_any_is_fitted(monkeypatch):
     assert "straight strokes" in refusal(paper)
 
 
-def test_squared_paper_all_of_whose_lines_are_strokes_is_within_the_bound(monkeypatch):
-    monkeypatch.setattr("grader.scan.strokes.ink.without_squares", lambda contrast: contrast)
+@pytest.mark.parametrize("pitch", [5, 1])
+def test_squared_paper_is_told_and_its_squares_are_no_strokes(pitch):
     paper = Paper()
-    for step in range(25, 400, 5):
-        paper.line((step, 15), (step, 280), pen=0.2)
-    for step in range(15, 285, 5):
-        paper.line((25, step), (405, step), pen=0.2)
-    assert len(paper.ink().strokes) > 100
+    grey = paper.grey
+    for step in range(0, 420, pitch):
+        paper.line((step, 0), (step, 297), pen=0.12, dark=190)
+    for step in range(0, 297, pitch):
+        paper.line((0, step), (420, step), pen=0.12, dark=190)
+    for start, end in SEGMENTS:
+        paper.line(start, end)
+    ink = paper.ink()
+    assert [problem.code for problem in ink.problems] == ["squared_paper"]
+    assert f"{pitch}.0 mm" in ink.problems[0].message
+    assert len(ink.strokes) == len(SEGMENTS)
+    paper.grey = grey
+    assert paper.ink().problems == ()
+
+
+def test_an_area_larger_than_a_title_block_is_told_where_it_is_left_out():
+    paper = Paper()
+    for start, end in [
+        ((206, 218), (206, 292)),
+        ((206, 218), (415, 218)),
+        ((206, 240), (415, 240)),
+        ((206, 260), (415, 260)),
+    ]:
+        paper.line(start, end)
+    assert [problem.code for problem in paper.ink().problems] == ["title_block_unsure"]

@@ -1,0 +1,72 @@
+"""Plans that no construction explains: their letters name the nodes, their strokes measure."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grader.reading.read import read_figures
+from grader.records import VELOCITY_PLAN, Ink, Letters
+from reference.authored.assignment import Assignment
+from tests.unit.reading.drawn import blank_sheet, ink_of, task
+
+SIGNS = {sign: column for column, sign in enumerate([*"oabcdnpπABCD'"])} | {"": 13}
+PLAN_MM, APART_MM, POLE = 60.0, 18.0, 200 - 120j
+NEAR_MM, SURE, SILENTLY_WRONG_MM = 0.5, 0.9, 1.0
+
+
+def scattered(names: tuple[str, ...], seed: int) -> dict[str, complex]:
+    """Nodes anywhere about a pole, apart from one another: no mechanism moves like that."""
+    lot, places = np.random.default_rng(seed), [POLE]
+    while len(places) < len(names):
+        at = POLE + complex(*lot.uniform(-PLAN_MM, PLAN_MM, 2))
+        if min(abs(at - other) for other in places) > APART_MM:
+            places.append(at)
+    return dict(zip(names, places, strict=True))
+
+
+def lettered_ink(ink: Ink, nodes: dict[str, complex], sure: float = 0.95) -> Ink:
+    """The ink with a letter beside each node."""
+    boxes = np.array([[at.real + 1.0, -at.imag - 3.5, 2.0, 3.0] for at in nodes.values()])
+    probability = np.full((len(nodes), len(SIGNS)), (1.0 - sure) / (len(SIGNS) - 1))
+    for row, name in enumerate(nodes):
+        probability[row, SIGNS[name]] = sure
+    return replace(ink, letters=Letters(boxes, probability, np.ones(len(nodes), dtype=bool), SIGNS))
+
+
+def drawn_and_read(assignment: Assignment, seed: int, *, letters: bool):
+    """(vectors as drawn, as read, confidences) of a plan of scattered nodes."""
+    variant = assignment.variants()[0]
+    construction = task("pump", variant)[2].construction
+    nodes = scattered(tuple(step.node for step in construction.figures[VELOCITY_PLAN]), seed)
+    vectors = {v.name: (nodes[v.tail], nodes[v.head]) for v in construction.vectors_of(VELOCITY_PLAN)}
+    ink = ink_of(list(vectors.values()))
+    ink = lettered_ink(ink, nodes) if letters else ink
+    reading = read_figures([ink], [blank_sheet()], assignment, variant, None, tuple(vectors))[0]
+    figure = reading.figures.get(VELOCITY_PLAN)
+    found = {} if figure is None else figure.vectors
+    read = {
+        name: one.length_mm * np.exp(1j * math.radians(one.direction_deg or 0.0))
+        for name, one in found.items()
+    }
+    return (
+        {name: head - tail for name, (tail, head) in vectors.items()},
+        read,
+        {name: one.confidence for name, one in found.items()},
+    )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_plan_that_no_mechanism_explains_is_read_by_its_letters(seed):
+    drawn, read, _ = drawn_and_read(task("pump")[0], seed, letters=True)
+    right = [name for name, way in drawn.items() if name in read and abs(read[name] - way) < NEAR_MM]
+    assert len(right) >= 0.8 * len(drawn)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_without_letters_such_a_plan_is_not_believed(seed):
+    drawn, read, sure = drawn_and_read(task("pump")[0], seed, letters=False)
+    assert not [
+        name for name in read if sure[name] > SURE and abs(read[name] - drawn[name]) > SILENTLY_WRONG_MM
+    ]
