@@ -22,7 +22,7 @@ from grader.documents import ReportDocument
 from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import Level, criterion_feedback
 from grader.inputs.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
-from grader.inputs.scale_text import declared_scales, sure_texts
+from grader.inputs.scale_text import SURE, declared_scales, sure_texts
 from grader.marking.decided import decide, open_again, with_decisions, with_nodes
 from grader.marking.mark import judge
 from grader.marking.report import reading_document, report_of, unjudged_report
@@ -34,8 +34,8 @@ from grader.reading.read import read_figures
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
 from grader.rubric import Asked, RubricFile
 from grader.scan.decode.pages import decode, is_blank
-from grader.scan.handwriting.captions import Spotter, captioned_scales, spotters
-from grader.scan.handwriting.fields import written_lengths, written_scales
+from grader.scan.handwriting.captions import Spotter, captioned_scales, spotters, surer
+from grader.scan.handwriting.fields import writing, written_lengths, written_scales
 from grader.scan.handwriting.letters import find_letters
 from grader.scan.register.distortion import straighten
 from grader.scan.register.registration import register
@@ -137,27 +137,35 @@ def missing_scales(submission: StudentSubmission) -> tuple[str, ...]:
     return tuple(name for name in SCALE_NAMES if name not in submission.declared and name not in measured)
 
 
-def writing_on(page: ScannedPage) -> list[Spotter]:
+def writing_on(page: ScannedPage, *, closely: bool = False) -> list[Spotter]:
     """The lines of writing on a plain page; none on a printed sheet, which has boxes, and on one refused.
 
-    The page is decoded again where its pixels were left behind: few pages need to be.
+    Arguments: `closely` decodes the page again, if its pixels were left behind; else its ink map must do.
     """
-    if page.ink is None or page.sheet is None or page.sheet.zones:
+    sheet = page.sheet
+    if page.ink is None or sheet is None or sheet.zones:
         return []
+    if not closely:
+        return spotters(page.ink.where)
     try:
-        image = page.image or straighten(decode(page.ref), page.sheet)[0]
+        image = page.image or straighten(decode(page.ref), sheet)[0]
     except InputFileError:
         return []
-    return spotters(image, page.sheet, page.ink.where)
+    return spotters(page.ink.where, lambda box: writing(image, sheet, box, 0.0))
 
 
 def _with_captions(page: ScannedPage, assignment: Assignment, names: Collection[str]) -> ScannedPage:
-    """A plain page with the scales of these names that are written on it."""
+    """A plain page with those of these scales that stand on it; looked at closely where in doubt."""
+    units: Mapping[str, str] = dict(assignment.file.scales.bare_units.items())
     lines = writing_on(page) if names else []
     if not lines:
         return page
-    units: Mapping[str, str] = dict(assignment.file.scales.bare_units.items())
     written = captioned_scales(lines, names, units)
+    doubtful = [name for name in names if name not in written or written[name].confidence < SURE]
+    if doubtful:
+        closer = captioned_scales(writing_on(page, closely=True), doubtful, units)
+        read = {name: surer(written.get(name), closer.get(name)) for name in doubtful}
+        written |= {name: one for name, one in read.items() if one is not None}
     return replace(page, reading=replace(page.reading, written=written))
 
 

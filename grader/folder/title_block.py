@@ -25,11 +25,11 @@ from grader.inputs.measurements import StudentSubmission
 from grader.inputs.roster import Roster, RosterRow
 from grader.inputs.scale_text import SURE
 from grader.pipeline import writing_on
-from grader.records import FloatArray, PageRef, Problem, Written
+from grader.records import FloatArray, PageRef, Problem, ScannedPage, Written
 from grader.scan.handwriting.captions import (
     NUMBER_WORDS,
     POSITION_WORDS,
-    Spotter,
+    surer,
     written_name,
     written_number,
 )
@@ -66,8 +66,11 @@ def written_owners(
 
 def _owner(cache: PageCache, ref: PageRef, names: Mapping[str, Collection[str]]) -> str | None:
     """The student whose name surely stands on a plain page."""
-    student, chance = written_name(_writing(cache, [ref]), names)
-    return student if chance >= SURELY else None
+    for closely in (False, True):
+        student, chance = written_name(writing_on(cache.page(ref), closely=closely), names)
+        if chance >= SURELY:
+            return student
+    return None
 
 
 def names_of(roster: Roster) -> dict[str, list[str]]:
@@ -94,11 +97,6 @@ def _spellings(row: RosterRow) -> Iterator[str]:
         yield "".join(words)
     if len(row.student_id) >= _LEAST_LETTERS:
         yield row.student_id
-
-
-def _writing(cache: PageCache, refs: Sequence[PageRef]) -> list[Spotter]:
-    """The lines of writing on plain pages."""
-    return [spotter for ref in refs for spotter in writing_on(cache.page(ref))]
 
 
 # Which number -------------------------------------------------------------------------------------
@@ -160,25 +158,37 @@ def _number(
     cache: PageCache, refs: Sequence[PageRef], assignment: Assignment, possible: Sequence[Variant]
 ) -> tuple[Variant | None, Problem]:
     """As `chosen_variant`, of what is written and drawn on some pages."""
-    lines = _writing(cache, refs)
     numbers = {variant.n for variant in possible}, {variant.position for variant in possible}
     both = all(len(each) > 1 for each in numbers)
     words = NUMBER_WORDS, POSITION_WORDS if both else (*NUMBER_WORDS, *POSITION_WORDS)
-    read = [
-        written_number(lines, [one for one in each if one is not None], spelt) if len(each) > 1 else None
-        for each, spelt in zip(numbers, words, strict=True)
-    ]
+    pages = [cache.page(ref) for ref in refs]
+    read = _read_numbers(pages, numbers, words)
     chances = [
-        _chance(read[0], variant.n, numbers[0]) * _chance(read[1], variant.position, numbers[1])
+        _chance(read.get(0), variant.n, numbers[0]) * _chance(read.get(1), variant.position, numbers[1])
         for variant in possible
     ]
     order = np.argsort(-np.array(chances), kind="stable")[:_MOST]
     compared, chance = [possible[index] for index in order], [chances[index] for index in order]
-    pages = [page.ink.strokes.ends for page in map(cache.page, refs) if page.ink is not None]
+    drawn = [page.ink.strokes.ends for page in pages if page.ink is not None]
     similar = sum(
-        (figure_similarity(ends, assignment, compared) for ends in pages), start=np.zeros(len(compared))
+        (figure_similarity(ends, assignment, compared) for ends in drawn), start=np.zeros(len(compared))
     )
     return chosen_variant(compared, chance, similar)
+
+
+def _read_numbers(
+    pages: Sequence[ScannedPage], numbers: Sequence[Collection[int | None]], words: Sequence[Sequence[str]]
+) -> dict[int, Written | None]:
+    """What is written behind the words, by their row; looked at closely where in doubt."""
+    read: dict[int, Written | None] = {row: None for row, choice in enumerate(numbers) if len(choice) > 1}
+    for closely in (False, True):
+        doubtful = [row for row, one in read.items() if one is None or one.confidence < SURE]
+        if doubtful:
+            lines = [line for page in pages for line in writing_on(page, closely=closely)]
+            for row in doubtful:
+                choice = [number for number in numbers[row] if number is not None]
+                read[row] = surer(read[row], written_number(lines, choice, words[row]))
+    return read
 
 
 def _chance(read: Written | None, number: int | None, numbers: Collection[int | None]) -> float:

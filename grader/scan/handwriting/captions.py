@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from grader.inputs.scale_text import parse_scale
-from grader.records import InkMap, Page, Sheet, Written
+from grader.records import InkMap, Written
 from grader.scan.handwriting.fields import meaning_of, placed, read_scale
-from grader.scan.handwriting.lines import Line, find_lines
+from grader.scan.handwriting.lines import Line, Look, find_lines
 from grader.scan.handwriting.model import COLUMN, JUNK, Lattice
 
 _STRANGE = 3e-4
@@ -45,9 +45,14 @@ _Places = dict[int, tuple[float, int]]
 _NOWHERE = (-np.inf, -1)
 
 
-def spotters(page: Page, sheet: Sheet, where: InkMap) -> list["Spotter"]:
-    """The lines of writing on a page, ready to be searched."""
-    return [Spotter(line) for line in find_lines(page, sheet, where)]
+def spotters(where: InkMap, look: Look | None = None) -> list["Spotter"]:
+    """The lines of writing on a page, ready to be searched; arguments as of `find_lines`."""
+    return [Spotter(line) for line in find_lines(where, look)]
+
+
+def surer(one: Written | None, other: Written | None) -> Written | None:
+    """The surer of two readings of one thing."""
+    return max((read for read in (one, other) if read), key=lambda read: read.confidence, default=None)
 
 
 class Spotter:

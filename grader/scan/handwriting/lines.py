@@ -1,5 +1,6 @@
 """Lines of writing on plain paper: pieces of ink in a row that belong to no drawn line."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -7,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from grader.records import Box, FloatArray, InkMap, Page, Sheet
-from grader.scan.handwriting.fields import PX_PER_MM, writing
+from grader.records import Box, FloatArray, GreyImage, InkMap
+from grader.scan.handwriting.fields import PX_PER_MM
 from grader.scan.handwriting.model import Lattice, lattice_of
 from grader.scan.pixels import BoolArray
 
@@ -77,10 +78,14 @@ class Line:
         return self.gaps > _TEXT
 
 
-def find_lines(page: Page, sheet: Sheet, where: InkMap) -> list[Line]:
+Look = Callable[[Box], GreyImage]
+"""Gives the contrast inside a box of the sheet, 255 = ink, 12 px/mm."""
+
+
+def find_lines(where: InkMap, look: Look | None = None) -> list[Line]:
     """The lines of writing on a page, in no order.
 
-    Arguments: lines are found on the map; their signs, which lie a pixel from each other there, on the page.
+    Arguments: signs are looked at on the page by `look`, else on the map, where narrow ones touch.
     """
     unit = where.px_per_mm / _COARSE
     labels, pieces = _pieces(where)
@@ -88,7 +93,7 @@ def find_lines(page: Page, sheet: Sheet, where: InkMap) -> list[Line]:
     for row in _rows(pieces, unit):
         left, top, right, bottom = row.box
         box = left / unit, top / unit, (right - left) / unit, (bottom - top) / unit
-        grey = writing(page, sheet, box, 0.0)
+        grey = look(box) if look is not None else _enlarged(where, row.box)
         if grey.size:
             own = np.isin(labels[top:bottom, left:right], row.labels).astype(np.uint8)
             own = np.asarray(cv2.dilate(own, np.ones((3, 3), np.uint8)), dtype=np.uint8)
@@ -97,6 +102,16 @@ def find_lines(page: Page, sheet: Sheet, where: InkMap) -> list[Line]:
             if lattice.count >= _LEAST_SIGNS:
                 lines.append(_line(box, lattice, PX_PER_MM * row.high / unit))
     return lines
+
+
+def _enlarged(where: InkMap, box: tuple[int, int, int, int]) -> GreyImage:
+    """A part of the map, given by its sides on the coarse one, enlarged to 12 px/mm."""
+    left, top, right, bottom = (_COARSE * side for side in box)
+    finer = PX_PER_MM / where.px_per_mm
+    grey = cv2.resize(
+        where.ink[top:bottom, left:right], None, fx=finer, fy=finer, interpolation=cv2.INTER_CUBIC
+    )
+    return np.asarray(grey, dtype=np.uint8)
 
 
 def _pieces(where: InkMap) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

@@ -13,6 +13,7 @@ from grader.scan.handwriting.captions import (
     written_name,
     written_number,
 )
+from grader.scan.handwriting.fields import writing
 from grader.scan.handwriting.lines import find_lines
 from samples.simulation.lettering import Handwriting, write
 from samples.simulation.strokes import PenWidth
@@ -28,7 +29,7 @@ NAMES = {
 
 
 def page(*texts: str, ruled: bool = False, height_mm: float = 4.0, seed: int = 5):
-    """A page with lines of writing, in the cells of a title block or not: its pixels, sheet and ink map."""
+    """The ink map of a page with lines of writing, in cells or not, and what looks at its pixels."""
     ink = np.zeros((round(100 * FINE), round(200 * FINE)), dtype=np.uint8)
     rng = np.random.default_rng(seed)
     for row, text in enumerate(texts):
@@ -51,7 +52,8 @@ def on_paper(ink):
     sheet = Sheet(
         np.diag([FINE, FINE, 1.0]), (200.0, 100.0), "combined", FINE, 0.0, 0.0, 0.0, (0, 0, 200, 100)
     )
-    return Page("page.png", 1, 255 - ink), sheet, where
+    picture = Page("page.png", 1, 255 - ink)
+    return where, lambda box: writing(picture, sheet, box, 0.0)
 
 
 def scales(*texts: str, names=("kL", "kv", "ka"), **how):
