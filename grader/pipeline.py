@@ -101,6 +101,8 @@ def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
         if boxes is None or boxes:
             ink = find_ink(image, sheet, boxes)
             if isinstance(ink, Unread):
+                if ink.name == "sheet":
+                    return _refused(page, "sheet_refused", f"{ref.file}: page {ref.page}: {ink.reason}")
                 why = f"{ref.file}: page {ref.page} is no drawing: {ink.reason}"
                 return _refused(page, "page_not_a_drawing", why)
             problems += tuple(replace(problem, file=ref.file) for problem in ink.problems)

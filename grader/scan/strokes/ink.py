@@ -47,6 +47,10 @@ from grader.scan.strokes.symbols import arcs, find_circles, led_to
 
 _DARK = 64.0
 """Of 255, a quarter of white: paper in photos is brighter than 130, a negative's darker than 20."""
+_PITCHES_MM = (1.0, 2.0, 2.5, 4.0, 5.0, 6.35, 7.0, 8.0, 10.0)
+"""Of printed squares: pads, millimetre paper, quarter inches, French and double squares."""
+_PITCH_WITHIN = 0.03
+"""Printers and copiers change sizes by a per cent or two."""
 _USUAL_BLOCK_MM = (200.0, 72.0)
 """From the paper's edges: the largest title blocks, of ISO 7200 and GOST 2.104, are 180 and 185 x 55 mm, in a
 frame up to 10 mm from the edge."""
@@ -70,6 +74,12 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     scale = working_scale(sheet.px_per_mm)
     reduced = flat.reduced(scale)
     squares = find_squares(reduced)
+    if squares is not None and not _is_usual(pitch := squares.pitch_px / scale / sheet.px_per_mm):
+        return Unread(
+            "sheet",
+            f"by the scale that was found its printed squares would be {pitch:.1f} mm, and no paper has such"
+            " ones; scan it again with the stated resolution kept",
+        )
     contrast = without_squares(reduced, squares)
     seeds = find_seeds(contrast)
     components = find_components(seeds)
@@ -86,6 +96,11 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     tips = find_tips(flat, strokes, sheet.mm_to_px)
     problems = _left_out(squares, field, page.source)
     return Ink(strokes, circles, marks, _ink_map(contrast, scale, sheet), tips=tips, problems=problems)
+
+
+def _is_usual(pitch_mm: float) -> bool:
+    """Whether paper is printed with squares of this size."""
+    return any(abs(pitch_mm / usual - 1.0) < _PITCH_WITHIN for usual in _PITCHES_MM)
 
 
 def _left_out(squares: Squares | None, field: Field, file: str) -> tuple[Problem, ...]:

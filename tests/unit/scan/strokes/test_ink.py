@@ -503,6 +503,14 @@ def test_squared_paper_is_told_and_its_squares_are_no_strokes(pitch):
     assert paper.ink().problems == ()
 
 
+def test_squares_of_a_size_that_no_paper_has_say_that_the_scale_is_wrong():
+    paper = Paper()
+    for step in np.arange(0.0, 420.0, 5.85):
+        paper.line((step, 0), (step, 297), pen=0.12, dark=190)
+        paper.line((0, step), (420, step), pen=0.12, dark=190)
+    assert "squares would be 5.8 mm" in refusal(paper)
+
+
 def test_an_area_larger_than_a_title_block_is_told_where_it_is_left_out():
     paper = Paper()
     for start, end in [
