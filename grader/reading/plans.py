@@ -53,6 +53,8 @@ COST_OF_ODD_NODE = 4.0
 """Nats for a node that is not where the construction puts it from the student's own: one of fifty."""
 EXPLAINED = 0.85
 """A regular plan supported over more of its length is what was drawn."""
+ODD_NODE_NATS = 1.5
+"""Nats of letters that each such node needs: without letters, others would do as well."""
 FAR_WORSE = 30.0
 """Nats: letters do not make up for more."""
 QUARTERS = (np.pi / 2, -np.pi / 2, np.pi)
@@ -146,6 +148,7 @@ class PlanReading:
     assignment, lines : strokes by vector, and the lines whose rows it names
     score : log likelihood ratio less costs, nats
     rivals : other explanations, best first
+    named : probability that its letters say the names, of one whose nodes the construction does not place
     """
 
     hypothesis: PlanHypothesis
@@ -155,6 +158,7 @@ class PlanReading:
     score: float
     lines: Lines
     rivals: tuple["PlanReading", ...] = ()
+    named: float = 1.0
 
     def fit(self) -> NodeFit:
         """The nodes by the strokes alone."""
@@ -356,6 +360,12 @@ def _by_letters(problem: PlanProblem, base: PlanHypothesis) -> list[PlanReading]
     return _read(cases, problem.free)
 
 
+def _named_by(letters_nats: float, hypothesis: PlanHypothesis) -> float:
+    """Probability that letters tell the names of a graph's nodes: strokes alone fit other names as well."""
+    odd = int((hypothesis.cost - COST_OF_GRAPH) / COST_OF_ODD_NODE) if hypothesis.label == BY_LETTERS else 0
+    return 1.0 / (1.0 + math.exp(ODD_NODE_NATS * odd - letters_nats)) if odd else 1.0
+
+
 def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[PlanReading]:
     """The best readings, what the letters say in their scores, best first, each set of strokes once."""
     poles = frozenset(plans[0].hypothesis.drawing.construction.poles.values())
@@ -368,7 +378,8 @@ def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[Pl
             at = dict(zip(nodes, expected.at.tolist(), strict=True))
             writing = lettering(at, problem.letters, poles, problem.renamed)
             nats = 0.0 if writing is None else writing.log()
-            scored[plan.strokes] = replace(plan, score=plan.score + nats)
+            named = _named_by(nats, plan.hypothesis)
+            scored[plan.strokes] = replace(plan, score=plan.score + nats, named=named)
     return sorted(scored.values(), key=lambda plan: -plan.score)
 
 

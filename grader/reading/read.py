@@ -485,7 +485,7 @@ def _named(plan: PlanReading, fit: NodeFit) -> FloatArray:
         weight = math.exp(min(0.0, rival.score - plan.score) / TEMPERATURE)
         total += weight * np.isfinite(apart)
         agree += weight * (apart < NEAR_MM)
-    return np.asarray(agree / total)
+    return np.asarray(plan.named * agree / total)
 
 
 def _marks(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> tuple[float, float]:
