@@ -29,7 +29,7 @@ BATCH, SIGNS_BATCH = 24, 64
 STEM, HIDDEN = (10, 28), 56
 SHIFT_PX = 8
 """Windows are moved by up to so much, that places within a cell are learnt alike."""
-SHEETS = 40
+SHEETS = 60
 DIGITS = 3000
 
 
@@ -72,9 +72,7 @@ def train(paths: list[Path], steps: int, out: Path, start: Path | None) -> None:
 
     network = network_of(nn)
     if start is not None:
-        known = torch.load(start)
-        known |= {name: known[name][:20] for name in ("told.weight", "told.bias")}
-        network.load_state_dict(known)
+        network.load_state_dict(torch.load(start))
     optimiser = torch.optim.AdamW(network.parameters(), 2e-3, weight_decay=1e-4)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 3e-3, total_steps=steps, pct_start=0.1)
     rng = np.random.default_rng(1)
@@ -315,12 +313,12 @@ def main() -> None:
     drawing.add_argument("--left-out", action="store_true")
     learning = acts.add_parser("network")
     learning.add_argument("data", type=Path, nargs="+")
-    learning.add_argument("--steps", type=int, default=9000)
+    learning.add_argument("--steps", type=int, default=5000)
     learning.add_argument("--out", type=Path, required=True)
     learning.add_argument("--start", type=Path)
     naming = acts.add_parser("signs")
     naming.add_argument("data", type=Path, nargs="+")
-    naming.add_argument("--steps", type=int, default=6000)
+    naming.add_argument("--steps", type=int, default=5000)
     naming.add_argument("--out", type=Path, required=True)
     naming.add_argument("--start", type=Path)
     checking = acts.add_parser("check")

@@ -382,16 +382,16 @@ def scanned(ink: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         grain = cv2.GaussianBlur(rng.random(ink.shape).astype(np.float32), (0, 0), rng.uniform(0.5, 1.8))
         grain = np.clip((grain - grain.mean()) / grain.std() / 2.0 + 0.5, 0.0, 1.0)
         soft = ink * (1.0 - rng.uniform(0.0, 0.75) * grain)
-    soft = cv2.GaussianBlur(soft, (0, 0), float(np.exp(rng.uniform(np.log(0.4), np.log(1.9)))))
+    soft = cv2.GaussianBlur(soft, (0, 0), float(np.exp(rng.uniform(np.log(0.4), np.log(2.6)))))
     lot, gain = rng.random(), 255.0 * rng.uniform(0.45, 1.0)
     if lot < 0.25:
         speckle = cv2.GaussianBlur(rng.normal(0.0, 1.0, soft.shape).astype(np.float32), (0, 0), 0.7)
-        bits = soft + rng.uniform(0.0, 0.2) * speckle > rng.uniform(0.2, 0.5)
+        bits = soft + rng.uniform(0.0, 0.2) * speckle > rng.uniform(0.12, 0.45)
         coarse = rng.random() < 0.4
         bits = cv2.resize(bits.astype(np.float32), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
         return (255.0 * (bits > 0.45 if coarse else bits)).astype(np.uint8)
     soft = cv2.resize(soft, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) * gain
-    soft += rng.normal(0.0, np.exp(rng.uniform(np.log(0.5), np.log(10.0))), soft.shape)
+    soft += rng.normal(0.0, np.exp(rng.uniform(np.log(0.5), np.log(14.0))), soft.shape)
     grey = np.clip(soft, 0.0, 255.0).astype(np.uint8)
     if lot < 0.6:
         coded = cv2.imencode(".jpg", 255 - grey, [cv2.IMWRITE_JPEG_QUALITY, int(rng.uniform(35, 92))])[1]
@@ -405,7 +405,7 @@ Labels = np.ndarray
 
 def own_window(alphabet: Alphabet, rng: np.random.Generator) -> tuple[np.ndarray, Labels]:
     """A window of line work of our own."""
-    window, pen = Window(), (rng.uniform(0.2, 0.6), rng.uniform(0.45, 1.0))
+    window, pen = Window(), (rng.uniform(0.2, 0.8), rng.uniform(0.45, 1.0))
     for _ in range(rng.integers(0, 4)):
         _node(window, _place(rng), rng, pen)
     for _ in range(rng.integers(0, 3)):
