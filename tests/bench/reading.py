@@ -229,6 +229,6 @@ def curve_picture(rows: Sequence[CurveRow], path: Path) -> None:
             axes.annotate(str(dpi), (x, y), textcoords="offset points", xytext=(4, 4), fontsize=8)
     axes.set(xlabel="processor time per page, ms", ylabel="median error of a node, mm", xlim=(0, None))
     axes.set_ylim(bottom=0)
-    axes.legend()
+    axes.legend(loc="lower left")
     with rc_context({"svg.hashsalt": "curve", "svg.fonttype": "none"}):
         figure.savefig(path, metadata={"Date": None})

@@ -14,7 +14,7 @@ from grader.scan.register.hypotheses import (
 )
 from reference.drawing.canvas import MM_PER_INCH
 
-KNOWN = Resolution((300.0, 300.0), stated=True)
+KNOWN = Resolution((300.0, 300.0), stated=True, is_sure=True)
 USUAL = np.log(300.0 / MM_PER_INCH)
 
 
