@@ -443,6 +443,9 @@ def _is_borne_out(
     value = _value(task, name, text, known).get(name)
     if value is None:
         return isinstance(_parsed_text(task, name, text), ByRule)
+    if "kL" not in known and name != "kL":
+        # The rule takes the length scale from the crank as drawn, where nobody declares it.
+        known = {**known, "kL": _by_rule(task, evidence, "kL", {})}
     ruled = float(getattr(task.assignment.scales([task.variant], **known), name)[0])
     shown = _evidence_of(task, evidence, name, however_doubtful=True)
     tried = [ruled] if shown is None else [ruled, shown[0] / shown[1]]

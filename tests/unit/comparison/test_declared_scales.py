@@ -1,12 +1,13 @@
 """Which scale counts as declared, where boxes, roster and drawing agree or do not."""
 
+import numpy as np
 import pytest
 
 from grader.comparison.scales import BEYOND_DOUBT, declarations
 from grader.comparison.scales import LIKELY as LEAST
 from grader.comparison.task import task_of
 from grader.inputs.scale_text import SURE, sure_texts
-from grader.records import Reading, Written
+from grader.records import MECHANISM, Figure, Reading, ReadNode, Written
 from grader.rubric import load_rubric
 from reference.authored.assignment import load_assignment
 
@@ -124,6 +125,20 @@ def test_two_sheets_whose_boxes_contradict_each_other_give_nothing(task):
 def test_a_rule_written_in_the_box_counts(task):
     found = declarations(task, {}, [reading("ωkL", LIKELY, "kv")])
     assert found.texts == {"kv": "ωkL"}
+
+
+def test_a_scale_by_the_rule_follows_the_drawn_crank_where_nobody_declares_the_scale_of_lengths(task):
+    def nodes(crank_mm):
+        ends = {task.yardstick.tail: 0j, task.yardstick.head: complex(crank_mm)}
+        return {name: ReadNode(at, 0.01 * np.eye(2), 0.99) for name, at in ends.items()}
+
+    text = f"{task.omega * 0.006:.4f} (m/s)/mm"
+    written = {"kv": Written(text, LIKELY)}
+    found = [
+        declarations(task, {}, [Reading({MECHANISM: Figure(nodes(crank), {})}, written=written)])
+        for crank in (50.0, 60.0)
+    ]
+    assert [one.texts for one in found] == [{"kv": text}, {}]
 
 
 def test_before_the_drawing_is_read_only_sure_boxes_are_taken():
