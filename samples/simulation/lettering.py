@@ -116,7 +116,7 @@ def _strokes_of(sign: str, forms: dict[str, int]) -> list[tuple[bool, ComplexArr
 def write(rng: Rng, pen: PenWidth, text: str, height_mm: float, style: Handwriting) -> WrittenText:
     """A text whose base line starts at 0."""
     forms = dict(style.forms)
-    at, strokes, signs = 0.0, [], []
+    at, strokes, signs = 0.0, list[InkStroke](), list[WrittenSign]()
     for letter in _letters(text):
         if letter.sign == " ":
             at += _SPACE * letter.size

@@ -11,8 +11,10 @@ all of the page.
 import json
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -65,7 +67,7 @@ def measure(folder: Path) -> list[PageFigures]:
     return [measure_page(path, by_picture.get(path.name)) for path in pictures]
 
 
-def measure_page(path: Path, truth: dict | None) -> PageFigures:
+def measure_page(path: Path, truth: Mapping[str, Any] | None) -> PageFigures:
     """The ink of one picture held against what was read by eye; without a truth, what there is of it."""
     start = time.process_time()
     page = page_of(path, 1)
@@ -93,7 +95,7 @@ def whole_picture(page: Page, dpi: float) -> Sheet:
     return Sheet(matrix, size, "combined", unit, 0.0, 0.0, 0.0, (0.0, 0.0, *size))
 
 
-def _count(row: PageFigures, ink: Ink, truth: dict, px_per_mm: float) -> None:
+def _count(row: PageFigures, ink: Ink, truth: Mapping[str, Any], px_per_mm: float) -> None:
     row.segments = len(truth["segments"])
     within = OFF_MM if truth["ruled"] else FREEHAND_MM
     centres = set()
