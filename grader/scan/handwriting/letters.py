@@ -19,6 +19,8 @@ DETECTED = (*"o123456789", *"aAbBcdDeEfFgGhHJkLmMnNprRstTuvxyz", *"πωεμ", "'
 """The signs that the detector knows; points, dashes and brackets are too like ends and pieces of lines."""
 PX_PER_MM = 6.0
 """Of the ink map that it looks at."""
+_COARSE = 1.1
+"""Maps of pages of so much less resolution are made finer: the networks know signs by their size."""
 CELL_PX = 4
 """Side of the cells for which it answers."""
 TILE_PX, _MARGIN_PX = 96, 16
@@ -65,13 +67,18 @@ def find_letters(ink: Ink, boxes: Sequence[Box] | None = None) -> Letters:
     """
     unit = ink.where.px_per_mm
     left, top, grey = _window(ink, boxes)
-    drawn = _drawn(ink, (left, top), grey.shape)
-    box, probability = _signs(grey, _tiles(grey, drawn))
+    ruled = _drawn(ink, (left, top), grey.shape)
+    finer = PX_PER_MM / unit
+    if finer > _COARSE:
+        size = round(finer * grey.shape[1]), round(finer * grey.shape[0])
+        grey, ruled = (np.asarray(cv2.resize(plane, size), dtype=np.uint8) for plane in (grey, ruled))
+        unit, left, top = finer * unit, round(finer * left), round(finer * top)
+    box, probability = _signs(grey, _tiles(grey, ruled))
     likely = np.flatnonzero(probability[:, COLUMN[JUNK]] < 0.5)
     alone = np.setdiff1d(np.arange(len(box)), likely[_in_words(box[likely])])
     box, probability = box[alone], probability[alone]
     x, y, right, low = np.column_stack([box[:, :2], box[:, :2] + box[:, 2:] + 1]).astype(np.int64).clip(0).T
-    touched = [drawn[part].any() for part in map(_part, y, low, x, right)]
+    touched = [ruled[part].any() for part in map(_part, y, low, x, right)]
     # The centre of the map's pixel q is at q / unit mm.
     box[:, :2] += [left, top]
     return Letters(box / unit, probability, ~np.array(touched, dtype=bool), COLUMN)
@@ -92,7 +99,7 @@ def _window(ink: Ink, boxes: Sequence[Box] | None) -> tuple[int, int, GreyImage]
 
 
 def _tiles(grey: GreyImage, drawn: GreyImage) -> list[tuple[int, int]]:
-    """Left columns and top rows of tiles that hold all ink that long strokes and rings do not explain."""
+    """Left columns and top rows of tiles that hold all ink that long strokes do not explain."""
     some = grey[::11, ::11]
     some = some[some > 2 * _FAINT]
     if len(some) == 0:
@@ -241,13 +248,8 @@ def _in_words(box: FloatArray) -> BoolArray:
     return np.asarray(np.bincount(line, minlength=1)[line] > _WORDS)
 
 
-def _usual_px(ink: Ink) -> float:
-    usual = float(np.median(ink.strokes.width)) if len(ink.strokes) else 0.4
-    return (usual + _GROWN_MM) * ink.where.px_per_mm
-
-
 def _drawn(ink: Ink, corner: tuple[int, int], shape: Sequence[int]) -> GreyImage:
-    """255 where a long fitted stroke or a ring runs."""
+    """255 where a long fitted stroke runs; rings are not among them: a letter o is one."""
     unit, shift = ink.where.px_per_mm, 4
     fine = 1 << shift
     drawn = np.zeros(tuple(shape), dtype=np.uint8)
@@ -259,7 +261,4 @@ def _drawn(ink: Ink, corner: tuple[int, int], shape: Sequence[int]) -> GreyImage
     for ends, width in zip(px(ink.strokes.ends[long]), ink.strokes.width[long], strict=True):
         pen = max(1, round((width + _GROWN_MM) * unit))
         cv2.line(drawn, ends[0].tolist(), ends[1].tolist(), 255, pen, cv2.LINE_8, shift)
-    pen = max(1, round(_usual_px(ink)))
-    for (x, y), radius in zip(px(ink.circles[:, :2]).tolist(), ink.circles[:, 2], strict=True):
-        cv2.circle(drawn, (x, y), round(radius * unit * fine), 255, pen, cv2.LINE_8, shift)
     return drawn

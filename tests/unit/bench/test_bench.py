@@ -81,7 +81,7 @@ def test_the_command_prints_the_figures_of_the_parts_asked_for(asked, monkeypatc
     class Bench:
         steps = 1
         figures = solver.SolverFigures(branches=(branch,))
-        rows, foreign, lines = (READING,), (), None
+        rows, foreign, curve, lines = (READING,), (), (), None
 
         def __init__(self, quick, students=None, whole=False):
             assert quick
