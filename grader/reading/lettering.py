@@ -40,6 +40,8 @@ USUAL_SHARE = 0.04
 """Of a sign among the pieces of a sheet: one in some 25."""
 LEGIBLE, LEGIBLE_COMPONENT = 0.6, 0.2
 """Shares of nodes whose letters are written and read."""
+LIKELY_PRIME = 0.5
+"""Probability from which a sign counts as a prime."""
 POLE_SIGNS = ("o", "p", "π")
 """What the pole of a plan is called in different schools."""
 
@@ -158,6 +160,14 @@ def fitting_letters(
     beside = (fits[:, None] * np.exp(-gap[near] / FALL_MM)).max(axis=0)
     legible = LEGIBLE_COMPONENT if name.startswith(COMPONENTS) else LEGIBLE
     return np.asarray(np.log(1.0 - legible + legible * beside))
+
+
+def primes_beside(at: ComplexArray, letters: Letters | None) -> int:
+    """How many primes stand about some nodes: those of an acceleration plan have them, others have not."""
+    if letters is None or "'" not in letters.column or not len(letters):
+        return 0
+    primes = _gaps(letters.box_mm[letters.chance("'") > LIKELY_PRIME], at)
+    return int(np.count_nonzero(primes.min(axis=1, initial=np.inf) < REACH_MM))
 
 
 def lettering(

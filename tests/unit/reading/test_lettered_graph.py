@@ -35,7 +35,23 @@ def lettered_ink(ink: Ink, nodes: dict[str, complex], sure: float = 0.95) -> Ink
     return replace(ink, letters=Letters(boxes, probability, np.ones(len(nodes), dtype=bool), SIGNS))
 
 
-def drawn_and_read(assignment: Assignment, seed: int, *, letters: bool):
+def with_primes(ink: Ink, nodes: dict[str, complex]) -> Ink:
+    """The same with a prime behind each letter, as an acceleration plan has them."""
+    boxes = np.array([[at.real + 3.3, -at.imag - 3.8, 0.4, 1.0] for at in nodes.values()])
+    probability = np.full((len(nodes), len(SIGNS)), 0.01)
+    probability[:, SIGNS["'"]] = 1.0 - 0.01 * (len(SIGNS) - 1)
+    both = (
+        np.concatenate(pair)
+        for pair in (
+            (ink.letters.box_mm, boxes),
+            (ink.letters.probability, probability),
+            (ink.letters.whole, np.ones(len(nodes), dtype=bool)),
+        )
+    )
+    return replace(ink, letters=Letters(*both, SIGNS))
+
+
+def drawn_and_read(assignment: Assignment, seed: int, *, letters: bool, primes: bool = False):
     """(vectors as drawn, as read, confidences) of a plan of scattered nodes."""
     variant = assignment.variants()[0]
     construction = task("pump", variant)[2].construction
@@ -43,6 +59,7 @@ def drawn_and_read(assignment: Assignment, seed: int, *, letters: bool):
     vectors = {v.name: (nodes[v.tail], nodes[v.head]) for v in construction.vectors_of(VELOCITY_PLAN)}
     ink = ink_of(list(vectors.values()))
     ink = lettered_ink(ink, nodes) if letters else ink
+    ink = with_primes(ink, nodes) if primes else ink
     reading = read_figures([ink], [blank_sheet()], assignment, variant, None, tuple(vectors))[0]
     figure = reading.figures.get(VELOCITY_PLAN)
     found = {} if figure is None else figure.vectors
@@ -70,3 +87,9 @@ def test_without_letters_such_a_plan_is_not_believed(seed):
     assert not [
         name for name in read if sure[name] > SURE and abs(read[name] - drawn[name]) > SILENTLY_WRONG_MM
     ]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nodes_with_primes_are_no_velocity_plan(seed):
+    drawn, read, sure = drawn_and_read(task("pump")[0], seed, letters=True, primes=True)
+    assert not [name for name in read if sure[name] > SURE and abs(read[name] - drawn[name]) < NEAR_MM]
