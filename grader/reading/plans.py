@@ -56,8 +56,8 @@ EXPLAINED = 0.85
 ODD_NODE_NATS = 1.5
 """Nats of letters that each such node needs: without letters, others would do as well."""
 FOREIGN_PRIMES = 2
-"""So many primes beside the nodes of a velocity plan say that it is the acceleration plan: of 30 simulated ones
-one had a prime near it, of 30 acceleration plans 26 had two and more."""
+"""So many primes beside the nodes of a velocity plan say that it is the acceleration plan: of 30 simulated
+ones one had a prime near it, of 30 acceleration plans 26 had two and more."""
 FAR_WORSE = 30.0
 """Nats: letters do not make up for more."""
 QUARTERS = (np.pi / 2, -np.pi / 2, np.pi)
