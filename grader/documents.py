@@ -87,6 +87,14 @@ class NodeDocument(Document):
     confidence: Share
 
 
+class OtherReadingDocument(Document):
+    """What else a vector may be; the confidence is that it is this one or one before it."""
+
+    length_mm: float
+    direction_deg: float
+    confidence: Share
+
+
 class VectorDocument(Document):
     """A vector as drawn; a zero vector has no direction."""
 
@@ -95,6 +103,7 @@ class VectorDocument(Document):
     direction_deg: float | None
     se_deg: float | None
     confidence: Share
+    others: list[OtherReadingDocument] = []
 
 
 class FigureDocument(Document):

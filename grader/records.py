@@ -342,6 +342,18 @@ class ReadNode:
 
 
 @dataclass(frozen=True, slots=True)
+class OtherReading:
+    """Another explanation's vector of the same name.
+
+    `confidence`: probability that the vector is this one, or one that is named before it.
+    """
+
+    length_mm: float
+    direction_deg: float
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True)
 class ReadVector:
     """A named vector as drawn, or as measured by the student.
 
@@ -350,6 +362,7 @@ class ReadVector:
     length_mm, se_mm : length on paper; None where only a direction or value is known
     direction_deg, se_deg : counter-clockwise from the sheet's +x, 0 <= d < 360; None if not known
     confidence : probability that this is the vector named, within 0.5 mm
+    others : what else it may be, likeliest first
     """
 
     length_mm: float | None
@@ -357,6 +370,7 @@ class ReadVector:
     direction_deg: float | None
     se_deg: float | None
     confidence: float
+    others: tuple[OtherReading, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -184,22 +184,29 @@ def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
     written = charges.evidence.written.get(criterion.name) if is_read else None
     _, remarks = held_against_cells(drawn, written, table, least)
 
-    def against(
-        expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
-    ) -> MarkRange:
+    def mark_of(one: DrawnVector, expected: complex, uncertainty: EndSpread, se: EndSpread) -> MarkRange:
         size = abs(expected)
         plain = tolerances(table, size, with_direction=with_direction)
         if uncertainty is NO_SPREAD:
-            mark = by_rule(mark_vector(drawn, expected, plain, table, se), rule)
-        else:
-            allowed = widened(plain, size, uncertainty, rubric.hand.at_most)
-            mark = by_rule(mark_vector(drawn, expected, allowed, table, se), rule)
-            if not mark.is_full:
-                by_hand = by_rule(
-                    mark_vector(drawn, expected, widened(plain, size, uncertainty), table, se), rule
-                )
-                mark = left_open(mark, ALL_RIGHT if _is_boundless(uncertainty, size) else by_hand)
-        mark = verdicts.with_confidence(mark, drawn.confidence, rubric.doubt.settle, size)
+            return by_rule(mark_vector(one, expected, plain, table, se), rule)
+        allowed = widened(plain, size, uncertainty, rubric.hand.at_most)
+        mark = by_rule(mark_vector(one, expected, allowed, table, se), rule)
+        if mark.is_full:
+            return mark
+        by_hand = by_rule(mark_vector(one, expected, widened(plain, size, uncertainty), table, se), rule)
+        return left_open(mark, ALL_RIGHT if _is_boundless(uncertainty, size) else by_hand)
+
+    def against(
+        expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
+    ) -> MarkRange:
+        mark, confidence = mark_of(drawn, expected, uncertainty, se), drawn.confidence
+        for other in drawn.if_others():
+            # Whichever of them was drawn, the verdict is the same: their probabilities count together.
+            same = mark_of(other, expected, uncertainty, se)
+            if not mark.is_certain or (same.worst, same.best) != (mark.worst, mark.best):
+                break
+            confidence = max(confidence, other.confidence)
+        mark = verdicts.with_confidence(mark, confidence, rubric.doubt.settle, abs(expected))
         return mark if mark.is_full else replace(mark, reasons=(*remarks, *mark.reasons))
 
     return against

@@ -9,7 +9,7 @@ import numpy as np
 
 from grader.comparison.task import Task
 from grader.outcomes import Reason
-from grader.records import MECHANISM, Figure, Reading, ReadNode
+from grader.records import MECHANISM, Figure, OtherReading, Reading, ReadNode
 from grader.rubric import ToleranceTable
 
 
@@ -42,6 +42,16 @@ class DrawnVector:
     confidence: float
     turn_rad: float = 0.0
     """Of the sketch on its sheet: the sheet's direction is `direction_rad` + this."""
+    others: tuple[OtherReading, ...] = ()
+    """What else it may be, likeliest first, as on the sheet."""
+
+    def if_others(self) -> Iterator["DrawnVector"]:
+        """The vector as each of the others, with the confidence that it is this one or one before it."""
+        for other in self.others:
+            direction = math.radians(other.direction_deg) - self.turn_rad
+            yield replace(
+                self, length_mm=other.length_mm, direction_rad=direction, confidence=other.confidence
+            )
 
     @property
     def as_complex(self) -> complex | None:
@@ -101,7 +111,7 @@ def gather(task: Task, submission: Submission) -> Evidence:
     drawn = {}
     for name, one in sheets.drawn.items():
         sure, _ = held_against_cells(one, written.get(name), task.rubric.tolerance_of(name), least)
-        drawn[name] = replace(one, confidence=sure)
+        drawn[name] = replace(one, confidence=sure, others=one.others if sure >= one.confidence else ())
     return Evidence(
         drawn=drawn,
         measured=measured,
@@ -207,7 +217,9 @@ def _vectors(task: Task, figure: str, read: Figure, turn: float, se_turn: float)
             continue
         direction = None if one.direction_deg is None else math.radians(one.direction_deg) - turn
         se_deg = math.hypot(one.se_deg or 0.0, math.degrees(se_turn))
-        found[vector.name] = DrawnVector(one.length_mm, one.se_mm, direction, se_deg, one.confidence, turn)
+        found[vector.name] = DrawnVector(
+            one.length_mm, one.se_mm, direction, se_deg, one.confidence, turn, one.others
+        )
     return found
 
 

@@ -22,6 +22,7 @@ from grader.records import (
     FloatArray,
     Ink,
     InkMap,
+    OtherReading,
     Reading,
     ReadNode,
     ReadVector,
@@ -300,14 +301,15 @@ def figure_of_plan(plan: PlanReading, scale_se: float, where: InkMap) -> tuple[F
     Arguments: `scale_se` is the sheet's relative standard error of lengths, `where` its ink.
     """
     fit, names = plan.fit(), plan.assignment.expected.names
-    named = _named(plan, fit)
+    explanations = _explanations(plan, fit)
     absent = dict(plan.hypothesis.absent)
     nodes = {
-        name: _node(fit, row, Signs(within(_node_cov(fit, row)), float(named[row])).confidence())
+        name: _node(fit, row, Signs(within(_node_cov(fit, row)), named).confidence())
         for row, name in enumerate(names)
         if name not in absent and np.isfinite(fit.at[row])
+        for _, named in explanations.of(explanations.at[:, row])[:1]
     }
-    vectors, unread = _vectors(plan, fit, named, scale_se, where)
+    vectors, unread = _vectors(plan, fit, explanations, scale_se, where)
     unread.extend(Unread(name, reason) for name, reason in absent.items())
     construction = plan.hypothesis.drawing.construction
     for vector in construction.vectors_of(construction.figure_of(names[0])):
@@ -340,7 +342,7 @@ def _node(fit: NodeFit, index: int, confidence: float) -> ReadNode:
 
 
 def _vectors(
-    plan: PlanReading, fit: NodeFit, named: FloatArray, scale_se: float, where: InkMap
+    plan: PlanReading, fit: NodeFit, explanations: "_Explanations", scale_se: float, where: InkMap
 ) -> tuple[dict[str, ReadVector], list[Unread]]:
     expected = plan.assignment.expected
     vectors: dict[str, ReadVector] = {}
@@ -358,15 +360,17 @@ def _vectors(
                 unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
                 continue
         cov = _difference_cov(fit, edge, span, scale_se)
-        signs = Signs(
-            placed=within(cov),
-            named=float(min(named[edge.tail], named[edge.head])),
-            off_mm=0.0,
-        )
+        (_, named), *others = explanations.of(explanations.at[:, edge.head] - explanations.at[:, edge.tail])
+        signs = Signs(within(cov), named, off_mm=0.0)
         if row >= 0:
             off_mm = float(np.abs(fit.residual_mm[index]).max())
             signs = replace(signs, off_mm=off_mm, marked=_marked(plan, fit, edge, row))
-        vectors[edge.name] = vector_of(span, cov, signs.confidence())
+        read = vector_of(span, cov, signs.confidence())
+        rivals = (
+            OtherReading(abs(other), _degrees(other), replace(signs, named=together).confidence())
+            for other, together in others
+        )
+        vectors[edge.name] = replace(read, others=tuple(rivals))
     return vectors, unread
 
 
@@ -386,8 +390,12 @@ def vector_of(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
     across = np.array([-along[1], along[0]])
     se_along, se_across = (math.sqrt(max(float(axis @ cov @ axis), 0.0)) for axis in (along, across))
     se_deg = math.degrees(math.atan2(se_across, max(length, 1e-9)))
-    direction = math.degrees(cmath.phase(span)) % 360.0 if length > se_across else None
+    direction = _degrees(span) if length > se_across else None
     return ReadVector(length, se_along, direction, se_deg, confidence)
+
+
+def _degrees(span: complex) -> float:
+    return math.degrees(cmath.phase(span)) % 360.0
 
 
 # Confidence ----------------------------------------------------------------------------------------
@@ -398,6 +406,8 @@ NEAR_MM = 0.5
 """A node is right within this of what was drawn: a pencil stroke's width."""
 RIVAL_NATS = 12.0
 """Rivals with a score lower by more are left out."""
+MOST_OTHERS = 3
+"""Others of one vector that are told: what remains has a share of a few hundredths."""
 TEMPERATURE = 3.0
 """Scores are divided by this: errors of one student's strokes are not independent."""
 WEIGHTS = {"placed": 0.2, "named": 0.5, "off_mm": -2.2, "marked": 2.4}
@@ -452,23 +462,49 @@ def within(cov: FloatArray, radius_mm: float = NEAR_MM) -> float:
     return float(first * second)
 
 
-def _named(plan: PlanReading, fit: NodeFit) -> FloatArray:
-    """(n,) share of the explanations, by their scores, that have each node where it is read."""
+@dataclass(frozen=True, slots=True)
+class _Explanations:
+    """A plan and its rivals: weights by their scores (k,), the plan's own 1 first, and nodes (k, n), mm.
+
+    A node that an explanation does not have is nan.
+    """
+
+    weight: FloatArray
+    at: ComplexArray
+    named: float
+
+    def of(self, values: ComplexArray) -> list[tuple[complex, float]]:
+        """What they say of something (k,): the plan's own value, then others, likeliest first.
+
+        With each stands the probability of it and those before it; values within `NEAR_MM` are one.
+        """
+        left = np.isfinite(values)
+        total, together = self.weight[left].sum(), 0.0
+        found: list[tuple[complex, float]] = []
+        while left.any() and len(found) <= MOST_OTHERS:
+            near = left & (np.abs(values - values[:, None]) < NEAR_MM)
+            share = near @ self.weight / total
+            row = int(np.argmax(np.where(left, share, 0.0))) if found else 0
+            together += float(share[row])
+            found.append((complex(values[row]), self.named * min(together, 1.0)))
+            left = left & ~near[row]
+        return found
+
+
+def _explanations(plan: PlanReading, fit: NodeFit) -> _Explanations:
     names = plan.assignment.expected.names
     # Many hypotheses name the same strokes, and so have their nodes in the same places.
     nodes_by_strokes = {plan.strokes: fit.at}
-    agree, total = np.ones(len(names)), np.ones(len(names))
+    weight, places = [1.0], [fit.at]
     for rival in plan.rivals:
         if rival.score <= plan.score - RIVAL_NATS:
             continue
         if rival.strokes not in nodes_by_strokes:
             nodes_by_strokes[rival.strokes] = rival.fit().at
         at = dict(zip(rival.assignment.expected.names, nodes_by_strokes[rival.strokes], strict=True))
-        apart = np.abs(np.array([at.get(name, np.nan) for name in names]) - fit.at)
-        weight = math.exp(min(0.0, rival.score - plan.score) / TEMPERATURE)
-        total += weight * np.isfinite(apart)
-        agree += weight * (apart < NEAR_MM)
-    return np.asarray(plan.named * agree / total)
+        weight.append(math.exp(min(0.0, rival.score - plan.score) / TEMPERATURE))
+        places.append(np.array([at.get(name, np.nan) for name in names]))
+    return _Explanations(np.array(weight), np.array(places), plan.named)
 
 
 def _marked(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> float:

@@ -12,7 +12,7 @@ from grader.comparison.evidence import Submission
 from grader.comparison.follow_through import ReplayResult
 from grader.comparison.own import PlanBasis
 from grader.comparison.task import task_of
-from grader.records import Figure, Reading, ReadNode, ReadVector, Unread
+from grader.records import Figure, OtherReading, Reading, ReadNode, ReadVector, Unread
 from grader.rubric import Band, CriterionTable, DoubtTable, ToleranceTable, load_rubric
 from reference.authored.assignment import load_assignment
 from reference.construction.mistakes import Mistake
@@ -164,6 +164,28 @@ def test_a_tolerance_is_wider_where_small_errors_add_up_and_says_so():
     assert outcome.tolerance.widened
     assert 1.5 * allowed.length_mm < outcome.tolerance.length_mm
     assert outcome.tolerance.length_mm <= PUMP.rubric.hand.at_most * allowed.length_mm * (1.0 + ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("others", "verdict"),
+    [
+        ([], "review"),
+        ([(75.0, 0.98)], "none"),
+        ([(75.0, 0.8), (90.0, 0.98)], "none"),
+        ([(75.0, 0.8)], "review"),
+        ([(None, 0.98)], "review"),
+    ],
+)
+def test_a_doubtful_vector_is_charged_where_it_is_wrong_whichever_was_drawn(others, verdict):
+    read = sheet(PUMP, rule_scales(PUMP))
+    vector = read.figures["velocity_plan"].vectors["v_C"]
+    told = tuple(
+        OtherReading(vector.length_mm if mm is None else mm, vector.direction_deg, confidence)
+        for mm, confidence in others
+    )
+    doubtful = changed(read, "v_C", length_mm=vector.length_mm + 20.0, confidence=0.6, others=told)
+    outcome = outcome_of(compare(PUMP, Submission(readings=(doubtful,), declared=DECLARED)), "v_C")
+    assert outcome.verdict == verdict
 
 
 def test_what_a_careful_hand_may_miss_beyond_that_goes_to_a_person():

@@ -198,6 +198,21 @@ def test_a_sheet_of_unsure_scale_gives_no_confidence_in_long_vectors():
     assert vectors_read(read(vague, assignment, variant))["v_A"][1] < SURE
 
 
+def test_where_a_node_was_drawn_twice_the_other_place_is_told_with_what_it_adds():
+    assignment, variant, drawing = task()
+    once = draw(drawing)
+    away = 1.5j * once.vectors["v_DC"] / abs(once.vectors["v_DC"])
+    again = [(once.nodes[end], once.nodes["d"] + away) for end in ("o", "c")]
+    found = read(draw(drawing, pen=Pen(extra=again)), assignment, variant).figures[VELOCITY_PLAN]
+    drawn_mm = sorted(abs(head - once.nodes["o"]) for head in (once.nodes["d"], once.nodes["d"] + away))
+    vector = found.vectors["v_D"]
+    told_mm = sorted([vector.length_mm, vector.others[0].length_mm])
+    assert np.allclose(told_mm, drawn_mm, atol=ALONG_MM)
+    sure = [vector.confidence, *(other.confidence for other in vector.others)]
+    assert sure == sorted(sure)
+    assert sure[1] > sure[0] + 0.05
+
+
 @pytest.mark.parametrize("redraw_mm", [0.05, 0.4])
 def test_a_node_is_no_surer_than_the_surest_vector_that_ends_there(redraw_mm):
     assignment, variant, drawing = task("pump", Variant(n=9))
