@@ -12,6 +12,7 @@ import simplejpeg
 from PIL import Image
 
 from grader.records import GreyImage, Page
+from grader.scan.decode.colour import COLOUR_STEP, Colours, colours_of
 from grader.scan.decode.limits import Door, InputFile, check_memory, check_size, damaged, truncated
 from reference.drawing.canvas import MM_PER_INCH
 from reference.errors import InputFileError
@@ -28,15 +29,16 @@ def to_grey(image: np.ndarray, *, rgb: bool = False) -> GreyImage:
 
     The pixels are bool, uint8, uint16 or float of 0..1.
 
-    Transparent pixels become paper. Colour becomes luma: its weights keep blue (0.11) and red (0.30)
-    ink at over half of full contrast, and, unlike the least channel, it does not carry the coarser
-    sampling of chroma into the strokes' edges.
+    Transparent pixels become paper.
     """
     if image.dtype == np.uint8 and image.ndim == 2:
         return np.ascontiguousarray(image)
     # Sensors of 10 to 14 bits are stored in 16 without being stretched.
     used = max(int(image.max()).bit_length(), _BYTE) if image.dtype == np.uint16 else _BYTE
-    return _in_bands(image, lambda band: _luma(_eight_bit(band, used), rgb=rgb))
+    colours = Colours(rgb)
+    if image.ndim == 3 and image.shape[2] >= 3:
+        colours = colours_of(_eight_bit(image[::COLOUR_STEP, ::COLOUR_STEP, :3], used), rgb=rgb)
+    return _in_bands(image, lambda band: _grey(_eight_bit(band, used), colours))
 
 
 def of_four_inks(image: np.ndarray) -> GreyImage:
@@ -53,15 +55,11 @@ def _in_bands(image: np.ndarray, grey: Callable[[np.ndarray], np.ndarray]) -> Gr
     return result
 
 
-def _luma(pixels: GreyImage, *, rgb: bool) -> np.ndarray:
+def _grey(pixels: GreyImage, colours: Colours) -> np.ndarray:
     if pixels.ndim == 2:
         return pixels
     channels: int = pixels.shape[2]
-    if channels <= 2:
-        grey = pixels[..., 0]
-    else:
-        code = cv2.COLOR_RGB2GRAY if rgb else cv2.COLOR_BGR2GRAY
-        grey = np.asarray(cv2.cvtColor(np.ascontiguousarray(pixels[..., :3]), code), dtype=np.uint8)
+    grey = pixels[..., 0] if channels <= 2 else colours.grey(pixels[..., :3])
     return _on_white(grey, pixels[..., -1]) if channels in (2, 4) else grey
 
 
@@ -217,7 +215,7 @@ def check_header(file: InputFile, page: int, data: bytes, *, least: bool = True)
             f"{file.name}, page {page}: the JPEG has {scans} scans, more than {_MAX_SCANS}; save it again",
         )
     planes = _PLANES.get(sampling, 3.0) if space not in _FOUR_INKS else 4.0
-    decoded = 9.0 if space in _FOUR_INKS else 0.0
+    decoded = 9.0 if space in _FOUR_INKS else 0.0 if space == "Gray" else 3.0
     pixel_bytes = decoded + (2.0 * planes if scans > 1 else 0.0)
     check_memory(file, page, wide * high, int(wide * high * pixel_bytes))
     if least:
@@ -226,24 +224,24 @@ def check_header(file: InputFile, page: int, data: bytes, *, least: bool = True)
 
 
 def decode(file: InputFile, page: int, data: bytes) -> GreyImage:
-    """Luma of a JPEG stream, (h, w) uint8; raises InputFileError where it is cut off or damaged.
+    """Grey of a JPEG stream, (h, w) uint8; raises InputFileError where it is cut off or damaged.
 
     libjpeg fills what is missing with grey and only warns: the warning is an error here.
     """
     try:
-        return _luma_of(data, strict=True)
+        return _grey_of(data, strict=True)
     except ValueError as error:
         message = str(error)
     if any(sign in message for sign in _CUT_OFF):
         raise truncated(file, page)
     if not any(harmless in message for harmless in _HARMLESS):
         raise damaged(file, page, message)
-    return _luma_of(data, strict=False)
+    return _grey_of(data, strict=False)
 
 
-def _luma_of(data: bytes, *, strict: bool) -> GreyImage:
-    plane: GreyImage = simplejpeg.decode_jpeg(data, colorspace="GRAY", strict=strict)[..., 0]
-    return plane
+def _grey_of(data: bytes, *, strict: bool) -> GreyImage:
+    is_grey = simplejpeg.decode_jpeg_header(data, strict=False)[2] == "Gray"
+    return to_grey(simplejpeg.decode_jpeg(data, colorspace="GRAY" if is_grey else "BGR", strict=strict))
 
 
 JPEG = Door(_jpeg_page)
