@@ -274,13 +274,14 @@ def _junctions(lines: Lines) -> _Junctions:
 
 def _clusters(points: ComplexArray) -> ComplexArray:
     """Means of points that are near one another, the fullest first."""
-    left, means = points, []
-    while len(left):
-        near = np.abs(left[:, None] - left) < SAME_MM
-        fullest = near[near.sum(axis=1).argmax()]
-        means.append((fullest.sum(), left[fullest].mean()))
-        left = left[~fullest]
-    return np.array([at for _, at in means], dtype=complex)
+    near = np.abs(points[:, None] - points) < SAME_MM
+    count, left, means = near.sum(axis=1), np.ones(len(points), dtype=bool), []
+    while left.any():
+        fullest = near[np.argmax(np.where(left, count, 0))] & left
+        means.append(points[fullest].mean())
+        count = count - near[:, fullest].sum(axis=1)
+        left &= ~fullest
+    return np.array(means, dtype=complex)
 
 
 def _joined(at: ComplexArray, lines: Lines) -> FloatArray:

@@ -2,9 +2,9 @@
 
 import cmath
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -105,13 +105,13 @@ def read_figures(
 
 def _drawings(
     assignment: Assignment, variant: Variant | None, scales: Scales | None
-) -> tuple[list[Drawing], list[Drawing]]:
-    """The student's own drawing (any variant's, when it is not known), and other students'."""
+) -> tuple[list[Drawing], Callable[[], list[Drawing]]]:
+    """The student's own drawing (any variant's, when it is not known), and other students', if asked for."""
     everybody = assignment.variants()
     if variant is None:
-        return drawings(assignment, everybody, scales), []
+        return drawings(assignment, everybody, scales), list
     others = [other for other in everybody if other != variant]
-    return drawings(assignment, [variant], scales), drawings(assignment, others, None)
+    return drawings(assignment, [variant], scales), cache(lambda: drawings(assignment, others, None))
 
 
 def _measurable(drawing: Drawing, assignment: Assignment, variant: Variant | None) -> Drawing:

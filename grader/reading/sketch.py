@@ -94,7 +94,7 @@ def find_sketch(
     lines: Lines,
     circles: FloatArray,
     own: list[Drawing],
-    others: list[Drawing],
+    others: Callable[[], list[Drawing]],
     letters_nats: Callable[[Mapping[str, complex]], float],
 ) -> SketchReading | None:
     """The sketch that explains most strokes: the student's own variant first, then others.
@@ -106,7 +106,7 @@ def find_sketch(
     sheet = _SketchSearch(lines, lines.take(lines.length > LEAST_LINK_MM), circles)
     cases = [case for drawing, cost in _candidates(own) for case in sheet.laid(drawing, upright, cost)]
     if _best_support(cases) < SURE:
-        for drawing in others:
+        for drawing in others():
             cases.extend(sheet.laid(drawing, upright, COST_IN_SUPPORT))
     if _best_support(cases) < HARDLY and own:
         turned = Search(turns_rad=ANY_TURN, give_rad=float(np.radians(2.5)), sizes=(1.0,))
