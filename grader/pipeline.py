@@ -22,7 +22,7 @@ from grader.documents import ReportDocument
 from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import Level, criterion_feedback
 from grader.inputs.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
-from grader.inputs.scale_text import SURE, declared_scales, sure_texts
+from grader.inputs.scale_text import SURE, declared_scales, sure_texts, understood_scales
 from grader.marking.decided import decide, open_again, with_decisions, with_nodes
 from grader.marking.mark import judge
 from grader.marking.report import reading_document, report_of, unjudged_report
@@ -30,7 +30,9 @@ from grader.outcomes import Judgement
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import backdrop, overlay
 from grader.overlay.scene import Picture
+from grader.reading.page_scale import at_drawn_scales
 from grader.reading.read import read_figures
+from grader.reading.sketch import drawings
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
 from grader.rubric import Asked, RubricFile
 from grader.scan.decode.pages import decode, is_blank
@@ -40,7 +42,7 @@ from grader.scan.handwriting.letters import find_letters
 from grader.scan.register.distortion import straighten
 from grader.scan.register.registration import register
 from grader.scan.strokes.ink import find_ink
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.construction.graph import Construction
 from reference.errors import InputFileError, MechanismError
 
@@ -179,21 +181,40 @@ def read_pages(
     wanted: Collection[str],
 ) -> list[ScannedPage]:
     """A student's pages with what was drawn on each; nothing on those that were refused."""
-    drawn = [(page.ink, page.sheet) for page in pages if page.ink is not None and page.sheet is not None]
     timing: dict[str, float] = {}
     with _timed(timing, "reading"):
         known = {**sure_texts([page.reading.written for page in pages if page.ink is not None]), **declared}
         scales = None if variant is None else declared_scales(assignment, variant, known)
-        inks, sheets = [ink for ink, _ in drawn], [sheet for _, sheet in drawn]
-        readings = iter(read_figures(inks, sheets, assignment, variant, scales, wanted) if drawn else ())
+        readings = _readings(pages, assignment, variant, scales, wanted)
+        right, sure = None, {}
+        if variant is not None:
+            right = drawings(assignment, [variant], scales)[0]
+            sure = understood_scales(assignment, variant, known)
+        at_scale = at_drawn_scales(pages, readings, right, sure)
+        if at_scale is not None:
+            pages = at_scale
+            readings = _readings(pages, assignment, variant, scales, wanted)
+    drawn = sum(page.ink is not None for page in pages)
     read = []
-    for page in pages:
-        is_drawn = page.ink is not None
-        reading = next(readings) if is_drawn else Reading({})
-        reading = replace(reading, written=page.reading.written, lengths=page.reading.lengths)
-        spent = timing["reading"] / len(drawn) if is_drawn else 0.0
-        read.append(replace(page, reading=reading, timing_ms={**page.timing_ms, "reading": spent}))
+    for page, reading in zip(pages, readings, strict=True):
+        told = replace(reading, written=page.reading.written, lengths=page.reading.lengths)
+        spent = timing["reading"] / drawn if page.ink is not None else 0.0
+        read.append(replace(page, reading=told, timing_ms={**page.timing_ms, "reading": spent}))
     return read
+
+
+def _readings(
+    pages: Sequence[ScannedPage],
+    assignment: Assignment,
+    variant: Variant | None,
+    scales: Scales | None,
+    wanted: Collection[str],
+) -> list[Reading]:
+    """What is drawn on each page; nothing on those that were refused."""
+    drawn = [(page.ink, page.sheet) for page in pages if page.ink is not None and page.sheet is not None]
+    inks, sheets = [ink for ink, _ in drawn], [sheet for _, sheet in drawn]
+    readings = iter(read_figures(inks, sheets, assignment, variant, scales, wanted) if drawn else ())
+    return [Reading({}) if page.ink is None else next(readings) for page in pages]
 
 
 # One student's mark ---------------------------------------------------------------------------------

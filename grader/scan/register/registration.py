@@ -109,8 +109,12 @@ _VAGUE_SE = 0.02
 _MOST_SIDES, _SOME_SIDES = 3, 2
 """A frame is known by three of its sides, if two sides of the paper are found too."""
 _ALL_SIDES = 4
-_COPY_SE = 0.012
-"""Copiers enlarge or reduce by a per cent or two by default."""
+_COPY_SE = 0.02
+"""Copiers enlarge or reduce by a per cent or two by default, to make a page fit by up to four."""
+_UNKNOWN_SE = 0.03
+"""A page is about as large as this says, if it is an A3 sheet at all: to be borne out by its drawing."""
+_CUT_OFF_MM = 60.0
+"""A scanner's window may be so much smaller than the sheet."""
 _SAMPLED, _WHITE = 7, 255
 """Every seventh pixel is tested; the value of white ones."""
 _FAR_OFF_MM = 1.5
