@@ -17,6 +17,8 @@ from reference.construction.mistakes import Drawing
 
 DRAWN_MM = 0.35
 """Standard error of a length set off and drawn by a student, beside that of its reading: its two ends."""
+SAME_DEVICE = 0.002
+"""Pages that registration has at so nearly the same resolution went through one scanner or copier."""
 LEAST_MM = 15.0
 """A shorter length tells less than other evidence."""
 SAME_LINKS = 0.002
@@ -86,7 +88,8 @@ def at_drawn_scales(
         if page.ink is None or sheet is None or sheet.zones:
             result.append(page)
             continue
-        shown = None if drawing is None else drawn_scale(reading, sheet, drawing, declared)
+        told = [] if drawing is None else _witnesses(sheet, pages, readings, drawing, declared)
+        shown = _page_scale(told, sheet.scale_se) if told else None
         result.append(_at_drawn_scale(page, sheet, shown))
     return result if any(one is not page for one, page in zip(result, pages, strict=True)) else None
 
@@ -120,13 +123,21 @@ def _is_news(shown: PageScale, sheet: Sheet) -> bool:
     return is_other or not 1.0 / TELLING < ratio < TELLING
 
 
-def drawn_scale(
-    reading: Reading, sheet: Sheet, drawing: Drawing, declared: Collection[str]
-) -> PageScale | None:
-    """The scale of a page by what is drawn on it; None where nothing on it tells it."""
-    witnesses = [*_links(reading, drawing), *_givens(reading, drawing, sheet.scale_se)]
-    known = [one for scale, one in witnesses if scale in declared]
-    return _page_scale(known, sheet.scale_se) if known else None
+def _witnesses(
+    sheet: Sheet,
+    pages: Sequence[ScannedPage],
+    readings: Sequence[Reading],
+    drawing: Drawing,
+    declared: Collection[str],
+) -> list[_Witness]:
+    """The lengths that tell a page's scale: its own, and those of pages made in the same way."""
+    found = []
+    for page, reading in zip(pages, readings, strict=True):
+        other = page.sheet
+        if other is not None and abs(other.px_per_mm / sheet.px_per_mm - 1.0) < SAME_DEVICE:
+            each = [*_links(reading, drawing), *_givens(reading, drawing, other.scale_se)]
+            found += [one for scale, one in each if scale in declared]
+    return found
 
 
 def _page_scale(witnesses: Sequence[_Witness], scale_se: float) -> PageScale:

@@ -153,12 +153,15 @@ def register_plain(page: Page) -> Sheet | Unread:
     if dpi is not None and not _is_copy(page):
         ranked = _as_scanned(ranked, dpi)
     if ranked:
+        if dpi is None and resolution is not None and not resolution.stated:
+            ranked = _as_usual(ranked, resolution.dpi)
         rival = None if dpi is not None else _rival_scale(ranked)
         best = _turned_as_stated(ranked, page.turn_deg)
         told = list(problems)
         sheet = _from_lines(page, best, lines, dpi, told)
-        if isinstance(sheet, Unread) and resolution is not None and dpi is not None:
-            return _from_resolution(page, resolution, lines, problems)
+        if isinstance(sheet, Unread) and resolution is not None:
+            doubt = None if resolution.is_sure else sheet.reason
+            return _from_resolution(page, resolution, lines, problems, doubt)
         if isinstance(sheet, Sheet) and rival is not None:
             sheet = _with_rival(sheet, rival)
         if isinstance(sheet, Unread) or not best.perspective:
@@ -183,6 +186,21 @@ def _as_scanned(ranked: list[Hypothesis], dpi: tuple[float, float]) -> list[Hypo
         if abs(axes[0] - axes[1]) < _SCANNED_SE / 2.0
         and sum(side.model is not PAPER for side in reading.sides) == _ALL_SIDES
     ]
+
+
+def _as_usual(ranked: list[Hypothesis], dpi: tuple[float, float]) -> list[Hypothesis]:
+    """The readings as likely as the best that have a resolution as scanners offer it; all without any.
+
+    Paper that fills the scanner's window may pass for a frame, at a resolution that no scanner has.
+    """
+    middle = float(np.log(np.array(dpi) / MM_PER_INCH).mean())
+    usual = [
+        reading
+        for reading in ranked
+        if reading.score > ranked[0].score - _AS_LIKELY
+        and abs(np.log(_px_per_mm(reading.mm_to_px, 1.0)) - middle) < _SCANNED_SE
+    ]
+    return usual or ranked
 
 
 def _turned_as_stated(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
@@ -232,6 +250,8 @@ def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
         size = f"{wide / page.dpi[0] * MM_PER_INCH:.0f} x {high / page.dpi[1] * MM_PER_INCH:.0f}"
         message = f"by its stated resolution the page is {size} mm, not A3"
         problems.append(Problem("resolution_wrong", message, page.source))
+        if _is_cut_off(page, page.dpi):
+            return Resolution(page.dpi, stated=True, is_sure=False)
     high, wide = page.grey.shape
     has_shape = abs(np.log(max(high, wide) / min(high, wide) * PAGE_MM[1] / PAGE_MM[0])) < _WINDOW_SHAPE
     for usual in _USUAL_DPI if has_shape else ():
@@ -240,6 +260,12 @@ def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
             is_exact = bool(np.abs(larger_px).max() < _SAME_PX)
             return Resolution((usual, usual), stated=False, is_sure=is_exact)
     return None
+
+
+def _is_cut_off(page: Page, dpi: tuple[float, float]) -> bool:
+    """Whether by a resolution a page may be A3 with its borders cut off."""
+    larger = np.subtract(size_mm(page, dpi), PAGE_MM)
+    return bool(np.all((larger >= -_CUT_OFF_MM) & (larger <= _A3_SLACK_MM))) and not looks_a4(page)
 
 
 def _is_a3(page: Page, dpi: tuple[float, float]) -> bool:
@@ -276,7 +302,7 @@ def _from_lines(
         scale_se = float(np.hypot(scale_se, _ASSUMED_PAPER_SE))
         message = "only the paper's edges give the scale; taken for A3"
         problems.append(Problem("paper_assumed", message, page.source))
-    if frame is None and copied:
+    if copied and sum(side.model is not PAPER for side in best.sides) < _ALL_SIDES:
         scale_se = float(np.hypot(scale_se, _COPY_SE))
     return _sheet(fit, frame, scale_se, problems)
 
@@ -345,9 +371,16 @@ def _settled(best: Hypothesis, dpi: tuple[float, float] | None, *, copied: bool)
 
 
 def _from_resolution(
-    page: Page, resolution: Resolution, lines: list[LongLine], problems: list[Problem]
+    page: Page,
+    resolution: Resolution,
+    lines: list[LongLine],
+    problems: list[Problem],
+    doubt: str | None = None,
 ) -> Sheet | Unread:
-    """Scale from the resolution alone, skew from ruled lines, place from the image's middle."""
+    """Scale from the resolution alone, skew from ruled lines, place from the image's middle.
+
+    Where nothing shows that the page is A3 (`doubt` says so), its drawing is to bear the scale out.
+    """
     high, wide = page.grey.shape
     tilt = _tilt(lines)
     quarter = 0.0 if wide >= high else np.pi / 2.0
@@ -362,10 +395,10 @@ def _from_resolution(
         block, matrix = min(tried, key=lambda one: off_turn_deg(one[1], page.turn_deg))
     else:
         block, matrix = max(tried, key=lambda one: (one[0], -off_turn_deg(one[1], page.turn_deg)))
-    if not resolution.stated and (block == 0.0 or looks_a4(page)):
-        return Unread(
-            "sheet", "no whole drawing frame, no title block or no stated resolution: not known to be A3"
-        )
+    if not resolution.is_sure and (block == 0.0 or resolution.stated):
+        doubt = doubt or "no whole drawing frame, no title block or no stated resolution: not known to be A3"
+    if doubt is not None and looks_a4(page):
+        return Unread("sheet", doubt)
     if block == 0.0 and not page.turn_is_sure:
         problems.append(_unsure_upright(page))
     if not resolution.stated:
@@ -377,6 +410,9 @@ def _from_resolution(
         scale_se = float(np.hypot(scale_se, _COPY_SE))
         message += f", and a copy's lengths are known to {100.0 * _COPY_SE:.0f} % only"
     problems.append(Problem("frame_missing", message, page.source))
+    if doubt is not None:
+        problems.append(Problem("scale_unknown", doubt, page.source))
+        scale_se = max(scale_se, _UNKNOWN_SE)
     return _sheet(_placed(matrix, resolution, lines, scale_se), None, scale_se, problems)
 
 
