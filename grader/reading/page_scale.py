@@ -37,7 +37,7 @@ UNKNOWN, SURELY = "scale_unknown", 0.008
 """A problem of registration, and the standard error at which a drawing answers it: no verdict hangs on less."""
 NEGLIGIBLE = 0.001
 """Scales that differ by less are one: 0.1 mm in 100 mm."""
-TELLING = 2.0
+TELLING = 1.4
 """The scale's standard error counts as another from this factor on."""
 
 

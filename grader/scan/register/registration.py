@@ -153,8 +153,8 @@ def register_plain(page: Page) -> Sheet | Unread:
     if dpi is not None and not _is_copy(page):
         ranked = _as_scanned(ranked, dpi)
     if ranked:
-        if dpi is None and resolution is not None and not resolution.stated:
-            ranked = _as_usual(ranked, resolution.dpi)
+        if dpi is None and resolution is not None and _passes_for_frame(ranked, resolution.dpi):
+            return _from_resolution(page, resolution, lines, problems)
         rival = None if dpi is not None else _rival_scale(ranked)
         best = _turned_as_stated(ranked, page.turn_deg)
         told = list(problems)
@@ -188,19 +188,15 @@ def _as_scanned(ranked: list[Hypothesis], dpi: tuple[float, float]) -> list[Hypo
     ]
 
 
-def _as_usual(ranked: list[Hypothesis], dpi: tuple[float, float]) -> list[Hypothesis]:
-    """The readings as likely as the best that have a resolution as scanners offer it; all without any.
+def _passes_for_frame(ranked: list[Hypothesis], dpi: tuple[float, float]) -> bool:
+    """Whether the best reading has a resolution that no scanner has, and one about as likely has a usual one.
 
-    Paper that fills the scanner's window may pass for a frame, at a resolution that no scanner has.
+    The edges of paper that fills a scanner's window may pass for a frame.
     """
     middle = float(np.log(np.array(dpi) / MM_PER_INCH).mean())
-    usual = [
-        reading
-        for reading in ranked
-        if reading.score > ranked[0].score - _AS_LIKELY
-        and abs(np.log(_px_per_mm(reading.mm_to_px, 1.0)) - middle) < _SCANNED_SE
-    ]
-    return usual or ranked
+    likely = [reading for reading in ranked if reading.score > ranked[0].score - _AS_LIKELY]
+    usual = [abs(np.log(_px_per_mm(one.mm_to_px, 1.0)) - middle) < _ANOTHER_SCALE for one in likely]
+    return any(usual) and not usual[0]
 
 
 def _turned_as_stated(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
