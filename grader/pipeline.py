@@ -30,7 +30,7 @@ from grader.outcomes import Judgement
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import backdrop, overlay
 from grader.overlay.scene import Picture
-from grader.reading.page_scale import at_drawn_scales
+from grader.reading.page_scale import at_drawn_scales, is_upside_down
 from grader.reading.read import read_figures
 from grader.reading.sketch import drawings
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
@@ -44,6 +44,7 @@ from grader.scan.register.registration import register
 from grader.scan.strokes.ink import find_ink
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.construction.graph import Construction
+from reference.construction.mistakes import Drawing
 from reference.errors import InputFileError, MechanismError
 
 # One page: pixels to strokes ----------------------------------------------------------------------
@@ -190,6 +191,10 @@ def read_pages(
         if variant is not None:
             right = drawings(assignment, [variant], scales)[0]
             sure = understood_scales(assignment, variant, known)
+        upright = [_upright(page, one, right) for page, one in zip(pages, readings, strict=True)]
+        if any(one is not page for one, page in zip(upright, pages, strict=True)):
+            pages = upright
+            readings = _readings(pages, assignment, variant, scales, wanted)
         at_scale = at_drawn_scales(pages, readings, right, sure)
         if at_scale is not None:
             pages = at_scale
@@ -201,6 +206,20 @@ def read_pages(
         spent = timing["reading"] / drawn if page.ink is not None else 0.0
         read.append(replace(page, reading=told, timing_ms={**page.timing_ms, "reading": spent}))
     return read
+
+
+def _upright(page: ScannedPage, reading: Reading, right: Drawing | None) -> ScannedPage:
+    """The page, the other way up where nothing but its drawing says so: letters are read upright only."""
+    unsure = [problem for problem in page.problems if problem.code == "upright_unsure"]
+    if not unsure or right is None or page.sheet is None or not is_upside_down(reading, right):
+        return page
+    turn_deg = (90 * round(page.sheet.rotation_deg / 90.0) + 180) % 360
+    turned = open_page(replace(page.ref, turn_deg=turn_deg))
+    if turned.image is None or turned.sheet is None:
+        return page
+    behind = backdrop(turned.image, turned.sheet) if page.backdrop is not None else None
+    image = turned.image if page.image is not None else None
+    return replace(turned, image=image, backdrop=behind, problems=(*turned.problems, *unsure))
 
 
 def _readings(

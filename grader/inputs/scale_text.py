@@ -405,9 +405,7 @@ def declared_scales(assignment: Assignment, variant: Variant, texts: Mapping[str
     return assignment.scales([variant], **understood_scales(assignment, variant, texts))
 
 
-def understood_scales(
-    assignment: Assignment, variant: Variant, texts: Mapping[str, str]
-) -> dict[str, float]:
+def understood_scales(assignment: Assignment, variant: Variant, texts: Mapping[str, str]) -> dict[str, float]:
     """The scales that texts declare, as far as they can be understood without the assignment's rule."""
     known: dict[str, float] = {}
     units: Mapping[str, str] = dict(assignment.file.scales.bare_units.items())

@@ -1,10 +1,11 @@
-"""The page's scale by the drawing's own answer: lengths that are known beforehand, as they were drawn.
+"""What a drawing tells of its page: the scale, and which way up it is.
 
 The links of the sketch, v_A and a_A are known from the variant and the declared scales. Each may be drawn
 wrongly; all of them longer or shorter by one factor say that the page's millimetres are not what its
 registration takes them for.
 """
 
+import cmath
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grader.records import MECHANISM, FloatArray, Problem, Reading, ScannedPage, Sheet
-from reference.construction.graph import pair
+from reference.construction.graph import evaluate, pair
 from reference.construction.mistakes import Drawing
 
 DRAWN_MM = 0.35
@@ -26,7 +27,7 @@ SAME_LINKS = 0.002
 STRAY, STRAY_DENSITY = 0.1, 2.0
 """Probability that a length is off by a mistake of its own, and its density over the factor's logarithm."""
 TOGETHER, TOGETHER_SPREAD = 0.01, 0.02
-"""The same of all of them by one factor, as by compasses that the crank's length set; how far they are off."""
+"""The same of all of them by one factor, as by compasses that the crank's length set; how far off."""
 WRONG, WRONG_SPREAD = 0.002, 0.03
 """Probability that a plain page's registration is off by more than its standard error says; how far."""
 WIDEST, STEP = 0.15, 0.0005
@@ -34,11 +35,41 @@ WIDEST, STEP = 0.15, 0.0005
 CLUSTER = 0.01
 """Factors that differ by less are of one explanation."""
 UNKNOWN, SURELY = "scale_unknown", 0.008
-"""A problem of registration, and the standard error at which a drawing answers it: no verdict hangs on less."""
+"""A problem of registration, and the standard error at which a drawing answers it."""
+ENOUGH = 2
+"""So many lengths of different figures answer it; one alone may be drawn wrongly."""
 NEGLIGIBLE = 0.001
 """Scales that differ by less are one: 0.1 mm in 100 mm."""
 TELLING = 1.4
 """The scale's standard error counts as another from this factor on."""
+
+
+UPSIDE_DOWN_RAD = math.radians(135.0)
+"""Figures turned by more lie the other way up: nobody turns a drawing so far on its sheet."""
+
+
+def is_upside_down(reading: Reading, drawing: Drawing) -> bool:
+    """Whether two figures of a page lie as on a sheet turned by half.
+
+    One alone may have been drawn so: a sense is easily reversed.
+
+    Arguments: `drawing` is what the student was to draw.
+    """
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    vectors = drawing.construction.vectors
+    turned = []
+    for name, figure in reading.figures.items():
+        ends = drawing.construction.links if name == MECHANISM else {
+            vector: (vectors[vector].tail, vectors[vector].head) for vector in figure.vectors
+        }  # fmt: skip
+        product = sum(
+            (figure.nodes[head].at - figure.nodes[tail].at)
+            * complex(np.ravel(nodes[head] - nodes[tail])[0]).conjugate()
+            for tail, head in ends.values()
+            if {tail, head} <= figure.nodes.keys()
+        )
+        turned.append(abs(cmath.phase(product)) > UPSIDE_DOWN_RAD)
+    return sum(turned) > 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +114,7 @@ def at_drawn_scales(
     declared : the scales that were surely declared, by name; the lengths of others tell nothing
     """
     result = []
-    for page, reading in zip(pages, readings, strict=True):
+    for page in pages:
         sheet = page.sheet
         if page.ink is None or sheet is None or sheet.zones:
             result.append(page)
@@ -97,19 +128,18 @@ def at_drawn_scales(
 def _at_drawn_scale(page: ScannedPage, sheet: Sheet, shown: PageScale | None) -> ScannedPage:
     """A page with what the drawing says of its scale; the page itself where that is nothing new."""
     unknown = next((problem for problem in page.problems if problem.code == UNKNOWN), None)
-    if unknown is not None and (shown is None or shown.se > SURELY):
+    if unknown is not None and (shown is None or shown.se > SURELY or len(shown.by) < ENOUGH):
         why = f"{unknown.message}; nor does the drawing tell it, by declared scales"
         return replace(page, sheet=None, ink=None, problems=(Problem("sheet_refused", why, page.ref.file),))
     if shown is None or not _is_news(shown, sheet):
         return page
     factor = 1.0 if abs(shown.factor - 1.0) < NEGLIGIBLE else shown.factor
+    told: tuple[Problem, ...] = ()
     percent, se, by = 100.0 * (factor - 1.0), 100.0 * shown.se, ", ".join(shown.by)
     if factor == 1.0 and shown.se > sheet.scale_se:
         message = f"{by} would have the page at another scale than its registration: lengths may be off"
         told = (Problem("scale_doubtful", f"{message} by {se:.1f} %", page.ref.file),)
-    elif factor == 1.0 and unknown is None:
-        told = ()
-    else:
+    elif factor != 1.0 or unknown is not None:
         message = f"by {by} lengths are {percent:+.1f} % longer than by frame, paper and resolution"
         told = (Problem("scale_by_drawing", f"{message} (\N{PLUS-MINUS SIGN} {se:.1f} %)", page.ref.file),)
     kept = tuple(problem for problem in page.problems if problem is not unknown)
@@ -131,7 +161,7 @@ def _witnesses(
     declared: Collection[str],
 ) -> list[_Witness]:
     """The lengths that tell a page's scale: its own, and those of pages made in the same way."""
-    found = []
+    found: list[_Witness] = []
     for page, reading in zip(pages, readings, strict=True):
         other = page.sheet
         if other is not None and abs(other.px_per_mm / sheet.px_per_mm - 1.0) < SAME_DEVICE:

@@ -43,6 +43,8 @@ def register(
 ) -> tuple[Sheet | Unread, Identity | None]:
     """The page's map from millimetres to pixels, or why there is none; and whose page it is by its code.
 
+    A sheet with the problem `scale_unknown` is one only if its drawing bears the scale out.
+
     A printed sheet's code is searched in its place; on other pages only a reduced picture is searched.
 
     Arguments: `corners_px` of the sheet, as in `PageRef`, where a person gave them: then they are taken.
@@ -391,10 +393,10 @@ def _from_resolution(
         block, matrix = min(tried, key=lambda one: off_turn_deg(one[1], page.turn_deg))
     else:
         block, matrix = max(tried, key=lambda one: (one[0], -off_turn_deg(one[1], page.turn_deg)))
-    if not resolution.is_sure and (block == 0.0 or resolution.stated):
+    if not resolution.is_sure if resolution.stated else block == 0.0:
         doubt = doubt or "no whole drawing frame, no title block or no stated resolution: not known to be A3"
-    if doubt is not None and looks_a4(page):
-        return Unread("sheet", doubt)
+    if (doubt is not None or not resolution.stated) and looks_a4(page):
+        return Unread("sheet", doubt or "no stated resolution, and the page is as large as A4")
     if block == 0.0 and not page.turn_is_sure:
         problems.append(_unsure_upright(page))
     if not resolution.stated:
