@@ -30,13 +30,21 @@ from grader.outcomes import Judgement
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import backdrop, overlay
 from grader.overlay.scene import Picture
-from grader.reading.page_scale import at_drawn_scales, is_upside_down
+from grader.reading.page_scale import at_drawn_scales, is_drawn_otherwise, is_upside_down
 from grader.reading.read import read_figures
 from grader.reading.sketch import drawings
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
 from grader.rubric import Asked, RubricFile
 from grader.scan.decode.pages import decode, is_blank
-from grader.scan.handwriting.captions import Spotter, captioned_scales, spotters, surer
+from grader.scan.handwriting.captions import (
+    NUMBER_WORDS,
+    POSITION_WORDS,
+    Spotter,
+    captioned_scales,
+    spotters,
+    surer,
+    written_number,
+)
 from grader.scan.handwriting.fields import writing, written_lengths, written_scales
 from grader.scan.handwriting.letters import find_letters
 from grader.scan.register.distortion import straighten
@@ -133,7 +141,29 @@ def read_submission(
         all_of_it = replace(asked, figures=frozenset())
         whole = [scan(page.ref, all_of_it) if page.narrowed else page for page in pages]
         read = read_pages(whole, assignment, submission.variant, submission.declared, asked.vectors)
-    return read
+    return [_with_number_compared(page, submission.variant, assignment) for page in read]
+
+
+def _with_number_compared(page: ScannedPage, variant: Variant | None, assignment: Assignment) -> ScannedPage:
+    """A plain page; told where the drawing is not the variant's and another number stands on it."""
+    if variant is None or page.ink is None or page.sheet is None or page.sheet.zones:
+        return page
+    if not is_drawn_otherwise(page.reading, drawings(assignment, [variant], None)[0]):
+        return page
+    for which, words in (("n", NUMBER_WORDS), ("position", POSITION_WORDS)):
+        numbers = {getattr(other, which) for other in assignment.variants()} - {None}
+        for closely in (False, True) if len(numbers) > 1 else ():
+            read = written_number(writing_on(page, closely=closely), sorted(numbers), words)
+            if read is None or read.confidence < SURE:
+                continue
+            if read.text != str(getattr(variant, which)):
+                said = f"the sheet reads {which} = {read.text} ({100 * read.confidence:.0f} %)"
+                message = f"{said}, graded is {variant}, from which the drawing differs: look"
+                page = replace(
+                    page, problems=(*page.problems, Problem("number_differs", message, page.ref.file))
+                )
+            break
+    return page
 
 
 def missing_scales(submission: StudentSubmission) -> tuple[str, ...]:

@@ -156,6 +156,9 @@ PROBLEMS: dict[str, str] = {
     "n_range": N_("The assignment has no such number."),
     "position_range": N_("The assignment has no such position."),
     "number_read": N_("The number was read on the sheet; check it."),
+    "number_differs": N_(
+        "The sheet has another number than the roster, and the drawing differs from the roster's."
+    ),
     "number_contradicted": N_("The number on the sheet is not the one that the drawing follows."),
     "number_doubtful": N_("The number on the sheet could not be read surely; add it to the roster."),
     "n_needed": N_("Nothing says this student's number or position; add it to the roster."),

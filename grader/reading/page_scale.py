@@ -72,6 +72,26 @@ def is_upside_down(reading: Reading, drawing: Drawing) -> bool:
     return sum(turned) > 1
 
 
+OTHER_RAD = math.radians(4.0)
+"""A link turned by more against the others is another variant's, or drawn wrongly: no hand misses so far."""
+
+
+def is_drawn_otherwise(reading: Reading, drawing: Drawing) -> bool:
+    """Whether the sketch has a link in another direction than it should, against the others."""
+    sketch = reading.figures.get(MECHANISM)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    turns = [
+        cmath.phase(
+            (sketch.nodes[head].at - sketch.nodes[tail].at)
+            * complex(np.ravel(nodes[head] - nodes[tail])[0]).conjugate()
+        )
+        for tail, head in drawing.construction.links.values()
+        if sketch is not None and {tail, head} <= sketch.nodes.keys()
+    ]
+    middle = float(np.median(turns)) if turns else 0.0
+    return any(abs(math.remainder(turn - middle, math.tau)) > OTHER_RAD for turn in turns)
+
+
 @dataclass(frozen=True, slots=True)
 class PageScale:
     """What the drawing says of a page's scale.
@@ -194,7 +214,7 @@ def _normal(off: FloatArray, se: float) -> FloatArray:
 def _links(reading: Reading, drawing: Drawing) -> Iterator[tuple[str, _Witness]]:
     """The sketch's links of given length, as one: a scale of their own moves them all."""
     nodes = reading.figures[MECHANISM].nodes if MECHANISM in reading.figures else {}
-    found = []
+    found: list[_Witness] = []
     for name, (tail, head) in drawing.construction.links.items():
         real = drawing.parameters.get(pair(tail, head), drawing.parameters.get(pair(head, tail)))
         if real is not None and tail in nodes and head in nodes:

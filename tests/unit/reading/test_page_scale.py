@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.reading.page_scale import at_drawn_scales, is_upside_down
+from grader.reading.page_scale import at_drawn_scales, is_drawn_otherwise, is_upside_down
 from grader.reading.sketch import drawings
 from grader.records import (
     ACCELERATION_PLAN,
@@ -132,3 +132,11 @@ def test_two_figures_turned_by_half_say_that_the_page_lies_upside_down():
     alone = drawn()
     turned = {**alone.figures, VELOCITY_PLAN: drawn(turn=-1.0).figures[VELOCITY_PLAN]}
     assert not is_upside_down(replace(alone, figures=turned), RIGHT)
+
+
+def test_only_a_sketch_with_a_link_in_another_direction_looks_like_another_variants():
+    assert not is_drawn_otherwise(drawn(), RIGHT)
+    assert not is_drawn_otherwise(drawn(turn=1j, links=1.3), RIGHT)
+    assert not is_drawn_otherwise(Reading({}), RIGHT)
+    (other,) = drawings(PUMP, [PUMP.variant(12)], None)
+    assert is_drawn_otherwise(drawn(), other)
