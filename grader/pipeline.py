@@ -22,7 +22,7 @@ from grader.documents import ReportDocument
 from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import Level, criterion_feedback
 from grader.inputs.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
-from grader.inputs.scale_text import SURE, declared_scales, sure_texts
+from grader.inputs.scale_text import SURE, declared_scales, sure_texts, understood_scales
 from grader.marking.decided import decide, open_again, with_decisions, with_nodes
 from grader.marking.mark import judge
 from grader.marking.report import reading_document, report_of, unjudged_report
@@ -30,18 +30,29 @@ from grader.outcomes import Judgement
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import backdrop, overlay
 from grader.overlay.scene import Picture
+from grader.reading.page_scale import at_drawn_scales, is_drawn_otherwise, is_upside_down
 from grader.reading.read import read_figures
+from grader.reading.sketch import drawings
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
 from grader.rubric import Asked, RubricFile
 from grader.scan.decode.pages import decode, is_blank
-from grader.scan.handwriting.captions import Spotter, captioned_scales, spotters, surer
+from grader.scan.handwriting.captions import (
+    NUMBER_WORDS,
+    POSITION_WORDS,
+    Spotter,
+    captioned_scales,
+    spotters,
+    surer,
+    written_number,
+)
 from grader.scan.handwriting.fields import writing, written_lengths, written_scales
 from grader.scan.handwriting.letters import find_letters
 from grader.scan.register.distortion import straighten
 from grader.scan.register.registration import register
 from grader.scan.strokes.ink import find_ink
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.construction.graph import Construction
+from reference.construction.mistakes import Drawing
 from reference.errors import InputFileError, MechanismError
 
 # One page: pixels to strokes ----------------------------------------------------------------------
@@ -130,7 +141,29 @@ def read_submission(
         all_of_it = replace(asked, figures=frozenset())
         whole = [scan(page.ref, all_of_it) if page.narrowed else page for page in pages]
         read = read_pages(whole, assignment, submission.variant, submission.declared, asked.vectors)
-    return read
+    return [_with_number_compared(page, submission.variant, assignment) for page in read]
+
+
+def _with_number_compared(page: ScannedPage, variant: Variant | None, assignment: Assignment) -> ScannedPage:
+    """A plain page; told where the drawing is not the variant's and another number stands on it."""
+    if variant is None or page.ink is None or page.sheet is None or page.sheet.zones:
+        return page
+    if not is_drawn_otherwise(page.reading, drawings(assignment, [variant], None)[0]):
+        return page
+    for which, words in (("n", NUMBER_WORDS), ("position", POSITION_WORDS)):
+        numbers = {getattr(other, which) for other in assignment.variants()} - {None}
+        for closely in (False, True) if len(numbers) > 1 else ():
+            read = written_number(writing_on(page, closely=closely), sorted(numbers), words)
+            if read is None or read.confidence < SURE:
+                continue
+            if read.text != str(getattr(variant, which)):
+                said = f"the sheet reads {which} = {read.text} ({100 * read.confidence:.0f} %)"
+                message = f"{said}, graded is {variant}, from which the drawing differs: look"
+                page = replace(
+                    page, problems=(*page.problems, Problem("number_differs", message, page.ref.file))
+                )
+            break
+    return page
 
 
 def missing_scales(submission: StudentSubmission) -> tuple[str, ...]:
@@ -179,21 +212,58 @@ def read_pages(
     wanted: Collection[str],
 ) -> list[ScannedPage]:
     """A student's pages with what was drawn on each; nothing on those that were refused."""
-    drawn = [(page.ink, page.sheet) for page in pages if page.ink is not None and page.sheet is not None]
     timing: dict[str, float] = {}
     with _timed(timing, "reading"):
         known = {**sure_texts([page.reading.written for page in pages if page.ink is not None]), **declared}
         scales = None if variant is None else declared_scales(assignment, variant, known)
-        inks, sheets = [ink for ink, _ in drawn], [sheet for _, sheet in drawn]
-        readings = iter(read_figures(inks, sheets, assignment, variant, scales, wanted) if drawn else ())
+        readings = _readings(pages, assignment, variant, scales, wanted)
+        right, sure = None, {}
+        if variant is not None:
+            right = drawings(assignment, [variant], scales)[0]
+            sure = understood_scales(assignment, variant, known)
+        upright = [_upright(page, one, right) for page, one in zip(pages, readings, strict=True)]
+        if any(one is not page for one, page in zip(upright, pages, strict=True)):
+            pages = upright
+            readings = _readings(pages, assignment, variant, scales, wanted)
+        at_scale = at_drawn_scales(pages, readings, right, sure)
+        if at_scale is not None:
+            pages = at_scale
+            readings = _readings(pages, assignment, variant, scales, wanted)
+    drawn = sum(page.ink is not None for page in pages)
     read = []
-    for page in pages:
-        is_drawn = page.ink is not None
-        reading = next(readings) if is_drawn else Reading({})
-        reading = replace(reading, written=page.reading.written, lengths=page.reading.lengths)
-        spent = timing["reading"] / len(drawn) if is_drawn else 0.0
-        read.append(replace(page, reading=reading, timing_ms={**page.timing_ms, "reading": spent}))
+    for page, reading in zip(pages, readings, strict=True):
+        told = replace(reading, written=page.reading.written, lengths=page.reading.lengths)
+        spent = timing["reading"] / drawn if page.ink is not None else 0.0
+        read.append(replace(page, reading=told, timing_ms={**page.timing_ms, "reading": spent}))
     return read
+
+
+def _upright(page: ScannedPage, reading: Reading, right: Drawing | None) -> ScannedPage:
+    """The page, the other way up where nothing but its drawing says so: letters are read upright only."""
+    unsure = [problem for problem in page.problems if problem.code == "upright_unsure"]
+    if not unsure or right is None or page.sheet is None or not is_upside_down(reading, right):
+        return page
+    turn_deg = (90 * round(page.sheet.rotation_deg / 90.0) + 180) % 360
+    turned = open_page(replace(page.ref, turn_deg=turn_deg))
+    if turned.image is None or turned.sheet is None:
+        return page
+    behind = backdrop(turned.image, turned.sheet) if page.backdrop is not None else None
+    image = turned.image if page.image is not None else None
+    return replace(turned, image=image, backdrop=behind, problems=(*turned.problems, *unsure))
+
+
+def _readings(
+    pages: Sequence[ScannedPage],
+    assignment: Assignment,
+    variant: Variant | None,
+    scales: Scales | None,
+    wanted: Collection[str],
+) -> list[Reading]:
+    """What is drawn on each page; nothing on those that were refused."""
+    drawn = [(page.ink, page.sheet) for page in pages if page.ink is not None and page.sheet is not None]
+    inks, sheets = [ink for ink, _ in drawn], [sheet for _, sheet in drawn]
+    readings = iter(read_figures(inks, sheets, assignment, variant, scales, wanted) if drawn else ())
+    return [Reading({}) if page.ink is None else next(readings) for page in pages]
 
 
 # One student's mark ---------------------------------------------------------------------------------

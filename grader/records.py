@@ -160,6 +160,18 @@ class Sheet:
     problems: tuple[Problem, ...] = ()
     lens: Lens | None = None
 
+    def longer(self, factor: float, scale_se: float) -> "Sheet":
+        """The same page where every length is so many times what it was taken for."""
+        shorter = np.diag([1.0 / factor, 1.0 / factor, 1.0])
+        matrix, lens = self.mm_to_px @ shorter, self.lens
+        if lens is not None:
+            lens = replace(lens, stored=lens.stored @ shorter, straight=matrix, scale_se=scale_se)
+        x, y, wide, high = (factor * side for side in self.drawable_mm)
+        return replace(
+            self, mm_to_px=matrix, px_per_mm=self.px_per_mm / factor, residual_mm=factor * self.residual_mm,
+            scale_se=scale_se, drawable_mm=(x, y, wide, high), lens=lens,
+        )  # fmt: skip
+
     def boxes_of(self, figures: Collection[str]) -> list[Box] | None:
         """The zones of these figures with the gap around them, where they are not all there are.
 
@@ -318,6 +330,22 @@ class Ink:
     letters: Letters | None = None
     tips: Tips = NO_TIPS
     problems: tuple[Problem, ...] = ()
+
+    def longer(self, factor: float) -> "Ink":
+        """The same ink where every length is so many times what it was taken for."""
+        strokes, letters = self.strokes, self.letters
+        return replace(
+            self,
+            strokes=replace(
+                strokes, ends=factor * strokes.ends, width=factor * strokes.width,
+                se_offset=factor * strokes.se_offset, se_end=factor * strokes.se_end,
+            ),
+            circles=factor * self.circles,
+            marks=factor * self.marks,
+            where=replace(self.where, px_per_mm=self.where.px_per_mm / factor),
+            letters=None if letters is None else replace(letters, box_mm=factor * letters.box_mm),
+            tips=replace(self.tips, along=factor * self.tips.along),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -486,6 +514,19 @@ class ScannedPage:
     timing_ms: Mapping[str, float] = field(default_factory=dict)
     narrowed: bool = False
     backdrop: Backdrop | None = None
+
+    def longer(self, factor: float, scale_se: float) -> "ScannedPage":
+        """The same page where every length is so many times what it was taken for; before it is read."""
+        sheet, ink, behind = self.sheet, self.ink, self.backdrop
+        if behind is not None:
+            wide, high = behind.page_mm
+            behind = replace(behind, page_mm=(factor * wide, factor * high))
+        return replace(
+            self,
+            sheet=None if sheet is None else sheet.longer(factor, scale_se),
+            ink=None if ink is None else ink.longer(factor),
+            backdrop=behind,
+        )
 
     def asked_only(self, names: Collection[str]) -> "ScannedPage":
         """The page, with what could not be read as far as it is asked for; all of it without `names`."""

@@ -142,6 +142,9 @@ PROBLEMS: dict[str, str] = {
     "registration_disagrees": N_("Frame, paper and resolution disagree about the sheet's size."),
     "paper_assumed": N_("Only the paper's edges give the scale; the paper was taken for A3."),
     "frame_missing": N_("No drawing frame was found; positions on the sheet are rough."),
+    "scale_by_drawing": N_("The page's scale was corrected by lengths that are known: links, v_A and a_A."),
+    "scale_doubtful": N_("Lengths that are known contradict the page's scale: lengths may be off."),
+    "scale_unknown": N_("Only the drawing can tell the page's scale, with kL, kv and ka declared."),
     "upright_unsure": N_("No title block shows which way up the sheet is."),
     "sheet_refused": N_("The sheet could not be placed: no frame, paper edge or marker settles it."),
     "nothing_handed_in": N_("Nothing was handed in."),
@@ -153,6 +156,9 @@ PROBLEMS: dict[str, str] = {
     "n_range": N_("The assignment has no such number."),
     "position_range": N_("The assignment has no such position."),
     "number_read": N_("The number was read on the sheet; check it."),
+    "number_differs": N_(
+        "The sheet has another number than the roster, and the drawing differs from the roster's."
+    ),
     "number_contradicted": N_("The number on the sheet is not the one that the drawing follows."),
     "number_doubtful": N_("The number on the sheet could not be read surely; add it to the roster."),
     "n_needed": N_("Nothing says this student's number or position; add it to the roster."),

@@ -320,10 +320,15 @@ def cached_reading(folder: Path, name: str, key: str, cache: PageCache) -> list[
         pages = _pages_in(folder / f"{name}.reading", key, cache.printed_key)
     except (OSError, ValueError):
         return None
-    scans = [cache.page(page.ref) for page in pages]
-    return [
-        replace(page, backdrop=scan.backdrop, ink=scan.ink) for page, scan in zip(pages, scans, strict=True)
-    ]
+    return [_with_scan(page, cache.page(page.ref)) for page in pages]
+
+
+def _with_scan(page: ScannedPage, scan: ScannedPage) -> ScannedPage:
+    """A page as read with the ink and the backdrop of its scan, at the scale at which it was read."""
+    if page.sheet is not None and scan.sheet is not None:
+        scan = scan.longer(scan.sheet.px_per_mm / page.sheet.px_per_mm, page.sheet.scale_se)
+    ink = scan.ink if page.sheet is not None else None
+    return replace(page, backdrop=scan.backdrop, ink=ink)
 
 
 def cached_maps(folder: Path, name: str) -> list[NDArray[np.uint8]]:

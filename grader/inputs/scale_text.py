@@ -402,6 +402,11 @@ def sure_texts(readings: Sequence[Mapping[str, Written]]) -> dict[str, str]:
 
 def declared_scales(assignment: Assignment, variant: Variant, texts: Mapping[str, str]) -> Scales:
     """The scales that texts declare, where they can be understood; the others by the assignment's rule."""
+    return assignment.scales([variant], **understood_scales(assignment, variant, texts))
+
+
+def understood_scales(assignment: Assignment, variant: Variant, texts: Mapping[str, str]) -> dict[str, float]:
+    """The scales that texts declare, as far as they can be understood without the assignment's rule."""
     known: dict[str, float] = {}
     units: Mapping[str, str] = dict(assignment.file.scales.bare_units.items())
     driver = assignment.mechanism([variant]).driver
@@ -412,4 +417,4 @@ def declared_scales(assignment: Assignment, variant: Variant, texts: Mapping[str
                 known[name] = value
             case ByRule() as rule if rule.powers.keys() <= {**omega, **known}.keys():
                 known[name] = rule.per_mm({**omega, **known})
-    return assignment.scales([variant], **known)
+    return known

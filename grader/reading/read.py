@@ -12,6 +12,7 @@ from grader.reading.expected import Edge
 from grader.reading.lettering import lettered, support
 from grader.reading.lines import Lines, lines_of
 from grader.reading.nodes import NodeFit
+from grader.reading.page_scale import given_length
 from grader.reading.plans import EXPLAINED, PlanProblem, PlanReading, best_plan, regular_plans
 from grader.reading.sketch import SketchReading, drawings, find_sketch
 from grader.records import (
@@ -119,10 +120,10 @@ def _measurable(drawing: Drawing, assignment: Assignment, variant: Variant | Non
     usual = assignment.scales([variant or assignment.variants()[0]])
     parameters = dict(drawing.parameters)
     for vector in drawing.construction.vectors.values():
-        real = parameters.get(vector.name, parameters.get(f"{vector.name}_n"))
+        real = given_length(parameters, vector.name)
         if real is None:
             continue
-        drawn_mm = abs(float(np.ravel(real)[0]) / float(np.ravel(parameters[vector.scale])[0]))
+        drawn_mm = real / float(np.ravel(parameters[vector.scale])[0])
         if drawn_mm and not LEAST_DRAWN_MM < drawn_mm < MOST_DRAWN_MM:
             parameters[vector.scale] = getattr(usual, vector.scale)
     return Drawing(drawing.construction, parameters)

@@ -43,6 +43,8 @@ def register(
 ) -> tuple[Sheet | Unread, Identity | None]:
     """The page's map from millimetres to pixels, or why there is none; and whose page it is by its code.
 
+    A sheet with the problem `scale_unknown` is one only if its drawing bears the scale out.
+
     A printed sheet's code is searched in its place; on other pages only a reduced picture is searched.
 
     Arguments: `corners_px` of the sheet, as in `PageRef`, where a person gave them: then they are taken.
@@ -109,8 +111,12 @@ _VAGUE_SE = 0.02
 _MOST_SIDES, _SOME_SIDES = 3, 2
 """A frame is known by three of its sides, if two sides of the paper are found too."""
 _ALL_SIDES = 4
-_COPY_SE = 0.012
-"""Copiers enlarge or reduce by a per cent or two by default."""
+_COPY_SE = 0.02
+"""Copiers enlarge or reduce by a per cent or two by default, to make a page fit by up to four."""
+_UNKNOWN_SE = 0.03
+"""A page is about as large as this says, if it is an A3 sheet at all: to be borne out by its drawing."""
+_CUT_OFF_MM = 60.0
+"""A scanner's window may be so much smaller than the sheet."""
 _SAMPLED, _WHITE = 7, 255
 """Every seventh pixel is tested; the value of white ones."""
 _FAR_OFF_MM = 1.5
@@ -149,12 +155,15 @@ def register_plain(page: Page) -> Sheet | Unread:
     if dpi is not None and not _is_copy(page):
         ranked = _as_scanned(ranked, dpi)
     if ranked:
+        if dpi is None and resolution is not None and _passes_for_frame(ranked, resolution.dpi):
+            return _from_resolution(page, resolution, lines, problems)
         rival = None if dpi is not None else _rival_scale(ranked)
         best = _turned_as_stated(ranked, page.turn_deg)
         told = list(problems)
         sheet = _from_lines(page, best, lines, dpi, told)
-        if isinstance(sheet, Unread) and resolution is not None and dpi is not None:
-            return _from_resolution(page, resolution, lines, problems)
+        if isinstance(sheet, Unread) and resolution is not None:
+            doubt = None if resolution.is_sure else sheet.reason
+            return _from_resolution(page, resolution, lines, problems, doubt)
         if isinstance(sheet, Sheet) and rival is not None:
             sheet = _with_rival(sheet, rival)
         if isinstance(sheet, Unread) or not best.perspective:
@@ -179,6 +188,17 @@ def _as_scanned(ranked: list[Hypothesis], dpi: tuple[float, float]) -> list[Hypo
         if abs(axes[0] - axes[1]) < _SCANNED_SE / 2.0
         and sum(side.model is not PAPER for side in reading.sides) == _ALL_SIDES
     ]
+
+
+def _passes_for_frame(ranked: list[Hypothesis], dpi: tuple[float, float]) -> bool:
+    """Whether the best reading has a resolution that no scanner has, and one about as likely has a usual one.
+
+    The edges of paper that fills a scanner's window may pass for a frame.
+    """
+    middle = float(np.log(np.array(dpi) / MM_PER_INCH).mean())
+    likely = [reading for reading in ranked if reading.score > ranked[0].score - _AS_LIKELY]
+    usual = [abs(np.log(_px_per_mm(one.mm_to_px, 1.0)) - middle) < _ANOTHER_SCALE for one in likely]
+    return any(usual) and not usual[0]
 
 
 def _turned_as_stated(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
@@ -228,6 +248,8 @@ def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
         size = f"{wide / page.dpi[0] * MM_PER_INCH:.0f} x {high / page.dpi[1] * MM_PER_INCH:.0f}"
         message = f"by its stated resolution the page is {size} mm, not A3"
         problems.append(Problem("resolution_wrong", message, page.source))
+        if _is_cut_off(page, page.dpi):
+            return Resolution(page.dpi, stated=True, is_sure=False)
     high, wide = page.grey.shape
     has_shape = abs(np.log(max(high, wide) / min(high, wide) * PAGE_MM[1] / PAGE_MM[0])) < _WINDOW_SHAPE
     for usual in _USUAL_DPI if has_shape else ():
@@ -236,6 +258,12 @@ def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
             is_exact = bool(np.abs(larger_px).max() < _SAME_PX)
             return Resolution((usual, usual), stated=False, is_sure=is_exact)
     return None
+
+
+def _is_cut_off(page: Page, dpi: tuple[float, float]) -> bool:
+    """Whether by a resolution a page may be A3 with its borders cut off."""
+    larger = np.subtract(size_mm(page, dpi), PAGE_MM)
+    return bool(np.all((larger >= -_CUT_OFF_MM) & (larger <= _A3_SLACK_MM))) and not looks_a4(page)
 
 
 def _is_a3(page: Page, dpi: tuple[float, float]) -> bool:
@@ -272,7 +300,7 @@ def _from_lines(
         scale_se = float(np.hypot(scale_se, _ASSUMED_PAPER_SE))
         message = "only the paper's edges give the scale; taken for A3"
         problems.append(Problem("paper_assumed", message, page.source))
-    if frame is None and copied:
+    if copied and sum(side.model is not PAPER for side in best.sides) < _ALL_SIDES:
         scale_se = float(np.hypot(scale_se, _COPY_SE))
     return _sheet(fit, frame, scale_se, problems)
 
@@ -341,9 +369,16 @@ def _settled(best: Hypothesis, dpi: tuple[float, float] | None, *, copied: bool)
 
 
 def _from_resolution(
-    page: Page, resolution: Resolution, lines: list[LongLine], problems: list[Problem]
+    page: Page,
+    resolution: Resolution,
+    lines: list[LongLine],
+    problems: list[Problem],
+    doubt: str | None = None,
 ) -> Sheet | Unread:
-    """Scale from the resolution alone, skew from ruled lines, place from the image's middle."""
+    """Scale from the resolution alone, skew from ruled lines, place from the image's middle.
+
+    Where nothing shows that the page is A3 (`doubt` says so), its drawing is to bear the scale out.
+    """
     high, wide = page.grey.shape
     tilt = _tilt(lines)
     quarter = 0.0 if wide >= high else np.pi / 2.0
@@ -358,10 +393,10 @@ def _from_resolution(
         block, matrix = min(tried, key=lambda one: off_turn_deg(one[1], page.turn_deg))
     else:
         block, matrix = max(tried, key=lambda one: (one[0], -off_turn_deg(one[1], page.turn_deg)))
-    if not resolution.stated and (block == 0.0 or looks_a4(page)):
-        return Unread(
-            "sheet", "no whole drawing frame, no title block or no stated resolution: not known to be A3"
-        )
+    if not resolution.is_sure if resolution.stated else block == 0.0:
+        doubt = doubt or "no whole drawing frame, no title block or no stated resolution: not known to be A3"
+    if (doubt is not None or not resolution.stated) and looks_a4(page):
+        return Unread("sheet", doubt or "no stated resolution, and the page is as large as A4")
     if block == 0.0 and not page.turn_is_sure:
         problems.append(_unsure_upright(page))
     if not resolution.stated:
@@ -373,6 +408,9 @@ def _from_resolution(
         scale_se = float(np.hypot(scale_se, _COPY_SE))
         message += f", and a copy's lengths are known to {100.0 * _COPY_SE:.0f} % only"
     problems.append(Problem("frame_missing", message, page.source))
+    if doubt is not None:
+        problems.append(Problem("scale_unknown", doubt, page.source))
+        scale_se = max(scale_se, _UNKNOWN_SE)
     return _sheet(_placed(matrix, resolution, lines, scale_se), None, scale_se, problems)
 
 

@@ -1,0 +1,262 @@
+"""What a drawing tells of its page: the scale, and which way up it is.
+
+The links of the sketch, v_A and a_A are known from the variant and the declared scales. Each may be drawn
+wrongly; all of them longer or shorter by one factor say that the page's millimetres are not what its
+registration takes them for.
+"""
+
+import cmath
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grader.records import MECHANISM, FloatArray, Problem, Reading, ScannedPage, Sheet
+from reference.construction.graph import evaluate, pair
+from reference.construction.mistakes import Drawing
+
+DRAWN_MM = 0.35
+"""Standard error of a length set off and drawn by a student, beside that of its reading: its two ends."""
+SAME_DEVICE = 0.002
+"""Pages that registration has at so nearly the same resolution went through one scanner or copier."""
+LEAST_MM = 15.0
+"""A shorter length tells less than other evidence."""
+SAME_LINKS = 0.002
+"""Links of one sketch are drawn with one ruler, and at one scale: together they are no surer than this."""
+STRAY, STRAY_DENSITY = 0.1, 2.0
+"""Probability that a length is off by a mistake of its own, and its density over the factor's logarithm."""
+TOGETHER, TOGETHER_SPREAD = 0.01, 0.02
+"""The same of all of them by one factor, as by compasses that the crank's length set; how far off."""
+WRONG, WRONG_SPREAD = 0.002, 0.03
+"""Probability that a plain page's registration is off by more than its standard error says; how far."""
+WIDEST, STEP = 0.15, 0.0005
+"""Factors that are tried, by their logarithm: a page off by more has no figure that is read."""
+CLUSTER = 0.01
+"""Factors that differ by less are of one explanation."""
+UNKNOWN, SURELY = "scale_unknown", 0.008
+"""A problem of registration, and the standard error at which a drawing answers it."""
+ENOUGH = 2
+"""So many lengths of different figures answer it; one alone may be drawn wrongly."""
+NEGLIGIBLE = 0.001
+"""Scales that differ by less are one: 0.1 mm in 100 mm."""
+TELLING = 1.4
+"""The scale's standard error counts as another from this factor on."""
+
+
+UPSIDE_DOWN_RAD = math.radians(135.0)
+"""Figures turned by more lie the other way up: nobody turns a drawing so far on its sheet."""
+
+
+def is_upside_down(reading: Reading, drawing: Drawing) -> bool:
+    """Whether two figures of a page lie as on a sheet turned by half.
+
+    One alone may have been drawn so: a sense is easily reversed.
+
+    Arguments: `drawing` is what the student was to draw.
+    """
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    vectors = drawing.construction.vectors
+    turned = []
+    for name, figure in reading.figures.items():
+        ends = drawing.construction.links if name == MECHANISM else {
+            vector: (vectors[vector].tail, vectors[vector].head) for vector in figure.vectors
+        }  # fmt: skip
+        product = sum(
+            (figure.nodes[head].at - figure.nodes[tail].at)
+            * complex(np.ravel(nodes[head] - nodes[tail])[0]).conjugate()
+            for tail, head in ends.values()
+            if {tail, head} <= figure.nodes.keys()
+        )
+        turned.append(abs(cmath.phase(product)) > UPSIDE_DOWN_RAD)
+    return sum(turned) > 1
+
+
+OTHER_RAD = math.radians(4.0)
+"""A link turned by more against the others is another variant's, or drawn wrongly: no hand misses so far."""
+
+
+def is_drawn_otherwise(reading: Reading, drawing: Drawing) -> bool:
+    """Whether the sketch has a link in another direction than it should, against the others."""
+    sketch = reading.figures.get(MECHANISM)
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    turns = [
+        cmath.phase(
+            (sketch.nodes[head].at - sketch.nodes[tail].at)
+            * complex(np.ravel(nodes[head] - nodes[tail])[0]).conjugate()
+        )
+        for tail, head in drawing.construction.links.values()
+        if sketch is not None and {tail, head} <= sketch.nodes.keys()
+    ]
+    middle = float(np.median(turns)) if turns else 0.0
+    return any(abs(math.remainder(turn - middle, math.tau)) > OTHER_RAD for turn in turns)
+
+
+@dataclass(frozen=True, slots=True)
+class PageScale:
+    """What the drawing says of a page's scale.
+
+    Attributes
+    ----------
+    factor : by which lengths on the page are longer than they were taken for
+    se : relative standard error of lengths after that
+    by : the lengths that tell it
+    """
+
+    factor: float
+    se: float
+    by: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Witness:
+    """A length's logarithm of the right one to the one drawn, with its standard error."""
+
+    name: str
+    off: float
+    se: float
+
+
+def at_drawn_scales(
+    pages: Sequence[ScannedPage],
+    readings: Sequence[Reading],
+    drawing: Drawing | None,
+    declared: Collection[str],
+) -> list[ScannedPage] | None:
+    """The pages at the scales that their drawings tell, to be read again; None where nothing changes.
+
+    A page of which registration does not know the scale is refused where its drawing does not tell it.
+
+    Arguments
+    ---------
+    readings : of each page, at the scale of its registration
+    drawing : what the student was to draw, at the declared scales; None where that is not known
+    declared : the scales that were surely declared, by name; the lengths of others tell nothing
+    """
+    result = []
+    for page in pages:
+        sheet = page.sheet
+        if page.ink is None or sheet is None or sheet.zones:
+            result.append(page)
+            continue
+        told = [] if drawing is None else _witnesses(sheet, pages, readings, drawing, declared)
+        shown = _page_scale(told, sheet.scale_se) if told else None
+        result.append(_at_drawn_scale(page, sheet, shown))
+    return result if any(one is not page for one, page in zip(result, pages, strict=True)) else None
+
+
+def _at_drawn_scale(page: ScannedPage, sheet: Sheet, shown: PageScale | None) -> ScannedPage:
+    """A page with what the drawing says of its scale; the page itself where that is nothing new."""
+    unknown = next((problem for problem in page.problems if problem.code == UNKNOWN), None)
+    if unknown is not None and (shown is None or shown.se > SURELY or len(shown.by) < ENOUGH):
+        why = f"{unknown.message}; nor does the drawing tell it, by declared scales"
+        return replace(page, sheet=None, ink=None, problems=(Problem("sheet_refused", why, page.ref.file),))
+    if shown is None or not _is_news(shown, sheet):
+        return page
+    factor = 1.0 if abs(shown.factor - 1.0) < NEGLIGIBLE else shown.factor
+    told: tuple[Problem, ...] = ()
+    percent, se, by = 100.0 * (factor - 1.0), 100.0 * shown.se, ", ".join(shown.by)
+    if factor == 1.0 and shown.se > sheet.scale_se:
+        message = f"{by} would have the page at another scale than its registration: lengths may be off"
+        told = (Problem("scale_doubtful", f"{message} by {se:.1f} %", page.ref.file),)
+    elif factor != 1.0 or unknown is not None:
+        message = f"by {by} lengths are {percent:+.1f} % longer than by frame, paper and resolution"
+        told = (Problem("scale_by_drawing", f"{message} (\N{PLUS-MINUS SIGN} {se:.1f} %)", page.ref.file),)
+    kept = tuple(problem for problem in page.problems if problem is not unknown)
+    return replace(page.longer(factor, shown.se), problems=(*kept, *told))
+
+
+def _is_news(shown: PageScale, sheet: Sheet) -> bool:
+    """Whether a page is to be read again with this scale."""
+    is_other = abs(shown.factor - 1.0) > max(NEGLIGIBLE, 0.5 * shown.se)
+    ratio = max(shown.se, NEGLIGIBLE) / max(sheet.scale_se, NEGLIGIBLE)
+    return is_other or not 1.0 / TELLING < ratio < TELLING
+
+
+def _witnesses(
+    sheet: Sheet,
+    pages: Sequence[ScannedPage],
+    readings: Sequence[Reading],
+    drawing: Drawing,
+    declared: Collection[str],
+) -> list[_Witness]:
+    """The lengths that tell a page's scale: its own, and those of pages made in the same way."""
+    found: list[_Witness] = []
+    for page, reading in zip(pages, readings, strict=True):
+        other = page.sheet
+        if other is not None and abs(other.px_per_mm / sheet.px_per_mm - 1.0) < SAME_DEVICE:
+            each = [*_links(reading, drawing), *_givens(reading, drawing, other.scale_se)]
+            found += [one for scale, one in each if scale in declared]
+    return found
+
+
+def _page_scale(witnesses: Sequence[_Witness], scale_se: float) -> PageScale:
+    """By Bayes: the registration's scale, or any other, with lengths of which some may be drawn wrongly."""
+    off = np.arange(-WIDEST, WIDEST + STEP / 2.0, STEP)
+    likely = np.ones_like(off)
+    for one in witnesses:
+        likely *= (1.0 - STRAY) * _normal(off - one.off, one.se) + STRAY * STRAY_DENSITY
+    together = np.convolve(likely, _normal(off, TOGETHER_SPREAD) * STEP, mode="same")
+    likely = (1.0 - TOGETHER) * likely + TOGETHER * together
+    before = (1.0 - WRONG) * _normal(off, max(scale_se, STEP)) + WRONG * _normal(off, WRONG_SPREAD)
+    chance = before * likely
+    chance /= chance.sum()
+    near = np.abs(off - off[int(np.argmax(chance))]) < CLUSTER
+    centre = float(np.sum(off[near] * chance[near]) / chance[near].sum())
+    se = float(np.sqrt(np.sum(chance * (off - centre) ** 2)))
+    return PageScale(math.exp(centre), max(se, min(scale_se, STEP)), tuple(one.name for one in witnesses))
+
+
+def _normal(off: FloatArray, se: float) -> FloatArray:
+    return np.asarray(np.exp(-0.5 * (off / se) ** 2) / (se * math.sqrt(2.0 * math.pi)))
+
+
+def _links(reading: Reading, drawing: Drawing) -> Iterator[tuple[str, _Witness]]:
+    """The sketch's links of given length, as one: a scale of their own moves them all."""
+    nodes = reading.figures[MECHANISM].nodes if MECHANISM in reading.figures else {}
+    found: list[_Witness] = []
+    for name, (tail, head) in drawing.construction.links.items():
+        real = drawing.parameters.get(pair(tail, head), drawing.parameters.get(pair(head, tail)))
+        if real is not None and tail in nodes and head in nodes:
+            drawn_mm = abs(nodes[head].at - nodes[tail].at)
+            se_mm = math.hypot(nodes[head].se_mm, nodes[tail].se_mm)
+            found += _witness(name, _scalar(real) / _scalar(drawing.parameters["kL"]), drawn_mm, se_mm)
+    if found:
+        middle = float(np.median([one.off for one in found]))
+        alike = [one for one in found if abs(one.off - middle) < 3.0 * one.se] or found
+        weights = np.array([one.se**-2.0 for one in alike])
+        off = float(np.average([one.off for one in alike], weights=weights))
+        se = math.hypot(float(weights.sum()) ** -0.5, SAME_LINKS)
+        yield "kL", _Witness(" ".join(one.name for one in alike), off, se)
+
+
+def _givens(reading: Reading, drawing: Drawing, scale_se: float) -> Iterator[tuple[str, _Witness]]:
+    """The vectors that are given at the start of each plan; `scale_se` is the page's, which theirs have."""
+    for vector in drawing.construction.vectors.values():
+        real = given_length(drawing.parameters, vector.name)
+        for figure in reading.figures.values():
+            drawn = figure.vectors.get(vector.name)
+            if real is not None and drawn is not None and drawn.length_mm is not None:
+                expected_mm = real / _scalar(drawing.parameters[vector.scale])
+                own_mm = math.sqrt(max(drawn.se_mm**2 - (scale_se * drawn.length_mm) ** 2, 0.0))
+                for witness in _witness(vector.name, expected_mm, drawn.length_mm, own_mm):
+                    yield vector.scale, witness
+
+
+def given_length(parameters: Mapping[str, FloatArray], vector: str) -> float | None:
+    """The size of a vector that is given at the start of a plan, SI; None of one that is to be found."""
+    if vector in parameters:
+        return abs(_scalar(parameters[vector]))
+    if f"{vector}_n" in parameters:
+        return math.hypot(_scalar(parameters[f"{vector}_n"]), _scalar(parameters[f"{vector}_t"]))
+    return None
+
+
+def _scalar(value: FloatArray) -> float:
+    return float(np.ravel(value)[0])
+
+
+def _witness(name: str, expected_mm: float, drawn_mm: float, se_mm: float) -> Iterator[_Witness]:
+    """A length long enough to tell the scale."""
+    if min(expected_mm, drawn_mm) > LEAST_MM:
+        yield _Witness(name, math.log(expected_mm / drawn_mm), math.hypot(se_mm, DRAWN_MM) / expected_mm)

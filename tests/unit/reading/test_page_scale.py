@@ -1,0 +1,142 @@
+"""The page's scale by what is drawn on it: lengths off by one factor move the page, one alone does not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grader.reading.page_scale import at_drawn_scales, is_drawn_otherwise, is_upside_down
+from grader.reading.sketch import drawings
+from grader.records import (
+    ACCELERATION_PLAN,
+    MECHANISM,
+    NO_TIPS,
+    VELOCITY_PLAN,
+    Figure,
+    Ink,
+    InkMap,
+    PageRef,
+    Problem,
+    Reading,
+    ReadNode,
+    ReadVector,
+    ScannedPage,
+    Sheet,
+    Strokes,
+)
+from reference.authored.assignment import load_assignment
+from reference.construction.graph import evaluate
+
+ALL = ("kL", "kv", "ka")
+PUMP = load_assignment("pump")
+(RIGHT,) = drawings(PUMP, [PUMP.variant(7)], None)
+NO_STROKES = Strokes(
+    np.array([[[100.0, 50.0], [120.0, 50.0]]]), *(np.full(shape, 0.3) for shape in (1, 1, 1, (1, 2), 1, 1))
+)
+
+
+def page(scale_se: float, *problems: Problem) -> ScannedPage:
+    ink = Ink(
+        NO_STROKES, np.zeros((0, 3)), np.zeros((0, 4)), InkMap(np.zeros((9, 9), np.uint8), 6.0), tips=NO_TIPS
+    )
+    sheet = Sheet(
+        np.diag([12.0, 12.0, 1.0]), (420.0, 297.0), "combined", 12.0, 0.0, 0.1, scale_se, (10, 10, 400, 277)
+    )
+    return ScannedPage(PageRef("a.png"), sheet=sheet, ink=ink, problems=problems)
+
+
+def drawn(
+    links: float = 1.0, velocities: float = 1.0, accelerations: float = 1.0, turn: complex = 1.0
+) -> Reading:
+    """The right drawing with the lengths of each figure so many times longer, turned."""
+    exact = {
+        name: complex(np.ravel(at)[0]) for name, at in evaluate(RIGHT.construction, RIGHT.parameters).items()
+    }
+    factors = {MECHANISM: links, VELOCITY_PLAN: velocities, ACCELERATION_PLAN: accelerations}
+    figures = {}
+    for figure, factor in factors.items():
+        nodes = {
+            name: ReadNode(turn * factor * at, np.eye(2) * 0.01, 0.99)
+            for name, at in exact.items()
+            if RIGHT.construction.figure_of(name) == figure
+        }
+        vectors = {}
+        for vector in RIGHT.construction.vectors_of(figure) if figure != MECHANISM else ():
+            span = nodes[vector.head].at - nodes[vector.tail].at
+            vectors[vector.name] = ReadVector(abs(span), 0.1, float(np.degrees(np.angle(span))), 0.1, 0.95)
+        figures[figure] = Figure(nodes, vectors)
+    return Reading(figures)
+
+
+def answered(reading: Reading, one: ScannedPage, declared=ALL) -> ScannedPage:
+    pages = at_drawn_scales([one], [reading], RIGHT, declared)
+    return one if pages is None else pages[0]
+
+
+@pytest.mark.parametrize("longer", [0.97, 0.99, 1.02, 1.04])
+def test_lengths_that_are_all_off_by_one_factor_correct_a_page_of_doubtful_scale(longer):
+    before = page(0.02)
+    after = answered(drawn(longer, longer, longer), before)
+    assert after.sheet.px_per_mm / before.sheet.px_per_mm == pytest.approx(longer, abs=0.003)
+    assert abs(np.log(after.sheet.px_per_mm / 12.0 / longer)) < 3.0 * after.sheet.scale_se < 0.03
+    assert [problem.code for problem in after.problems] == ["scale_by_drawing"]
+    assert after.ink.strokes.ends == pytest.approx(before.ink.strokes.ends * 12.0 / after.sheet.px_per_mm)
+
+
+def test_the_same_on_a_surely_registered_page_is_a_doubt_and_no_correction():
+    after = answered(drawn(1.02, 1.02, 1.02), page(0.001))
+    assert after.sheet.px_per_mm == 12.0
+    assert after.sheet.scale_se > 0.003
+    assert [problem.code for problem in after.problems] == ["scale_doubtful"]
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [{"links": 1.02}, {"links": 1.25}, {"velocities": 0.98}, {"velocities": 1.047, "accelerations": 1.096}],
+    ids=["another kL", "another kL by far", "v_A alone", "another omega"],
+)
+@pytest.mark.parametrize("scale_se", [0.001, 0.02])
+def test_a_students_own_mistake_moves_no_page(mistake, scale_se):
+    after = answered(drawn(**mistake), page(scale_se))
+    assert abs(np.log(after.sheet.px_per_mm / 12.0)) < 2.0 * after.sheet.scale_se
+    assert abs(np.log(after.sheet.px_per_mm / 12.0)) < 0.015
+
+
+def test_a_right_drawing_makes_a_doubtful_scale_sure_and_leaves_a_sure_one_alone():
+    assert answered(drawn(), page(0.02)).sheet.scale_se < 0.005
+    sure = page(0.001)
+    assert answered(drawn(), sure) is sure
+
+
+def test_lengths_at_scales_that_nobody_declared_tell_nothing():
+    doubtful = page(0.02)
+    assert answered(drawn(1.03, 1.03, 1.03), doubtful, ()) is doubtful
+
+
+def test_a_page_of_unknown_scale_is_refused_unless_its_drawing_tells_it():
+    unknown = page(0.03, Problem("scale_unknown", "no frame was found"))
+    assert answered(drawn(1.03, 1.03, 1.03), unknown).sheet.px_per_mm == pytest.approx(12.36, abs=0.04)
+    for refused in (
+        answered(Reading({}), unknown),
+        answered(drawn(), unknown, ()),
+        answered(drawn(), unknown, ["kv"]),
+    ):
+        assert refused.sheet is None
+        assert refused.ink is None
+        assert [problem.code for problem in refused.problems] == ["sheet_refused"]
+
+
+def test_two_figures_turned_by_half_say_that_the_page_lies_upside_down():
+    assert is_upside_down(drawn(turn=-1.0), RIGHT)
+    assert not is_upside_down(drawn(), RIGHT)
+    alone = drawn()
+    turned = {**alone.figures, VELOCITY_PLAN: drawn(turn=-1.0).figures[VELOCITY_PLAN]}
+    assert not is_upside_down(replace(alone, figures=turned), RIGHT)
+
+
+def test_only_a_sketch_with_a_link_in_another_direction_looks_like_another_variants():
+    assert not is_drawn_otherwise(drawn(), RIGHT)
+    assert not is_drawn_otherwise(drawn(turn=1j, links=1.3), RIGHT)
+    assert not is_drawn_otherwise(Reading({}), RIGHT)
+    (other,) = drawings(PUMP, [PUMP.variant(12)], None)
+    assert is_drawn_otherwise(drawn(), other)
