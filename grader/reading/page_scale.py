@@ -153,6 +153,8 @@ def _at_drawn_scale(page: ScannedPage, sheet: Sheet, shown: PageScale | None) ->
         return replace(page, sheet=None, ink=None, problems=(Problem("sheet_refused", why, page.ref.file),))
     if shown is None or not _is_news(shown, sheet):
         return page
+    if shown.se > sheet.scale_se and len(shown.by) < ENOUGH:
+        return page
     factor = 1.0 if abs(shown.factor - 1.0) < NEGLIGIBLE else shown.factor
     told: tuple[Problem, ...] = ()
     percent, se, by = 100.0 * (factor - 1.0), 100.0 * shown.se, ", ".join(shown.by)

@@ -113,6 +113,8 @@ _MOST_SIDES, _SOME_SIDES = 3, 2
 _ALL_SIDES = 4
 _COPY_SE = 0.02
 """Copiers enlarge or reduce by a per cent or two by default, to make a page fit by up to four."""
+_SQUARES_SE = 0.003
+"""On squared paper a printed line may pass for a side of the frame: it lies within a millimetre of one."""
 _UNKNOWN_SE = 0.03
 """A page is about as large as this says, if it is an A3 sheet at all: to be borne out by its drawing."""
 _CUT_OFF_MM = 60.0
@@ -143,7 +145,8 @@ def register_plain(page: Page) -> Sheet | Unread:
         return Unread("sheet", f"{long_px} pixels along the long side are too few for an A3 drawing")
     flat = flatten(page.grey)
     shape = (page.grey.shape[0], page.grey.shape[1])
-    lines = without_grid(long_lines(flat), shape)
+    every = long_lines(flat)
+    lines = without_grid(every, shape)
     problems: list[Problem] = []
     resolution = _resolution(page, problems)
     dpi = resolution.dpi if resolution is not None and resolution.is_sure else None
@@ -166,6 +169,8 @@ def register_plain(page: Page) -> Sheet | Unread:
             return _from_resolution(page, resolution, lines, problems, doubt)
         if isinstance(sheet, Sheet) and rival is not None:
             sheet = _with_rival(sheet, rival)
+        if isinstance(sheet, Sheet) and len(lines) < len(every):
+            sheet = replace(sheet, scale_se=float(np.hypot(sheet.scale_se, _SQUARES_SE)))
         if isinstance(sheet, Unread) or not best.perspective:
             return sheet
         return _with_lens(flat, sheet, best)

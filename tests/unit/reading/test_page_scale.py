@@ -90,6 +90,11 @@ def test_the_same_on_a_surely_registered_page_is_a_doubt_and_no_correction():
     assert [problem.code for problem in after.problems] == ["scale_doubtful"]
 
 
+def test_one_length_alone_makes_no_sure_page_doubtful():
+    sure = page(0.001)
+    assert answered(drawn(velocities=1.02), sure, ["kv"]) is sure
+
+
 @pytest.mark.parametrize(
     "mistake",
     [{"links": 1.02}, {"links": 1.25}, {"velocities": 0.98}, {"velocities": 1.047, "accelerations": 1.096}],

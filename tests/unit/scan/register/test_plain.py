@@ -9,6 +9,7 @@ import pytest
 
 from grader.records import Page
 from grader.scan.decode.pages import page_of, pages_of
+from grader.scan.register import registration
 from grader.scan.register.distortion import straight, straighten, straightened
 from grader.scan.register.registration import rectify
 
@@ -241,6 +242,17 @@ def test_squared_paper_has_no_title_block():
             shift=SUBPIXEL,
         )
     assert unknown_because(rectify(Page("a.png", 1, grey, None)))
+
+
+def test_a_frame_on_squared_paper_is_less_sure_since_a_square_may_pass_for_a_side(monkeypatch):
+    page = Page("a.png", 1, painted(*scanner(), bed=248), None)
+    plain, every = rectify(page), registration.long_lines
+    monkeypatch.setattr(registration, "long_lines", lambda flat: [*every(flat), "a square's line"])
+    monkeypatch.setattr(registration, "without_grid", lambda lines, _: lines[:-1])
+    sheet = rectify(page)
+    assert np.array_equal(sheet.mm_to_px, plain.mm_to_px)
+    assert plain.scale_se < 0.002
+    assert 0.003 <= sheet.scale_se < 0.004
 
 
 @pytest.mark.parametrize(
