@@ -147,8 +147,11 @@ class ReadingDocument(Document):
 # Report: a submission's verdicts ------------------------------------------------------------------
 
 
-class QuantityDocument(Document):
-    """A vector's drawn length and direction, and the real value that they stand for."""
+class Quantity(Document):
+    """A drawn or expected vector, an angular value or a scale; None where not known or meaningless.
+
+    Length and direction are on paper, the value is in SI.
+    """
 
     length_mm: float | None = None
     direction_deg: float | None = None
@@ -156,8 +159,8 @@ class QuantityDocument(Document):
     unit: str | None = None
 
 
-class ToleranceDocument(Document):
-    """How far the drawing may be off for full marks."""
+class Tolerance(Document):
+    """What full marks allow."""
 
     length_mm: float | None = None
     direction_deg: float | None = None
@@ -199,9 +202,9 @@ class CriterionDocument(Document):
     """Null while under review, and where not judged."""
     max_points: float
     verdict: Verdict
-    measured: QuantityDocument
-    expected: QuantityDocument
-    tolerance: ToleranceDocument
+    measured: Quantity
+    expected: Quantity
+    tolerance: Tolerance
     confidence: Share
     probability: Share | None = None
     """That the verdict is right; under review, of the likeliest one. Null in reports of earlier versions."""

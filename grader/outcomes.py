@@ -47,7 +47,7 @@ scale_assumed         used, unit                                             not
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from grader.documents import Verdict
+from grader.documents import Quantity, Tolerance, Verdict
 from reference.construction.mistakes import Mistake
 
 Param = float | str
@@ -59,37 +59,6 @@ class Reason:
 
     code: str
     params: Mapping[str, Param] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """A drawn or expected vector, an angular value or a scale; None where not known or meaningless.
-
-    Attributes
-    ----------
-    length_mm, direction_deg : on paper
-    value, unit : real, SI
-    """
-
-    length_mm: float | None = None
-    direction_deg: float | None = None
-    value: float | None = None
-    unit: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Tolerance:
-    """What full marks allow; for values and scales `value` (same unit as the quantity).
-
-    Attributes
-    ----------
-    widened : more than the rubric states, because a careful hand's small errors add up to it here
-    """
-
-    length_mm: float | None = None
-    direction_deg: float | None = None
-    value: float | None = None
-    widened: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,13 +8,13 @@ from rich.table import Table
 from grader.cli.app import check_language
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
+from grader.documents import Quantity
 from grader.feedback.sentences import mistake_feedback, reason_sentence
 from grader.files import write_whole
 from grader.inputs.measurements import Measurements, names_of, read_measurements
 from grader.language import Tongue, tongue
 from grader.marking.mark import judge
 from grader.marking.self_check import LEVELS, Checked, Level, checked_values, is_all_right, likely_mistakes
-from grader.outcomes import Quantity
 from grader.rubric import RubricFile, rubric_of
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError

@@ -33,7 +33,8 @@ from grader.comparison.verdicts import (
     tolerances,
     widened,
 )
-from grader.outcomes import Outcome, Quantity, Reason, Tolerance, UsedScale
+from grader.documents import Quantity, Tolerance
+from grader.outcomes import Outcome, Reason, UsedScale
 from grader.rubric import CriterionTable
 from reference.construction.elements import Normal
 from reference.construction.graph import AngularRate

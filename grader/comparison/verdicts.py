@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from grader.comparison.evidence import DrawnVector
 from grader.comparison.task import unit_of
-from grader.documents import Verdict
-from grader.outcomes import Outcome, Quantity, Reason, Tolerance
+from grader.documents import Quantity, Tolerance, Verdict
+from grader.outcomes import Outcome, Reason
 from grader.rubric import CriterionTable, ToleranceTable
 from reference.construction.uncertainty import EndSpread
 
@@ -255,7 +255,7 @@ REVERSED_WITHIN_DEG = 20.0
 def tolerances(tolerance: ToleranceTable, expected_mm: float, *, with_direction: bool) -> Tolerance:
     """Both tolerances as the rubric states them."""
     turn = tolerance.direction_at(expected_mm) if with_direction else None
-    return Tolerance(tolerance.length_at(expected_mm), turn)
+    return Tolerance(length_mm=tolerance.length_at(expected_mm), direction_deg=turn)
 
 
 def widened(
@@ -275,7 +275,7 @@ def widened(
         turned = math.degrees(math.atan2(uncertainty.across, expected_mm))
         direction = max(plain_deg, min(turned, at_most * plain_deg))
     is_wider = length_mm > plain_mm or direction != plain_deg
-    return Tolerance(length_mm, direction, widened=is_wider)
+    return Tolerance(length_mm=length_mm, direction_deg=direction, widened=is_wider)
 
 
 def mark_vector(
@@ -374,7 +374,7 @@ RANKS: dict[Verdict, int] = {"none": 0, "partial": 1, "follow_through": 2, "full
 def quantity(name: str, length_mm: float, direction_rad: float | None, value: float) -> Quantity:
     """The quantity of a vector; `direction_rad` on the sheet."""
     direction = None if direction_rad is None else degrees(direction_rad)
-    return Quantity(length_mm, direction, value, unit_of(name))
+    return Quantity(length_mm=length_mm, direction_deg=direction, value=value, unit=unit_of(name))
 
 
 def expected_quantity(name: str, expected: complex, scale: float, turn_rad: float) -> Quantity:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from grader.documents import QuantityDocument, ReportDocument, ToleranceDocument
+from grader.documents import Quantity, ReportDocument, Tolerance
 from grader.language import N_, Tongue
 from reference.drawing.subject import SCALE_UNITS
 
@@ -24,7 +24,7 @@ TAKEN = N_("A person took off %(points)s.")
 # Cells --------------------------------------------------------------------------------------------
 
 
-def quantity_cells(quantity: QuantityDocument, speaker: Tongue) -> list[str]:
+def quantity_cells(quantity: Quantity, speaker: Tongue) -> list[str]:
     """Length and direction on paper, real value: a line each."""
     drawn = []
     if quantity.length_mm is not None:
@@ -39,7 +39,7 @@ def quantity_cells(quantity: QuantityDocument, speaker: Tongue) -> list[str]:
     return lines
 
 
-def tolerance_cells(tolerance: ToleranceDocument, unit: str, speaker: Tongue) -> list[str]:
+def tolerance_cells(tolerance: Tolerance, unit: str, speaker: Tongue) -> list[str]:
     """What full marks allow, in length and direction or in the value, which is in this unit."""
     drawn = []
     if tolerance.length_mm is not None:

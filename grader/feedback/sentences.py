@@ -10,9 +10,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Literal
 
+from grader.documents import Quantity
 from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, question_of, words_of
 from grader.language import N_, Tongue, tongue
-from grader.outcomes import NamedMistake, Outcome, Param, Quantity, Reason
+from grader.outcomes import NamedMistake, Outcome, Param, Reason
 
 Level = Literal["symbol", "hint", "full"]
 

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from grader.documents import (
     CriterionDocument,
     MistakeDocument,
-    QuantityDocument,
+    Quantity,
     ReportDocument,
     RivalDocument,
     ScaleDocument,
@@ -402,7 +402,7 @@ class StudentPage:
         groups: dict[str, list[str]] = {}
         for row in self.group("waiting").rows:
             why = next((code for code in WAITING if code in row.reasons), "")
-            if why == "unread" and row.measured != QuantityDocument():
+            if why == "unread" and row.measured != Quantity():
                 why = "doubtful"
             groups.setdefault(why, []).append(self.shown(row.drawn or row.id))
         return [(self.speaker.gettext(WAITING[why]), names) for why, names in groups.items()]

@@ -12,14 +12,16 @@ from grader.documents import (
     CriterionDocument,
     DecidedDocument,
     ProblemDocument,
+    Quantity,
     ReportDocument,
+    Tolerance,
     Verdict,
 )
 from grader.inputs.decisions import Decision
 from grader.inputs.measurements import StudentSubmission
 from grader.marking.mark import CHARGED, DECIMALS, score, with_mistake
 from grader.marking.settling import OPENING, at_stake
-from grader.outcomes import Judgement, NamedMistake, Outcome, Quantity, Reason, Tolerance
+from grader.outcomes import Judgement, NamedMistake, Outcome, Reason
 from grader.reading.corrected import corrected
 from grader.records import Problem, ScannedPage
 from grader.rubric import CriterionTable, RubricFile

@@ -8,7 +8,8 @@ not show.
 from dataclasses import dataclass
 from typing import Literal
 
-from grader.outcomes import Judgement, NamedMistake, Outcome, Quantity, Reason, Tolerance
+from grader.documents import Quantity, Tolerance
+from grader.outcomes import Judgement, NamedMistake, Outcome, Reason
 
 Level = Literal["symbol", "hint", "full"]
 LEVELS: tuple[Level, ...] = ("symbol", "hint", "full")

@@ -6,7 +6,7 @@ from urllib.parse import urlencode
 
 from markupsafe import Markup
 
-from grader.documents import CriterionDocument, QuantityDocument
+from grader.documents import CriterionDocument, Quantity
 from grader.feedback.numbers import quantity_cells, score_text, tolerance_cells
 from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
 from grader.inputs.decisions import Decision
@@ -170,7 +170,7 @@ def _state(criterion: CriterionDocument, decision: Decision | None, said: str, s
 
 
 def _numbers(criterion: CriterionDocument, speaker: Tongue) -> Iterator[tuple[str, Markup]]:
-    def cells(quantity: QuantityDocument) -> str:
+    def cells(quantity: Quantity) -> str:
         return " · ".join(quantity_cells(quantity, speaker))
 
     unit = criterion.expected.unit or criterion.measured.unit or ""

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 from urllib.parse import urlsplit
 
 from jinja2 import PackageLoader
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -31,7 +31,7 @@ from grader.lms.export import export, usual_name
 from grader.lms.grades import Options
 from grader.review import questions
 from grader.review.scans import page_of
-from grader.review.session import Answer, ChangedError, OnWhole, Session, page_criterion
+from grader.review.session import Answer, ChangedError, Said, Session, Whole, page_criterion
 from reference.errors import CallError, PlanmarkError
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
@@ -169,15 +169,13 @@ class Review:
     def decide(self, said: "Answers") -> dict[str, Any]:
         """Verdicts on criteria, all of them or none."""
         since = self.session.version
-        answers = [Answer(**one.model_dump()) for one in said.answers]
-        self.session.decide(answers, said.by, said.window)
+        self.session.decide(said.answers, said.by, said.window)
         return self._facts(since)
 
-    def whole(self, said: "Whole") -> dict[str, Any]:
+    def whole(self, said: Whole) -> dict[str, Any]:
         """A comment on a whole submission, and points added."""
         since = self.session.version
-        whole = OnWhole(said.student, said.comment, said.added, said.seen)
-        self.session.decide_whole(whole, said.by, said.window)
+        self.session.decide_whole(said)
         return self._facts(since)
 
     def node(self, said: "Moved") -> dict[str, Any]:
@@ -204,7 +202,7 @@ class Review:
         self.session.decide_page(ref, row, said.seen, said.window)
         return self._facts(self.session.version)
 
-    def undo(self, said: "Said") -> dict[str, Any]:
+    def undo(self, said: Said) -> dict[str, Any]:
         """The last decision of a window taken back."""
         since = self.session.version
         students, row = self.session.undo(said.window)
@@ -213,7 +211,7 @@ class Review:
 
     # The end --------------------------------------------------------------------------------------
 
-    def finish(self, _said: "Said") -> dict[str, Any]:
+    def finish(self, _said: Said) -> dict[str, Any]:
         """Start to bring all pages up to date and to export."""
         if not self.run.running:
             self.run = Run(running=True)
@@ -273,40 +271,10 @@ Number = Annotated[int, Field(ge=0, lt=100_000)]
 Place = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False)]
 
 
-class Said(BaseModel):
-    """What every post says: who decides, and in which window."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-    by: str = ""
-    window: str = ""
-
-
-class Given(BaseModel):
-    """An answer to one question, see `Answer`."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-    student: str
-    criterion: str
-    verdict: str
-    comment: str = ""
-    seen: str = ""
-
-
 class Answers(Said):
     """Answers that are written together."""
 
-    answers: Annotated[list[Given], Field(min_length=1)]
-
-
-class Whole(Said):
-    """A comment on a whole submission, and points added."""
-
-    student: str
-    comment: str = ""
-    added: Place = 0.0
-    seen: Annotated[tuple[str, str], Field(strict=False)] = ("", "")
+    answers: Annotated[list[Answer], Field(min_length=1)]
 
 
 class Moved(Said):
@@ -328,7 +296,7 @@ class OnPage(Said):
     owner: str | None = None
     turn: int | None = None
     seen: str = ""
-    corners: list[Annotated[tuple[Place, Place], Field(strict=False)]] = []
+    corners: list[Annotated[tuple[Place, Place], Field(strict=False)]] = Field(default_factory=list)
 
 
 def _whole(value: object) -> int:

@@ -8,8 +8,11 @@ import threading
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from typing import Annotated
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic.dataclasses import dataclass as posted
 
 from grader.comparison.task import task_of
 from grader.documents import CriterionDocument, ProblemDocument, ReadingDocument, ReportDocument
@@ -67,7 +70,16 @@ class Student:
         raise CallError("criterion_unknown", f"{self.job.folder} has no criterion {name}")
 
 
-@dataclass(frozen=True, slots=True)
+class Said(BaseModel):
+    """What every post says: who decides, and in which window."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    by: str = ""
+    window: str = ""
+
+
+@posted(config=Said.model_config, frozen=True, slots=True)
 class Answer:
     """What a person decided on one criterion.
 
@@ -84,14 +96,13 @@ class Answer:
     seen: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class OnWhole:
+class Whole(Said):
     """What a person said of a whole submission: a comment, points added, the marks of what stood there."""
 
     student: str
-    comment: str
-    added: float
-    seen: tuple[str, str] = ("", "")
+    comment: str = ""
+    added: Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False)] = 0.0
+    seen: Annotated[tuple[str, str], Field(strict=False)] = ("", "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,20 +220,20 @@ class Session:
             self._write(wanted, there, window)
             return self._marked_anew({answer.student for answer in answers})
 
-    def decide_whole(self, answer: OnWhole, by: str, window: str) -> list[Student]:
+    def decide_whole(self, answer: Whole) -> list[Student]:
         """Write a comment on a whole submission and points added to it; an empty one takes it back.
 
         Raises as `decide`.
         """
         with self._lock:
             student, there = self.student(answer.student), self.standing()
-            comment = replace(self._row(student, "comment", "", by, there), comment=answer.comment)
-            total = replace(self._row(student, "total", "", by, there), points=answer.added)
+            comment = replace(self._row(student, "comment", "", answer.by, there), comment=answer.comment)
+            total = replace(self._row(student, "total", "", answer.by, there), points=answer.added)
             wanted = ((comment, answer.seen[0], answer.comment), (total, answer.seen[1], answer.added))
             gone = [
                 (row, seen) for row, seen, said in wanted if not said and there.rows.get(row.key) is not None
             ]
-            self._write([(row, seen) for row, seen, said in wanted if said], there, window, gone)
+            self._write([(row, seen) for row, seen, said in wanted if said], there, answer.window, gone)
             return self._marked_anew({answer.student})
 
     def move(self, answer: Answer, by: str, window: str) -> list[Student]:

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from grader.documents import CriterionDocument, QuantityDocument, ReportDocument, ResultsDocument
+from grader.documents import CriterionDocument, Quantity, ReportDocument, ResultsDocument
 from grader.feedback.numbers import settled_points
 
 SLACK = 1e-5
@@ -85,7 +85,7 @@ def _of_sentence(criterion: CriterionDocument) -> Iterator[str]:
     said = criterion.feedback
     if not said:
         yield "nothing is said"
-    if NOT_READ.search(said) and criterion.measured != QuantityDocument(unit=criterion.measured.unit):
+    if NOT_READ.search(said) and criterion.measured != Quantity(unit=criterion.measured.unit):
         yield f"'{said}' beside a measured value"
     if criterion.verdict != "review" and DOUBTS.search(said):
         yield f"settled, but '{said}'"

@@ -19,10 +19,10 @@ import numpy as np
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import Task, task_of
+from grader.documents import Quantity
 from grader.folder.batch import Batch, grade
 from grader.inputs.measurements import names_of, read_measurements
 from grader.marking.mark import judge
-from grader.outcomes import Quantity
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef, Reading
 from grader.rubric import RubricFile

@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 
 from grader.comparison.criteria import compare
 from grader.comparison.evidence import Submission
+from grader.documents import Quantity, Tolerance
 from grader.feedback.sentences import criterion_feedback
 from grader.marking.mark import judge, score
-from grader.outcomes import Outcome, Quantity, Tolerance
+from grader.outcomes import Outcome
 from grader.records import Figure, Reading, ReadNode
 from grader.rubric import RubricFile, WeightsTable
 from reference.construction.mistakes import Mistake

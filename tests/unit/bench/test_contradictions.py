@@ -2,12 +2,12 @@
 
 import pytest
 
-from grader.documents import DecidedDocument, MistakeDocument, QuantityDocument
+from grader.documents import DecidedDocument, MistakeDocument, Quantity
 from tests.bench.contradictions import contradictions
 from tests.unit.feedback.works import criterion, report
 
-NEAR = QuantityDocument(length_mm=46.9, direction_deg=13.0)
-FAR = QuantityDocument(length_mm=61.6, direction_deg=13.0)
+NEAR = Quantity(length_mm=46.9, direction_deg=13.0)
+FAR = Quantity(length_mm=61.6, direction_deg=13.0)
 
 
 def row(verdict="full", points=5.0, said="Right.", **changes):

@@ -2,7 +2,7 @@
 
 import re
 
-from grader.documents import DecidedDocument, QuantityDocument, ScaleDocument
+from grader.documents import DecidedDocument, Quantity, ScaleDocument
 from grader.feedback.class_page import distribution_svg
 from grader.feedback.class_statistics import (
     commonest,
@@ -92,7 +92,7 @@ def test_follow_through_is_counted_by_points_students_and_criteria():
 
 def test_scales_lost_or_not_understood_are_told_and_links_are_no_scales():
     def about(name, verdict, unit):
-        quantity = QuantityDocument(value=0.05, unit=unit)
+        quantity = Quantity(value=0.05, unit=unit)
         return criterion(name, verdict, 0.0).model_copy(update={"vector": None, "expected": quantity})
 
     refused = {"ka": ScaleDocument(declared=None, used=1.0, assumed=True, text="bla", refused="why")}

@@ -6,10 +6,11 @@ from dataclasses import replace
 import pytest
 
 from grader import outcomes
+from grader.documents import Quantity, Tolerance
 from grader.feedback.mistakes import MISTAKES
 from grader.feedback.sentences import FULL, HINTS, criterion_feedback, mistake_feedback, reason_sentence
 from grader.language import LANGUAGES, tongue
-from grader.outcomes import NamedMistake, Outcome, Quantity, Reason, Tolerance
+from grader.outcomes import NamedMistake, Outcome, Reason
 from reference.construction.mistakes import CODES, Mistake
 
 TOO_LONG = Reason("too_long", {"measured_mm": 49.5, "expected_mm": 47.2, "off_mm": 2.3, "tolerance_mm": 1.0})
@@ -128,7 +129,9 @@ def test_what_is_not_required_is_not_called_missing_too():
 def test_what_was_read_is_not_called_unread():
     unread = Reason("unread", {"reason": "n_BA, on which it hangs, was not read for certain"})
     doubtful = Reason("doubtful", {"confidence": 0.4})
-    read = replace(outcome("review", doubtful, unread), measured=Quantity(48.1, 255.0))
+    read = replace(
+        outcome("review", doubtful, unread), measured=Quantity(length_mm=48.1, direction_deg=255.0)
+    )
     told = "It was read with too little certainty (n_BA, on which it hangs, was not read for certain)."
     assert criterion_feedback(read, "en") == told
     assert criterion_feedback(read, "en", "hint") == "It was read with too little certainty."

@@ -6,9 +6,9 @@ from dataclasses import replace
 from grader.documents import (
     DecidedDocument,
     MistakeDocument,
-    QuantityDocument,
+    Quantity,
     RivalDocument,
-    ToleranceDocument,
+    Tolerance,
 )
 from grader.feedback.student_page import GROUPS, About, StudentPage, feedback_page
 from grader.language import tongue
@@ -126,7 +126,7 @@ def test_what_waits_is_told_with_what_it_is_likely_to_be():
 
 def test_what_was_read_is_not_called_unread():
     unsure = criterion("v_B", "review", None).model_copy(update={"reasons": ["unread"]})
-    nothing = unsure.model_copy(update={"measured": QuantityDocument()})
+    nothing = unsure.model_copy(update={"measured": Quantity()})
     told = [page_of(report(criteria=[row], mistakes=[])).waiting[0][0] for row in (unsure, nothing)]
     assert told == ["read with too little certainty", "not read on the sheet"]
 
@@ -139,7 +139,7 @@ def test_what_was_expected_from_own_values_says_so():
 def test_no_direction_is_shown_where_none_is_judged():
     short = criterion("v_B").model_copy(
         update={
-            "expected": QuantityDocument(length_mm=0.4, direction_deg=90.0),
+            "expected": Quantity(length_mm=0.4, direction_deg=90.0),
             "reasons": ["right", "too_short_to_judge"],
         }
     )
@@ -213,7 +213,7 @@ def test_what_is_not_required_and_not_there_takes_one_line():
 
 def test_a_widened_tolerance_is_told_as_such_with_the_reason():
     wider = criterion("v_B").model_copy(
-        update={"tolerance": ToleranceDocument(length_mm=2.4, direction_deg=3.0, widened=True)}
+        update={"tolerance": Tolerance(length_mm=2.4, direction_deg=3.0, widened=True)}
     )
     page = page_of(report(criteria=[wider, criterion("v_A")], mistakes=[]))
     assert [page.tolerance(row) for row in page.report.criteria] == [

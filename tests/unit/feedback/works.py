@@ -7,12 +7,12 @@ from grader.documents import (
     CriterionDocument,
     MistakeDocument,
     ProblemDocument,
-    QuantityDocument,
+    Quantity,
     ReportDocument,
     ResultsDocument,
     RivalDocument,
     ScaleDocument,
-    ToleranceDocument,
+    Tolerance,
     UnmatchedDocument,
 )
 from grader.overlay.scene import Arrow, Dot, Ghost, Picture, Scene
@@ -23,9 +23,9 @@ HOSTILE = '<script>alert("x")</script>'
 def criterion(name="v_B", verdict="full", points=5.0, *, feedback="Right.", title=None):
     return CriterionDocument(
         id=name, title=title or f"Vector {name}", vector=name, points=points, max_points=5.0, verdict=verdict,
-        measured=QuantityDocument(length_mm=47.25, direction_deg=12.5, value=1.701, unit="m/s"),
-        expected=QuantityDocument(length_mm=46.4, direction_deg=13.5, value=1.6704, unit="m/s"),
-        tolerance=ToleranceDocument(length_mm=1.0, direction_deg=1.5), confidence=0.99, feedback=feedback,
+        measured=Quantity(length_mm=47.25, direction_deg=12.5, value=1.701, unit="m/s"),
+        expected=Quantity(length_mm=46.4, direction_deg=13.5, value=1.6704, unit="m/s"),
+        tolerance=Tolerance(length_mm=1.0, direction_deg=1.5), confidence=0.99, feedback=feedback,
     )  # fmt: skip
 
 

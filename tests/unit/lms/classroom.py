@@ -6,10 +6,10 @@ from grader.documents import (
     CriterionDocument,
     MistakeDocument,
     ProblemDocument,
-    QuantityDocument,
+    Quantity,
     ReportDocument,
     ResultsDocument,
-    ToleranceDocument,
+    Tolerance,
 )
 from grader.lms.export import export
 from grader.lms.grades import Options
@@ -18,9 +18,9 @@ from grader.lms.grades import Options
 def criterion(name, verdict, points, feedback=""):
     return CriterionDocument(
         id=name, title=f"Vector {name}", vector=name, points=points, max_points=5.0, verdict=verdict,
-        measured=QuantityDocument(length_mm=47.25, direction_deg=12.5),
-        expected=QuantityDocument(length_mm=46.4, direction_deg=12.0, value=1.67, unit="m/s"),
-        tolerance=ToleranceDocument(length_mm=1.0, direction_deg=1.5), confidence=0.99, feedback=feedback,
+        measured=Quantity(length_mm=47.25, direction_deg=12.5),
+        expected=Quantity(length_mm=46.4, direction_deg=12.0, value=1.67, unit="m/s"),
+        tolerance=Tolerance(length_mm=1.0, direction_deg=1.5), confidence=0.99, feedback=feedback,
     )  # fmt: skip
 
 

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from grader.documents import Quantity, Tolerance
 from grader.inputs.decisions import Decision
 from grader.marking.decided import decide
 from grader.marking.mark import score
-from grader.outcomes import Judgement, NamedMistake, Outcome, Quantity, Reason, Tolerance
+from grader.outcomes import Judgement, NamedMistake, Outcome, Reason
 from grader.rubric import load_rubric
 from reference.construction.mistakes import Mistake
 

@@ -2,8 +2,9 @@
 
 import pytest
 
+from grader.documents import Quantity, Tolerance
 from grader.marking.mark import score
-from grader.outcomes import Outcome, Quantity, Tolerance
+from grader.outcomes import Outcome
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference.authored.toml_file import Text
 

@@ -7,7 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from grader.outcomes import Outcome, Quantity, Tolerance
+from grader.documents import Quantity, Tolerance
+from grader.outcomes import Outcome
 from grader.overlay.picture import backdrop, overlay, paint
 from grader.overlay.scene import ARROW_WIDTH_MM, COLOURS, MARKS, Arrow, Ghost, Scene, labels_of, scene_of
 from grader.records import Figure, Page, Reading, ReadNode, ReadVector, Sheet
