@@ -88,19 +88,13 @@ def score_line(report: ReportDocument, speaker: Tongue) -> str:
 
     Empty where nothing was judged.
     """
-    parts = _parts(report)
+    parts = parts_of(report)
     if not parts:
         return ""
     return " ".join((_settled(report, parts, speaker), *_open_and_added(report, parts, speaker)))
 
 
-def settled_points(report: ReportDocument) -> float | None:
-    """What the points of the rows give together, in points of the score; None where nothing was judged."""
-    parts = _parts(report)
-    return sum(part.result for part in parts) if parts else None
-
-
-def _parts(report: ReportDocument) -> list[Part]:
+def parts_of(report: ReportDocument) -> list[Part]:
     """Each section with a weight of its own, of which anything was judged, and all others together."""
     parts = []
     for section in dict.fromkeys(criterion.section for criterion in report.criteria):

@@ -54,7 +54,7 @@ def measured_picture(
                 drawn[figure] = plan
     if not drawn:
         return None
-    return Picture(source, 1, b"", b"", 0, 0, _side_by_side(list(drawn.values())))
+    return Picture(source, 1, b"", b"", _side_by_side(list(drawn.values())))
 
 
 def _plan(

@@ -86,7 +86,6 @@ def overlay(
     show_expected : whether wrong vectors have the expected one ghosted in
     """
     scan = behind.scan
-    height, width = scan.shape
     scene = Scene(behind.page_mm)
     if behind.registered and reading is not None:
         scene = scene_of(
@@ -94,7 +93,7 @@ def overlay(
         )
     plain = _grey(cv2.LUT(scan, _FEW_TONES))
     png = _encode(".png", paint(plain, scene), _FLAT_PNG)
-    return Picture(behind.source, behind.page, png, _smaller(scan, plain), width, height, scene)
+    return Picture(behind.source, behind.page, png, _smaller(scan, plain), scene)
 
 
 def _smaller(scan: GreyImage, plain: GreyImage) -> bytes:

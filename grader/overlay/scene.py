@@ -151,7 +151,6 @@ class Picture:
     png : the overlay, painted
     scan : the cleaned scan alone, upright, for the page that draws the scene as SVG; a PNG or JPEG file,
         whichever is smaller; empty where nothing was scanned
-    width_px, height_px : of both
     scene : what is drawn on it; its page_mm spans the whole picture
     """
 
@@ -159,8 +158,6 @@ class Picture:
     page: int
     png: bytes
     scan: bytes
-    width_px: int
-    height_px: int
     scene: Scene
 
 

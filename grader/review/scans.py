@@ -16,8 +16,7 @@ KEPT = 6
 class Scans:
     """Decoded pages; safe for several threads."""
 
-    def __init__(self, kept: int = KEPT) -> None:
-        self._kept = kept
+    def __init__(self) -> None:
         self._pages: OrderedDict[tuple[str, int, str, float], tuple[Page, Sheet | None]] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -50,7 +49,7 @@ class Scans:
                 pixels = decode(ref)
                 opened = (pixels, None) if sheet is None or not bend else straighten(pixels, sheet)
                 self._pages[key] = opened
-                if len(self._pages) > self._kept:
+                if len(self._pages) > KEPT:
                     self._pages.popitem(last=False)
             self._pages.move_to_end(key)
             pixels, straight = self._pages[key]

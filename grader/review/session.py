@@ -30,8 +30,6 @@ from reference.construction.graph import Construction
 from reference.errors import CallError, PlanmarkError
 
 OPEN = "review"
-SURE = 0.9
-"""Proposals of at least this probability are offered to be accepted together."""
 MOST_COMMENTS = 30
 """Comments that are offered again."""
 

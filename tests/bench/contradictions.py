@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from grader.documents import CriterionDocument, Quantity, ReportDocument, ResultsDocument
-from grader.feedback.numbers import settled_points
+from grader.feedback.numbers import parts_of
 
 SLACK = 1e-5
 """Excess over a tolerance or over points by rounding."""
@@ -115,9 +115,10 @@ def _of_mistakes(report: ReportDocument) -> Iterator[str]:
 
 def _of_score(report: ReportDocument) -> Iterator[str]:
     """The score against the sum of the rows."""
-    settled = settled_points(report)
-    if settled is None:
+    parts = parts_of(report)
+    if not parts:
         return
+    settled = sum(part.result for part in parts)
     if report.score is not None and abs(settled + report.added - report.score) > 1e-3:
         yield f"score {report.score}, but the rows add up to {settled:.3f}"
     if report.score is None and report.score_range is not None:

@@ -90,5 +90,5 @@ def picture(source="s07.jpg", *, spread=60.0, scanned=True):
     ghosts = (Ghost("v_B", "velocity_plan", (100.0, 100.0), (100.0 + spread, 150.0)),)
     scene = Scene((420.0, 297.0), arrows, ghosts, dots)
     if not scanned:
-        return Picture(source, 1, b"", b"", 0, 0, scene)
-    return Picture(source, 1, png.tobytes(), jpeg.tobytes(), 420, 297, scene)
+        return Picture(source, 1, b"", b"", scene)
+    return Picture(source, 1, png.tobytes(), jpeg.tobytes(), scene)
