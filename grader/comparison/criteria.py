@@ -18,7 +18,7 @@ from grader.comparison.charges import Against, Charges, ComparedMark, new_charge
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather, held_against_cells
 from grader.comparison.follow_through import NO_SPREAD, Explain, ReplayResult, nothing_explained
 from grader.comparison.scales import Scale, settle
-from grader.comparison.task import Task, TaskSegment, unit_of
+from grader.comparison.task import Task, unit_of
 from grader.comparison.verdicts import (
     ALL_RIGHT,
     FULL,
@@ -169,7 +169,9 @@ def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> 
         mark,
         verdicts.quantity(one.name, drawn.length_mm, on_sheet, value),
         verdicts.expected_quantity(one.name, marked.expected, scale, drawn.turn_rad),
-        _full_tolerance(criterion, charges, marked, with_direction=with_direction),
+        _full_tolerance(
+            charges, criterion, marked.expected, marked.uncertainty, with_direction=with_direction
+        ),
         confidence=drawn.confidence,
         followed=marked.is_followed,
         mistake="arithmetic" if is_arithmetic else None,
@@ -224,14 +226,24 @@ def _is_boundless(uncertainty: EndSpread, size_mm: float) -> bool:
 
 
 def _full_tolerance(
-    criterion: CriterionTable, charges: Charges, marked: ComparedMark, *, with_direction: bool
+    charges: Charges,
+    criterion: CriterionTable,
+    expected: complex,
+    uncertainty: EndSpread,
+    *,
+    with_direction: bool = False,
 ) -> Tolerance:
-    """What full marks allow, for the report."""
-    size = abs(marked.expected)
+    """What full marks allow on paper; `expected` is complex millimetres."""
+    size = abs(expected)
     plain = tolerances(charges.task.rubric.tolerance_of(criterion), size, with_direction=with_direction)
-    if marked.uncertainty is NO_SPREAD:
+    if uncertainty is NO_SPREAD:
         return plain
-    return widened(plain, size, marked.uncertainty, charges.task.rubric.hand.at_most)
+    return widened(plain, size, uncertainty, charges.task.rubric.hand.at_most)
+
+
+def _of_value(on_paper: Tolerance, per_mm: float) -> Tolerance:
+    """The tolerance of a value from that of the length it stands for."""
+    return Tolerance(value=(on_paper.length_mm or 0.0) * per_mm, widened=on_paper.widened)
 
 
 # Computed values -----------------------------------------------------------------------------------
@@ -282,11 +294,7 @@ def value_outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
     value, unit = abs(values[one.name]), unit_of(one.name)
 
     def allowed(expected: complex, uncertainty: EndSpread) -> Tolerance:
-        plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(expected), with_direction=False)
-        if uncertainty is NO_SPREAD:
-            return Tolerance(value=(plain.length_mm or 0.0) * scale)
-        wider = widened(plain, abs(expected), uncertainty, charges.task.rubric.hand.at_most)
-        return Tolerance(value=(wider.length_mm or 0.0) * scale, widened=wider.widened)
+        return _of_value(_full_tolerance(charges, criterion, expected, uncertainty), scale)
 
     def against(
         expected: complex, uncertainty: EndSpread = NO_SPREAD, se: EndSpread = NO_SPREAD
@@ -434,7 +442,10 @@ def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     allowed = Tolerance(value=plain)
     mark, followed = mark_value(value, right, plain, plain, table, unit), False
     if not mark.is_full:
-        allowed = _widened_rate(charges, criterion, segment, per_mm)
+        # It is as uncertain as the vector that turns the link.
+        exact = segment.drawn(charges.used)
+        uncertainty = charges.following.uncertainty_of(segment, exact)
+        allowed = _of_value(_full_tolerance(charges, criterion, exact, uncertainty), per_mm)
         mark = mark_value(value, right, allowed.value or 0.0, plain, table, unit)
     charges.remember(name, mark)
     follows = task.rubric.follows_through(criterion)
@@ -454,17 +465,6 @@ def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
             mark, right, followed = the_better(candidate, mark, follows_from), own, True
     measured, expected = Quantity(value=value, unit=unit), Quantity(value=right, unit=unit)
     return verdicts.outcome(criterion, mark, measured, expected, allowed, followed=followed)
-
-
-def _widened_rate(
-    charges: Charges, criterion: CriterionTable, segment: TaskSegment, per_mm: float
-) -> Tolerance:
-    """The tolerance of an angular quantity, widened by the uncertainty of the vector that turns the link."""
-    exact = segment.drawn(charges.used)
-    plain = tolerances(charges.task.rubric.tolerance_of(criterion), abs(exact), with_direction=False)
-    uncertainty = charges.following.uncertainty_of(segment, exact)
-    wider = widened(plain, abs(exact), uncertainty, charges.task.rubric.hand.at_most)
-    return Tolerance(value=(wider.length_mm or 0.0) * per_mm, widened=wider.widened)
 
 
 def rate_from_vector(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -> float | None:

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 from grader.outcomes import Outcome
 from grader.overlay.scene import (
-    HAS_GHOST,
     LEAST_ARROW_MM,
     XY,
     Arrow,
@@ -20,7 +19,7 @@ from grader.overlay.scene import (
     Picture,
     Scene,
     expected_vector,
-    ghost_of,
+    ghosts_of,
     on_paper,
 )
 from grader.records import Reading
@@ -84,11 +83,7 @@ def _plan(
     vectors = [vector for vector in construction.vectors_of(figure) if vector.name in steps]
     nodes = _nodes(pole, vectors, steps)
     arrows = tuple(_arrows(figure, vectors, steps, nodes, outcomes))
-    ghosts = tuple(
-        ghost_of(arrow, vector)
-        for arrow in arrows
-        if arrow.verdict in HAS_GHOST and (vector := expected.get(arrow.name)) is not None
-    )
+    ghosts = tuple(ghosts_of(arrows, outcomes)) if show_expected else ()
     dots = tuple(
         Dot(name, on_paper(place), doubtful=False, lettered=True, figure=figure)
         for name, place in nodes.items()

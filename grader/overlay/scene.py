@@ -7,7 +7,7 @@ dashes, doubtful ones short ones, expected ones dots. Nothing rests on colour al
 
 import cmath
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -204,7 +204,7 @@ def scene_of(
         for kind, figure in reading.figures.items()
         for name, node in figure.nodes.items()
     )
-    ghosts = tuple(_ghosts(arrows, outcomes)) if show_expected else ()
+    ghosts = tuple(ghosts_of(arrows, outcomes)) if show_expected else ()
     return Scene(page_mm, tuple(arrows), ghosts, dots)
 
 
@@ -250,7 +250,7 @@ def _links(
             yield Arrow(name, MECHANISM, *ends, outcome.verdict, doubtful, is_link=True)
 
 
-def _ghosts(arrows: list[Arrow], outcomes: Mapping[str, Judged]) -> Iterator[Ghost]:
+def ghosts_of(arrows: Iterable[Arrow], outcomes: Mapping[str, Judged]) -> Iterator[Ghost]:
     """The expected vectors beside those that are wrong or wait for a person."""
     for arrow in arrows:
         expected = expected_vector(outcomes.get(arrow.name))
