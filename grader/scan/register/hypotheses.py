@@ -64,12 +64,14 @@ class Hypothesis:
 class Resolution:
     """The resolution to go by: as stated, or as the image's size and a usual dpi suggest.
 
-    `is_sure` where it is stated, and where the image has exactly A3's pixels by it.
+    `is_sure` where it is stated, and where the image has exactly A3's pixels by it; `copied` where it is
+    that of a copy, whose drawing may be smaller or larger.
     """
 
     dpi: tuple[float, float]
     stated: bool
     is_sure: bool
+    copied: bool = False
 
 
 def hypotheses(
@@ -214,7 +216,7 @@ def _scan_misfit(params: FloatArray, resolution: Resolution | None) -> float:
     unequal = (params[0] - params[1]) / _UNEQUAL_SE
     penalty = 0.5 * unequal**2
     if resolution is not None:
-        se, most = (_DPI_SE, 3.0) if resolution.is_sure else (_WINDOW_SE, 1.5)
+        se, most = (_DPI_SE, 3.0) if resolution.is_sure and not resolution.copied else (_WINDOW_SE, 1.5)
         wrong = (params[:2] - np.log(np.array(resolution.dpi) / MM_PER_INCH)) / se
         penalty += min(most, 0.25 * float(wrong @ wrong))
     return float(penalty)

@@ -150,6 +150,8 @@ def register_plain(page: Page) -> Sheet | Unread:
     problems: list[Problem] = []
     resolution = _resolution(page, problems)
     dpi = resolution.dpi if resolution is not None and resolution.is_sure else None
+    if resolution is not None and _is_copy(page):
+        resolution = replace(resolution, copied=True)
     ranked = hypotheses(lines, shape, resolution)
     if page.turn_is_sure:
         ranked = [
@@ -160,7 +162,7 @@ def register_plain(page: Page) -> Sheet | Unread:
     if ranked:
         if dpi is None and resolution is not None and _passes_for_frame(ranked, resolution.dpi):
             return _from_resolution(page, resolution, lines, problems)
-        rival = None if dpi is not None else _rival_scale(ranked)
+        rival = None if dpi is not None and not _is_copy(page) else _rival_scale(ranked)
         best = _turned_as_stated(ranked, page.turn_deg)
         told = list(problems)
         sheet = _from_lines(page, best, lines, dpi, told)
