@@ -172,13 +172,14 @@ class Charges:
         return replace(mark, best=FULL, reasons=(*mark.reasons, unread), sure=min(mark.sure, EVEN))
 
     def unknown_upstream(self, segment: TaskSegment) -> tuple[str, ...]:
-        """The nodes that a vector's head is made from and that were not read, of figures that were."""
+        """What a vector is made from and was not read: nodes, of figures that were, and its scale."""
         construction, nodes = self.task.construction, self.evidence.nodes
+        scale = self.settled[segment.scale].mark
+        is_unseen = scale is not None and any(reason.code == "unread" for reason in scale.reasons)
         needs = [need for need in construction.step(segment.head).needs if need not in nodes]
-        if not needs:
-            return ()
-        read = {construction.figure_of(node) for node in nodes}
-        return tuple(dict.fromkeys(need for need in needs if construction.figure_of(need) in read))
+        read = {construction.figure_of(node) for node in nodes} if needs else set()
+        unread = dict.fromkeys(need for need in needs if construction.figure_of(need) in read)
+        return (*((segment.scale,) if is_unseen else ()), *unread)
 
     # What is wrong --------------------------------------------------------------------------------
 

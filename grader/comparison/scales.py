@@ -135,9 +135,12 @@ def _evidence_of(
     drawn = evidence.vector(vector)
     if drawn is None or drawn.length_mm <= 0.0 or not task.real.get(vector):
         return None
-    if drawn.confidence < task.rubric.least_confidence and not however_doubtful:
-        return None
-    return abs(task.real[vector]), drawn.length_mm, drawn.se_mm
+    shown = abs(task.real[vector]), drawn.length_mm, drawn.se_mm
+    least = task.rubric.least_confidence
+    if drawn.confidence >= least or however_doubtful:
+        return shown
+    # Where others that were surely read are right at its scale, it was read rightly.
+    return shown if _fitting(task, evidence, name, shown[0] / shown[1], least) >= TELLING else None
 
 
 def _doubtful_crank(task: Task, evidence: Evidence) -> tuple[float, float] | None:
@@ -160,14 +163,14 @@ def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> fl
     return other if _fitting(task, evidence, name, other) > _fitting(task, evidence, name, used) else None
 
 
-def _fitting(task: Task, evidence: Evidence, name: str, scale: float) -> int:
-    """How many drawn vectors beside the one of the crank have the right length at a scale."""
+def _fitting(task: Task, evidence: Evidence, name: str, scale: float, least: float = 0.0) -> int:
+    """How many drawn vectors of such a confidence, beside the crank's, have the right length at a scale."""
     vectors = [v for v in task.construction.vectors.values() if v.scale == name]
     known = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != f"{name[1]}_{task.pin}"]
     return sum(
         _fits(drawn, abs(task.real[vector]) / scale, task.rubric.tolerance_of(vector))
         for vector, drawn in known
-        if drawn is not None
+        if drawn is not None and drawn.confidence >= least
     )
 
 

@@ -168,6 +168,26 @@ def test_a_crank_drawn_too_long_beside_right_links_is_a_wrong_crank_and_no_wrong
     assert outcome_of(comparison, "O2B").verdict == "full"
 
 
+def ten_times_smaller(**v_a):
+    """A velocity plan at a tenth of the declared scale; `v_a`, what is changed of v_A as read."""
+    drawn = sheet(TASK, {**RULE, "kv": 10.0 * RULE["kv"]})
+    read = changed(drawn, "v_A", **v_a) if v_a else without(drawn, "v_A")
+    return compare(TASK, Submission(readings=(read,), declared=declared()))
+
+
+def test_a_doubtful_vector_of_the_crank_tells_the_scale_where_others_bear_it_out():
+    comparison = ten_times_smaller(confidence=0.85)
+    assert outcome_of(comparison, "kv").verdict == "none"
+    assert outcome_of(comparison, "v_B").verdict == "follow_through"
+
+
+def test_while_the_scale_of_a_plan_was_not_read_nothing_is_charged_at_it():
+    comparison = ten_times_smaller()
+    velocities = {one.criterion: one.verdict for one in comparison.outcomes if one.criterion.startswith("v_")}
+    assert outcome_of(comparison, "kv").verdict == "review"
+    assert set(velocities.values()) == {"review"}
+
+
 def test_links_are_not_judged_where_no_sketch_was_read():
     comparison = compare(TASK, Submission(measured=measured(TASK)))
     assert {one.verdict for one in comparison.outcomes if one.name in TASK.construction.links} == {
