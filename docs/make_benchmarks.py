@@ -1,7 +1,8 @@
 """Measure and put the figures into benchmarks.md: `python -m docs.make_benchmarks`, some half an hour.
 
-With `solver`, `reading`, `paper`, `curve`, `lines`, `judging` or `settling` only that part is measured and replaced;
-a number is that of students: for each scene, for each kind, hand and mechanism, for each kind of sheet.
+With `solver`, `reading`, `paper`, `curve`, `lines`, `judging` or `settling` only that part is measured and
+replaced; a number is that of students: for each scene, for each kind, hand and mechanism, for each kind of
+sheet.
 """
 
 import re

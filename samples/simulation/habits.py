@@ -1,4 +1,4 @@
-"""What people leave on a sheet beside the drawing asked for: helper lines, dimensions, corrections, other figures."""
+"""What people leave on a sheet beside the drawing: helper lines, dimensions, corrections, other figures."""
 
 from collections.abc import Mapping, Sequence
 from typing import get_args

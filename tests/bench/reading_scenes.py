@@ -89,7 +89,6 @@ SCENES = (
 )
 
 
-
 def _left(*habits: Habit) -> Callable[[Settings], Settings]:
     """Somebody who leaves this on the sheet."""
     return lambda own: replace(own, student=replace(own.student, habits=habits))

@@ -1,4 +1,4 @@
-"""What people leave beside a drawing is seen on the sheet and leaves the true vectors; so do paper and scanners."""
+"""What people leave beside a drawing is seen and leaves the true vectors; so do paper and scanners."""
 
 from dataclasses import replace
 
@@ -52,7 +52,9 @@ def test_a_dithered_page_has_two_values_and_tones():
     scan = replace(SMALL, device="copier", mode="bilevel", container="png", dpi=100.0)
     plain, tones = drawn(scan=scan).image, drawn(scan=replace(scan, dithered=True)).image
     assert set(np.unique(tones)) == {0, 255}
-    changes = [np.count_nonzero(image[:, 1:] != image[:, :-1]) / (image == 0).sum() for image in (plain, tones)]
+    changes = [
+        np.count_nonzero(image[:, 1:] != image[:, :-1]) / (image == 0).sum() for image in (plain, tones)
+    ]
     assert changes[1] > 1.5 * changes[0]
 
 

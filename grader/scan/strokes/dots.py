@@ -1,18 +1,12 @@
-"""Black and white scans whose lines are rows of dots: faint copies and dithered tones, joined to lines again."""
+"""Black and white scans whose lines are rows of dots (faint copies, dithered tones), joined to lines."""
 
 import cv2
 import numpy as np
 
 from grader.records import GreyImage
-from grader.scan.pixels import averaged
+from grader.scan.pixels import averaged, is_dotted
 from grader.scan.strokes.seeds import PX_PER_MM, working_scale
 
-_SAMPLED = 37
-"""Every such row tells whether a page has tones."""
-_LONELY = 3
-"""Of the nine pixels around a dot: so many are ink at most. A line that is drawn through has more."""
-_DOTTED = 0.17
-"""Share of ink in such dots: copies have up to 0.11, a faint one 0.25, a dithered page 0.35 and more."""
 _SOFT_MM = 0.13
 """Dots of a line are this near to each other."""
 _LINE_MM = 4.2
@@ -25,28 +19,16 @@ _GAIN = 2.5
 """A line a third of which is left becomes as dark as one drawn through."""
 
 
-def is_dotted(grey: GreyImage) -> bool:
-    """Whether a page is black and white, and much of its ink single dots."""
-    rows = grey[::_SAMPLED]
-    if np.any((rows > 0) & (rows < 255)):
-        return False
-    ink = np.asarray(cv2.compare(grey, 128, cv2.CMP_LT)) & 1
-    around = cv2.boxFilter(ink, cv2.CV_8U, (3, 3), normalize=False)
-    lonely = cv2.countNonZero(cv2.multiply(ink, np.asarray(around <= _LONELY).astype(np.uint8)))
-    return lonely > _DOTTED * max(cv2.countNonZero(ink), 1)
-
-
 def joined_dots(grey: GreyImage, px_per_mm: float) -> GreyImage:
     """A dotted page in tones, with lines where rows of dots lie; any other page as it is given."""
     if not is_dotted(grey):
         return grey
-    dark = cv2.bitwise_not(cv2.GaussianBlur(grey, (0, 0), _SOFT_MM * px_per_mm))
+    soft = np.asarray(cv2.GaussianBlur(grey, (0, 0), _SOFT_MM * px_per_mm), dtype=np.uint8)
     side = max(1, round(1.0 / working_scale(px_per_mm)))
-    lines = _along_lines(averaged(cv2.bitwise_not(grey), side))
-    lines = cv2.resize(lines, None, fx=side, fy=side, interpolation=cv2.INTER_LINEAR)
-    part = dark[: lines.shape[0], : lines.shape[1]]
-    part[:] = cv2.max(part, lines)
-    return np.asarray(cv2.bitwise_not(dark), dtype=np.uint8)
+    lines = cv2.resize(_along_lines(averaged(~grey, side)), None, fx=side, fy=side)
+    part = soft[: lines.shape[0], : lines.shape[1]]
+    part[:] = np.minimum(part, ~np.asarray(lines, dtype=np.uint8))
+    return soft
 
 
 def _along_lines(dark: GreyImage) -> GreyImage:

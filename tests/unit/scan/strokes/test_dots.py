@@ -4,7 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from grader.scan.strokes.dots import is_dotted, joined_dots
+from grader.records import Page
+from grader.scan.decode.pages import is_blank
+from grader.scan.pixels import is_dotted
+from grader.scan.strokes.dots import joined_dots
 from grader.scan.strokes.seeds import find_seeds
 
 PX_PER_MM = 11.81
@@ -69,3 +72,14 @@ def test_any_other_page_is_left_as_it_is():
     for page in (copy, grey):
         assert not is_dotted(page)
         assert joined_dots(page, PX_PER_MM) is page
+
+
+def test_a_page_of_faint_lines_is_not_blank_and_one_of_pepper_is():
+    page = np.full((3508, 4961), 255, np.uint8)
+    for row in range(800, 2800, 400):
+        cv2.line(page, (900, row), (2900, row + 300), 0, 4)
+    page[np.random.default_rng(3).random(page.shape) > 0.2] = 255
+    assert not is_blank(Page("copy.tif", 1, page))
+    pepper = np.full(page.shape, 255, np.uint8)
+    pepper.reshape(-1)[np.random.default_rng(4).integers(0, pepper.size, 150)] = 0
+    assert is_blank(Page("back.tif", 1, pepper))
