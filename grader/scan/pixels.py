@@ -41,7 +41,7 @@ _RIM = 0.06
 _LONELY = 3
 """Of the nine pixels around a dot: so many are ink at most. A line that is drawn through has more."""
 _DOTTED = 0.12
-"""Share of ink in such dots: copies have up to 0.06, faint ones 0.16 to 0.42, dithered pages 0.32 and more."""
+"""Share of ink in such dots: copies have up to 0.06, faint ones 0.16 to 0.42, dithered pages over 0.3."""
 _TUKEY_ROUNDS = 6
 _TUKEY = 4.685
 """Tukey's constant: 95 % efficient for normal errors."""
