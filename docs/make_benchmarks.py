@@ -1,7 +1,8 @@
 """Measure and put the figures into benchmarks.md: `python -m docs.make_benchmarks`, some half an hour.
 
-With `solver`, `reading`, `curve`, `lines`, `judging` or `settling` only that part is measured and replaced;
-a number is that of students: for each scene, for each kind, hand and mechanism, for each kind of sheet.
+With `solver`, `reading`, `paper`, `curve`, `lines`, `judging` or `settling` only that part is measured and
+replaced; a number is that of students: for each scene, for each kind, hand and mechanism, for each kind of
+sheet.
 """
 
 import re
@@ -17,8 +18,8 @@ from tests.bench.judging_tally import judging_tables
 from tests.bench.lines import lines_tables, measure_lines
 from tests.bench.plain_text import Table, as_text
 from tests.bench.reading import STUDENTS, curve_picture, curve_tables, measure_curve, measure_reading
-from tests.bench.reading_scenes import foreign_tables, measure_foreign
-from tests.bench.reading_tally import reading_tables
+from tests.bench.reading_scenes import PAPER_SCENES, foreign_tables, measure_foreign
+from tests.bench.reading_tally import paper_tables, reading_tables
 from tests.bench.settling import measure
 from tests.bench.solver import measure_solver, solver_tables
 
@@ -29,6 +30,11 @@ def _reading(students: int | None) -> Iterable[Table]:
     cv2.setNumThreads(1)
     rows = tuple(measure_reading(students=students or STUDENTS))
     return [*reading_tables(rows), *foreign_tables(tuple(measure_foreign()))]
+
+
+def _paper(students: int | None) -> Iterable[Table]:
+    cv2.setNumThreads(1)
+    return paper_tables(tuple(measure_reading(students=students or STUDENTS, scenes=PAPER_SCENES)))
 
 
 def _curve(students: int | None) -> Iterable[Table]:
@@ -58,6 +64,7 @@ def _settling(students: int | None) -> Iterable[Table]:
 PARTS: dict[str, Callable[[int | None], Iterable[Table]]] = {
     "solver": lambda _: solver_tables(measure_solver()),
     "reading": _reading,
+    "paper": _paper,
     "curve": _curve,
     "lines": _lines,
     "judging": _judging,

@@ -34,6 +34,14 @@ _REMAP_ROWS = 32000
 """Image maps may not have more rows."""
 _PART = 1 << 21
 """Values of each array of a computation in parts: 8 MB in single precision."""
+_SAMPLED_ROWS = 37
+"""Every such row tells whether a page has tones."""
+_RIM = 0.06
+"""Of the long side: paper's edges on a copier's glass are broad and black."""
+_LONELY = 3
+"""Of the nine pixels around a dot: so many are ink at most. A line that is drawn through has more."""
+_DOTTED = 0.12
+"""Share of ink in such dots: copies have up to 0.06, faint ones 0.16 to 0.42, dithered pages over 0.3."""
 _TUKEY_ROUNDS = 6
 _TUKEY = 4.685
 """Tukey's constant: 95 % efficient for normal errors."""
@@ -250,6 +258,18 @@ def averaged(grey: GreyImage, side: int) -> GreyImage:
     size = max(1, grey.shape[1] // side), max(1, grey.shape[0] // side)
     squares = grey[: size[1] * side, : size[0] * side]
     return np.asarray(cv2.resize(squares, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def is_dotted(grey: GreyImage) -> bool:
+    """Whether a page is black and white, and much of its ink single dots."""
+    rows = grey[::_SAMPLED_ROWS]
+    if np.any((rows > 0) & (rows < 255)):
+        return False
+    rim = round(_RIM * max(grey.shape))
+    ink = np.ascontiguousarray(grey[rim:-rim, rim:-rim] == 0) if rim else grey == 0
+    around = cv2.boxFilter(ink.view(np.uint8), cv2.CV_8U, (3, 3), normalize=False)
+    lonely = np.count_nonzero(ink & (np.asarray(around) <= _LONELY))
+    return bool(lonely > _DOTTED * np.count_nonzero(ink))
 
 
 # Pieces of ink ------------------------------------------------------------------------------------

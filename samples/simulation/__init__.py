@@ -6,6 +6,7 @@ drawing whatever the scanner: hand, page, pen and scanner have random streams of
 """
 
 from samples.simulation.desk import PrintedSheet
+from samples.simulation.habits import HABITS
 from samples.simulation.mixture import HARDSHIPS, PENS, any_settings, with_hardships
 from samples.simulation.settings import (
     CAREFUL,
@@ -33,6 +34,7 @@ from samples.simulation.student import (
 __all__ = [
     "CAREFUL",
     "CLEAN_SCAN",
+    "HABITS",
     "HARDSHIPS",
     "PENS",
     "PERFECT",

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from samples.simulation import figures, page, symbols, truth, wording
+from samples.simulation import figures, habits, page, symbols, truth, wording
 from samples.simulation.hand import DrawingTask, DrawnFigure, DrawnSheet
 from samples.simulation.lettering import any_handwriting
 from samples.simulation.scanner import Background
@@ -99,6 +99,8 @@ class Desk:
             velocities = next((f.nodes for f in sheet.figures if f.name == VELOCITY), {})
             lines = wording.calculations(self.task, self.settings.page, velocities)
             page.write_block(sketch, lines, room, boxes)
+        drawn = {figure.name: figures.at_origin(figure, origins[figure.name]) for figure in sheet.figures}
+        habits.add(sketch, self.task, drawn, self.settings.student.habits, (room, boxes))
         crossed = self._abandoned(sketch, sheet, room, boxes) if self.settings.student.abandoned else None
         told = truth.drawing_truth(self.task, sheet, sketch, origins, missing)
         told["scales"]["written"] = written
@@ -108,7 +110,10 @@ class Desk:
         room, taken = self._room()
         # A stream of its own for each kind of sheet: asked twice, it gives the same layout.
         rng = np.random.default_rng([self.seed, 4, len(sheet.kind)])
-        return page.place_figures(sheet.figures, room, taken, rng)
+        origins = page.place_figures(sheet.figures, room, taken, rng)
+        if origins is not None and "overlapping" in self.settings.student.habits:
+            return habits.overlapped(origins, room)
+        return origins
 
     def _room(self) -> tuple[Box, list[Box]]:
         """Where figures may go, and what is taken by the title block."""

@@ -37,13 +37,14 @@ def print_squares(sketch: SheetSketch) -> None:
     pitch = sketch.page.squared_mm
     if pitch <= 0.0:
         return
-    pen = PenWidth(SQUARES_LAYER, 0.12, 0.6, 0.0, 0.0)
     turn = complex(np.exp(1j * sketch.rng.normal(0.0, 0.003)))
     start = sketch.rng.uniform(0.0, pitch, 2)
     w, h = PAPER_MM
     lines = [(complex(x, 4.0), complex(x, -h - 4.0)) for x in np.arange(start[0], w, pitch)]
-    lines += [(complex(-4.0, -y), complex(w + 4.0, -y)) for y in np.arange(start[1], h, pitch)]
-    for p, q in lines:
+    level = [(complex(-4.0, -y), complex(w + 4.0, -y)) for y in np.arange(start[1], h, pitch)]
+    for number, (p, q) in [*enumerate(lines), *enumerate(level)]:
+        strong = pitch > 2.0 or number % 5 == 0
+        pen = PenWidth(SQUARES_LAYER, 0.12, 0.6 if strong else 0.35, 0.0, 0.0)
         sketch.strokes.append(straight(sketch.rng, pen, p * turn, q * turn))
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from samples.simulation.raster import render
 from samples.simulation.settings import Colour, PenStyle, Scan
@@ -51,7 +52,8 @@ def smudge(mx: Float32Array, my: Float32Array, rng: Rng) -> Float32Array:
 
 
 _TONER: Colour = (22, 22, 24)
-_SQUARES: Colour = (150, 190, 225)
+_UNSHARP_PX = 1.6
+"""Radius of scanners' unsharp masks."""
 _COARSE = 8
 """Pixels per sample of the soft faults (light, smudges, folds)."""
 
@@ -71,13 +73,14 @@ class DrawnPaper:
     strokes: Sequence[InkStroke]
     pens: PenStyle
     background: Background | None = None
+    squares: Colour = (150, 190, 225)
 
 
 def digitise(paper: DrawnPaper, scan: Scan, view: PaperView, rng: Rng) -> NDArray[np.uint8]:
     """The stored image: (h, w) grey, (h, w, 3) RGB, or for one bit (h, w) of 0 and 255."""
     light = _light(scan, view, rng, paper.pens.smudges)
     mask = _paper_mask(view, scan)
-    inks = _inks(paper.strokes, paper.pens, view, rng)
+    inks = _inks(paper, view, rng)
     printed = None if paper.background is None else _printed(paper.background, view)
     ghost = _show_through(paper.strokes, view, scan)
     specks = _dust(scan, view.size, rng)
@@ -109,19 +112,18 @@ def _of(colour: Colour, channel: int | None) -> float:
 # Ink ----------------------------------------------------------------------------------------------
 
 
-def _inks(
-    strokes: Sequence[InkStroke], pens: PenStyle, view: PaperView, rng: Rng
-) -> list[tuple[Float32Array, Colour]]:
+def _inks(paper: DrawnPaper, view: PaperView, rng: Rng) -> list[tuple[Float32Array, Colour]]:
     """Coverage 0..1 and colour of each layer that is on the sheet."""
+    pens = paper.pens
     colours: Mapping[str, Colour] = {
         MAIN_LAYER: pens.colour,
         PLAN_LAYER: pens.plan_colour or pens.colour,
         PRINT_LAYER: _TONER,
-        SQUARES_LAYER: _SQUARES,
+        SQUARES_LAYER: paper.squares,
     }
     inks = []
     for layer, colour in colours.items():
-        own = [stroke for stroke in strokes if stroke.layer == layer]
+        own = [stroke for stroke in paper.strokes if stroke.layer == layer]
         if own:
             cover = render(own, view.to_px, view.size).astype(np.float32) / np.float32(255.0)
             if layer in {MAIN_LAYER, PLAN_LAYER} and pens.grain > 0:
@@ -287,6 +289,9 @@ def _sensed(plane: Float32Array, scan: Scan, rng: Rng, specks: Sequence[_Speck])
             cv2.circle(plane, (x, y), round(speck.radius_px * 16), speck.value, -1, cv2.LINE_AA, 4)
     if scan.blur_px > 0:
         plane = np.asarray(cv2.GaussianBlur(plane, (0, 0), scan.blur_px), dtype=np.float32)
+    if scan.sharpen > 0:
+        soft = np.asarray(cv2.GaussianBlur(plane, (0, 0), _UNSHARP_PX), dtype=np.float32)
+        plane = plane + np.float32(scan.sharpen) * (plane - soft)
     spread = float(np.hypot(scan.noise, scan.tint_grain))
     if spread > 0:
         plane = plane + _noise(plane.shape, spread, rng)
@@ -322,7 +327,11 @@ def _dust(scan: Scan, size: tuple[int, int], rng: Rng) -> list[_Speck]:
 
 
 def _one_bit(image: GreyImage, scan: Scan, rng: Rng) -> GreyImage:
-    """A copier's threshold, with a ragged edge and pepper."""
+    """A copier's threshold, with a ragged edge and pepper; or tones by error diffusion, paper to white."""
+    if scan.dithered:
+        white = np.float32(255.0 / (0.93 * _of(scan.paper, None)))
+        bright = np.clip(image.astype(np.float32) * white, 0.0, 255.0).astype(np.uint8)
+        return np.asarray(Image.fromarray(bright).convert("1").convert("L"), dtype=np.uint8)
     level = rng.uniform(0.68, 0.82) * 0.96 * _of(scan.paper, None)
     ragged = image.astype(np.float32) + _noise(image.shape, 7.0, rng)
     bits = np.where(ragged > level, 255, 0).astype(np.uint8)

@@ -6,6 +6,10 @@ from typing import Literal
 Colour = tuple[int, int, int]
 Box = tuple[float, float, float, float]
 """Left, top, width and height, sheet millimetres, y down."""
+Habit = Literal[
+    "erased", "struck", "long helpers", "dimensions", "hatched sections", "third figure", "overlapping"
+]
+"""What a person leaves on a sheet beside the drawing (`samples.simulation.habits`)."""
 MECHANISM, VELOCITY, ACCELERATION = "mechanism", "velocity_plan", "acceleration_plan"
 PLANS = (VELOCITY, ACCELERATION)
 """The figures of a drawing, by the names of the published formats."""
@@ -58,6 +62,7 @@ class Student:
     omitted : share of the pole-to-point vectors that are not drawn out
     abandoned : a figure begun and crossed out; with `abandoned_whole` drawn to its end before
     helpers : thin lines of no meaning: directions carried over from the sketch, rulers set wrongly
+    habits : what else is left on a plain sheet; ``overlapping`` figures lie on each other
     """
 
     crank_mm: float | None = None
@@ -74,6 +79,7 @@ class Student:
     abandoned: bool = False
     abandoned_whole: bool = False
     helpers: int = 0
+    habits: tuple[Habit, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +136,8 @@ class PenStyle:
 class PageStyle:
     """The page: frame, title block, language, what is written.
 
-    `squared_mm` is the pitch of paper with printed squares, 0 for plain paper; `letters_touch` the share
+    `squared_mm` is the pitch of paper with printed squares, 0 for plain paper, every fifth line of
+    millimetre paper stronger, in the colour `squares`; `letters_touch` the share
     of letters set down without a look at what is there, on lines and other letters.
     """
 
@@ -147,6 +154,7 @@ class PageStyle:
     end_labels: float = 0.3
     bar_over_vectors: bool = False
     squared_mm: float = 0.0
+    squares: Colour = (150, 190, 225)
     letters_touch: float = 0.0
 
 
@@ -163,9 +171,12 @@ class Scan:
     stretch : unequal scale, standard deviation of x and y against the dpi
     copy_scale : a copier's enlargement of the drawing
     dpi_tag : what the file says; None for nothing
+    jpeg_tables : the coarse tables of a program that saves for the web, in place of the quality
     streaks : faint lines along the whole image from dirt on the glass
     crease : how sharp a fold is, 1 for a usual one
     stains : rings and drops of coffee
+    sharpen : a scanner's unsharp mask, the share of an edge that is added to it
+    dithered : one bit by error diffusion, not by a threshold
     curl_mm : how far a photographed sheet's bow moves its middle against a flat one
     """
 
@@ -180,7 +191,10 @@ class Scan:
     copy_scale: float = 1.0
     dpi_tag: float | None = 300.0
     jpeg_quality: int = 85
+    jpeg_tables: Literal["", "web_low"] = ""
     blur_px: float = 0.55
+    sharpen: float = 0.0
+    dithered: bool = False
     noise: float = 2.0
     shading: float = 0.04
     paper: Colour = (246, 246, 242)

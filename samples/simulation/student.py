@@ -46,7 +46,7 @@ def encoded(image: Pixels, scan: Scan, *, exif: bool = False) -> bytes:
             marks[0x0112] = _EXIF_ORIENTATION[scan.quarter_turns % 4]
             tags["exif"] = marks
         flat = picture.convert("L") if scan.mode == "bilevel" else picture
-        flat.save(buffer, "JPEG", quality=scan.jpeg_quality, **tags)
+        flat.save(buffer, "JPEG", quality=scan.jpeg_tables or scan.jpeg_quality, **tags)
     return buffer.getvalue()
 
 
@@ -196,7 +196,8 @@ def _scanned(desk: Desk, sheet: DrawnSheet, number: tuple[int, int]) -> Simulate
     rng = np.random.default_rng([desk.seed, 3, number[0]])
     view = view_of(settings.scan, rng)
     background = None if desk.printed is None else desk.printed[sheet.kind].background
-    image = digitise(DrawnPaper(sketch.strokes, settings.pen, background), settings.scan, view, rng)
+    paper = DrawnPaper(sketch.strokes, settings.pen, background, settings.page.squares)
+    image = digitise(paper, settings.scan, view, rng)
     about = {"student_id": desk.student_id, "seed": desk.seed, "page": number[0]}
     return SimulatedSheet(image, {**told, **truth.scan_truth(view, frame, settings), **about}, settings)
 

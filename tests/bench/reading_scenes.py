@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
@@ -34,6 +35,7 @@ from samples.simulation.mixture import Device
 from samples.simulation.page import FRAMES_MM, draw_frame, print_squares
 from samples.simulation.printing import printed_sheets
 from samples.simulation.scanner import Background, DrawnPaper, digitise
+from samples.simulation.settings import Colour, Habit
 from samples.simulation.sketch import SheetSketch
 from samples.simulation.view import view_of
 from samples.simulation.wording import CAPTIONS, WORDS, declared_texts
@@ -54,6 +56,7 @@ class ReadingScene:
     dpi : None as it comes
     printed : drawn on the printed answer sheet
     hardship : how much more often than usual sheets are hard to read
+    changed : what the scene changes of somebody's settings
     """
 
     name: str
@@ -66,6 +69,7 @@ class ReadingScene:
     dpi: float | None = 300.0
     printed: bool = False
     hardship: float = 1.0
+    changed: Callable[[Settings], Settings] = lambda settings: settings
 
 
 ALL_HANDS = (CAREFUL, TYPICAL, SLOPPY)
@@ -83,6 +87,70 @@ SCENES = (
     ReadingScene("shaper", "shaper", assignment="shaper", hands=ALL_HANDS, mistakes=0.3),
     ReadingScene("piston", "piston", assignment="piston", hands=ALL_HANDS, mistakes=0.3),
 )
+
+
+def _left(*habits: Habit) -> Callable[[Settings], Settings]:
+    """Somebody who leaves this on the sheet."""
+    return lambda own: replace(own, student=replace(own.student, habits=habits))
+
+
+def _drawn(**pen: Any) -> Callable[[Settings], Settings]:
+    """Somebody with another pen."""
+    return lambda own: replace(own, pen=replace(own.pen, **pen))
+
+
+def _seen(**scan: Any) -> Callable[[Settings], Settings]:
+    """Somebody with another scanner."""
+    return lambda own: replace(own, scan=replace(own.scan, **scan))
+
+
+def _on(pitch_mm: float, colour: Colour, mode: Literal["grey", "colour"]) -> Callable[[Settings], Settings]:
+    """Somebody who draws on squared paper."""
+    return lambda own: replace(
+        own, page=replace(own.page, squared_mm=pitch_mm, squares=colour), scan=replace(own.scan, mode=mode)
+    )
+
+
+def _faint(own: Settings) -> Settings:
+    """A hard pencil, of which a copier loses half."""
+    pen = replace(own.pen, line_mm=0.35, thin_mm=0.2, dark=0.36, thin_dark=0.2, grain=0.4, colour=_LEAD)
+    return replace(own, pen=replace(pen, plan_colour=None))
+
+
+def _worn(own: Settings) -> Settings:
+    """Folded twice, punched, with two stains of coffee."""
+    return replace(own, scan=replace(own.scan, fold=True, crease=3.0, punched=True, stains=2))
+
+
+_LEAD: Colour = (78, 78, 82)
+_YELLOW: Colour = (236, 200, 40)
+_ORANGE: Colour = (240, 170, 110)
+_GREEN: Colour = (150, 205, 160)
+PAPER_SCENES = tuple(
+    replace(scene, hardship=0.0)
+    for scene in (
+        ReadingScene("erased", "vectors rubbed out", changed=_left("erased")),
+        ReadingScene("struck", "a vector anew beside a struck one", changed=_left("struck")),
+        ReadingScene("double", "lines drawn twice", changed=_drawn(doubled=1.0)),
+        ReadingScene("helpers", "helper lines to the edge", changed=_left("long helpers")),
+        ReadingScene("dimensions", "dimension lines", changed=_left("dimensions")),
+        ReadingScene("sections", "hatched sections", changed=_left("hatched sections")),
+        ReadingScene("overlapping", "overlapping figures", changed=_left("overlapping")),
+        ReadingScene("third", "a third figure", changed=_left("third figure")),
+        ReadingScene("yellow", "vectors in yellow", changed=lambda own: _drawn(plan_colour=_YELLOW)(
+            _seen(mode="colour")(own))),
+        ReadingScene("orange-1", "orange 1 mm paper, colour", changed=_on(1.0, _ORANGE, "colour")),
+        ReadingScene("green-1-grey", "green 1 mm paper, grey scan", changed=_on(1.0, _GREEN, "grey")),
+        ReadingScene("worn", "folds, holes, coffee", changed=_worn),
+        ReadingScene("sharpened", "unsharp mask, coarse JPEG",
+                     changed=_seen(sharpen=1.2, jpeg_tables="web_low", container="jpg")),
+        ReadingScene("faint", "faint 1-bit copies", device="copier", changed=_faint),
+        ReadingScene("dithered", "1 bit, dithered", device="copier", changed=_seen(dithered=True)),
+        ReadingScene("curled", "photos of a curled answer sheet", device="phone", dpi=None, printed=True,
+                     changed=_seen(curl_mm=2.5)),
+    )
+)  # fmt: skip
+"""Paper, habits and copies that the other scenes have seldom or never, each by itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +172,7 @@ class SceneWork:
 
 def scene_named(name: str) -> ReadingScene:
     """One of the scenes. Raises KeyError."""
-    return {scene.name: scene for scene in SCENES}[name]
+    return {scene.name: scene for scene in (*SCENES, *PAPER_SCENES)}[name]
 
 
 def works(scene: ReadingScene, students: int, first_seed: int = 1) -> Iterator[SceneWork]:
@@ -142,7 +210,7 @@ def _settings(scene: ReadingScene, assignment: Assignment, variant: Variant, see
         )  # fmt: skip
         if settings.student.mistakes or not scene.wrong:
             break
-    return replace(settings, hand=hand)
+    return scene.changed(replace(settings, hand=hand))
 
 
 def answer_sheets(assignment: Assignment, variant: Variant) -> Mapping[str, PrintedSheet]:

@@ -297,6 +297,11 @@ def reading_tables(reading: Sequence[SceneRow]) -> Iterator[Table]:
         yield _table("Reading: processor milliseconds per page, and peak memory", reading, _TIMES)
 
 
+def paper_tables(reading: Sequence[SceneRow]) -> Iterator[Table]:
+    """The rows of scenes of paper and habits: one short table."""
+    yield _table("Reading: paper, habits and copies, each by itself", reading, _PAPER)
+
+
 def _table(title: str, rows: Sequence[SceneRow], columns: Sequence[Column]) -> Table:
     return title, [head for head, _ in columns], [[cell(row) for _, cell in columns] for row in rows]
 
@@ -329,6 +334,16 @@ _VECTORS: Sequence[Column] = (
     ("unread", lambda row: percent(row.unread)),
     ("under 5 mm: right", lambda row: f"{percent(row.short_right)} of {row.short}"),
     ("silent misreads", lambda row: f"{row.misreads} of {row.confidently}"),
+)
+_PAPER: Sequence[Column] = (
+    _SCENE,
+    ("sheets", lambda row: str(row.sheets)),
+    ("vectors", lambda row: str(row.vectors)),
+    ("right", lambda row: percent(row.right)),
+    ("believed", lambda row: percent(row.confident)),
+    ("misread", lambda row: f"{row.misreads} of {row.confidently}"),
+    ("refused", lambda row: str(row.refused)),
+    ("ms a page", lambda row: f"{row.processor_ms:.0f}"),
 )
 _NODES: Sequence[Column] = (
     _SCENE,

@@ -12,7 +12,7 @@ import numpy as np
 from grader.records import Page, PageRef
 from grader.scan.decode import pdf, pictures, tiff
 from grader.scan.decode.limits import Door, InputFile, changed, kind_of, load
-from grader.scan.pixels import connected, shrink
+from grader.scan.pixels import connected, is_dotted, shrink
 from reference.errors import InputFileError
 
 _DOORS: dict[str, Door] = {"jpeg": pictures.JPEG, "png": pictures.PNG, "tiff": tiff.TIFF, "pdf": pdf.PDF}
@@ -20,6 +20,10 @@ _LONG_SIDE_PX = 1700
 """About 4 px/mm on A3: strokes of 0.3 mm survive, dust and grain fade."""
 _DARK = 0.16
 """Contrast of a pencil stroke at this resolution; what shows through paper stays under 0.1."""
+_DOTTED_DARK = 0.08
+"""The same of a line of dots, of a black and white page, on which nothing shows through."""
+_DOT_GAP_PX = 7
+"""Dots of a faint copy's line are this near to each other: 1.7 mm."""
 _LONG = 0.012
 """Of the long side (5 mm on A3): longer than dust, hairs and letters that show through."""
 _RIM = 0.03
@@ -108,7 +112,10 @@ def is_blank(page: Page) -> bool:
     rim = min(int(_RIM * max(small.shape)), (min(small.shape) - 1) // 2)
     if rim > 0:
         share = share[rim:-rim, rim:-rim]
-    inner = np.ascontiguousarray(share < (1.0 - _DARK) * 255).astype(np.uint8)
+    dotted = is_dotted(page.grey)
+    inner = np.ascontiguousarray(share < (1.0 - (_DOTTED_DARK if dotted else _DARK)) * 255).astype(np.uint8)
+    if dotted:
+        inner = np.asarray(cv2.dilate(inner, np.ones((_DOT_GAP_PX, _DOT_GAP_PX), np.uint8)), dtype=np.uint8)
     extent = np.hypot(*connected(inner)[1][:, 2:].T)
     long_side = max(small.shape)
     return bool(extent[extent > _LONG * long_side].sum() < _ENOUGH * long_side)

@@ -19,6 +19,7 @@ from grader.scan.pixels import (
     reduction,
 )
 from grader.scan.strokes.centreline import Fitted, Pen, fit_centre, refined, rejoined
+from grader.scan.strokes.dots import joined_dots
 from grader.scan.strokes.ends import coverage, find_ends, find_tips, split_by_darkness, through_bands
 from grader.scan.strokes.regions import (
     PROBES,
@@ -70,7 +71,7 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
             f"half of it is as dark as {grey:.0f} of 255 or darker: a picture with its tones inverted, a"
             " pattern, or a photo taken in the dark? Scan the sheet in greyscale, dark lines on white paper",
         )
-    flat = flatten(page.grey)
+    flat = flatten(joined_dots(page.grey, sheet.px_per_mm))
     scale = working_scale(sheet.px_per_mm)
     reduced = flat.reduced(scale)
     squares = find_squares(reduced)

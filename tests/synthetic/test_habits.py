@@ -1,0 +1,70 @@
+"""What people leave beside a drawing is seen and leaves the true vectors; so do paper and scanners."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference.authored.assignment import load_assignment
+from samples.simulation import HABITS, PERFECT, PageStyle, Scan, Settings, Student, simulate
+from samples.simulation.student import encoded
+
+SMALL = Scan(dpi=45.0, noise=0.0, tint_grain=0.0, dust=0)
+
+
+def drawn(seed=3, scan=SMALL, page=None, **student):
+    assignment = load_assignment("pump")
+    settings = Settings(PERFECT, Student(**student), page=page or PageStyle(), scan=scan)
+    return simulate(assignment, assignment.variant(9), seed, settings)[0]
+
+
+@pytest.mark.parametrize("habit", HABITS)
+def test_a_habit_is_seen_and_leaves_the_true_vectors(habit):
+    one, plain = drawn(habits=(habit,)), drawn()
+    assert one.image.shape == plain.image.shape
+    assert np.any(one.image != plain.image)
+    for figure in ("velocity_plan", "acceleration_plan"):
+        vectors, usual = (sheet.truth["figures"][figure]["vectors"] for sheet in (one, plain))
+        for vector in usual:
+            assert vectors[vector]["length_mm"] == pytest.approx(usual[vector]["length_mm"], abs=1e-3)
+
+
+def test_overlapping_figures_lie_on_each_other():
+    one = drawn(habits=("overlapping",))
+    boxes = [np.array(list(figure["nodes"].values())) for figure in one.truth["figures"].values()]
+    low, high = np.array([box.min(axis=0) for box in boxes]), np.array([box.max(axis=0) for box in boxes])
+    assert any(np.all((low[i] < high[j]) & (low[j] < high[i])) for i, j in ((0, 1), (0, 2), (1, 2)))
+
+
+def test_long_helper_lines_stand_in_the_truth():
+    one, plain = drawn(habits=("long helpers",)), drawn()
+    counts = [len(sheet.truth["figures"]["velocity_plan"]["construction"]) for sheet in (one, plain)]
+    assert counts[0] == counts[1] + 2
+
+
+def test_an_unsharp_mask_makes_edges_overshoot():
+    paper = drawn(scan=replace(SMALL, shading=0.0, fold=False)).image
+    sharp = drawn(scan=replace(SMALL, shading=0.0, fold=False, sharpen=1.5)).image
+    assert sharp.max() > paper.max() or sharp.min() < paper.min()
+
+
+def test_a_dithered_page_has_two_values_and_tones():
+    scan = replace(SMALL, device="copier", mode="bilevel", container="png", dpi=100.0)
+    plain, tones = drawn(scan=scan).image, drawn(scan=replace(scan, dithered=True)).image
+    assert set(np.unique(tones)) == {0, 255}
+    changes = [
+        np.count_nonzero(image[:, 1:] != image[:, :-1]) / (image == 0).sum() for image in (plain, tones)
+    ]
+    assert changes[1] > 1.5 * changes[0]
+
+
+def test_coarse_tables_are_those_of_the_file():
+    sheet = drawn()
+    coarse = replace(sheet.settings.scan, jpeg_tables="web_low")
+    assert len(encoded(sheet.image, coarse)) < len(encoded(sheet.image, sheet.settings.scan))
+
+
+def test_millimetre_paper_has_its_colour():
+    page = PageStyle(squared_mm=1.0, squares=(240, 170, 110))
+    image = drawn(scan=replace(SMALL, mode="colour", dpi=100.0), page=page).image.astype(float)
+    assert image[..., 0].mean() > image[..., 2].mean() + 10.0
