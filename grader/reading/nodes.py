@@ -30,7 +30,8 @@ HIDDEN_MM = 0.5
 END_REACH_MM = 5.0
 """An end that is farther from a node is not about it."""
 CENTRE_MM = 0.2
-"""Standard error of a node by the centre of the circle drawn around it."""
+"""Standard error of a node by the centre of the circle drawn around it, on each axis: on real drawings lines
+miss the centres by 0.26 mm in the median, which is 0.22 mm on each axis."""
 SUREST = 0.97
 """Largest probability of all tips near a node together: any of them may be a letter's stroke."""
 TIP_REACH_MM = 3.5
