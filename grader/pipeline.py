@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from hashlib import blake2b
 
 from grader.comparison.evidence import Submission
@@ -217,18 +218,12 @@ def read_pages(
         known = {**sure_texts([page.reading.written for page in pages if page.ink is not None]), **declared}
         scales = None if variant is None else declared_scales(assignment, variant, known)
         readings = _readings(pages, assignment, variant, scales, wanted)
-        right, sure = None, {}
-        if variant is not None:
-            right = drawings(assignment, [variant], scales)[0]
-            sure = understood_scales(assignment, variant, known)
-        upright = [_upright(page, one, right) for page, one in zip(pages, readings, strict=True)]
-        if any(one is not page for one, page in zip(upright, pages, strict=True)):
-            pages = upright
-            readings = _readings(pages, assignment, variant, scales, wanted)
-        at_scale = at_drawn_scales(pages, readings, right, sure)
-        if at_scale is not None:
-            pages = at_scale
-            readings = _readings(pages, assignment, variant, scales, wanted)
+        right = None if variant is None else drawings(assignment, [variant], scales)[0]
+        sure: Collection[str] = () if variant is None else understood_scales(assignment, variant, known)
+        for at_drawing in (_upright, partial(at_drawn_scales, declared=sure)):
+            placed = at_drawing(pages, readings, right)
+            if placed is not None:
+                pages, readings = placed, _readings(placed, assignment, variant, scales, wanted)
     drawn = sum(page.ink is not None for page in pages)
     read = []
     for page, reading in zip(pages, readings, strict=True):
@@ -238,10 +233,24 @@ def read_pages(
     return read
 
 
-def _upright(page: ScannedPage, reading: Reading, right: Drawing | None) -> ScannedPage:
-    """The page, the other way up where nothing but its drawing says so: letters are read upright only."""
+def _upright(
+    pages: Sequence[ScannedPage], readings: Sequence[Reading], right: Drawing | None
+) -> list[ScannedPage] | None:
+    """The pages, the other way up where nothing but a drawing says so; None where none is.
+
+    Letters are read upright only, so that such a page is opened again.
+    """
+    turned = [
+        _turned(page) if right is not None and is_upside_down(reading, right) else page
+        for page, reading in zip(pages, readings, strict=True)
+    ]
+    return turned if any(one is not page for one, page in zip(turned, pages, strict=True)) else None
+
+
+def _turned(page: ScannedPage) -> ScannedPage:
+    """A page whose way up was not sure, opened the other way up."""
     unsure = [problem for problem in page.problems if problem.code == "upright_unsure"]
-    if not unsure or right is None or page.sheet is None or not is_upside_down(reading, right):
+    if not unsure or page.sheet is None:
         return page
     turn_deg = (90 * round(page.sheet.rotation_deg / 90.0) + 180) % 360
     turned = open_page(replace(page.ref, turn_deg=turn_deg))
