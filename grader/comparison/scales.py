@@ -293,8 +293,8 @@ BELIEVED = 0.97
 """Probability from which what a box says, with what was drawn, is believed."""
 LIKELY = 0.05
 """A text that is less likely by its signs alone is not looked for in the drawing."""
-RULE_SE, BY_CRANK_SE = 0.002, 0.01
-"""Relative: a scale by the rule is written to three or four digits; by the crank as drawn."""
+RULE_SE = 0.002
+"""Relative: a scale by the rule is written to three or four digits."""
 HAND_MM = 0.35
 """Standard error of a length as a student draws it, beside that of its reading: its two ends."""
 SAME = 0.005
@@ -455,11 +455,10 @@ def _likelihood(task: Task, evidence: Evidence, name: str, text: str, known: Map
     value = _value(task, name, text, known).get(name)
     if value is None:
         return FREE_RULE if isinstance(_parsed_text(task, name, text), ByRule) else 0.0
-    rule_se = RULE_SE
     if "kL" not in known and name != "kL":
         # The rule takes the length scale from the crank as drawn, where nobody declares it.
-        known, rule_se = {**known, "kL": _by_rule(task, evidence, "kL", {})}, BY_CRANK_SE
-    tried = [(float(getattr(task.assignment.scales([task.variant], **known), name)[0]), rule_se)]
+        known = {**known, "kL": _by_rule(task, evidence, "kL", {})}
+    tried = [(float(getattr(task.assignment.scales([task.variant], **known), name)[0]), RULE_SE)]
     shown = _evidence_of(task, evidence, name, however_doubtful=True)
     if shown is not None:
         tried.append((shown[0] / shown[1], math.hypot(shown[2], HAND_MM) / shown[1]))
