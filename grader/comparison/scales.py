@@ -129,8 +129,9 @@ def _evidence_of(
     Arguments: `however_doubtful` takes a vector whatever its confidence.
     """
     if name == "kL":
-        length = evidence.yardstick_mm or (_doubtful_crank(task, evidence) if however_doubtful else None)
-        return None if task.yardstick is None or not length else (task.yardstick.length_m, *length)
+        if task.yardstick is None or evidence.yardstick_mm is None or evidence.yardstick_mm[0] <= 0.0:
+            return None
+        return (task.yardstick.length_m, *evidence.yardstick_mm)
     vector = f"{name[1]}_{task.pin}"
     drawn = evidence.vector(vector)
     if drawn is None or drawn.length_mm <= 0.0 or not task.real.get(vector):
@@ -141,15 +142,6 @@ def _evidence_of(
         return shown
     # Where others that were surely read are right at its scale, it was read rightly.
     return shown if _fitting(task, evidence, name, shown[0] / shown[1], least) >= TELLING else None
-
-
-def _doubtful_crank(task: Task, evidence: Evidence) -> tuple[float, float] | None:
-    """The drawn length of the yardstick, whatever the confidence in its joints, and its standard error."""
-    ends = None if task.yardstick is None else {task.yardstick.tail, task.yardstick.head}
-    for name, joints in task.construction.links.items():
-        if set(joints) == ends and name in evidence.drawn and evidence.drawn[name].length_mm > 0.0:
-            return evidence.drawn[name].length_mm, evidence.drawn[name].se_mm
-    return None
 
 
 def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> float | None:
@@ -287,24 +279,13 @@ def _ends(task: Task, name: str) -> tuple[str, str]:
 
 # Which of the declarations count -------------------------------------------------------------------
 
-BEYOND_DOUBT = 0.985
-"""Confidence at which a box is believed that neither the drawing nor the rule bears out."""
-BELIEVED = 0.97
-"""Probability from which what a box says, with what was drawn, is believed."""
-LIKELY = 0.05
-"""A text that is less likely by its signs alone is not looked for in the drawing."""
-RULE_SE = 0.002
-"""Relative: a scale by the rule is written to three or four digits."""
-HAND_MM = 0.35
-"""Standard error of a length as a student draws it, beside that of its reading: its two ends."""
+LIKELY, BEYOND_DOUBT = 0.2, 0.985
+"""Confidence at which a box is believed where the drawing or the rule has the very scale (a misreading
+would hit it once in hundreds), and where they have another; `SURE` where they have nearly that scale."""
 SAME = 0.005
 """Relative: two scales that differ less are one, rounded."""
-AT_RANDOM = 0.2
-"""Density of a misread scale over its logarithm: digits are taken for others at random."""
-NOT_FOLLOWED = 0.1
-"""Share of the drawings that do not follow the scale written on them."""
-FREE_RULE = 50.0
-"""How much likelier a rule of the student's own, such as omega kL, is than a misreading."""
+BORNE_OUT = 0.02
+"""Relative: as near as that the drawing or the rule bears a scale out."""
 Source = Literal["roster", "measurements", "box"]
 SOURCES: Mapping[Source, str] = {
     "roster": "the roster",
@@ -383,26 +364,29 @@ def _believed(
             f"{name} on the sheet could not be read; enter {name} in the roster or with the measurements"
         )
         return None, [Problem("scale_box_unread", message)]
-    read = ((best.text, best.confidence), *best.others)
-    borne = [chance * _likelihood(task, evidence, name, text, known) for text, chance in read]
-    unread = max(1.0 - sum(chance for _, chance in read), 0.0)
-    likeliest = max(range(len(read)), key=borne.__getitem__)
-    is_likely = read[likeliest][1] >= LIKELY
-    is_believed = is_likely and borne[likeliest] >= BELIEVED * (sum(borne) + unread)
-    if not is_believed and best.confidence < BEYOND_DOUBT:
-        unsure = "too unsure to be used"
-        unborne = "which neither the drawing nor the assignment's rule bears out"
-        message = f"{name} on the sheet seems to read '{best.text}' ({100 * best.confidence:.0f} %)"
-        why = unsure if best.confidence < SURE else unborne
-        return None, [Problem("scale_box_doubtful", f"{message}, {why}; look, and enter {name}")]
-    chosen = Written(*read[likeliest]) if is_believed else best
+    message = f"{name} on the sheet seems to read '{best.text}' ({100 * best.confidence:.0f} %)"
+    if best.confidence < SURE:
+        likely = (
+            Written(*read) for read in ((best.text, best.confidence), *best.others) if read[1] >= LIKELY
+        )
+        very = (one for one in likely if _is_borne_out(task, evidence, name, one.text, known, SAME))
+        chosen = next(very, None)
+        if chosen is None:
+            why = "too unsure to be used"
+            return None, [Problem("scale_box_doubtful", f"{message}, {why}; look, and enter {name}")]
+        best = chosen
     sure = [box for box in boxes if box.confidence >= SURE]
-    if any(not _is_same(task, name, box.text, chosen.text, known) for box in sure):
+    if any(not _is_same(task, name, box.text, best.text, known) for box in sure):
         each = " and ".join(f"'{box.text}'" for box in sure)
         return None, [
             Problem("scale_box_disagrees", f"{name} reads {each} on the sheets: none is used; look")
         ]
-    return chosen, []
+    if _is_borne_out(task, evidence, name, best.text, known):
+        return best, []
+    if best.confidence < BEYOND_DOUBT:
+        why = "which neither the drawing nor the assignment's rule bears out"
+        return None, [Problem("scale_box_doubtful", f"{message}, {why}; look, and enter {name}")]
+    return best, []
 
 
 def _contradicts(name: str, box: Written, text: str, source: Source) -> Problem:
@@ -447,21 +431,25 @@ def _is_certainly_same(task: Task, name: str, text: str, other: str, known: Mapp
     return first is not None and second is not None and abs(first / second - 1.0) <= SAME
 
 
-def _likelihood(task: Task, evidence: Evidence, name: str, text: str, known: Mapping[str, float]) -> float:
-    """How much likelier what was drawn, or the rule, is if this scale is written than if it was misread.
+def _is_borne_out(
+    task: Task,
+    evidence: Evidence,
+    name: str,
+    text: str,
+    known: Mapping[str, float],
+    within: float = BORNE_OUT,
+) -> bool:
+    """Whether the drawn crank, v_A or a_A, or the assignment's rule, has nearly this scale.
 
-    It is drawn crank, v_A or a_A, however doubtful, that count: hardly a misreading hits their very scale.
+    A rule of the student's own, such as omega kL, needs nothing else to bear it out.
     """
     value = _value(task, name, text, known).get(name)
     if value is None:
-        return FREE_RULE if isinstance(_parsed_text(task, name, text), ByRule) else 0.0
+        return isinstance(_parsed_text(task, name, text), ByRule)
     if "kL" not in known and name != "kL":
         # The rule takes the length scale from the crank as drawn, where nobody declares it.
         known = {**known, "kL": _by_rule(task, evidence, "kL", {})}
-    tried = [(float(getattr(task.assignment.scales([task.variant], **known), name)[0]), RULE_SE)]
+    ruled = float(getattr(task.assignment.scales([task.variant], **known), name)[0])
     shown = _evidence_of(task, evidence, name, however_doubtful=True)
-    if shown is not None:
-        tried.append((shown[0] / shown[1], math.hypot(shown[2], HAND_MM) / shown[1]))
-    off = [(math.log(value / scale) / se, se) for scale, se in tried if scale > 0.0]
-    density = max(math.exp(-0.5 * each**2) / (se * math.sqrt(math.tau)) for each, se in off)
-    return (1.0 - NOT_FOLLOWED) * density / AT_RANDOM + NOT_FOLLOWED
+    tried = [ruled] if shown is None else [ruled, shown[0] / shown[1]]
+    return any(abs(value / one - 1.0) <= within for one in tried if one > 0.0)

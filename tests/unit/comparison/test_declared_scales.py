@@ -146,16 +146,3 @@ def test_before_the_drawing_is_read_only_sure_boxes_are_taken():
     assert sure_texts([sure]) == {"kL": RULED}
     assert sure_texts([sure, unsure]) == {}
     assert sure_texts([]) == {}
-
-
-@pytest.mark.parametrize(("off", "used"), [(1.003, True), (1.03, False)])
-def test_the_drawn_crank_tells_a_scale_from_its_rival_however_doubtful_both_are(task, off, used):
-    drawn_mm = off * task.yardstick.length_m / 0.0061
-    nodes = {
-        name: ReadNode(at, np.eye(2) * 0.01, 0.3)
-        for name, at in {task.yardstick.tail: 100 - 100j, task.yardstick.head: 100 + drawn_mm - 100j}.items()
-    }
-    rivals = (("0.0081 m/mm", 0.4), (OTHER, 0.3))
-    written = {"kL": Written(*rivals[0], others=rivals[1:])}
-    found = declarations(task, {}, [Reading({MECHANISM: Figure(nodes, {})}, written=written)])
-    assert found.texts == ({"kL": OTHER} if used else {})
