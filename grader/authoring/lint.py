@@ -49,10 +49,10 @@ from grader.printed.layout import SCALE_OF
 from grader.rubric import RubricFile, check_rubric
 from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
-from reference.construction.derive import construction_of, image_name
+from reference.construction.derive import image_name
 from reference.construction.graph import Construction, ancestors
 from reference.geometry import FloatArray
-from reference.plan import Plan, exact_plan
+from reference.plan import Plan, construction_for, exact_plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,11 +91,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     accelerations = rubric.needs_accelerations or any(
         "acceleration_plan" in page.figures for page in assignment.file.page
     )
-    construction = construction_of(
-        assignment.mechanism(variants),
-        accelerations=accelerations,
-        plate_by_similarity=assignment.file.plate_images == "similarity",
-    )
+    construction = construction_for(assignment, variants, accelerations=accelerations)
     broken = broken_variants(assignment, variants)
     findings = [*broken_findings(assignment, broken), *data_findings(assignment, rubric, construction)]
     rows = {each.variant: _row(each.variant, problem=each.error.message) for each in broken}

@@ -24,9 +24,9 @@ from grader.printed.layout import (
     code_of,
     comb_cells,
     combs_of,
-    construction_for,
     field_boxes,
     marker_places,
+    page_construction,
     poles_mm,
 )
 from grader.printed.pdf import (
@@ -381,7 +381,7 @@ def _plans(
     for table in assignment.file.page:
         figures = list(dict.fromkeys(table.figures))
         fit = best_template(assignment, figures)
-        construction = construction_for(assignment, figures)
+        construction = page_construction(assignment, figures)
         names = [vector.name for figure in figures for vector in construction.vectors_of(figure)]
         boxes = _boxes(names, asked)
         if names and not boxes and (asked is None or set(names) & set(asked)):
@@ -400,7 +400,7 @@ def cells_of(
     table = next((page for page in assignment.file.page if set(page.figures) == set(figures)), None)
     if table is None:
         return {}
-    construction = construction_for(assignment, table.figures)
+    construction = page_construction(assignment, table.figures)
     ordered = dict.fromkeys(table.figures)
     return combs_of(_boxes([v.name for figure in ordered for v in construction.vectors_of(figure)], asked))
 
