@@ -28,7 +28,9 @@ from grader.records import PageRef, ScannedPage
 from grader.rubric import Asked
 from grader.similarity.groups import CELLS, ink_map
 
-RECORDS: Mapping[str, type] = {name: kind for name, kind in vars(records).items() if isinstance(kind, type) and is_dataclass(kind)}
+RECORDS: Mapping[str, type] = {
+    name: kind for name, kind in vars(records).items() if isinstance(kind, type) and is_dataclass(kind)
+}
 
 # What a stage depends on --------------------------------------------------------------------------
 

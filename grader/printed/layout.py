@@ -8,13 +8,13 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, Variant
 from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.drawing.canvas import A3_MM
 from reference.geometry import ComplexArray
@@ -23,7 +23,7 @@ from reference.plan import construction_for
 # The code's text ----------------------------------------------------------------------------------
 
 VERSION = "planmark1"
-KINDS = ("all", "velocity", "acceleration")
+KINDS = get_args(PageKind)
 MAX_LENGTH = 200
 _NAME = r"[A-Za-z0-9._-]{1,64}"
 _NUMBER = r"(?:-?[0-9]{1,9})?"
@@ -241,7 +241,7 @@ class PageLayout(_Document):
     cells from the left: three digits, then the tenths.
     """
 
-    kind: Literal["all", "velocity", "acceleration", "calibration"]
+    kind: PageKind | Literal["calibration"]
     markers: list[MarkerPlace]
     zones: dict[str, Box | dict[str, Box]]
     cells: dict[str, tuple[Box, ...]] = {}
