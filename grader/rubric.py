@@ -16,9 +16,9 @@ from pydantic import Field, model_validator
 from grader.records import MECHANISM
 from reference.authored.assignment import Assignment, locate
 from reference.authored.toml_file import Authored, Identifier, Text, is_file, load
-from reference.construction.derive import construction_of
 from reference.construction.graph import Construction
 from reference.errors import AuthoredFileError, CallError, Finding
+from reference.plan import construction_for
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -281,11 +281,7 @@ class Asked:
 
 def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
     """What a rubric asks to be read."""
-    construction = construction_of(
-        assignment.mechanism(assignment.variants()[:1]),
-        accelerations=rubric.needs_accelerations,
-        plate_by_similarity=assignment.file.plate_images == "similarity",
-    )
+    construction = construction_for(assignment, accelerations=rubric.needs_accelerations)
     known = [construction.vectors[name] for name in rubric.vectors if name in construction.vectors]
     plans = dict.fromkeys(construction.figure_of(vector.head) for vector in known)
     figures = frozenset({MECHANISM, *plans} if plans else ())
@@ -317,9 +313,7 @@ def rubric_of(assignment: Assignment) -> RubricFile:
     Raises AuthoredFileError with every fault, names that the mechanism does not have among them.
     """
     rubric = load_rubric(assignment.file.rubric, beside=assignment.path)
-    mechanism = assignment.mechanism(assignment.variants()[:1])
-    by_similarity = assignment.file.plate_images == "similarity"
-    findings = check_rubric(rubric, construction_of(mechanism, plate_by_similarity=by_similarity))
+    findings = check_rubric(rubric, construction_for(assignment))
     if findings:
         path = locate("rubric", assignment.file.rubric, assignment.path)
         raise AuthoredFileError(str(path), tuple(findings))

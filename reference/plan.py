@@ -65,6 +65,17 @@ class Plan:
         return np.where(np.abs(drawn) <= ZERO_SHARE * self.size_mm(figure), np.nan, angle)
 
 
+def construction_for(
+    assignment: Assignment, variants: list[Variant] | None = None, *, accelerations: bool = True
+) -> Construction:
+    """How an assignment's plans are drawn, of some variants; of the first where none are named."""
+    return construction_of(
+        assignment.mechanism(assignment.variants()[:1] if variants is None else variants),
+        accelerations=accelerations,
+        plate_by_similarity=assignment.file.plate_images == "similarity",
+    )
+
+
 def exact_plan(
     assignment: Assignment,
     variants: list[Variant],
@@ -79,8 +90,7 @@ def exact_plan(
     mechanism = assignment.mechanism(variants)
     scales = scales or assignment.scales(variants)
     motion = move(mechanism, accelerations=accelerations)
-    by_similarity = assignment.file.plate_images == "similarity"
-    construction = construction_of(mechanism, accelerations=accelerations, plate_by_similarity=by_similarity)
+    construction = construction_for(assignment, variants, accelerations=accelerations)
     nodes = _nodes(construction, mechanism, motion, scales)
     vectors = {}
     for name, vector in construction.vectors.items():

@@ -17,7 +17,6 @@ from grader.authoring.round_scales import (
     PageRoom,
     Proposal,
     asked_vectors,
-    ends_of,
     extents_of,
     length_findings,
     pages_of,
@@ -41,18 +40,17 @@ from grader.documents import (
     LintDocument,
     LintFindingDocument,
     LintLeast,
-    LintScales,
     LintVariant,
     LintWorst,
 )
 from grader.printed.layout import SCALE_OF
 from grader.rubric import RubricFile, check_rubric
-from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant
+from reference.authored.assignment import TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
-from reference.construction.derive import construction_of, image_name
+from reference.construction.derive import image_name
 from reference.construction.graph import Construction, ancestors
 from reference.geometry import FloatArray
-from reference.plan import Plan, exact_plan
+from reference.plan import Plan, construction_for, exact_plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,11 +89,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     accelerations = rubric.needs_accelerations or any(
         "acceleration_plan" in page.figures for page in assignment.file.page
     )
-    construction = construction_of(
-        assignment.mechanism(variants),
-        accelerations=accelerations,
-        plate_by_similarity=assignment.file.plate_images == "similarity",
-    )
+    construction = construction_for(assignment, variants, accelerations=accelerations)
     broken = broken_variants(assignment, variants)
     findings = [*broken_findings(assignment, broken), *data_findings(assignment, rubric, construction)]
     rows = {each.variant: _row(each.variant, problem=each.error.message) for each in broken}
@@ -341,17 +335,6 @@ def lint_document(result: Lint) -> LintDocument:
         needs_a_person=result.needs_a_person,
         findings=[LintFindingDocument.model_validate(finding) for finding in result.findings],
         variants=list(result.rows),
-        scales=[
-            LintScales(
-                name=proposal.name,
-                **{name: ends_of(getattr(proposal.scales, name)) for name in SCALE_NAMES},
-                room=proposal.room,
-                shortest_mm=proposal.shortest_mm,
-                under_8_mm=proposal.under_8_mm,
-                asked=proposal.asked,
-                shortest_link_mm=proposal.link_mm,
-            )
-            for proposal in result.scales
-        ],
+        scales=[proposal.over_all for proposal in result.scales],
         worst=result.worst,
     )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.authoring.findings import NAMED, BoolArray, LintFinding, chosen
-from grader.documents import LintLeast
+from grader.documents import LintLeast, LintScales
 from grader.printed.layout import FRAME_MM, MARGIN_MM, SCALE_OF, TEMPLATES, Template, template_for
 from grader.records import MECHANISM, Box
 from grader.rubric import RubricFile
@@ -251,26 +251,17 @@ ProposalName = Literal["proposed", "round", "round_each"]
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """Scales and what they give, over all variants.
+    """Scales and what they give.
 
     Attributes
     ----------
-    name : ``proposed`` (by the assignment), ``round`` (the same for all), ``round_each`` (each its own)
-    room : the least enlargement that any figure's zone has left; below 1 it does not fit
-    shortest_mm : the shortest asked vector that is not zero; None where none is asked
-    under_8_mm, asked : how many asked vectors are shorter than 8 mm, of how many
-    link_mm : the shortest link of the sketch
+    over_all : over all variants, as it is published
     short : (N,) how many asked vectors of each variant are shorter than 8 mm
     still_short : names of the vectors that are, the most frequent first
     """
 
-    name: ProposalName
     scales: Scales
-    room: float
-    shortest_mm: LintLeast | None
-    under_8_mm: int
-    asked: int
-    link_mm: float
+    over_all: LintScales
     short: IntArray
     still_short: tuple[str, ...]
 
@@ -389,37 +380,38 @@ def _judged(name: ProposalName, scales: Scales, plan: Plan, asked: AskedVectors,
         shortest = LintLeast(value=float(real[least].min()), at=asked.names[least])
     short = real < WELL_READ_MM
     often = sorted(zip(asked.names, short.sum(axis=1).tolist(), strict=True), key=lambda entry: -entry[1])
-    return Proposal(
+    over_all = LintScales(
         name=name,
-        scales=scales,
+        **{each: ends_of(getattr(scales, each)) for each in SCALE_NAMES},
         room=room,
         shortest_mm=shortest,
         under_8_mm=int(np.sum(short)),
         asked=int(real.size - asked.is_zero.sum()),
-        link_mm=float(np.min(_shortest_link_m(plan) / scales.kL)),
-        short=np.asarray(short.sum(axis=0), dtype=np.intp).reshape(len(plan.variants)),
-        still_short=tuple(name for name, count in often if count),
+        shortest_link_mm=float(np.min(_shortest_link_m(plan) / scales.kL)),
     )
+    of_each = np.asarray(short.sum(axis=0), dtype=np.intp).reshape(len(plan.variants))
+    return Proposal(scales, over_all, of_each, tuple(vector for vector, count in often if count))
 
 
 def scale_findings(assignment: Assignment, plan: Plan, proposed: Sequence[Proposal]) -> Iterator[LintFinding]:
     """Round scales where the proposed ones are none, and whether normals can be built by the triangle."""
     drawn = {figure for _, figures in pages_of(assignment, plan) for figure in figures}
     names = [name for figure, name in SCALE_OF.items() if figure in drawn]
-    own, round_, each = proposed
+    own, round_, each = (proposal.over_all for proposal in proposed)
     values = {name: np.asarray(getattr(plan.scales, name)) for name in names}
     is_round = all(
         np.allclose(round_up(scale, steps_of(name)), scale, rtol=1e-6) for name, scale in values.items()
     )
     if own.room < 1.0 or not is_round:
         why = "do not fit" if own.room < 1.0 else "are not round"
+        round_text = written(proposed[1].scales, names)
         message = (
-            f"the proposed scales {why}; round ones that fit every variant: {written(round_.scales, names)};"
+            f"the proposed scales {why}; round ones that fit every variant: {round_text};"
             f" then {round_.under_8_mm} of {round_.asked} asked vectors are under {WELL_READ_MM:g} mm"
             f" instead of {own.under_8_mm}; with round scales of each variant's own {each.under_8_mm}"
         )
         yield LintFinding("hint", "round_scales", "assignment", "$.scales", message)
-    yield from _short_findings(plan, own, each)
+    yield from _short_findings(plan, own, proposed[2])
     if "acceleration_plan" in plan.nodes_mm and any("_n" in name for name in plan.vectors_si):
         ratio = plan.scales.kL * plan.scales.ka / plan.scales.kv**2
         if not np.allclose(ratio, 1.0, rtol=1e-6):
@@ -429,18 +421,18 @@ def scale_findings(assignment: Assignment, plan: Plan, proposed: Sequence[Propos
             yield LintFinding("hint", "no_altitude_method", "assignment", "$.scales", message)
 
 
-def _short_findings(plan: Plan, own: Proposal, each: Proposal) -> Iterator[LintFinding]:
+def _short_findings(plan: Plan, own: LintScales, each: Proposal) -> Iterator[LintFinding]:
     """Whether scales of each variant's own make every asked vector long enough, and what no scale does."""
     if own.under_8_mm == 0:
         return
-    if each.under_8_mm == 0:
+    if each.over_all.under_8_mm == 0:
         message = f"with round scales of each variant's own no asked vector is under {WELL_READ_MM:g} mm"
         yield LintFinding("hint", "scales_of_its_own", "assignment", "$.scales", message)
         return
-    left = each.short > 0
+    left, still = each.short > 0, each.over_all.under_8_mm
     names = ", ".join(each.still_short[:NAMED]) + (" and more" if len(each.still_short) > NAMED else "")
     message = (
-        f"even at the largest round scales that fit the sheet, {each.under_8_mm} of {each.asked} asked"
+        f"even at the largest round scales that fit the sheet, {still} of {own.asked} asked"
         f" vectors stay under {WELL_READ_MM:g} mm ({names}): no scale makes them easy to read; a page for"
         " each plan, or a criterion that is optional, would help"
     )
@@ -454,7 +446,7 @@ def suggestions(proposed: Sequence[Proposal], plan: Plan, figures: Collection[st
     names = [name for figure, name in SCALE_OF.items() if figure in figures]
     texts = {}
     for index, variant in enumerate(plan.variants):
-        if each.short[index] < own.short[index] or own.room < 1.0:
+        if each.short[index] < own.short[index] or own.over_all.room < 1.0:
             scales = Scales(*(getattr(each.scales, name)[index : index + 1] for name in SCALE_NAMES))
             texts[variant] = (
                 f"{written(scales, names)}: {each.short[index]} instead of {own.short[index]} asked vectors"

@@ -50,11 +50,6 @@ MODELS: dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]
 }
 
 
-def schema_names() -> list[str]:
-    """The names that `schema` knows."""
-    return list(MODELS)
-
-
 def schema(name: str) -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of a document or authored file; CallError for an unknown name."""
     if name not in MODELS:

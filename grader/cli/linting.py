@@ -10,16 +10,15 @@ from rich.table import Table
 
 from grader.authoring.findings import named
 from grader.authoring.lint import Lint, lint, lint_document
-from grader.authoring.round_scales import WELL_READ_MM, Proposal, ends_of, ratio_text
+from grader.authoring.round_scales import WELL_READ_MM, ratio_text
 from grader.cli.app import new_table
-from grader.documents import LintLeast, LintVariant, LintWorst
+from grader.documents import LintLeast, LintScales, LintVariant, LintWorst
 from grader.files import write_whole
 from grader.rubric import load_rubric
 from reference.authored.assignment import Variant, load_assignment
 from reference.drawing.canvas import Label
 from reference.drawing.canvas import svg as as_svg
 from reference.drawing.sheets import FRAME, reference_drawing
-from reference.geometry import FloatArray
 
 SHOWN_ROWS = 40
 """More variants than that stand in ranges."""
@@ -47,7 +46,7 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
     console.print(_variants_table(result.rows))
     if result.scales and result.plan is not None:
         console.print()
-        console.print(_scales_table(result.scales))
+        console.print(_scales_table([proposal.over_all for proposal in result.scales]))
     console.print()
     # A line each, which terminals break and programs can search.
     for finding in result.findings:
@@ -120,16 +119,16 @@ def _room_of(figures: Sequence[LintLeast | None]) -> str:
     return f"{least.value:.2f} {where}" if least.value < 1.0 else f"{least.value:.2f}"
 
 
-def _scales_table(scales: Sequence[Proposal]) -> Table:
+def _scales_table(scales: Sequence[LintScales]) -> Table:
     """Quantities in rows: three columns stay readable in a narrow terminal."""
     titles = {"proposed": "as proposed", "round": "round", "round_each": "round, each its own"}
     table = Table("scales", box=None, header_style="bold")
     for proposal in scales:
         table.add_column(titles[proposal.name], justify="right", no_wrap=True)
     rows: dict[str, list[str]] = {
-        "kL": ["..".join(dict.fromkeys(map(ratio_text, ends_of(proposal.scales.kL)))) for proposal in scales],
-        "kv, (m/s)/mm": [_span(proposal.scales.kv) for proposal in scales],
-        "ka, (m/s^2)/mm": [_span(proposal.scales.ka) for proposal in scales],
+        "kL": ["..".join(dict.fromkeys(map(ratio_text, proposal.kL))) for proposal in scales],
+        "kv, (m/s)/mm": [_span(proposal.kv) for proposal in scales],
+        "ka, (m/s^2)/mm": [_span(proposal.ka) for proposal in scales],
         "fits, times": [f"{proposal.room:.2f}" for proposal in scales],
         "shortest asked, mm": [
             "-"
@@ -140,15 +139,15 @@ def _scales_table(scales: Sequence[Proposal]) -> Table:
         f"asked under {WELL_READ_MM:g} mm": [
             f"{proposal.under_8_mm} of {proposal.asked}" for proposal in scales
         ],
-        "shortest link, mm": [f"{proposal.link_mm:.1f}" for proposal in scales],
+        "shortest link, mm": [f"{proposal.shortest_link_mm:.1f}" for proposal in scales],
     }
     for name, cells in rows.items():
         table.add_row(name, *cells)
     return table
 
 
-def _span(values: FloatArray) -> str:
-    low, high = (f"{end:.0f}" if end >= 1e4 else f"{end:.4g}" for end in ends_of(values))
+def _span(ends: tuple[float, float]) -> str:
+    low, high = (f"{end:.0f}" if end >= 1e4 else f"{end:.4g}" for end in ends)
     return low if low == high else f"{low}..{high}"
 
 

@@ -1,6 +1,7 @@
 """A folder of submissions: inventory, owners, marking in parallel, results. One bad file stops nothing."""
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -27,7 +28,6 @@ from grader.folder.cache import (
 )
 from grader.folder.changes import (
     CACHE_FOLDER,
-    Inputs,
     RunNote,
     changes_since,
     earlier,
@@ -135,45 +135,38 @@ def graded(batch: Batch, progress: Progress, workers: Pool | None = None) -> Gra
     if not files and roster is None:
         raise _nothing(batch)
     make_folder(batch.out)
-    if workers is not None:
-        return _graded(batch, (roster, decisions), files, progress, workers)
-    with Workers(batch.jobs, batch.limits, __name__) as pool:
-        return _graded(batch, (roster, decisions), files, progress, pool)
-
-
-def _graded(
-    batch: Batch,
-    listed: tuple[Roster | None, ClassDecisions],
-    files: Sequence[Path],
-    progress: Progress,
-    workers: Pool,
-) -> Graded:
-    roster, decisions = listed
     notes = batch.out / CACHE_FOLDER
     names, cache = names_of(batch.assignment), _page_cache(batch)
-    contents = take_inventory(files, batch.folder, names, workers, progress, cache, decisions.place)
-    students, unmatched = _submissions(batch, (roster, decisions), contents, cache, workers)
-    if not students and not unmatched:
-        raise _nothing(batch)
     before = earlier(batch.out / "results.json", batch.assignment.id)
-    jobs = _jobs(batch, cache, students)
-    reports = _marked(batch, cache, jobs, progress, workers)
-    inputs = inputs_of_run(batch.assignment, batch.rubric, jobs, contents, decisions.pages)
+    with Workers(batch.jobs, batch.limits, __name__) if workers is None else nullcontext(workers) as pool:
+        contents = take_inventory(files, batch.folder, names, pool, progress, cache, decisions.place)
+        students, unmatched = _submissions(batch, (roster, decisions), contents, cache, pool)
+        if not students and not unmatched:
+            raise _nothing(batch)
+        jobs = _jobs(batch, cache, students)
+        reports = _marked(batch, cache, jobs, progress, pool)
+    pages = tuple(page for content in contents for page in content.pages)
+    authored = {
+        "assignment": repr(_authored(batch.assignment)),
+        "rubric": batch.rubric.model_dump_json(),
+        "program": stage_digest(MARK_STAGE),
+    }
+    submitted = {job.folder: job.submission for job in jobs}
+    inputs = inputs_of(authored, submitted, {page.file: page.digest for page in pages}, decisions.pages)
     decisions.note_failures(reports)
     results = ResultsDocument(
         assignment=batch.assignment.id,
         titles={one.id: one.title.in_language(batch.lang) for one in batch.rubric.criterion},
         reports=reports,
         unmatched=[*unmatched, *decisions.problems()],
-        moved=changes_since(before, reports, [job.folder for job in jobs], (noted_inputs(notes), inputs)),
-        alike=similar_of_run(batch.assignment, jobs, reports, notes / "readings"),
+        moved=changes_since(before, reports, list(submitted), (noted_inputs(notes), inputs)),
+        alike=_similar(batch.assignment, jobs, reports, notes / "readings"),
         stale=sorted(decisions.stale, key=lambda decision: decision.line),
         expected_wrong=_expected_wrong(reports),
     )
     _write_results(batch, results, students)
     note_inputs(notes, inputs)
     note_run(_note_of(batch), notes)
-    pages = tuple(page for content in contents for page in content.pages)
     return Graded(results, tuple(jobs), pages, cache)
 
 
@@ -305,30 +298,12 @@ class Job:
         return self.folder.replace("/", "#")
 
 
-def inputs_of_run(
-    assignment: Assignment,
-    rubric: RubricFile,
-    jobs: Sequence[Job],
-    contents: Sequence[FileContent],
-    decided: Container[tuple[str, int]] = frozenset(),
-) -> Inputs:
-    """What this run's marks come from, for the next run to tell what has changed.
-
-    Arguments: `decided` are the pages of which a person decided something.
-    """
-    files = (assignment.file.model_dump_json(), assignment.mechanism_file.model_dump_json())
-    authored = {
-        "assignment": repr(files),
-        "rubric": rubric.model_dump_json(),
-        "program": stage_digest(MARK_STAGE),
-    }
-    digests = {page.file: page.digest for content in contents for page in content.pages}
-    return inputs_of(
-        authored, [job.submission for job in jobs], [job.folder for job in jobs], digests, decided
-    )
+def _authored(assignment: Assignment) -> tuple[str, str]:
+    """The texts of the assignment and its mechanism."""
+    return assignment.file.model_dump_json(), assignment.mechanism_file.model_dump_json()
 
 
-def similar_of_run(
+def _similar(
     assignment: Assignment, jobs: Sequence[Job], reports: Sequence[ReportDocument], readings: Path
 ) -> list[AlikeDocument]:
     """The similar sheets among those that were marked."""
@@ -355,7 +330,7 @@ def _page_cache(batch: Batch) -> PageCache:
 
 def _jobs(batch: Batch, cache: PageCache, students: Sequence[StudentSubmission]) -> list[Job]:
     """The submissions with digests of what they depend on."""
-    assignment = (batch.assignment.file.model_dump_json(), batch.assignment.mechanism_file.model_dump_json())
+    assignment = _authored(batch.assignment)
     read = digest_of((stage_digest(READ_STAGE), cache.key, *assignment, cache.asked.vectors))
     settings = (batch.rubric.model_dump_json(), batch.level, batch.with_ghosts)
     marked = digest_of((stage_digest(MARK_STAGE), *assignment, *settings))

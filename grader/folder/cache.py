@@ -21,39 +21,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from grader import records
 from grader.files import write_whole
 from grader.pipeline import scan
-from grader.records import (
-    Backdrop,
-    Figure,
-    Identity,
-    Ink,
-    InkMap,
-    Lens,
-    Letters,
-    PageRef,
-    Problem,
-    Reading,
-    ReadNode,
-    ReadVector,
-    ScannedPage,
-    Sheet,
-    Strokes,
-    Swapped,
-    Tips,
-    Unread,
-    Written,
-)
+from grader.records import PageRef, ScannedPage
 from grader.rubric import Asked
 from grader.similarity.groups import CELLS, ink_map
 
 RECORDS: Mapping[str, type] = {
-    record.__name__: record
-    for record in (
-        Backdrop, Figure, Identity, Ink, InkMap, Lens, Letters, PageRef, Problem, Reading, ReadNode,
-        ReadVector, ScannedPage, Sheet, Strokes, Swapped, Tips, Unread, Written,
-    )
-}  # fmt: skip
+    name: kind for name, kind in vars(records).items() if isinstance(kind, type) and is_dataclass(kind)
+}
 
 # What a stage depends on --------------------------------------------------------------------------
 

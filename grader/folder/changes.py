@@ -79,17 +79,16 @@ class Inputs(BaseModel):
 
 def inputs_of(
     authored: Mapping[str, str],
-    submissions: Sequence[StudentSubmission],
-    folders: Sequence[str],
+    submissions: Mapping[str, StudentSubmission],
     digests: Mapping[str, str],
-    decided: Container[tuple[str, int]] = frozenset(),
+    decided: Container[tuple[str, int]],
 ) -> Inputs:
-    """What a run's marks come from.
+    """What a run's marks come from, for the next run to tell what has changed.
 
     Arguments
     ---------
     authored : texts of the ``assignment``, the ``rubric`` and the version of the ``program``
-    folders : of the submissions
+    submissions : by their folders
     digests : of the files handed in, by their names
     decided : pages, by file and number, of which a person decided something
     """
@@ -108,7 +107,7 @@ def inputs_of(
                 submission.variant, sorted(submission.declared.items()), submission.lang, submission.name
             ),
         }
-        for submission, folder in zip(submissions, folders, strict=True)
+        for folder, submission in submissions.items()
     }
     return Inputs(common={name: _digest(text) for name, text in authored.items()}, own=own)
 
@@ -208,8 +207,8 @@ def _read_note(out: Path) -> RunNote | None:
 def changes_since(
     before: Mapping[Key, EarlierReport] | None,
     reports: Sequence[ReportDocument],
-    folders: Sequence[str] = (),
-    inputs: tuple[Inputs, Inputs] | None = None,
+    folders: Sequence[str],
+    inputs: tuple[Inputs, Inputs],
 ) -> list[MovedDocument]:
     """The submissions whose status or points changed, new ones and dropped ones; none after a first run.
 
@@ -257,15 +256,13 @@ def _criteria_changed(then: EarlierReport, now: ReportDocument) -> list[Criterio
 
 
 def _why(
-    then: EarlierReport | None, now: ReportDocument | None, folder: str, inputs: tuple[Inputs, Inputs] | None
+    then: EarlierReport | None, now: ReportDocument | None, folder: str, inputs: tuple[Inputs, Inputs]
 ) -> list[Cause]:
     """What differs between the two runs' notes."""
     if then is None:
         return ["new"]
     if now is None:
         return ["gone"]
-    if inputs is None:
-        return []
     last, this = inputs
     own = last.own.get(folder, {}), this.own.get(folder, {})
     pairs = [(name, last.common.get(name), this.common.get(name)) for name in COMMON]

@@ -5,7 +5,7 @@ and not applied. One that cannot be applied at all is a fault with its line; the
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -318,11 +318,10 @@ class _Check:
 
     def fault_of(self, row: Decision) -> tuple[str, str] | None:
         """The column that is wrong, and why; None for a decision that fits."""
-        checks: dict[str, Callable[[Decision], tuple[str, str] | None]]
-        checks = {"verdict": self._verdict, "node": self._node}
-        return checks[row.kind](row) if row.kind in checks else None
-
-    def _verdict(self, row: Decision) -> tuple[str, str] | None:
+        if row.kind == "node":
+            return self._node(row)
+        if row.kind != "verdict":
+            return None
         criteria = {one.id: one for one in self.rubric.criterion}
         if row.criterion not in criteria:
             return "criterion", f"'{row.criterion}' is not in this rubric{_meant(row.criterion, criteria)}"

@@ -27,10 +27,10 @@ from grader.language import N_, Tongue, tongue
 from grader.records import FloatArray, GreyImage, PageRef, Problem
 from grader.scan.pixels import shrink
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, bars, evaluate, parameters_of
 from reference.errors import CallError
 from reference.geometry import ComplexArray
+from reference.plan import construction_for
 
 SURE, CHECK = "yes", "check"
 LIKE_MM = 150.0
@@ -271,9 +271,7 @@ def figure_similarity(ends_mm: FloatArray, assignment: Assignment, variants: Seq
 def _outlines(assignment: Assignment, variants: list[Variant]) -> list[ComplexArray]:
     """(lines, 2, variants) ends of the lines of each figure, in drawn mm at the proposed scales, y up."""
     mechanism, scales = assignment.mechanism(variants), assignment.scales(variants)
-    construction = construction_of(
-        mechanism, plate_by_similarity=assignment.file.plate_images == "similarity"
-    )
+    construction = construction_for(assignment, variants)
     nodes = evaluate(construction, parameters_of(mechanism, scales.kL, scales.kv, scales.ka))
     shape = (len(variants),)
     return [

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from grader.inputs.roster import why_no_id
+from grader.inputs.roster import short, why_no_id
 
 TURNS = (0, 90, 180, 270)
 LARGEST = 100_000.0
@@ -100,8 +100,3 @@ def place(text: str) -> tuple[float, float]:
     if max(abs(x), abs(y)) > LARGEST:
         raise ValueError(f"'{short(text)}' lies outside of every sheet")
     return x, y
-
-
-def short(text: str) -> str:
-    """The text, not longer than a message should quote it."""
-    return text if len(text) <= 40 else text[:37] + "..."

@@ -30,11 +30,12 @@ from typing import Literal
 from filelock import FileLock, Timeout
 
 from grader.files import OutputError, make_folder, sync_folder, write_whole
-from grader.inputs.decision_texts import LARGEST, PageDecision, page_decision, place, short
+from grader.inputs.decision_texts import LARGEST, PageDecision, page_decision, place
 from grader.inputs.roster import (
     ScanRef,
     delimiter_of,
     parse_scan,
+    short,
     surplus_of,
     table_lines,
     whole_number,
@@ -192,17 +193,6 @@ class DecisionTable:
         return [line.row for line in self.lines if not line.cells]
 
 
-def read_decisions(path: Path) -> list[Decision]:
-    """The decisions in a file, none where there is no file.
-
-    Raises InputFileError naming each faulty line.
-    """
-    table = read_table(path)
-    if table.faults:
-        raise _refused(path.name, table.faults)
-    return table.rows
-
-
 def read_table(path: Path) -> DecisionTable:
     """A file's content, empty where there is no file. Raises InputFileError for a fault of the whole file."""
     try:
@@ -295,18 +285,14 @@ def _line(
         key = None
         faults["position"] = f"'{short(text['position'])}' is no whole number"
     told = [(f", {column}", why) for column, why in faults.items()]
-    strangers, surplus = _strangers(header, cells), surplus_of(header, cells, delimiter)
+    strangers = [cell for name, cell in zip(header, cells, strict=False) if not name and cell.strip()]
+    surplus = surplus_of(header, cells, delimiter)
     if strangers and surplus is None:
         surplus = f"'{short(strangers[0].strip())}' stands in a column without a name; move it to comment"
     if surplus is not None:
         key, told = None, [("", surplus)]
     as_it_stands = (*(given.get(name, "") for name in COLUMNS), *strangers, *cells[len(header) :])
     return Line(row, key, as_it_stands if told else ()), told
-
-
-def _strangers(header: Sequence[str], cells: Sequence[str]) -> list[str]:
-    """What stands in columns without a name."""
-    return [cell for name, cell in zip(header, cells, strict=False) if not name and cell.strip()]
 
 
 def _without_repeated(lines: Sequence[Line], delimiter: str) -> tuple[list[Line], list[tuple[int, Finding]]]:

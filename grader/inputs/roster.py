@@ -209,12 +209,12 @@ def _check_header(header: list[str]) -> Iterator[Finding]:
             yield Finding("line 1", f"column {name} is missing")
     for name, count in sorted(Counter(filter(None, header)).items()):
         if count > 1:
-            yield Finding("line 1", f"column {_short(name)} is there {count} times")
+            yield Finding("line 1", f"column {short(name)} is there {count} times")
     names = frozenset(header)
     for name in _unknown(header)[:MOST_FINDINGS]:
         near = _near(name)
         if near is not None and near not in names:
-            yield Finding("line 1", f"column '{_short(name)}' is not known; did you mean {near}?")
+            yield Finding("line 1", f"column '{short(name)}' is not known; did you mean {near}?")
 
 
 def _unknown(header: list[str]) -> list[str]:
@@ -229,7 +229,7 @@ def _near(name: str) -> str | None:
 def _passed_over(header: list[str], file: str) -> Iterator[Problem]:
     unknown = _unknown(header)
     if unknown:
-        names = ", ".join(_short(name) for name in unknown[:MOST_FINDINGS])
+        names = ", ".join(short(name) for name in unknown[:MOST_FINDINGS])
         more = f" and {len(unknown) - MOST_FINDINGS} more" if len(unknown) > MOST_FINDINGS else ""
         message = f"columns without meaning here are passed over: {names}{more}"
         yield Problem("roster_columns", message, file)
@@ -272,12 +272,12 @@ def _faults_of(row: RosterRow, text: Mapping[str, str]) -> Iterator[tuple[str, s
     if not row.student_id:
         yield "student_id", "is empty"
     elif why is not None:
-        yield "student_id", f"'{_short(row.student_id)}' is refused: {why}"
+        yield "student_id", f"'{short(row.student_id)}' is refused: {why}"
     for name, value in (("n", row.n), ("position", row.position)):
         if text[name] and value is None:
-            yield name, f"'{_short(text[name])}' is no whole number"
+            yield name, f"'{short(text[name])}' is no whole number"
     if row.lang is not None and row.lang not in LANGUAGES:
-        yield "lang", f"'{_short(text['lang'])}' is not known; there are {', '.join(LANGUAGES)}"
+        yield "lang", f"'{short(text['lang'])}' is not known; there are {', '.join(LANGUAGES)}"
 
 
 def parse_scan(text: str) -> ScanRef | str:
@@ -287,12 +287,12 @@ def parse_scan(text: str) -> ScanRef | str:
         return ScanRef(text)
     if re.fullmatch(r"\d{1,6}", page, re.ASCII):
         if not file or int(page) < 1:
-            return f"'{_short(text)}': a page is FILE#NUMBER, from 1"
+            return f"'{short(text)}': a page is FILE#NUMBER, from 1"
         return ScanRef(file, int(page))
     # A file's own name may have a # in it; what follows one in `#3-4` is a page written wrongly.
     if "." in page:
         return ScanRef(text)
-    return f"'{_short(text)}': after # one page number is expected, from 1"
+    return f"'{short(text)}': after # one page number is expected, from 1"
 
 
 def _check_together(rows: list[RosterRow]) -> Iterator[Finding]:
@@ -350,5 +350,6 @@ def _check_scans(rows: list[RosterRow]) -> Iterator[Finding]:
             named.setdefault(ref.page, (ref, row))
 
 
-def _short(text: str) -> str:
+def short(text: str) -> str:
+    """The text, not longer than a message should quote it."""
     return text if len(text) <= 40 else text[:37] + "..."

@@ -24,9 +24,9 @@ from grader.printed.layout import (
     code_of,
     comb_cells,
     combs_of,
-    construction_for,
     field_boxes,
     marker_places,
+    page_construction,
     poles_mm,
 )
 from grader.printed.pdf import (
@@ -43,7 +43,7 @@ from grader.printed.pdf import (
     wrap,
 )
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity, Problem
-from reference.authored.assignment import Assignment, PageTable, Variant
+from reference.authored.assignment import Assignment, PageKind, PageTable, Variant
 from reference.drawing.canvas import Piece, pieces_of, scale_pieces
 from reference.errors import AuthoredFileError, CallError, Finding
 
@@ -112,11 +112,13 @@ class PageForm:
 
     Attributes
     ----------
+    kind : of the assignment's page
     template : the page's
     fields : boxes to write in, by scale or vector
     poles : the names of the plans' poles, by figure
     """
 
+    kind: PageKind
     template: Template
     fields: dict[str, Box]
     poles: dict[str, str]
@@ -307,14 +309,6 @@ class Sheets:
     problems: tuple[Problem, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class _PagePlan:
-    """One page of the assignment: its template and boxes, the same for every student."""
-
-    table: PageTable
-    form: PageForm
-
-
 def make_sheets(
     assignment: Assignment,
     rows: Sequence[RosterRow],
@@ -334,16 +328,16 @@ def make_sheets(
     Raises AuthoredFileError with every row whose n or position does not suit the assignment.
     """
     variants = _variants(assignment, rows, roster)
-    plans, problems = _plans(assignment, asked)
-    poles = [poles_mm(assignment, plan.form.template, variants) for plan in plans]
+    forms, problems = _forms(assignment, asked)
+    poles = [poles_mm(assignment, form.template, variants) for form in forms]
     drawing = PdfDrawing.begin(assignment.file.title.in_language(lang))
     for index, (row, variant) in enumerate(zip(rows, variants, strict=True)):
-        for page, plan in enumerate(plans, start=1):
-            identity = Identity(assignment.id, row.student_id, variant.n, variant.position, plan.table.kind)
+        for page, form in enumerate(forms, start=1):
+            identity = Identity(assignment.id, row.student_id, variant.n, variant.position, form.kind)
             own = {figure: places[index] for figure, places in poles[page - 1].items()}
-            text = PageText(identity, row.name, page, len(plans), own)
-            draw_page(drawing, assignment, text, plan.form, tongue(row.lang or lang))
-    layout = Layout(pages=[_layout(plan) for plan in plans])
+            text = PageText(identity, row.name, page, len(forms), own)
+            draw_page(drawing, assignment, text, form, tongue(row.lang or lang))
+    layout = Layout(pages=[_layout(form) for form in forms])
     return Sheets(drawing.finish(), layout, (*problems, *_unprintable(rows, roster)))
 
 
@@ -353,11 +347,6 @@ def _unprintable(rows: Sequence[RosterRow], roster: str) -> Iterator[Problem]:
         if letters:
             message = f"line {row.line}: the font has no {letters}; {row.student_id}'s name has boxes instead"
             yield Problem("sheet_letters", message, roster)
-
-
-def page_layouts(assignment: Assignment, asked: Collection[str] | None = None) -> Layout:
-    """The layout of an assignment's pages, without printing any; `asked` as for `make_sheets`."""
-    return Layout(pages=[_layout(plan) for plan in _plans(assignment, asked)[0]])
 
 
 def _variants(assignment: Assignment, rows: Sequence[RosterRow], roster: str) -> list[Variant]:
@@ -373,15 +362,15 @@ def _variants(assignment: Assignment, rows: Sequence[RosterRow], roster: str) ->
     return variants
 
 
-def _plans(
+def _forms(
     assignment: Assignment, asked: Collection[str] | None
-) -> tuple[list[_PagePlan], tuple[Problem, ...]]:
-    plans: list[_PagePlan] = []
+) -> tuple[list[PageForm], tuple[Problem, ...]]:
+    forms: list[PageForm] = []
     problems: list[Problem] = []
     for table in assignment.file.page:
         figures = list(dict.fromkeys(table.figures))
         fit = best_template(assignment, figures)
-        construction = construction_for(assignment, figures)
+        construction = page_construction(assignment, figures)
         names = [vector.name for figure in figures for vector in construction.vectors_of(figure)]
         boxes = _boxes(names, asked)
         if names and not boxes and (asked is None or set(names) & set(asked)):
@@ -389,8 +378,8 @@ def _plans(
             problems.append(Problem("sheet_boxes", message, str(assignment.path)))
         problems.extend(_too_small(assignment, table, fit))
         scales = {SCALE_OF[figure]: SCALE_BOXES[SCALE_OF[figure]] for figure in figures}
-        plans.append(_PagePlan(table, PageForm(fit.template, scales | boxes, dict(construction.poles))))
-    return plans, tuple(problems)
+        forms.append(PageForm(table.kind, fit.template, scales | boxes, dict(construction.poles)))
+    return forms, tuple(problems)
 
 
 def cells_of(
@@ -400,7 +389,7 @@ def cells_of(
     table = next((page for page in assignment.file.page if set(page.figures) == set(figures)), None)
     if table is None:
         return {}
-    construction = construction_for(assignment, table.figures)
+    construction = page_construction(assignment, table.figures)
     ordered = dict.fromkeys(table.figures)
     return combs_of(_boxes([v.name for figure in ordered for v in construction.vectors_of(figure)], asked))
 
@@ -434,14 +423,10 @@ def _too_small(assignment: Assignment, table: PageTable, fit: TemplateFit) -> li
     return problems
 
 
-def _layout(plan: _PagePlan) -> PageLayout:
-    zones: dict[str, Box | dict[str, Box]] = {**plan.form.template.zones, "fields": plan.form.fields}
-    return PageLayout(
-        kind=plan.table.kind,
-        markers=marker_places(plan.form.template),
-        zones=zones,
-        cells=combs_of(plan.form.fields),
-    )
+def _layout(form: PageForm) -> PageLayout:
+    zones: dict[str, Box | dict[str, Box]] = {**form.template.zones, "fields": form.fields}
+    markers = marker_places(form.template)
+    return PageLayout(kind=form.kind, markers=markers, zones=zones, cells=combs_of(form.fields))
 
 
 # The calibration page -----------------------------------------------------------------------------

@@ -8,22 +8,22 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.construction.derive import construction_of
+from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, Variant
 from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.drawing.canvas import A3_MM
 from reference.geometry import ComplexArray
+from reference.plan import construction_for
 
 # The code's text ----------------------------------------------------------------------------------
 
 VERSION = "planmark1"
-KINDS = ("all", "velocity", "acceleration")
+KINDS = get_args(PageKind)
 MAX_LENGTH = 200
 _NAME = r"[A-Za-z0-9._-]{1,64}"
 _NUMBER = r"(?:-?[0-9]{1,9})?"
@@ -241,7 +241,7 @@ class PageLayout(_Document):
     cells from the left: three digits, then the tenths.
     """
 
-    kind: Literal["all", "velocity", "acceleration", "calibration"]
+    kind: PageKind | Literal["calibration"]
     markers: list[MarkerPlace]
     zones: dict[str, Box | dict[str, Box]]
     cells: dict[str, tuple[Box, ...]] = {}
@@ -286,13 +286,9 @@ class TemplateFit:
     need_mm: dict[str, tuple[float, float]]
 
 
-def construction_for(assignment: Assignment, figures: Sequence[str]) -> Construction:
+def page_construction(assignment: Assignment, figures: Sequence[str]) -> Construction:
     """The construction of an assignment, without accelerations where no figure needs them."""
-    return construction_of(
-        assignment.mechanism(assignment.variants()),
-        accelerations=ACCELERATION_PLAN in figures,
-        plate_by_similarity=assignment.file.plate_images == "similarity",
-    )
+    return construction_for(assignment, assignment.variants(), accelerations=ACCELERATION_PLAN in figures)
 
 
 def places_mm(
@@ -303,7 +299,7 @@ def places_mm(
     (nodes, variants) complex millimetres by figure, y up; a sketch's about its own origin.
     """
     scales = assignment.scales(variants)
-    construction = construction_for(assignment, figures)
+    construction = page_construction(assignment, figures)
     parameters = parameters_of(assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
     nodes = evaluate(construction, parameters)
     return {

@@ -31,13 +31,12 @@ from grader.similarity.submission import (
     scales_used,
 )
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.construction.derive import construction_of
 from reference.construction.elements import View
 from reference.construction.graph import Construction
 from reference.construction.steps import Coincide, Pivot, Pole, Step
 from reference.construction.uncertainty import SMALL, step_errors
 from reference.geometry import ComplexArray
-from reference.plan import exact_plan
+from reference.plan import construction_for, exact_plan
 
 USUAL_SHARE = 0.45
 """Share of the drafting errors that is independent; a large class gives its own share,"""
@@ -101,10 +100,7 @@ class DrawingSimilarity:
 
 def compare_drawings(assignment: Assignment, submissions: Sequence[ComparedSubmission]) -> DrawingSimilarity:
     """Compare the drawings of a class."""
-    construction = construction_of(
-        assignment.mechanism(assignment.variants()[:1]),
-        plate_by_similarity=assignment.file.plate_images == "similarity",
-    )
+    construction = construction_for(assignment)
     figures = (MECHANISM, *construction.poles)
     nodes = {figure: [step.node for step in construction.figures[figure]] for figure in figures}
     drawn = drawn_of(submissions, nodes)

@@ -72,10 +72,13 @@ class ScalesTable(Authored):
     """The unit of a scale that a student writes as a bare number, where the assignment says one."""
 
 
+PageKind = Literal["all", "velocity", "acceleration"]
+
+
 class PageTable(Authored):
     """A sheet that a student hands in, with the figures drawn on it."""
 
-    kind: Literal["all", "velocity", "acceleration"]
+    kind: PageKind
     figures: Annotated[list[Literal["mechanism", "velocity_plan", "acceleration_plan"]], Field(min_length=1)]
 
 

@@ -15,7 +15,7 @@ import uvicorn
 
 from grader.files import samples_folder
 from grader.folder.batch import Batch, grade
-from grader.inputs.decisions import read_decisions
+from grader.inputs.decisions import read_table
 from grader.review.server import application
 from grader.review.session import Session
 from grader.rubric import load_rubric
@@ -71,7 +71,7 @@ def class_of_30(tmp_path_factory):
 
 
 def decisions_in(top):
-    return {(row.student_id, row.criterion): row for row in read_decisions(top / "in" / "decisions.csv")}
+    return {(row.student_id, row.criterion): row for row in read_table(top / "in" / "decisions.csv").rows}
 
 
 class Server:

@@ -9,7 +9,7 @@ import typer
 from pydantic import BaseModel
 
 from grader.cli.app import app
-from grader.cli.exporting import schema_names
+from grader.cli.exporting import MODELS
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference.authored import assignment, mechanism
 from reference.construction.mistakes import CODES
@@ -106,7 +106,7 @@ def test_every_mistake_code_is_explained():
         assert f"`{code}`" in DOCS["formats.md"]
 
 
-@pytest.mark.parametrize("name", schema_names())
+@pytest.mark.parametrize("name", MODELS)
 def test_every_schema_is_named_where_its_document_is_described(name):
     assert f"planmark schema {name}" in EVERYTHING
 

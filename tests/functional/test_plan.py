@@ -9,7 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 from grader.cli.app import app
-from grader.cli.exporting import schema, schema_names
+from grader.cli.exporting import MODELS, schema
 from reference.authored.assignment import library
 
 
@@ -104,7 +104,7 @@ def test_a_mechanism_that_does_not_assemble_has_its_own_status(planmark, tmp_pat
     assert "group of B does not assemble" in ran.stderr
 
 
-@pytest.mark.parametrize("name", schema_names())
+@pytest.mark.parametrize("name", MODELS)
 def test_every_schema_is_a_schema(planmark, name):
     ran = planmark("schema", name)
     assert ran.returncode == 0

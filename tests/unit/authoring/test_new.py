@@ -79,7 +79,7 @@ def test_a_start_can_be_drawn_and_lint_finds_nothing_to_change(tmp_path, start):
     assert {criterion.vector for criterion in rubric.criterion} - {None} == set(plan.vectors_si)
     found = lint(assignment, rubric)
     assert [str(one) for one in found.findings if one.severity != "hint"] == []
-    assert found.scales[0].under_8_mm == 0
+    assert found.scales[0].over_all.under_8_mm == 0
 
 
 @pytest.mark.parametrize("name", built_in())

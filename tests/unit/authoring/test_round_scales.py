@@ -71,7 +71,7 @@ def test_round_scales_put_into_the_file_fit_and_are_proposed_again(tmp_path, nam
     own, round_, _each = found.scales
     for scale in ("kL", "kv", "ka"):
         np.testing.assert_allclose(getattr(round_.scales, scale), getattr(own.scales, scale), rtol=ROUNDING)
-    assert own.under_8_mm == round_.under_8_mm
+    assert own.over_all.under_8_mm == round_.over_all.under_8_mm
 
 
 @pytest.mark.parametrize("name", built_in())
@@ -83,9 +83,9 @@ def test_scales_of_each_variants_own_are_never_coarser_than_the_common_ones(name
         own, common = getattr(each.scales, scale), getattr(together.scales, scale)
         assert np.all(own <= common * (1 + ROUNDING))
         assert np.min(own) > 0.0
-    assert together.room >= 1.0 - ROUNDING
-    assert each.room >= 1.0 - ROUNDING
-    assert each.under_8_mm <= together.under_8_mm
+    assert together.over_all.room >= 1.0 - ROUNDING
+    assert each.over_all.room >= 1.0 - ROUNDING
+    assert each.over_all.under_8_mm <= together.over_all.under_8_mm
 
 
 def test_round_scales_that_do_not_fit_are_told_with_those_that_do(tmp_path):
@@ -107,14 +107,14 @@ def test_scales_of_a_variants_own_are_suggested_where_fewer_vectors_are_short_an
     found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
     own, _, each = found.scales
     told = suggestions(found.scales, found.plan, ("mechanism", "velocity_plan", "acceleration_plan"))
-    assert each.room >= 1.0
+    assert each.over_all.room >= 1.0
     for index, variant in enumerate(found.plan.variants):
-        better = each.short[index] < own.short[index] or own.room < 1.0
+        better = each.short[index] < own.short[index] or own.over_all.room < 1.0
         assert (variant in told) == bool(better)
-    assert own.short.sum() == own.under_8_mm
+    assert own.short.sum() == own.over_all.under_8_mm
     codes = {finding.code for finding in found.findings}
-    assert ("short_at_any_scale" in codes) == bool(own.under_8_mm and each.under_8_mm)
-    assert ("scales_of_its_own" in codes) == bool(own.under_8_mm and not each.under_8_mm)
+    assert ("short_at_any_scale" in codes) == bool(own.over_all.under_8_mm and each.over_all.under_8_mm)
+    assert ("scales_of_its_own" in codes) == bool(own.over_all.under_8_mm and not each.over_all.under_8_mm)
 
 
 # Room on the sheets, held against boxes laid out by hand -----------------------------------------

@@ -8,12 +8,12 @@ import pytest
 
 from grader.inputs.roster import RosterRow
 from grader.language import tongue
+from grader.printed import answer_sheet
 from grader.printed.answer_sheet import (
     calibration_segments,
     cells_of,
     make_calibration,
     make_sheets,
-    page_layouts,
 )
 from grader.printed.layout import (
     FRAME_MM,
@@ -44,6 +44,12 @@ FAINT = 200
 """The darkest grey (0..255) printed where students draw: the crosses for the poles."""
 LEAST_CELL_MM = 3.5
 ANA = RosterRow("s07", "Ana Țîrlea", 7, line=2)
+
+
+def page_layouts(assignment, asked=None):
+    """The layout of an assignment's pages, without printing any."""
+    forms, _ = answer_sheet._forms(assignment, asked)
+    return Layout(pages=[answer_sheet._layout(form) for form in forms])
 
 
 def boxes_of(page):

@@ -7,7 +7,7 @@ import numpy as np
 
 from grader.similarity.submission import ComparedSubmission
 from reference.authored.assignment import load_assignment
-from reference.construction.derive import construction_of
+from reference.plan import construction_for
 from samples.simulation import CAREFUL, SLOPPY, TYPICAL, Student
 from samples.simulation.hand import draw, task_of
 
@@ -69,10 +69,7 @@ def measured(drawn, seed, step_mm=0.5, spread_mm=0.1, *, directions=True):
     (figures,) = drawn.sheets
     nodes = {node: at for figure in figures.values() for node, at in figure.items()}
     assignment = load_assignment("press" if drawn.variant.n is None else "pump")
-    construction = construction_of(
-        assignment.mechanism(assignment.variants()[:1]),
-        plate_by_similarity=assignment.file.plate_images == "similarity",
-    )
+    construction = construction_for(assignment)
     numbers = {}
     for name, vector in construction.vectors.items():
         at = nodes[vector.head] - nodes[vector.tail]
