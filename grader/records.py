@@ -241,6 +241,12 @@ class Tips:
 NO_TIPS = Tips(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
 
 
+FAINT = 25
+"""Of 255: ink map values up to this are paper."""
+BESIDE_PX = 3
+"""Half a millimetre beside a segment still belongs to it."""
+
+
 @dataclass(frozen=True, slots=True)
 class InkMap:
     """A coarse map of the ink, which shows whether something is drawn.
@@ -254,21 +260,15 @@ class InkMap:
     ink: GreyImage
     px_per_mm: float
 
-    def share_inked(self, first: complex, last: complex) -> float:
+    def share_inked(self, first: complex, last: complex, beside_px: int = BESIDE_PX) -> float:
         """The share of the middle of a segment (complex mm) that has ink on it or beside it, 0..1."""
         along = np.linspace(0.25, 0.75, max(int(abs(last - first)), 4))
         at = (first + along * (last - first)) * self.px_per_mm
-        beside = 1j * np.exp(1j * np.angle(last - first)) * np.arange(-BESIDE_PX, BESIDE_PX + 1)
+        beside = 1j * np.exp(1j * np.angle(last - first)) * np.arange(-beside_px, beside_px + 1)
         places = at[:, None] + beside
         rows = np.clip(np.rint(-places.imag).astype(int), 0, self.ink.shape[0] - 1)
         columns = np.clip(np.rint(places.real).astype(int), 0, self.ink.shape[1] - 1)
         return float(np.mean(self.ink[rows, columns].max(axis=1) > FAINT))
-
-
-FAINT = 25
-"""Of 255: ink map values up to this are paper."""
-BESIDE_PX = 3
-"""Half a millimetre beside a segment still belongs to it."""
 
 
 @dataclass(frozen=True, slots=True)

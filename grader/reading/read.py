@@ -284,6 +284,8 @@ BLANK = 0.25
 """Share of a vector's length that other lines may ink where the vector itself is not drawn."""
 INKED = 0.9
 """Share from which it is drawn, though its stroke is another's too; it is read from its nodes."""
+ON_IT_PX = 1
+"""How far beside it such a stroke's ink may begin: of vectors a degree apart only one may be drawn."""
 LEAST_VECTOR_MM = 2.0
 """A shorter vector is read from its nodes, with or without a stroke."""
 
@@ -353,11 +355,11 @@ def _vectors(
         row = int(plan.assignment.stroke[index])
         if row < 0 and abs(span) > LEAST_VECTOR_MM:
             ends = f"{expected.names[edge.tail]} and {expected.names[edge.head]}"
-            inked = where.share_inked(complex(fit.at[edge.tail]), complex(fit.at[edge.head]))
-            if inked <= BLANK:
+            at = complex(fit.at[edge.tail]), complex(fit.at[edge.head])
+            if where.share_inked(*at) <= BLANK:
                 unread.append(Unread(edge.name, f"nothing is drawn between {ends}", is_blank=True))
                 continue
-            if inked < INKED:
+            if where.share_inked(*at, ON_IT_PX) < INKED:
                 unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
                 continue
         cov = _difference_cov(fit, edge, span, scale_se)

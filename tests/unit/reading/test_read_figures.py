@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.reading.read import read_figures
-from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Reading
+from grader.reading.read import INKED, ON_IT_PX, read_figures
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, InkMap, Reading
 from reference.authored.assignment import Assignment, Variant, built_in
 from reference.construction.mistakes import Mistake, commit
 from tests.unit.reading.drawn import PLACES, Drawn, Pen, draw, ink_of, task
@@ -132,6 +132,15 @@ def test_a_vector_that_is_not_drawn_is_unread_with_its_reason():
     reasons = {one.name: one.reason for one in reading.unread}
     assert "v_C" in reasons or vectors_read(reading)["v_C"][1] < SURE
     assert "v_B" not in reasons
+
+
+def test_a_line_that_leaves_a_vector_by_a_degree_is_not_its_stroke():
+    ink = np.zeros((60, 480), np.uint8)
+    ink[29:32, 30:390] = 255
+    where = InkMap(ink, px_per_mm=6.0)
+    start, on_it, beside = 5.0 - 5.0j, 65.0 - 5.1j, 65.0 - 5.8j
+    assert where.share_inked(start, on_it, ON_IT_PX) > INKED
+    assert where.share_inked(start, beside) > INKED > where.share_inked(start, beside, ON_IT_PX)
 
 
 def test_sketch_and_plans_on_different_sheets_are_read_together():
