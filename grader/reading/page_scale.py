@@ -28,14 +28,13 @@ STRAY, STRAY_DENSITY = 0.1, 2.0
 """Probability that a length is off by a mistake of its own, and its density over the factor's logarithm."""
 TOGETHER, TOGETHER_SPREAD = 0.01, 0.02
 """The same of all of them by one factor, as by compasses that the crank's length set; how far off."""
-WRONG, WRONG_SPREAD = 0.01, 0.03
-"""Probability that a plain page's registration is off by more than its standard error says; how far. Of 1-bit
-copies one in thirty is, of flatbed scans none of some hundred was."""
+WRONG, WRONG_SPREAD = 0.002, 0.03
+"""Probability that a plain page's registration is off by more than its standard error says; how far."""
 WIDEST, STEP = 0.15, 0.0005
 """Factors that are tried, by their logarithm: a page off by more has no figure that is read."""
 CLUSTER = 0.01
 """Factors that differ by less are of one explanation."""
-RIVAL = 0.02
+RIVAL = 0.05
 """Other factors of such a probability together are what lengths may be off by: half-way is none of them."""
 UNKNOWN, SURELY = "scale_unknown", 0.008
 """A problem of registration, and the standard error at which a drawing answers it."""

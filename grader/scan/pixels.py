@@ -265,7 +265,8 @@ def is_dotted(grey: GreyImage) -> bool:
     rows = grey[::_SAMPLED_ROWS]
     if np.any((rows > 0) & (rows < 255)):
         return False
-    rim = round(_RIM * max(grey.shape))
+    # A strip narrower than two rims has no more than its middle.
+    rim = min(round(_RIM * max(grey.shape)), (min(grey.shape) - 1) // 2)
     ink = np.ascontiguousarray(grey[rim:-rim, rim:-rim] == 0) if rim else grey == 0
     around = cv2.boxFilter(ink.view(np.uint8), cv2.CV_8U, (3, 3), normalize=False)
     lonely = np.count_nonzero(ink & (np.asarray(around) <= _LONELY))
