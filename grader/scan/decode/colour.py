@@ -22,7 +22,7 @@ _IN_BLOCKS, _OF_BLOCK = 0.75, (0.004, 0.5)
 """Rulings are in so many of the blocks, in each with such a share of its pixels: two lines, no tint."""
 _DARKER = 20
 """What is darker than nearly all of the rulings by so much of 255 is drawn on them."""
-_FAINT = 0.6
+_FAINT = 0.5
 """Share of the least channel's darkness that a stroke keeps: of yellow, 0.9 beside a luma of 0.1."""
 
 
