@@ -22,8 +22,9 @@ _IN_BLOCKS, _OF_BLOCK = 0.75, (0.004, 0.5)
 """Rulings are in so many of the blocks, in each with such a share of its pixels: two lines, no tint."""
 _DARKER = 20
 """What is darker than nearly all of the rulings by so much of 255 is drawn on them."""
-_FAINT = 0.5
-"""Share of the least channel's darkness that a stroke keeps: of yellow, 0.9 beside a luma of 0.1."""
+_YELLOW = 0.6
+"""Share of its darkness in blue that a stroke keeps: of yellow 0.9, beside a luma of 0.1. Of all pencils it
+alone is lost in luma."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,14 +35,14 @@ class Colours:
     ----------
     rgb : whether red is the first channel, not blue
     has_strokes : whether some of them are drawn
-    white : the paper, by channel
+    white : the paper, in blue
     clear : the channel in which the paper's rulings are bright, None for paper without
     darkest : luma below which nothing belongs to the rulings
     """
 
     rgb: bool
     has_strokes: bool = False
-    white: tuple[float, ...] = (255.0, 255.0, 255.0)
+    white: float = 255.0
     clear: int | None = None
     darkest: int = 0
 
@@ -56,11 +57,9 @@ class Colours:
             bright = cv2.max(luma, cv2.extractChannel(pixels, self.clear))
             luma = np.where(luma < self.darkest, luma, bright)
         elif self.has_strokes:
-            for channel, white in zip(cv2.split(pixels), self.white, strict=True):
-                light = cv2.convertScaleAbs(
-                    channel, alpha=_FAINT * 255.0 / white, beta=255.0 * (1.0 - _FAINT)
-                )
-                luma = cv2.min(luma, light)
+            blue = cv2.extractChannel(pixels, 2 if self.rgb else 0)
+            alpha, beta = _YELLOW * 255.0 / self.white, 255.0 * (1.0 - _YELLOW)
+            luma = cv2.min(luma, cv2.convertScaleAbs(blue, alpha=alpha, beta=beta))
         return np.asarray(luma, dtype=np.uint8)
 
 
@@ -91,8 +90,8 @@ def colours_of(sample: GreyImage, *, rgb: bool) -> Colours:
     everywhere = np.mean((share > _OF_BLOCK[0]) & (share < _OF_BLOCK[1]), axis=0)
     common = int(np.argmax(everywhere))
     if everywhere[common] < _IN_BLOCKS:
-        white = np.maximum(np.percentile(paper, 80, axis=0), 1.0)
-        return Colours(rgb, has_strokes=True, white=tuple(white.tolist()))
+        white = max(float(np.percentile(paper[:, 2 if rgb else 0], 80)), 1.0)
+        return Colours(rgb, has_strokes=True, white=white)
     ruled = coloured[:, (hue == common) | (hue == (common + 1) % _HUES)]
     luma = cv2.cvtColor(ruled, cv2.COLOR_RGB2GRAY if rgb else cv2.COLOR_BGR2GRAY)
     darkest = max(int(np.percentile(luma, 10)) - _DARKER, 0)
