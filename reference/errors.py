@@ -11,7 +11,6 @@ PlanmarkError            caught once, at the rim
 import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 MOST_FINDINGS = 20
 """A person reads no more at a time; a hostile file has a million."""
@@ -33,7 +32,8 @@ class PlanmarkError(Exception):
         self.code = code
 
     def __reduce__(self) -> tuple[object, ...]:
-        return (type(self), (self.code, self.message))
+        # Errors come back from worker processes as they were, whatever their classes are made from.
+        return (type(self).__new__, (type(self), self.message), self.__dict__)
 
 
 class CallError(PlanmarkError):
@@ -79,9 +79,6 @@ class AuthoredFileError(PlanmarkError):
         self.file = file
         self.findings = findings
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return (type(self), (self.file, self.findings))
-
 
 class MechanismError(PlanmarkError):
     """The mechanism has no position here, or its velocities are not determined.
@@ -100,9 +97,6 @@ class MechanismError(PlanmarkError):
     ) -> None:
         super().__init__(code, template if gap_m is None else template.replace("{gap}", f"{gap_m:.6g} m"))
         self.template, self.group, self.gap_m = template, group, gap_m
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return (partial(type(self), group=self.group, gap_m=self.gap_m), (self.code, self.template))
 
 
 class InputFileError(PlanmarkError):

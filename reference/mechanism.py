@@ -9,7 +9,7 @@ right (behind); an array where it differs between variants.
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from types import NoneType
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import numpy as np
 
@@ -269,26 +269,21 @@ def joints_of(group: Group) -> tuple[str, ...]:
 
 Array = np.ndarray[Any, np.dtype[Any]]
 """Real or complex: one number for all variants, or one for each."""
-Part = TypeVar("Part")
 PLAIN = (str, int, float, complex, NoneType)
 """What a mechanism is made of besides records, tuples, mappings and arrays."""
 
 
-def with_arrays(part: Part, change: Callable[[Array], Any]) -> Part:
+def with_arrays(part: Any, change: Callable[[Array], Any]) -> Any:  # noqa: ANN401 - the same kind of part
     """A mechanism, or a part of it, with every array replaced, in the order of its fields."""
-    return cast("Part", _changed(part, change))
-
-
-def _changed(part: Any, change: Callable[[Array], Any]) -> Any:  # noqa: ANN401 - whatever a part is made of
     if isinstance(part, np.ndarray):
         return change(part)
     if isinstance(part, PLAIN):
         return part
     if isinstance(part, tuple):
-        return tuple([_changed(inner, change) for inner in part])
+        return tuple([with_arrays(inner, change) for inner in part])
     if isinstance(part, Mapping):
-        return {name: _changed(inner, change) for name, inner in part.items()}
-    return type(part)(*[_changed(getattr(part, name), change) for name in part.__slots__])
+        return {name: with_arrays(inner, change) for name, inner in part.items()}
+    return type(part)(*[with_arrays(getattr(part, name), change) for name in part.__slots__])
 
 
 def form_of(part: Any) -> Hashable:  # noqa: ANN401 - a mechanism, or whatever a part is made of

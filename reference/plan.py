@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reference.authored.assignment import Assignment, Scales, Variant
 from reference.construction.derive import construction_of, image_name
@@ -57,12 +58,15 @@ class Plan:
         """The largest distance of a plan's node from its pole."""
         return np.asarray(np.max([np.abs(node) for node in self.nodes_mm[figure].values()], axis=0))
 
+    def is_zero(self, vector: str) -> NDArray[np.bool_]:
+        """Whether a vector's true length is zero but for rounding, against the size of its plan."""
+        figure = self.construction.figure_of(self.construction.vectors[vector].head)
+        return np.asarray(np.abs(self.drawn_mm(vector)) <= ZERO_SHARE * self.size_mm(figure))
+
     def direction_deg(self, vector: str) -> FloatArray:
         """Counter-clockwise from +x, 0 <= d < 360; nan for a zero vector."""
-        figure = self.construction.figure_of(self.construction.vectors[vector].head)
-        drawn = self.drawn_mm(vector)
-        angle = np.degrees(np.angle(drawn)) % 360.0 % 360.0
-        return np.where(np.abs(drawn) <= ZERO_SHARE * self.size_mm(figure), np.nan, angle)
+        angle = np.degrees(np.angle(self.drawn_mm(vector))) % 360.0 % 360.0
+        return np.where(self.is_zero(vector), np.nan, angle)
 
 
 def construction_for(

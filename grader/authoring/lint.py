@@ -200,24 +200,16 @@ def _worst(rows: Sequence[LintVariant]) -> LintWorst:
 # Names in the files: unknown, unused, not told to the student -------------------------------------
 
 
-def formulas_in(thing: object) -> Iterator[Formula]:
-    """Every formula of an authored table, however deep."""
-    if isinstance(thing, Formula):
-        yield thing
-    elif isinstance(thing, BaseModel):
-        for name in type(thing).model_fields:
-            yield from formulas_in(getattr(thing, name))
-    elif isinstance(thing, dict):
-        for value in thing.values():
-            yield from formulas_in(value)
-    elif isinstance(thing, list | tuple):
-        for value in thing:
-            yield from formulas_in(value)
-
-
 def names_in(thing: object) -> set[str]:
-    """The names that the formulas of a table need."""
-    return {name for formula in formulas_in(thing) for name in formula.names}
+    """The names that the formulas of an authored table need, however deep they stand."""
+    if isinstance(thing, Formula):
+        return set(thing.names)
+    inside: Iterable[object] = ()
+    if isinstance(thing, BaseModel):
+        inside = (getattr(thing, name) for name in type(thing).model_fields)
+    elif isinstance(thing, dict | list | tuple):
+        inside = thing.values() if isinstance(thing, dict) else thing
+    return set().union(*map(names_in, inside))
 
 
 def data_findings(

@@ -76,19 +76,11 @@ def asked_vectors(rubric: RubricFile, plan: Plan) -> AskedVectors:
     return AskedVectors(tuple(asked), names, *_lengths(plan, names), least_mm)
 
 
-def is_zero(plan: Plan, vector: str) -> BoolArray:
-    """(N,) whether a vector's true length is zero but for rounding, against the size of its plan."""
-    figure = plan.construction.figure_of(plan.construction.vectors[vector].head)
-    return np.asarray(np.abs(plan.drawn_mm(vector)) <= ZERO_SHARE * plan.size_mm(figure))
-
-
 def _lengths(plan: Plan, names: tuple[str, ...]) -> tuple[FloatArray, BoolArray]:
-    count = len(plan.variants)
-    lengths, zeros = np.empty((len(names), count)), np.zeros((len(names), count), dtype=np.bool_)
-    for row, name in enumerate(names):
-        lengths[row] = np.abs(plan.drawn_mm(name))
-        zeros[row] = is_zero(plan, name)
-    return lengths, zeros
+    """(V, N) drawn lengths, and whether each is zero."""
+    shape = (len(names), len(plan.variants))
+    lengths = np.array([np.abs(plan.drawn_mm(name)) for name in names]).reshape(shape)
+    return lengths, np.array([plan.is_zero(name) for name in names], dtype=np.bool_).reshape(shape)
 
 
 def length_findings(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Iterator[LintFinding]:

@@ -16,7 +16,6 @@ from typing import Literal
 
 import numpy as np
 
-from grader.authoring.round_scales import is_zero
 from grader.language import Tongue
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.drawing.canvas import (
@@ -134,11 +133,11 @@ def _point(joint: str, at: np.ndarray, count: int) -> tuple[Column, ...]:
 def _rate(plan: Plan, name: str) -> FloatArray:
     """An angular quantity, exactly zero where the vector that it comes from is."""
     values = np.broadcast_to(plan.rates[name], (len(plan.variants),))
-    return np.where(is_zero(plan, plan.construction.rates[name].vector), 0.0, values) + 0.0
+    return np.where(plan.is_zero(plan.construction.rates[name].vector), 0.0, values) + 0.0
 
 
 def _vector(plan: Plan, name: str) -> tuple[Column, ...]:
-    drawn, value, zero = np.abs(plan.drawn_mm(name)), np.abs(plan.vectors_si[name]), is_zero(plan, name)
+    drawn, value, zero = np.abs(plan.drawn_mm(name)), np.abs(plan.vectors_si[name]), plan.is_zero(name)
     unit = VECTOR_UNITS[plan.construction.vectors[name].scale]
     return (
         Column(name, name, "mm", np.where(zero, 0.0, drawn), 2),

@@ -17,7 +17,7 @@ from reference.geometry import ComplexArray, FloatArray, direction, dot
 from reference.kinematics.continuation import change
 from reference.kinematics.cycle import Cycle
 from reference.kinematics.motion import Motion, move_where_possible
-from reference.mechanism import CrossSlider, Dyad, FixedGuide, Group, Mechanism, Slider, SlottedLink, Yoke
+from reference.mechanism import CrossSlider, Dyad, FixedGuide, Mechanism, Slider, SlottedLink, Yoke
 from reference.plan import vectors_of
 
 # Quantities ---------------------------------------------------------------------------------------
@@ -275,14 +275,18 @@ def strokes_of(subject: CycleSubject) -> tuple[OutputStroke, ...]:
 
 
 def _outputs(subject: CycleSubject) -> Iterator[_Output]:
+    is_ground = subject.structure.is_ground
     for group in subject.structure.groups:
         match group:
             case Slider(guide=FixedGuide() as guide) | Yoke(guide=guide):
                 yield _slider(group.node, guide)
             case CrossSlider(guides=guides):
                 yield from (_slider(group.node, guide) for guide in guides if isinstance(guide, FixedGuide))
-            case Dyad() | SlottedLink():
-                yield from _rockers(subject, group)
+            case Dyad(node=node, pins=pins, links=links):
+                arms = zip(links, pins, strict=True)
+                yield from (_rocker(link, pin, node) for link, pin in arms if is_ground(pin))
+            case SlottedLink(node=node, pivot=pin, link=link) if is_ground(pin):
+                yield _rocker(link, pin, node)
             case _:
                 pass
 
@@ -299,24 +303,14 @@ def _slider(node: str, guide: FixedGuide) -> _Output:
     return _Output(node, False, rate, place)  # noqa: FBT003 - the field's name says it
 
 
-def _rockers(subject: CycleSubject, group: Group) -> Iterator[_Output]:
-    match group:
-        case Dyad(pins=pins, links=links):
-            arms = [(link, pin, group.node) for pin, link in zip(pins, links, strict=True)]
-        case SlottedLink():
-            arms = [(group.link, group.pivot, group.node)]
-        case _:
-            arms = []
-    for link, pin, node in arms:
-        if subject.structure.is_ground(pin):
+def _rocker(link: str, pin: str, node: str) -> _Output:
+    def rate(motion: Motion) -> FloatArray:
+        return motion.omega[link]
 
-            def rate(motion: Motion, link: str = link) -> FloatArray:
-                return motion.omega[link]
+    def place(motion: Motion) -> ComplexArray:
+        return np.asarray(motion.position[node] - motion.position[pin])
 
-            def place(motion: Motion, pin: str = pin, node: str = node) -> ComplexArray:
-                return np.asarray(motion.position[node] - motion.position[pin])
-
-            yield _Output(link, True, rate, place)  # noqa: FBT003 - as above
+    return _Output(link, True, rate, place)  # noqa: FBT003 - as above
 
 
 def _stroke(subject: CycleSubject, output: _Output) -> OutputStroke:

@@ -74,9 +74,6 @@ class ClashError(PlanmarkError):
         super().__init__("decision_clash", message)
         self.rows = rows
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return (type(self), (self.message, self.rows))
-
 
 @dataclass(frozen=True, slots=True)
 class Decision:

@@ -49,11 +49,6 @@ class ComparedSubmission:
     excused: frozenset[str] = frozenset()
     printed: bool = False
 
-    @property
-    def key(self) -> tuple[str, int | None]:
-        """Student and position."""
-        return self.student_id, self.variant.position
-
 
 def compared_submission(
     report: ReportDocument, variant: Variant, measured: Measurements | None

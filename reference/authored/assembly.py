@@ -129,13 +129,15 @@ def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int
         bodies.carry(driver.link, driver.pivot, driver.pin, driver.length_m)
     ground = {joint: numbers.point(point) for joint, point in file.ground.items()}
     groups_ = (_located(index, table, numbers, bodies) for index, table in enumerate(file.group))
-    return with_arrays(Mechanism(ground, driver, tuple(groups_)), numbers.for_all)
+    mechanism: Mechanism = with_arrays(Mechanism(ground, driver, tuple(groups_)), numbers.for_all)
+    return mechanism
 
 
 def build_driver(file: MechanismFile, values: Mapping[str, Value], count: int) -> Driver:
     """The driven link alone, as `build_mechanism` has it."""
     numbers = _Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
-    return with_arrays(_driver(file, numbers), numbers.for_all)
+    driver: Driver = with_arrays(_driver(file, numbers), numbers.for_all)
+    return driver
 
 
 def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _LinkAxes) -> Group:

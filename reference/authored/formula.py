@@ -6,7 +6,6 @@ nothing. Evaluation works on floats and on NumPy arrays alike.
 """
 
 import ast
-import difflib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from reference.errors import near_names
 from reference.geometry import FloatArray
 
 MAX_LENGTH = 200
@@ -157,6 +157,6 @@ def _evaluate(node: ast.expr, values: Mapping[str, Value]) -> Any:  # noqa: ANN4
 
 
 def _unknown_name(name: str, known: Mapping[str, object]) -> str:
-    near = difflib.get_close_matches(name, list(known), n=2)
+    near = near_names(name, known)
     hint = f"; did you mean {' or '.join(near)}?" if near else f"; known: {', '.join(sorted(known))}"
     return f"unknown name {name}{hint}"

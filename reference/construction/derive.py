@@ -74,6 +74,15 @@ class Draft:
             return ACCELERATION_POLE if primed else VELOCITY_POLE
         return image_name(joint, primed=primed)
 
+    def images_of(self, base: tuple[str, str], *, primed: bool) -> tuple[str, str]:
+        """The nodes of two joints."""
+        return self.image(base[0], primed=primed), self.image(base[1], primed=primed)
+
+    def add_images(self, velocity: Step, acceleration: Step) -> None:
+        """A step of each plan."""
+        self.velocity.append(velocity)
+        self.acceleration.append(acceleration)
+
     def relative(self, node: str, pin: str) -> str:
         """The subscript of a vector of `node` about `pin`: B about A is BA, about the ground B."""
         return node if self.mechanism.is_ground(pin) else f"{node}{pin}"
@@ -106,8 +115,10 @@ Condition = tuple[Line, Line]
 def images_at(draft: Draft, node: str, conditions: Sequence[Condition]) -> None:
     """Both images of a node, where the two lines of each plan meet."""
     velocity_lines, acceleration_lines = zip(*conditions, strict=True)
-    draft.velocity.append(TwoLines(draft.image(node), *velocity_lines))
-    draft.acceleration.append(TwoLines(draft.image(node, primed=True), *acceleration_lines))
+    draft.add_images(
+        TwoLines(draft.image(node), *velocity_lines),
+        TwoLines(draft.image(node, primed=True), *acceleration_lines),
+    )
     absolute(draft, node)
 
 
@@ -143,7 +154,7 @@ def slides(draft: Draft, node: str, guides: Sequence[Guide]) -> list[Condition]:
             continue
         under, (g, h) = guide.coincident, guide.base
         draft.sketch.append(Coincide(under, node))
-        add_images(draft, *_similar_images(draft, under, (g, h)))
+        draft.add_images(*similar_images(draft, under, (g, h)))
         absolute(draft, under)
         turn = (draft.image(g), draft.image(h))
         conditions.append(sliding(draft, (under, node), Along(g, h), turn, (guide.link, g, h)))
@@ -187,55 +198,24 @@ def guide_line(node: str, guide: Guide) -> Line | FixedLine:
     return Line(guide.base[0], Along(*guide.base))
 
 
-def add_images(draft: Draft, velocity: Step, acceleration: Step) -> None:
-    """A step of each plan."""
-    draft.velocity.append(velocity)
-    draft.acceleration.append(acceleration)
-
-
-def _base_images(draft: Draft, base: tuple[str, str], *, primed: bool) -> tuple[str, str]:
-    return draft.image(base[0], primed=primed), draft.image(base[1], primed=primed)
-
-
-def _similar_images(draft: Draft, node: str, base: tuple[str, str]) -> list[Similar]:
+def similar_images(draft: Draft, node: str, base: tuple[str, str]) -> tuple[Similar, Similar]:
     """The similarity steps of a link's third point, for both plans."""
-    return [
-        Similar(draft.image(node, primed=primed), _base_images(draft, base, primed=primed), (*base, node))
+    velocity, acceleration = (
+        Similar(draft.image(node, primed=primed), draft.images_of(base, primed=primed), (*base, node))
         for primed in (False, True)
-    ]
+    )
+    return velocity, acceleration
 
 
 def note_similar_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
     """How both images of a plate's third point would come by similarity."""
-    draft.images.update({step.node: step for step in _similar_images(draft, node, base)})
+    draft.images.update({step.node: step for step in similar_images(draft, node, base)})
 
 
 def rigid_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
     """Both images of a link's point by similarity, without relative vectors."""
     note_similar_images(draft, node, base)
-    add_images(draft, *_similar_images(draft, node, base))
-    absolute(draft, node)
-
-
-def similar_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
-    """Both images of a plate's point by similarity, and the velocities about its base."""
-    rigid_images(draft, node, base)
-    for pin in base:
-        if not draft.mechanism.is_ground(pin):
-            draft.vector(f"v_{node}{pin}", draft.image(pin), draft.image(node), (pin, node))
-
-
-def images_on_line(draft: Draft, node: str, base: tuple[str, str]) -> None:
-    """Both images of a point that divides a link."""
-    add_images(
-        draft,
-        *(
-            Divide(
-                draft.image(node, primed=primed), _base_images(draft, base, primed=primed), f"ratio {node}"
-            )
-            for primed in (False, True)
-        ),
-    )
+    draft.add_images(*similar_images(draft, node, base))
     absolute(draft, node)
 
 
@@ -394,12 +374,22 @@ def _draw_group(draft: Draft, group: Group) -> None:
             _draw_plate(draft, group)
             note_similar_images(draft, node, (p, q))
             if group.is_ever_flat or draft.plate_by_similarity:
-                similar_images(draft, node, (p, q))
+                rigid_images(draft, node, (p, q))
+                for pin in (p, q):
+                    if not draft.mechanism.is_ground(pin):
+                        draft.vector(f"v_{node}{pin}", draft.image(pin), draft.image(node), (pin, node))
             else:
                 images_at(draft, node, rotations(draft, node, {p: link, q: link}))
         case PointOnLine(node=node, base=(p, q)):
-            draft.sketch.append(Divide(node, (p, q), f"ratio {node}"))
-            images_on_line(draft, node, (p, q))
+            ratio = f"ratio {node}"
+            draft.sketch.append(Divide(node, (p, q), ratio))
+            draft.add_images(
+                *(
+                    Divide(draft.image(node, primed=primed), draft.images_of((p, q), primed=primed), ratio)
+                    for primed in (False, True)
+                )
+            )
+            absolute(draft, node)
         case Slider(node=node, pin=pin, link=link, guide=guide):
             radius = Scaled(pair(pin, node), "kL")
             draft.sketch.append(ArcAndLine(node, pin, radius, guide_line(node, guide), group.side))

@@ -371,8 +371,5 @@ def affected(mistake: Mistake, construction: Construction) -> frozenset[str]:
         return frozenset(step.node for step in construction.steps)
     if mistake.at in construction.figures:
         return frozenset(step.node for step in construction.figures[mistake.at])
-    moved = {mistake.at}
-    for step in construction.steps:
-        if moved.intersection(step.needs):
-            moved.add(step.node)
-    return frozenset(moved)
+    made_from = (step.node for step in construction.steps if mistake.at in construction.upstream(step.node))
+    return frozenset({mistake.at, *made_from})

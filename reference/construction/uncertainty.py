@@ -7,7 +7,7 @@ ones gives what follows from these, with the errors of the later acts alone.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -181,63 +181,45 @@ def trace(
 
     A node without a solution is nan; an error that leaves no solution counts as no shift.
     """
-    drawing = _Tracing(construction, parameters, skill, own)
-    with np.errstate(all="ignore"):
-        for figure, steps in construction.figures.items():
-            drawing.trace(figure, steps)
-    made = {name: drawing.as_traced(place) for name, place in drawing.made.items()}
-    nodes = {
-        name: made[name] if place is drawing.made[name] else drawing.as_traced(place)
-        for name, place in drawing.nodes.items()
-    }
-    return TracedDrawing(made, nodes, drawing.drafting_count)
+    every = acts(construction)
+    drafting = len(every)
+    measuring = max(
+        (len(one.shifts) for nodes in own.values() for one in nodes.values() if one.shifts is not None),
+        default=0,
+    )
+    # Arrays over the errors: none first, then one act's in each element, then those of measuring.
+    rows = SMALL * np.eye(drafting, 1 + drafting + measuring, 1)
+    errors = {act: row * skill.deviation(act[2]) for act, row in zip(every, rows, strict=True)}
 
-
-@dataclass(slots=True)
-class _Tracing:
-    """A construction while it is traced: arrays with no error first, then one for each act."""
-
-    construction: Construction
-    parameters: Parameters
-    skill: Skill
-    own: Mapping[str, Mapping[str, OwnNode]]
-    errors: Errors = field(init=False)
-    drafting_count: int = field(init=False)
-    measuring_count: int = field(init=False)
-    made: dict[str, ComplexArray] = field(default_factory=dict)
-    nodes: dict[str, ComplexArray] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        every = acts(self.construction)
-        counts = (
-            len(one.shifts) for nodes in self.own.values() for one in nodes.values() if one.shifts is not None
-        )
-        self.drafting_count, self.measuring_count = len(every), max(counts, default=0)
-        rows = SMALL * np.eye(self.drafting_count, 1 + self.drafting_count + self.measuring_count, 1)
-        self.errors = {act: row * self.skill.deviation(act[2]) for act, row in zip(every, rows, strict=True)}
-
-    def trace(self, figure: str, steps: tuple[Step, ...]) -> None:
-        """Trace one figure, from the own nodes that belong to it."""
-        own = {name: self.placed(one) for name, one in self.own.get(figure, {}).items()}
-        view = View({**self.nodes, **own}, self.parameters, self.errors)
-        known: dict[str, ComplexArray] = view.nodes  # type: ignore[assignment]
-        for step in steps:
-            node = step.node
-            mark = view.error(node, 0, "x") + 1j * view.error(node, 0, "y")
-            self.made[node] = np.asarray(step.place(view) + mark)
-            known[node] = self.nodes[node] = own.get(node, self.made[node])
-
-    def placed(self, one: OwnNode) -> ComplexArray:
-        """An own node as an array over the errors."""
-        place = np.full(1 + self.drafting_count + self.measuring_count, one.at)
+    def placed(one: OwnNode) -> ComplexArray:
+        place = np.full(1 + drafting + measuring, one.at)
         if one.shifts is not None:
-            place[1 + self.drafting_count : 1 + self.drafting_count + len(one.shifts)] += SMALL * one.shifts
+            place[1 + drafting : 1 + drafting + len(one.shifts)] += SMALL * one.shifts
         return place
 
-    def as_traced(self, place: ComplexArray) -> TracedNode:
-        """A node's position without errors, and its shift by each of them."""
-        shifts = (place[1:] - place[0]) / SMALL
-        return TracedNode(complex(place[0]), np.where(np.isfinite(shifts), shifts, 0.0))
+    made: dict[str, ComplexArray] = {}
+    nodes: dict[str, ComplexArray] = {}
+    with np.errstate(all="ignore"):
+        for figure, steps in construction.figures.items():
+            here = {name: placed(one) for name, one in own.get(figure, {}).items()}
+            known = {**nodes, **here}
+            view = View(known, parameters, errors)
+            for step in steps:
+                node = step.node
+                mark = view.error(node, 0, "x") + 1j * view.error(node, 0, "y")
+                made[node] = np.asarray(step.place(view) + mark)
+                known[node] = nodes[node] = here.get(node, made[node])
+        traced = {name: _traced(place) for name, place in made.items()}
+        taken = {
+            name: traced[name] if place is made[name] else _traced(place) for name, place in nodes.items()
+        }
+    return TracedDrawing(traced, taken, drafting)
+
+
+def _traced(place: ComplexArray) -> TracedNode:
+    """A node's position without errors, and its shift by each of them."""
+    shifts = (place[1:] - place[0]) / SMALL
+    return TracedNode(complex(place[0]), np.where(np.isfinite(shifts), shifts, 0.0))
 
 
 def spread(shifts: ComplexArray, along: complex) -> EndSpread:

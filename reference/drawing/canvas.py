@@ -64,11 +64,6 @@ def scale_pieces(name: str) -> tuple[Piece, ...]:
     return (Piece(name[:1]), Piece(name[1:], -1)) if len(name) > 1 else (Piece(name),)
 
 
-def as_pieces(text: Text) -> tuple[Piece, ...]:
-    """A text as pieces: a plain one is a single piece on the line."""
-    return (Piece(text),) if isinstance(text, str) else text
-
-
 @dataclass(frozen=True, slots=True)
 class Placed:
     """A piece in its place: from the text's start to the right, above the line."""
@@ -82,9 +77,9 @@ class Placed:
 def set_pieces(text: Text, size: float) -> Iterator[Placed]:
     """The pieces in their places; an index above stands over the index below that it follows."""
     right, below_from, below_to = 0.0, 0.0, 0.0
-    for piece in as_pieces(text):
+    for piece in (Piece(text),) if isinstance(text, str) else text:
         own = piece.size(size)
-        wide = sum(_WIDTH.get(letter, _WIDTH_OF_OTHERS) for letter in piece.text) * own
+        wide = _width(piece.text, own)
         start = below_from if piece.height > 0 and below_to == right else right
         yield Placed(piece.text, start, piece.rise(size), own)
         if piece.height < 0:
@@ -95,11 +90,13 @@ def set_pieces(text: Text, size: float) -> Iterator[Placed]:
 @lru_cache(maxsize=CACHE_SIZE)
 def width_of(text: Text, size: float) -> float:
     """How wide a text is set."""
-    return max((piece.right + _width(piece) for piece in set_pieces(text, size)), default=0.0)
+    return max(
+        (piece.right + _width(piece.text, piece.size) for piece in set_pieces(text, size)), default=0.0
+    )
 
 
-def _width(piece: Placed) -> float:
-    return sum(_WIDTH.get(letter, _WIDTH_OF_OTHERS) for letter in piece.text) * piece.size
+def _width(text: str, size: float) -> float:
+    return sum(_WIDTH.get(letter, _WIDTH_OF_OTHERS) for letter in text) * size
 
 
 @lru_cache(maxsize=CACHE_SIZE)

@@ -9,7 +9,7 @@ import pytest
 
 from reference.authored.assignment import load_assignment
 from reference.drawing import symbols
-from reference.drawing.canvas import Area, Curve, Label, Stroke, as_pieces, shifted
+from reference.drawing.canvas import Area, Curve, Label, Stroke, set_pieces, shifted
 from reference.drawing.labels import Wanted, place_labels, segments_of
 from reference.drawing.sheets import (
     CELL_MM,
@@ -31,7 +31,7 @@ SAMPLES = 40
 
 
 def text_of(label):
-    return "".join(piece.text for piece in as_pieces(label.text))
+    return "".join(piece.text for piece in set_pieces(label.text, 1.0))
 
 
 def labels_of(shapes):
@@ -84,7 +84,7 @@ def test_the_table_has_every_vector_with_its_segment_and_every_rate(case, folder
     assignment, plan = planned(case, folder)
     subject = Subject(assignment, plan)
     rows = list(table_rows(subject, list(plan.nodes_mm)))[1:]
-    names = ["".join(piece.text for piece in as_pieces(row.name)) for row in rows]
+    names = ["".join(piece.text for piece in set_pieces(row.name, 1.0)) for row in rows]
     wanted = [*plan.construction.vectors, *plan.rates]
     assert sorted(names) == sorted("".join(p.text for p in subject.letter(name)) for name in wanted)
     for vector, row in zip(plan.construction.vectors, rows, strict=False):

@@ -14,7 +14,7 @@ from grader.solution.sentences import sentence, speaker_of, wording_of
 from grader.solution.steps import explain
 from reference.authored.assignment import load_assignment
 from reference.construction.steps import Given, Pole
-from reference.drawing.canvas import Label, Ring, as_pieces, pieces_of
+from reference.drawing.canvas import Label, Ring, pieces_of, set_pieces
 from reference.drawing.sheets import BEFORE, NOW, reference_drawing
 from reference.drawing.subject import Subject
 from reference.plan import exact_plan
@@ -167,14 +167,16 @@ def test_each_picture_shows_the_new_step_and_greys_the_earlier_ones(case, folder
         seen = set()
         for step in chapter.steps:
             now = [shape for shape in step.picture.shapes if getattr(shape, "colour", "") == NOW]
-            named = {"".join(piece.text for piece in as_pieces(s.text)) for s in now if isinstance(s, Label)}
+            named = {
+                "".join(piece.text for piece in set_pieces(s.text, 1.0)) for s in now if isinstance(s, Label)
+            }
             letter = letters(subject, step.explanation.step.node)
             assert any(letter in label.split(", ") for label in named)
             before = {
                 part
                 for s in step.picture.shapes
                 if isinstance(s, Label) and s.colour == BEFORE
-                for part in "".join(piece.text for piece in as_pieces(s.text)).split(", ")
+                for part in "".join(piece.text for piece in set_pieces(s.text, 1.0)).split(", ")
             }
             shown = before | {part for label in named for part in label.split(", ")}
             assert seen <= shown
