@@ -141,15 +141,14 @@ class Gradebook(Form):
         return f"Canvas says '{grade}': excused, or not given this assignment" if is_out else ""
 
     def identity(self, row: int) -> Mapping[str, str]:
-        """Canvas's numbers of the student, the name, and the name with the first name first."""
+        """Canvas's numbers of the student, the and the name."""
         cells = {name: self.value(row, name) for name in HEADER[1:4] if name in self.columns}
         name = self.value(row, "Student")
         if "LastName" in self.columns and "FirstName" in self.columns:
             name = f"{self.value(row, 'LastName')}, {self.value(row, 'FirstName')}"
         if all(_MANUAL.fullmatch(cell) for cell in (*cells.values(), name)):
             return {}
-        last, _, first = name.partition(",")
-        return {**cells, "name": name, "name turned": f"{first} {last}"}
+        return {**cells, "name": name}
 
     @staticmethod
     def evidence(student_id: str, person: Person) -> Evidence:
@@ -160,7 +159,6 @@ class Gradebook(Form):
             ("SIS Login ID", person.username or student_id),
             ("SIS Login ID", person.email),
             ("name", person.name),
-            ("name turned", person.name),
         )
 
 

@@ -90,7 +90,7 @@ def test_who_is_not_there_or_shares_a_row_is_told(tmp_path):
     delivery, text = filled(tmp_path, *(report(one, 7.5) for one in people), people=people)
     assert text == EXPORTED.replace('2",3,,55', '2",3,7.5,55')
     assert delivery.written == ("s01",)
-    assert "fits s02 and S-02 alike" in delivery.unplaced["s02"]
+    assert "fits s02 (4712, s02) and S-02 (S-02) alike" in delivery.unplaced["s02"]
     assert "has the name, but another SIS User ID" in delivery.unplaced["s08"]
     assert "nobody in the gradebook has" in delivery.unplaced["s09"]
 
