@@ -69,6 +69,7 @@ class Options:
     assignment_id: int | None = None
     cmid: int | None = None
     context_id: int | None = None
+    replace_guide: Path | None = None
     lang: str = "en"
     now: datetime | None = None
 
