@@ -267,7 +267,7 @@ def _link_point(
                 axes[node] = axes[p] + shape * base
                 return PointOnLine(node, (p, q), link, np.asarray(shape.real), np.asarray(local.real))
             sides = np.where(shape.imag < 0.0, -1, 1)
-            side = int(sides[0]) if np.all(sides == sides[0]) else sides
+            side = sides
             first, second = np.abs(shape * base), np.abs((1.0 - shape) * base)
     axes[node] = axes[p] + shape * base
     return Plate(node, (p, q), link, (first, second), side, shape, local)
