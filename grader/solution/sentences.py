@@ -410,7 +410,7 @@ def _arc(speaker: Speaker, step: ArcAndLine | Tangent) -> Markup:
         text = TANGENT_LEFT if left else TANGENT
         return speaker.say(text, node=step.node, centre=step.centre, radius=radius, start=step.start)
     angle, line = (
-        _direction(speaker, step.guide) * side_at(step.side, speaker.view),
+        complex(_direction(speaker, step.guide) * side_at(step.side, speaker.view)),
         _line(speaker, step.guide),
     )
     return speaker.say(
