@@ -29,6 +29,7 @@ from grader.authoring.variant_checks import (
     LEAST_CROSSING_DEG,
     LEAST_TRANSMISSION,
     Conditions,
+    assembly_findings,
     broken_findings,
     broken_variants,
     condition_findings,
@@ -103,6 +104,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     rooms = {index: room_of(figures, extents) for index, figures in pages_of(assignment, plan)}
     scales = proposals(assignment, plan, extents, asked, rooms)
     findings += [
+        *assembly_findings(assignment, sound),
         *condition_findings(assignment, plan, conditions),
         *length_findings(rubric, plan, asked),
         *room_findings(assignment, plan, rooms),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup, escape
 
-from grader.language import N_, UNITS, Tongue
+from grader.language import N_, SIDES, UNITS, Tongue
 from reference import geometry
 from reference.construction.elements import (
     Along,
@@ -78,6 +78,7 @@ def wording_of(tongue: Tongue) -> Wording:
         variant={name: _(word) for name, word in VARIANT.items()},
         columns=(first, second, third, fourth, fifth),
         too_large=_(TOO_LARGE),
+        sides={side: _(words) for side, words in SIDES.items()},
         units={unit: _(unit) for unit in (*UNITS, *OTHER_UNITS)},
     )
 

@@ -5,8 +5,8 @@ evaluated on arrays over variants.
 """
 
 import os
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -17,6 +17,7 @@ from pydantic import Field, model_validator
 
 from reference.authored import toml_file
 from reference.authored.assembly import LARGEST, build_driver, build_mechanism
+from reference.authored.flat_positions import signs_of, with_signs
 from reference.authored.formula import Formula, FormulaError, Value
 from reference.authored.mechanism import MechanismFile, check_mechanism
 from reference.authored.toml_file import LENGTH_UNITS_M, Authored, FormulaText, Identifier, Text
@@ -170,6 +171,8 @@ class Assignment:
     path: Path
     rows: VariantRows | None = None
     """Of the table of variants, where there is one."""
+    signs: Mapping[str, Mapping[Variant, float]] = field(default_factory=dict)
+    """-1 for each group and variant that has passed a flat position on its way from the first position."""
 
     @property
     def id(self) -> str:
@@ -225,9 +228,25 @@ class Assignment:
             known[name] = formula(known)
         return known
 
+    def given(self, variant: Variant) -> Iterator[tuple[GivenTable, float | str]]:
+        """What a student is told: each datum with its number, or the side that the table has in words."""
+        values = self.values([variant])
+        for datum in self.file.given:
+            number = float(np.ravel(datum.value(values))[0])
+            column = self.rows.columns.get(datum.value.text) if self.rows else None
+            yield datum, column.words[number < 0.0] if column and column.words else number
+
     def mechanism(self, variants: list[Variant]) -> Mechanism:
-        """The mechanism of every variant, SI, arrays of shape (N,)."""
-        return build_mechanism(self.mechanism_file, self.values(variants), len(variants))
+        """The mechanism of every variant, SI, arrays of shape (N,).
+
+        The positions of one n are one motion: sides hold in the first of them that is not flat, and are
+        reversed by each flat position on the way.
+        """
+        mechanism = build_mechanism(self.mechanism_file, self.values(variants), len(variants))
+        return with_signs(
+            mechanism,
+            {node: np.array([sign[variant] for variant in variants]) for node, sign in self.signs.items()},
+        )
 
     def scales(
         self,
@@ -328,7 +347,12 @@ def _load(path: Path, _changed_ns: int) -> Assignment:
     findings = [*_check_table(assignment)] or _check_formulas(assignment)
     if findings:
         raise AuthoredFileError(str(path), tuple(findings))
-    return assignment
+    variants = assignment.variants()
+    if not assignment.numbers("position"):
+        return assignment
+    signs = signs_of(assignment.mechanism(variants), [variant.n for variant in variants])
+    by_variant = {node: dict(zip(variants, passed.tolist(), strict=True)) for node, passed in signs.items()}
+    return replace(assignment, signs=by_variant)
 
 
 def _check_table(assignment: Assignment) -> Iterator[Finding]:
