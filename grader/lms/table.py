@@ -16,8 +16,8 @@ from typing import ClassVar, Self
 
 from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
 from grader.files import OutputError, write_whole
-from grader.inputs.roster import delimiter_of
 from grader.lms.grades import Delivery, Grade, Options, Person, in_a_row, ready
+from reference.authored.variant_table import delimiter_of
 from reference.errors import CallError, InputFileError, lines_of
 
 Cell = str | int | float | None
