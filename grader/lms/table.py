@@ -217,12 +217,18 @@ class RawTable:
     mark : a byte order mark, or nothing
     rows : raw cells
     ends : each row's line end; nothing after the last where the file has none
+    kept : the columns that are written; all where None
     """
 
     mark: str
     delimiter: str
     rows: list[list[str]] = field(default_factory=list)
     ends: list[str] = field(default_factory=list)
+    kept: Sequence[int] | None = None
+
+    def header(self) -> list[str]:
+        """The first row's cells; none of an empty file."""
+        return [self.value(0, column) for column in range(len(self.rows[0]))] if self.rows else []
 
     def value(self, row: int, column: int) -> str:
         """A cell's meaning."""
@@ -230,13 +236,21 @@ class RawTable:
         return cell[1:-1].replace('""', '"') if cell.startswith('"') else cell
 
     def put(self, row: int, column: int, text: str) -> None:
-        """Change one cell; one that already means this text stays as it is written."""
+        """Change one cell; one that already means this text stays as it is written.
+
+        It is quoted where it must be, and where the whole header is.
+        """
         if self.value(row, column) != text:
-            self.rows[row][column] = quoted(text, self.delimiter)
+            is_quoted = all(cell.startswith('"') for cell in self.rows[0])
+            self.rows[row][column] = quoted(text, self.delimiter, always=is_quoted)
 
     def text(self) -> str:
-        """The whole file."""
-        lines = (self.delimiter.join(row) + end for row, end in zip(self.rows, self.ends, strict=True))
+        """The whole file, or its columns that are kept."""
+        rows = [
+            row if self.kept is None or row == [""] else [row[column] for column in self.kept]
+            for row in self.rows
+        ]
+        lines = (self.delimiter.join(row) + end for row, end in zip(rows, self.ends, strict=True))
         return self.mark + "".join(lines)
 
     def ragged(self) -> list[str]:
@@ -249,9 +263,9 @@ class RawTable:
         ]
 
 
-def quoted(text: str, delimiter: str) -> str:
+def quoted(text: str, delimiter: str, *, always: bool = False) -> str:
     """A raw cell that means this text."""
-    if any(mark in text for mark in (delimiter, '"', "\n", "\r")) or text != text.strip():
+    if always or any(mark in text for mark in (delimiter, '"', "\n", "\r")) or text != text.strip():
         return '"' + text.replace('"', '""') + '"'
     return text
 
@@ -389,9 +403,9 @@ class Form(ABC):
     above: int = 0
     possible: float | None = None
     notes: list[str] = field(default_factory=list)
+    platform: str = ""
 
     name: ClassVar[str]
-    platform: ClassVar[str]
     replaced: ClassVar[str] = ""
     """What the platform does where grades that it holds already are changed."""
 
