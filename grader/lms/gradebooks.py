@@ -99,7 +99,7 @@ LAYOUTS = (
         key="blackboard", platform="Blackboard", required=("Username", "Last Name"),
         kept=("Last Name", "First Name"), who={"Student ID": "student_id", "Username": "login"},
         # Of text columns, and of those that Blackboard computes from others, the kind is another.
-        item=re.compile(r"(?P<title>.*\S)\s*\[[^\]\d]*(?P<maximum>[\d.,]+) Score\]\s*\|(?P<id>\d+)"),
+        item=re.compile(r"(?P<title>.*\S)\s*\[[^\]\d]*(?P<maximum>[\d.,]+)(?: Score)?\]\s*\|(?P<id>\d+)"),
     ),
 )  # fmt: skip
 """By what only its own files have, the plainest last."""
