@@ -193,14 +193,13 @@ class Gradebook(Form):
     """Columns of last and first names."""
 
     name = "the gradebook"
+    keeps_others = False
 
     @classmethod
     def opened(cls, data: bytes, file: str, item: str) -> Self:
         """A gradebook as its platform exports it, and the column of an assignment in it."""
         table = parse(data, file, delimiter="\t" if b"\t" in data.partition(b"\n")[0] else None)
         header = [cell.strip() for cell in table.header()]
-        if len(table.rows) < 2:
-            raise _refused(file, "its platform", ["it has no students"])
         layout = _layout(header, file)
         faults = table.ragged()
         points = next((row for row in range(1, min(len(table.rows), 4)) if _POINTS in table.value(row, 0)), 0)
@@ -246,7 +245,7 @@ class Gradebook(Form):
         return f"{self.platform} says '{grade}': excused, or not given this assignment" if is_out else ""
 
     def identity(self, row: int) -> Mapping[str, str]:
-        """The platform's numbers of the student, the name, and the name with the first name first.
+        """The platform's numbers of the student, and the name.
 
         Brightspace puts a `#` before numbers and names of users.
         """
@@ -257,8 +256,7 @@ class Gradebook(Form):
             name = ", ".join(self.table.value(row, column or 0).strip() for column in self.names)
         if all(_MANUAL.fullmatch(cell) for cell in (*cells.values(), name.strip(", "))):
             return {}
-        last, _, first = name.partition(",")
-        return {**cells, "name": name, "name turned": f"{first} {last}"}
+        return {**cells, "name": name}
 
     @staticmethod
     def evidence(student_id: str, person: Person) -> Evidence:
@@ -270,7 +268,6 @@ class Gradebook(Form):
             ("login", person.email),
             ("email", person.email),
             ("name", person.name),
-            ("name turned", person.name),
         )
 
     def put_grade(self, row: int, text: str) -> bool:
@@ -301,14 +298,12 @@ def fill_gradebook(data: bytes, file: str, grades: Sequence[Grade], options: Opt
         data = data.decode(encoding, errors="replace").encode("utf-8")
     form = Gradebook.opened(data, file, options.item)
     asked = next(layout.platform for layout in LAYOUTS if layout.key == options.to)
+    if not form.people:
+        raise _refused(file, asked, ["it has no students"])
     if form.platform != asked:
         raise _refused(file, asked, [f"it is one of {form.platform}'s"])
     if form.possible and options.maximum is not None:
         raise CallError("option_unused", "--maximum has no meaning beside --gradebook: it states its own")
-    if not form.possible and options.maximum is None:
-        message = f"{file}: does not state the maximum grade: give the one that {asked} has (--maximum)"
-        raise CallError("maximum_unstated", message)
-    form.possible = form.possible or options.maximum
     comments = {grade.student_id: plain_comment(grade) for grade in ready(grades)}
     delivery = fill_in(form, file, grades, options, comments if "feedback" in form.columns else {})
     if encoding == "utf-8" or not isinstance(delivery.content, bytes):

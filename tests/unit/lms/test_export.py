@@ -100,10 +100,10 @@ def test_an_option_without_meaning_is_refused_not_passed_over(options, message, 
         export(results(marked("s01", 5.0)), tmp_path / "x", options)
 
 
-@pytest.mark.parametrize("option", [{"item": "Pump"}, {"identity": "email"}, {"maximum": 10.0}])
+@pytest.mark.parametrize("option", [{"item": "Pump"}, {"identity": "email"}])
 def test_a_worksheet_says_itself_what_options_would(option, tmp_path):
     form = tmp_path / "w.csv"
-    form.write_text("Identifier,Grade,Last modified (grade)\nParticipant 1,,-\n")
+    form.write_text("Identifier,Grade,Maximum grade,Last modified (grade)\nParticipant 1,,10.00,-\n")
     with pytest.raises(CallError, match="no meaning beside --worksheet"):
         export(results(marked("s01", 5.0)), tmp_path / "x", Options(to="moodle", form=form, **option))
 
@@ -128,7 +128,7 @@ def test_sheets_that_look_alike_are_told_before_their_grades_are_out(tmp_path):
 
 def test_a_worksheet_filled_in_again_is_told_to_be_skipped_by_moodle(tmp_path):
     form = tmp_path / "w.csv"
-    form.write_text("Identifier,Grade,Last modified (grade)\nParticipant 1,,-\n")
+    form.write_text("Identifier,Grade,Maximum grade,Last modified (grade)\nParticipant 1,,5.00,-\n")
     options = Options(to="moodle", form=form, people={"s01": Person(participant=1)})
     one = results(marked("s01", 5.0))
     assert not any("made before" in note for note in export(one, tmp_path / "o.csv", options).notes)
@@ -149,7 +149,7 @@ def test_two_students_with_a_row_between_them_have_none_even_if_one_is_withheld(
     both = results(marked("s01", 5.0), marked("s02", 5.0, status="needs_review"))
     delivery = export(both, tmp_path / "o.csv", Options(to="moodle", form=form, people=people))
     assert delivery.written == ()
-    assert "fits s01 and s02 alike" in delivery.unplaced["s01"]
+    assert "fits s01 (Ion) and s02 (Ion) alike" in delivery.unplaced["s01"]
     assert set(delivery.withheld) == {"s02"}
 
 
@@ -165,7 +165,7 @@ def test_export_writes_one_file_and_says_who_is_in_it(tmp_path):
 
 # What is rendered is read back, and a difference stops it ------------------------------------------
 ONE = results(marked("s01", 5.0, 2.5))
-WORKSHEET = "Identifier,Grade,Last modified (grade)\nParticipant 1,,-\n"
+WORKSHEET = "Identifier,Grade,Maximum grade,Last modified (grade)\nParticipant 1,,10.00,-\n"
 GRADEBOOK = (
     "LastName,FirstName,ID,SIS User ID,SIS Login ID,Section,Pump (1)\n"
     "    Points Possible,,,,,,10\nPopescu,Ion,1,s01,,1,\n"
@@ -192,7 +192,7 @@ def test_a_table_that_reads_otherwise_is_not_written(tmp_path, monkeypatch):
 
 def test_a_filled_in_file_that_reads_otherwise_is_not_written(tmp_path, monkeypatch):
     whole = RawTable.text
-    monkeypatch.setattr(RawTable, "text", lambda self: whole(self).replace("7.5", "75"))
+    monkeypatch.setattr(RawTable, "text", lambda *rows: whole(*rows).replace("7.5", "5.5"))
     people = {"s01": Person(participant=1)}
     refused(tmp_path, Options(to="moodle", form=form(tmp_path, WORKSHEET), people=people))
     refused(tmp_path, Options(to="canvas", form=form(tmp_path, GRADEBOOK)))

@@ -22,15 +22,9 @@ EXPORTED = (
     '"Student, Test",4713,,abcdef,1,,,,\r\n'
 )
 
-WRITTEN = (
-    "Student,ID,SIS User ID,SIS Login ID,Section,Pump (12345)\r\n"
-    "    Points Possible,,,,,10.00\r\n"
-    '"Popescu, Ion",4711,s01,ion@x.ro,"Group ""A"", 2",\r\n'
-    '"Șerban, Țuțu",4712,S-02,tutu@x.ro,1,6.00\r\n'
-    '"Student, Test",4713,,abcdef,1,\r\n'
-)
+WRITTEN = "Student,ID,SIS User ID,SIS Login ID,Section,Pump (12345)\r\n    Points Possible,,,,,10.00\r\n"
 """What is written of it: who a row is, and the assignment that is asked for."""
-GRADED = WRITTEN.replace('2",\r', '2",7.5\r')
+GRADED = WRITTEN + '"Popescu, Ion",4711,s01,ion@x.ro,"Group ""A"", 2",7.5\r\n'
 
 
 def canvas(out, *reports, form=None, text=EXPORTED, what=None, **how):
@@ -102,7 +96,7 @@ def test_who_is_not_there_or_shares_a_row_is_told(tmp_path):
     delivery, text = filled(tmp_path, *(report(one, 7.5) for one in people), people=people)
     assert text == GRADED
     assert delivery.written == ("s01",)
-    assert "fits s02 and S-02 alike" in delivery.unplaced["s02"]
+    assert "fits s02 (4712, s02) and S-02 (S-02) alike" in delivery.unplaced["s02"]
     assert "has the name, but another student_id" in delivery.unplaced["s08"]
     assert "nobody in the gradebook has" in delivery.unplaced["s09"]
 
@@ -117,7 +111,7 @@ def test_a_grade_that_canvas_holds_for_a_withheld_student_stays_and_is_told(tmp_
 def test_excused_students_are_left(tmp_path, cell):
     text = EXPORTED.replace('2",3,,55', f'2",3,{cell},55')
     delivery, after = filled(tmp_path, report("s01", 7.5), text=text)
-    assert after == WRITTEN.replace('2",\r', f'2",{cell}\r')
+    assert after == WRITTEN
     assert "excused" in delivery.unplaced["s01"]
 
 
@@ -153,15 +147,14 @@ def test_the_gradebook_states_its_own_maximum(tmp_path):
 
 def test_a_row_of_nobody_below_the_points_is_left(tmp_path):
     text = EXPORTED.replace('"Popescu, Ion"', 'Manual Posting,,,,,,,,\r\n"Popescu, Ion"', 1)
-    assert filled(tmp_path, report("s01", 7.5), text=text)[1] == GRADED.replace(
-        '"Popescu', 'Manual Posting,,,,,\r\n"Popescu', 1
-    )
+    assert filled(tmp_path, report("s01", 7.5), text=text)[1] == GRADED
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "no students"),
+        ("", "not the columns"),
+        (EXPORTED[: EXPORTED.index('"Popescu')], "no students"),
         ("a,b\n1,2\n", "not the columns"),
         (EXPORTED.replace("    Points Possible", "x"), "no row 'Points Possible'"),
         (EXPORTED.replace("10.00", "(read only)"), "has '\\(read only\\)' points possible"),
@@ -269,9 +262,8 @@ def test_blackboards_file_with_commas_is_one_too(tmp_path):
 def test_a_status_file_of_ilias_stays_whole_and_says_which_rows_count(tmp_path):
     waiting = report("s02", None, status="needs_review")
     delivery, after = other(tmp_path, "ilias", ILIAS, TWO[0], waiting, people=PEOPLE, maximum=10.0)
-    first, second = after.decode().splitlines()[1:]
+    (first,) = after.decode().splitlines()[1:]
     assert first.startswith('"1","7","ion","Popescu","Ion","passed","7.5","","')
-    assert second == ILIAS.splitlines()[2]
     assert set(delivery.withheld) == {"s02"}
 
 
@@ -287,12 +279,12 @@ def test_a_status_file_of_ilias_stays_whole_and_says_which_rows_count(tmp_path):
             "brightspace",
             BRIGHTSPACE.replace(" <Numeric MaxPoints:5>", ""),
             {"item": "Quiz"},
-            "does not state",
+            "states no maximum grade",
         ),
-        ("ilias", ILIAS, {}, "does not state the maximum grade: .* \\(--maximum\\)"),
+        ("ilias", ILIAS, {}, "states no maximum grade"),
         ("ilias", ILIAS, {"maximum": 20.0}, "maximum there is 20, the rubric's is 10"),
         ("brightspace", BRIGHTSPACE.replace(",#\r", ",#,x\r", 1), {"item": "Pump"}, "row 2: has 10 cells"),
-        ("blackboard", b"\xff\xfe\x00", {}, "no students"),
+        ("blackboard", b"\xff\xfe\x00", {}, "not the columns"),
     ],
 )
 def test_what_these_platforms_would_swallow_is_refused(tmp_path, to, data, how, message):
