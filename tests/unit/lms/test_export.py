@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from grader.documents import AlikeDocument
 from grader.files import OutputError
 from grader.lms import table
-from grader.lms.canvas import CanvasMarksDocument
+from grader.lms.api import CanvasMarksDocument
 from grader.lms.export import KINDS, export, usual_name
 from grader.lms.grades import Options, Person
 from grader.lms.marks import PlatformCriterion
@@ -24,7 +24,26 @@ NEEDED = {
     ("moodle", "feedback"): {"people": {"s09": Person(participant=1)}},
     ("moodle", "marks"): {"criteria": "c1,11", "assignment_id": 17},
     ("canvas", "marks"): {"criteria": "c1,11"},
+    ("canvas-api", "marks"): {"course_id": "1", "assignment_id": "2"},
+    ("google-classroom", "marks"): {"course_id": "1", "assignment_id": "2"},
+    ("ms-education", "marks"): {"course_id": "a", "assignment_id": "b"},
+    ("blackboard", "grades"): {"form": "Last Name,Username,Pump [Total Pts: 5 Score] |7\nPopescu,s01,\n"},
+    ("ilias", "grades"): {
+        "form": "update,usr_id,login,status,mark,comment\n0,7,s01,notgraded,,\n",
+        "maximum": 5.0,
+    },
+    ("ilias", "feedback"): {"form": {"multi_feedback_Pump_3/Popescu_Ion_s01_7/": b""}},
 }
+
+
+def filled_in_there(path, content):
+    if isinstance(content, str):
+        path.write_text(content, encoding="utf-8")
+        return path
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in content.items():
+            archive.writestr(name, data)
+    return path
 
 
 @pytest.mark.parametrize("key", KINDS)
@@ -37,6 +56,8 @@ def test_where_nobody_has_a_grade_the_file_has_nobody_and_everybody_is_told(key,
         table = tmp_path / "criteria.csv"
         table.write_text(f"criterion,id\n{options['criteria']}\n")
         options["criteria"] = table
+    if "form" in options:
+        options["form"] = filled_in_there(tmp_path / "form", options["form"])
     options = Options(to=key[0], what=key[1], **options)
     path = tmp_path / usual_name(options)
     waiting = marked("s01", 5.0, status="needs_review")
@@ -67,7 +88,7 @@ def test_files_are_called_by_platform_and_thing(options, name):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (Options(to="lti", item="x"), "--item has no meaning for lti grades"),
+        (Options(to="lti", identity="x"), "--identity has no meaning for lti grades"),
         (Options(to="csv", position=1), "--position has no meaning for csv marks"),
         (Options(to="canvas", identity="email"), "--identity has no meaning"),
         (Options(to="canvas", what="marks", rescale=True), "--rescale has no meaning"),
