@@ -4,6 +4,7 @@ if (location.protocol === "file:") {
   window.Worker = class extends EventTarget {
     constructor(url) {
       super();
+      const address = new URL(url, location.href).href;
       const frame = document.createElement("iframe");
       frame.hidden = true;
       document.body.append(frame);
@@ -15,7 +16,7 @@ if (location.protocol === "file:") {
             (one) =>
               new Promise((loaded, failed) => {
                 const script = frame.contentDocument.createElement("script");
-                script.src = new URL(one, url).href;
+                script.src = new URL(one, address).href;
                 script.async = false;
                 script.onload = loaded;
                 script.onerror = failed;
@@ -23,7 +24,7 @@ if (location.protocol === "file:") {
               }),
           ),
         );
-      this.loaded = this.inside.importScripts(url);
+      this.loaded = this.inside.importScripts(address);
     }
 
     postMessage(data) {
