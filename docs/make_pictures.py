@@ -6,7 +6,7 @@ import socket
 import tempfile
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from html import escape
 from pathlib import Path
 
@@ -51,12 +51,13 @@ def reference_picture() -> None:
 def walk_pictures() -> None:
     """The bundled class from scans to the worksheet: a scan, its overlay, pages, the filled-in worksheet."""
     samples = HERE.parent / "samples" / "pump"
-    _small(samples / f"{WAITING}_2.jpg", "scan")
-    with tempfile.TemporaryDirectory() as work:
-        out = Path(work) / "marks"
+    _small(samples / f"{WAITING}_1.jpg", "scan")
+    # Pages name the folder of results as it was given: here as the walk has it.
+    with tempfile.TemporaryDirectory() as work, chdir(work):
+        out = Path("marks")
         planmark(["grade", str(samples), "--assignment", "pump", "--out", str(out)], standalone_mode=False)
-        _small(out / WAITING / "overlay_2.png", "overlay")
-        filled, table = Path(work) / "filled.csv", Path(work) / "filled.html"
+        _small(out / WAITING / "overlay.png", "overlay")
+        filled, table = Path("filled.csv"), Path("filled.html")
         asked = ["export", str(out), "--to", "moodle", "--worksheet", str(WORKSHEET), "--file", str(filled)]
         planmark(asked, standalone_mode=False)
         table.write_text(_as_page(filled), encoding="utf-8")
@@ -68,7 +69,7 @@ def walk_pictures() -> None:
         with _browser() as browser:
             for name, path in pages.items():
                 page = browser.new_page(viewport={"width": 1000, "height": SHOWN_PX[name]})
-                page.goto(path.as_uri())
+                page.goto(path.resolve().as_uri())
                 page.screenshot(path=PICTURES / f"{name}.png")
 
 
