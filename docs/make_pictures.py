@@ -18,7 +18,7 @@ from grader.cli.commands import app as planmark
 from grader.folder.batch import Batch
 from grader.review.server import application
 from grader.review.session import Session
-from grader.rubric import load_rubric
+from grader.rubric import RubricFile, load_rubric
 from reference.authored.assignment import load_assignment
 from reference.drawing.canvas import svg
 from reference.drawing.sheets import reference_drawing
@@ -26,6 +26,7 @@ from reference.plan import exact_plan
 
 HERE = Path(__file__).resolve().parent
 PICTURES = HERE / "pictures"
+SAMPLES = HERE.parent / "samples" / "pump"
 WORKSHEET = HERE / "assets" / "Grades-Pump.csv"
 """As Moodle gives it for the bundled class."""
 WIDTH_PX = 1100
@@ -50,12 +51,11 @@ def reference_picture() -> None:
 
 def walk_pictures() -> None:
     """The bundled class from scans to the worksheet: a scan, its overlay, pages, the filled-in worksheet."""
-    samples = HERE.parent / "samples" / "pump"
-    _small(samples / f"{WAITING}_1.jpg", "scan")
+    _small(SAMPLES / f"{WAITING}_1.jpg", "scan")
     # Pages name the folder of results as it was given: here as the walk has it.
     with tempfile.TemporaryDirectory() as work, chdir(work):
         out = Path("marks")
-        planmark(["grade", str(samples), "--assignment", "pump", "--out", str(out)], standalone_mode=False)
+        planmark(["grade", str(SAMPLES), "--assignment", "pump", "--out", str(out)], standalone_mode=False)
         _small(out / WAITING / "overlay.png", "overlay")
         filled, table = Path("filled.csv"), Path("filled.html")
         asked = ["export", str(out), "--to", "moodle", "--worksheet", str(WORKSHEET), "--file", str(filled)]
@@ -102,16 +102,27 @@ def _browser() -> Iterator[Browser]:
 
 
 def review_pictures() -> None:
-    """The page of the review: a question, eight at once, and a question on a phone."""
-    pump = load_assignment("pump")
+    """The page of the review: a question on a screen and on a phone, and one of eight students at once."""
+    rubric = load_rubric("pump")
+    with _reviewed(rubric) as address, _browser() as browser:
+        for name, width, height in (("review", 1280, 760), ("review-phone", 390, 844)):
+            _opened(browser, address, width, height).screenshot(path=PICTURES / f"{name}.png")
+    # An instructor who wants to see what is near a limit has more to look at, also eight of a kind.
+    doubt = rubric.doubt.model_copy(update={"in_doubt": "person", "stake": 0.0})
+    with _reviewed(rubric.model_copy(update={"doubt": doubt})) as address, _browser() as browser:
+        page = _opened(browser, address, 1280, 760)
+        page.click("[data-mode=eight]")
+        _settled(page)
+        page.screenshot(path=PICTURES / "review-eight.png")
+
+
+@contextmanager
+def _reviewed(rubric: RubricFile) -> Iterator[str]:
+    """The address of the review of the bundled class by a rubric."""
     with tempfile.TemporaryDirectory() as work:
         folder = Path(work) / "in"
-        shutil.copytree(HERE.parent / "samples" / "pump", folder)
-        rubric = load_rubric("pump")
-        # A teacher who wants to see what is near a limit has more to look at.
-        doubt = rubric.doubt.model_copy(update={"in_doubt": "person", "stake": 0.0})
-        rubric = rubric.model_copy(update={"doubt": doubt})
-        session = Session(Batch(pump, rubric, folder, Path(work) / "out"))
+        shutil.copytree(SAMPLES, folder)
+        session = Session(Batch(load_assignment("pump"), rubric, folder, Path(work) / "out"))
         session.bring_up_to_date(lambda *_: None)
         listener = socket.create_server(("127.0.0.1", 0))
         config = uvicorn.Config(application(session), log_level="warning", lifespan="off", ws="none")
@@ -119,24 +130,18 @@ def review_pictures() -> None:
         thread = threading.Thread(target=server.run, args=([listener],))
         thread.start()
         try:
-            _photograph(f"http://127.0.0.1:{listener.getsockname()[1]}/")
+            yield f"http://127.0.0.1:{listener.getsockname()[1]}/"
         finally:
             server.should_exit = True
             thread.join()
 
 
-def _photograph(address: str) -> None:
-    with _browser() as browser:
-        for name, width, height in (("review", 1280, 760), ("review-phone", 390, 844)):
-            page = browser.new_page(viewport={"width": width, "height": height})
-            page.goto(address)
-            page.evaluate("document.getElementById('by').value = ''")
-            _settled(page)
-            page.screenshot(path=PICTURES / f"{name}.png")
-            if name == "review":
-                page.click("[data-mode=eight]")
-                _settled(page)
-                page.screenshot(path=PICTURES / "review-eight.png")
+def _opened(browser: Browser, address: str, width: int, height: int) -> Page:
+    page = browser.new_page(viewport={"width": width, "height": height})
+    page.goto(address)
+    page.evaluate("document.getElementById('by').value = ''")
+    _settled(page)
+    return page
 
 
 def _settled(page: Page) -> None:
