@@ -406,6 +406,13 @@ def export(
     context_id: Annotated[
         int | None, typer.Option("--context-id", min=1, help="Moodle's number of the activity's context.")
     ] = None,
+    replace_guide: Annotated[
+        Path | None,
+        typer.Option(
+            "--replace-guide",
+            help="Delete the guide there: Moodle's core_grading_get_gradingform_instances tells the points.",
+        ),
+    ] = None,
     lang: LanguageOption = "en",
 ) -> None:
     """Write the results for a learning platform, validated before anything is written."""
@@ -421,6 +428,7 @@ def export(
         to=to, what=what, form=worksheet or gradebook, criteria=criteria, submissions=submissions,
         identity=identity, item=item,
         position=position, combine=combine, maximum=maximum, rescale=rescale, visibility=visibility,
-        course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id, lang=lang,
+        course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id,
+        replace_guide=replace_guide, lang=lang,
     )  # fmt: skip
     raise typer.Exit(1 if export_results(results, file, options, roster, ids) else 0)

@@ -23,7 +23,7 @@ from pydantic import ValidationError
 
 from grader.documents import MeasurementsDocument
 from grader.inputs.decisions import Decision
-from grader.inputs.roster import MAX_LINES, delimiter_of, surplus_of, table_lines, whole_number, why_no_id
+from grader.inputs.roster import MAX_LINES, surplus_of, whole_number, why_no_id
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.records import (
     ACCELERATION_PLAN,
@@ -37,6 +37,7 @@ from grader.records import (
 )
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.authored.toml_file import findings_of
+from reference.authored.variant_table import delimiter_of, table_lines
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, coincident
 from reference.errors import MOST_FINDINGS, Finding, InputFileError, lines_of, near_names
@@ -331,7 +332,7 @@ class _Entries:
 
 def _parse_csv(text: str, file: str, names: Names) -> Iterator[Measurements]:
     delimiter = delimiter_of(text)
-    lines, faults = table_lines(text, delimiter)
+    lines, faults = table_lines(text, delimiter, MAX_LINES)
     if not lines and not faults:
         faults = [Finding("line 1", "the file is empty; its first line must name the columns")]
     header = [cell.strip() for cell in lines[0][1]] if lines else []

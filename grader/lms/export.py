@@ -73,7 +73,9 @@ KINDS: Mapping[tuple[str, str], _Kind] = {
     ("csv", "grades"): _Kind(".csv", of_results=summary_text),
     ("moodle", "grades"): _of_grades(".csv", moodle.grades_file, "maximum rescale form identity item"),
     ("moodle", "feedback"): _of_grades(".zip", moodle.feedback_files, "form"),
-    ("moodle", "rubric"): _of_grades(".json", moodle_guide.guide, "criteria cmid context_id item"),
+    ("moodle", "rubric"): _of_grades(
+        ".json", moodle_guide.guide, "criteria cmid context_id replace_guide item"
+    ),
     ("moodle", "marks"): _of_grades(".json", moodle_guide.fillings, "criteria assignment_id"),
     ("canvas", "grades"): _of_grades(".csv", gradebooks.grades_file, "maximum rescale form item"),
     ("canvas", "rubric"): _of_grades(".csv", api.rubric, "item"),

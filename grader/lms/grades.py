@@ -71,6 +71,7 @@ class Options:
     assignment_id: str | None = None
     cmid: int | None = None
     context_id: int | None = None
+    replace_guide: Path | None = None
     lang: str = "en"
     now: datetime | None = None
 

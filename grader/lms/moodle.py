@@ -47,7 +47,10 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "email address", "adresă de email", "adresa de email", "adresa de e-mail",
         "адрес электронной почты",
     ),
-    "group": ("group", "grup", "группа", "группы"),
+    "group": (
+        "group", "grup", "группа", "группы", "gruppe", "groupe", "grupo", "gruppo", "groep", "grupp",
+        "skupina", "csoport", "група",
+    ),
     "grade": ("grade", "notă", "nota", "оценка"),
     "maximum": ("maximum grade", "notă maximă", "nota maximă", "максимальная оценка"),
     "scale": ("scale", "scală", "scala", "шкала"),
@@ -100,7 +103,7 @@ class Worksheet(Form):
         columns = _columns(table)
         header = ", ".join(table.value(0, place).strip() for place in range(len(table.rows[0])))
         faults = [
-            f"row 1: there is no column '{COLUMNS[name][0]}' (columns: {header})"
+            f"row 1: there is no column '{COLUMNS[name][0].capitalize()}' (columns: {header})"
             for name in _REQUIRED
             if name not in columns
         ]

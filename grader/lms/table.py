@@ -7,7 +7,8 @@ import re
 import unicodedata
 from abc import ABC, abstractmethod
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path
@@ -15,8 +16,8 @@ from typing import ClassVar, Self
 
 from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
 from grader.files import OutputError, write_whole
-from grader.inputs.roster import delimiter_of
 from grader.lms.grades import Delivery, Grade, Options, Person, in_a_row, ready
+from reference.authored.variant_table import delimiter_of
 from reference.errors import CallError, InputFileError, lines_of
 
 Cell = str | int | float | None
@@ -395,7 +396,9 @@ _CellKey = tuple[str, str]
 """A column and what is compared of a cell in it."""
 
 
-def _rows_with(cells: Mapping[int, Mapping[str, str]], wanted: Set[_CellKey]) -> dict[_CellKey, list[int]]:
+def _rows_with(
+    cells: Mapping[int, Mapping[str, str]], wanted: AbstractSet[_CellKey]
+) -> dict[_CellKey, list[int]]:
     """The rows of each cell; of a wanted name that no row has, those that have it in part."""
     rows_with: dict[_CellKey, list[int]] = defaultdict(list)
     parts: dict[str, set[int]] = defaultdict(set)

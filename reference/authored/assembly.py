@@ -21,7 +21,7 @@ from reference.authored.mechanism import (
     SliderTable,
     SlottedLinkTable,
 )
-from reference.authored.toml_file import LENGTH_UNITS_M
+from reference.authored.toml_file import LENGTH_UNITS_M, SideText
 from reference.geometry import ComplexArray, FloatArray
 from reference.kinematics import assur
 from reference.mechanism import (
@@ -38,6 +38,7 @@ from reference.mechanism import (
     MovingGuide,
     Plate,
     PointOnLine,
+    Side,
     Slider,
     SlotPoint,
     SlottedLink,
@@ -52,8 +53,6 @@ LARGEST = 1e9
 SHORTEST_M = 1e-9
 """No number of an authored file is larger, no length shorter: their squares then neither over- nor
 underflow."""
-
-SIDES = {"left": 1, "right": -1, "ahead": 1, "behind": -1}
 
 
 class _Numbers:
@@ -85,6 +84,22 @@ class _Numbers:
     def angle(self, formula: Formula) -> FloatArray:
         """Degrees to radians."""
         return np.asarray(np.radians(self.number(formula)))
+
+    def side(self, text: SideText) -> Side:
+        """+1 or -1; of a formula an array, whether or not it differs between the variants at hand."""
+        if isinstance(text.side, int):
+            return text.side
+        first, second = text.words
+        unknown = text.side.names - self.values.keys()
+        if unknown:
+            raise FormulaError(
+                f"side = '{text.side.text}' is neither {first} nor {second}, nor data of a variant"
+            )
+        signs = np.sign(self.number(text.side))
+        if np.any(signs == 0.0):
+            detail = f"above zero is {first}, below {second}"
+            raise FormulaError(f"side = '{text.side.text}' is zero for some variant: {detail}")
+        return signs
 
     def point(self, point: list[Formula]) -> ComplexArray:
         x, y = (self.distance(formula) for formula in point)
@@ -209,12 +224,12 @@ def _group(table: AnyGroupTable, numbers: _Numbers, bodies: _LinkAxes) -> Group:
             first, second = (numbers.length(length, node) for length in table.lengths)
             bodies.carry(link_p, p, node, first)
             bodies.carry(link_q, q, node, second)
-            return Dyad(node, (p, q), (link_p, link_q), (first, second), SIDES[table.side])
+            return Dyad(node, (p, q), (link_p, link_q), (first, second), numbers.side(table.side))
         case SliderTable():
             length = numbers.length(table.length, node)
             guide = _guide(table.guide, numbers, bodies)
             bodies.carry(table.link, table.pin, node, length)
-            return Slider(node, table.pin, table.link, length, guide, SIDES[table.side])
+            return Slider(node, table.pin, table.link, length, guide, numbers.side(table.side))
         case SlottedLinkTable():
             return _slotted_link(table, numbers, bodies)
         case CrossSliderTable():
@@ -233,7 +248,7 @@ def _slotted_link(table: SlottedLinkTable, numbers: _Numbers, bodies: _LinkAxes)
             raise FormulaError(f"the offset of link {table.link} is zero: leave out offset and foot")
         bodies.axes[table.link][table.foot] = np.asarray(1j * offset)
     bodies.slots[table.link] = table.node
-    side = SIDES[table.side]
+    side = numbers.side(table.side)
     return SlottedLink(table.node, table.pin, table.pivot, table.link, offset, table.foot, side)
 
 
@@ -255,8 +270,8 @@ def _link_point(
             return PointOnLine(node, (p, q), link, ratio)
         case PlateTable():
             first, second = (numbers.length(length, node) for length in table.lengths)
-            side: int | FloatArray = SIDES[table.side or "left"]
-            shape = _shape(np.abs(base), first, second, SIDES[table.side or "left"])
+            side = numbers.side(table.side) if table.side else 1
+            shape = _shape(np.abs(base), first, second, side)
             if table.side is None and np.any(shape.imag != 0.0):
                 detail = f"{node} may lie to the left or to the right of {p} -> {q}; say which: side"
                 raise FormulaError(f"side of {node} is missing: {detail}")
@@ -267,13 +282,13 @@ def _link_point(
                 axes[node] = axes[p] + shape * base
                 return PointOnLine(node, (p, q), link, np.asarray(shape.real), np.asarray(local.real))
             sides = np.where(shape.imag < 0.0, -1, 1)
-            side = int(sides[0]) if np.all(sides == sides[0]) else sides
+            side = sides
             first, second = np.abs(shape * base), np.abs((1.0 - shape) * base)
     axes[node] = axes[p] + shape * base
     return Plate(node, (p, q), link, (first, second), side, shape, local)
 
 
-def _shape(base: FloatArray, first: FloatArray, second: FloatArray, side: int) -> ComplexArray:
+def _shape(base: FloatArray, first: FloatArray, second: FloatArray, side: Side) -> ComplexArray:
     """A plate's third point over its base, (C - A) / (B - A); exactly real where it is in line."""
     with np.errstate(all="ignore"):
         along, across, _ = assur.rrr_place(base + 0j, first, second, side)

@@ -22,7 +22,6 @@ from tests.unit.lms.classroom import a_class, marked, report, results
 
 NEEDED = {
     ("moodle", "feedback"): {"people": {"s09": Person(participant=1)}},
-    ("moodle", "rubric"): {"cmid": 1, "context_id": 2},
     ("moodle", "marks"): {"criteria": "c1,11", "assignment_id": 17},
     ("canvas-api", "marks"): {"course_id": "1", "assignment_id": "2"},
     ("google-classroom", "marks"): {"course_id": "1", "assignment_id": "2"},
@@ -49,7 +48,10 @@ def filled_in_there(path, content):
 @pytest.mark.parametrize("key", KINDS)
 def test_where_nobody_has_a_grade_the_file_has_nobody_and_everybody_is_told(key, tmp_path):
     options = dict(NEEDED.get(key, {}))
-    if "criteria" in options:
+    if key == ("moodle", "rubric"):
+        options["criteria"] = tmp_path / "definitions.json"
+        options["criteria"].write_text('{"areas": [{"cmid": 1, "contextid": 2}]}')
+    elif "criteria" in options:
         table = tmp_path / "criteria.csv"
         table.write_text(f"criterion,id\n{options['criteria']}\n")
         options["criteria"] = table
