@@ -2,12 +2,15 @@
 
 import json
 import re
+import tomllib
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pypdfium2
 import pytest
 
+from grader.cli.exporting import schema
 from reference.authored.assignment import load_assignment
 from reference.errors import AuthoredFileError
 from reference.kinematics.cycle import cycle
@@ -44,6 +47,18 @@ def conveyor(tmp_path) -> Path:
     for name, content in (*shown, ("conveyor.rubric.toml", RUBRIC + "\n".join(criteria))):
         (tmp_path / name).write_text(content, encoding="utf-8")
     return tmp_path / "conveyor.assignment.toml"
+
+
+def test_the_example_follows_the_schemas(conveyor):
+    for kind in ("assignment", "mechanism"):
+        text = conveyor.with_name(f"conveyor.{kind}.toml").read_text(encoding="utf-8")
+        jsonschema.validate(tomllib.loads(text), schema(kind))
+    inline = {**tomllib.loads(conveyor.read_text(encoding="utf-8"))}
+    jsonschema.validate(
+        {**inline, "variant": {"table": {"columns": ["n"], "rows": [[1]]}}}, schema("assignment")
+    )
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({**inline, "variant": {"table": 3}}, schema("assignment"))
 
 
 def test_the_example_is_accepted_in_all_variants(planmark, conveyor):
