@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.records import MECHANISM, FloatArray, Problem, Reading, ScannedPage, Sheet
+from grader.records import MECHANISM, Figure, FloatArray, Problem, Reading, ScannedPage, Sheet
 from reference.construction.graph import evaluate, pair
 from reference.construction.mistakes import Drawing
 
@@ -57,20 +57,13 @@ def is_upside_down(reading: Reading, drawing: Drawing) -> bool:
 
     Arguments: `drawing` is what the student was to draw.
     """
-    nodes = evaluate(drawing.construction, drawing.parameters)
     vectors = drawing.construction.vectors
     turned = []
     for name, figure in reading.figures.items():
         ends = drawing.construction.links if name == MECHANISM else {
             vector: (vectors[vector].tail, vectors[vector].head) for vector in figure.vectors
         }  # fmt: skip
-        product = sum(
-            (figure.nodes[head].at - figure.nodes[tail].at)
-            * complex(np.ravel(nodes[head] - nodes[tail])[0]).conjugate()
-            for tail, head in ends.values()
-            if {tail, head} <= figure.nodes.keys()
-        )
-        turned.append(abs(cmath.phase(product)) > UPSIDE_DOWN_RAD)
+        turned.append(abs(cmath.phase(sum(_turns(figure, ends, drawing)))) > UPSIDE_DOWN_RAD)
     return sum(turned) > 1
 
 
@@ -81,17 +74,21 @@ OTHER_RAD = math.radians(4.0)
 def is_drawn_otherwise(reading: Reading, drawing: Drawing) -> bool:
     """Whether the sketch has a link in another direction than it should, against the others."""
     sketch = reading.figures.get(MECHANISM)
-    nodes = evaluate(drawing.construction, drawing.parameters)
-    turns = [
-        cmath.phase(
-            (sketch.nodes[head].at - sketch.nodes[tail].at)
-            * complex(np.ravel(nodes[head] - nodes[tail])[0]).conjugate()
-        )
-        for tail, head in drawing.construction.links.values()
-        if sketch is not None and {tail, head} <= sketch.nodes.keys()
-    ]
+    links = drawing.construction.links
+    turns = [] if sketch is None else [cmath.phase(turn) for turn in _turns(sketch, links, drawing)]
     middle = float(np.median(turns)) if turns else 0.0
     return any(abs(math.remainder(turn - middle, math.tau)) > OTHER_RAD for turn in turns)
+
+
+def _turns(figure: Figure, ends: Mapping[str, tuple[str, str]], drawing: Drawing) -> list[complex]:
+    """Of each line between nodes that were read: drawn times the conjugate of expected."""
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    return [
+        (figure.nodes[head].at - figure.nodes[tail].at)
+        * complex(np.ravel(nodes[head] - nodes[tail])[0]).conjugate()
+        for tail, head in ends.values()
+        if {tail, head} <= figure.nodes.keys()
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +108,7 @@ class PageScale:
 
 
 @dataclass(frozen=True, slots=True)
-class _Witness:
+class _Length:
     """A length's logarithm of the right one to the one drawn, with its standard error."""
 
     name: str
@@ -141,7 +138,7 @@ def at_drawn_scales(
         if page.ink is None or sheet is None or sheet.zones:
             result.append(page)
             continue
-        told = [] if drawing is None else _witnesses(sheet, pages, readings, drawing, declared)
+        told = [] if drawing is None else _lengths(sheet, pages, readings, drawing, declared)
         shown = _page_scale(told, sheet.scale_se) if told else None
         result.append(_at_drawn_scale(page, sheet, shown))
     return result if any(one is not page for one, page in zip(result, pages, strict=True)) else None
@@ -177,15 +174,15 @@ def _is_news(shown: PageScale, sheet: Sheet) -> bool:
     return is_other or not 1.0 / TELLING < ratio < TELLING
 
 
-def _witnesses(
+def _lengths(
     sheet: Sheet,
     pages: Sequence[ScannedPage],
     readings: Sequence[Reading],
     drawing: Drawing,
     declared: Collection[str],
-) -> list[_Witness]:
+) -> list[_Length]:
     """The lengths that tell a page's scale: its own, and those of pages made in the same way."""
-    found: list[_Witness] = []
+    found: list[_Length] = []
     for page, reading in zip(pages, readings, strict=True):
         other = page.sheet
         if other is not None and abs(other.px_per_mm / sheet.px_per_mm - 1.0) < SAME_DEVICE:
@@ -194,11 +191,11 @@ def _witnesses(
     return found
 
 
-def _page_scale(witnesses: Sequence[_Witness], scale_se: float) -> PageScale:
+def _page_scale(lengths: Sequence[_Length], scale_se: float) -> PageScale:
     """By Bayes: the registration's scale, or any other, with lengths of which some may be drawn wrongly."""
     off = np.arange(-WIDEST, WIDEST + STEP / 2.0, STEP)
     likely = np.ones_like(off)
-    for one in witnesses:
+    for one in lengths:
         likely *= (1.0 - STRAY) * _normal(off - one.off, one.se) + STRAY * STRAY_DENSITY
     together = np.convolve(likely, _normal(off, TOGETHER_SPREAD) * STEP, mode="same")
     likely = (1.0 - TOGETHER) * likely + TOGETHER * together
@@ -210,33 +207,33 @@ def _page_scale(witnesses: Sequence[_Witness], scale_se: float) -> PageScale:
     apart = float(chance[~near].sum())
     spread = chance if apart < RIVAL else np.where(near, 0.0, chance) / apart
     se = float(np.sqrt(np.sum(spread * (off - centre) ** 2)))
-    return PageScale(math.exp(centre), max(se, min(scale_se, STEP)), tuple(one.name for one in witnesses))
+    return PageScale(math.exp(centre), max(se, min(scale_se, STEP)), tuple(one.name for one in lengths))
 
 
 def _normal(off: FloatArray, se: float) -> FloatArray:
     return np.asarray(np.exp(-0.5 * (off / se) ** 2) / (se * math.sqrt(2.0 * math.pi)))
 
 
-def _links(reading: Reading, drawing: Drawing) -> Iterator[tuple[str, _Witness]]:
+def _links(reading: Reading, drawing: Drawing) -> Iterator[tuple[str, _Length]]:
     """The sketch's links of given length, as one: a scale of their own moves them all."""
     nodes = reading.figures[MECHANISM].nodes if MECHANISM in reading.figures else {}
-    found: list[_Witness] = []
+    found: list[_Length] = []
     for name, (tail, head) in drawing.construction.links.items():
         real = drawing.parameters.get(pair(tail, head), drawing.parameters.get(pair(head, tail)))
         if real is not None and tail in nodes and head in nodes:
             drawn_mm = abs(nodes[head].at - nodes[tail].at)
             se_mm = math.hypot(nodes[head].se_mm, nodes[tail].se_mm)
-            found += _witness(name, _scalar(real) / _scalar(drawing.parameters["kL"]), drawn_mm, se_mm)
+            found += _length(name, _scalar(real) / _scalar(drawing.parameters["kL"]), drawn_mm, se_mm)
     if found:
         middle = float(np.median([one.off for one in found]))
         alike = [one for one in found if abs(one.off - middle) < 3.0 * one.se] or found
         weights = np.array([one.se**-2.0 for one in alike])
         off = float(np.average([one.off for one in alike], weights=weights))
         se = math.hypot(float(weights.sum()) ** -0.5, SAME_LINKS)
-        yield "kL", _Witness(" ".join(one.name for one in alike), off, se)
+        yield "kL", _Length(" ".join(one.name for one in alike), off, se)
 
 
-def _givens(reading: Reading, drawing: Drawing, scale_se: float) -> Iterator[tuple[str, _Witness]]:
+def _givens(reading: Reading, drawing: Drawing, scale_se: float) -> Iterator[tuple[str, _Length]]:
     """The vectors that are given at the start of each plan; `scale_se` is the page's, which theirs have."""
     for vector in drawing.construction.vectors.values():
         real = given_length(drawing.parameters, vector.name)
@@ -245,8 +242,8 @@ def _givens(reading: Reading, drawing: Drawing, scale_se: float) -> Iterator[tup
             if real is not None and drawn is not None and drawn.length_mm is not None:
                 expected_mm = real / _scalar(drawing.parameters[vector.scale])
                 own_mm = math.sqrt(max(drawn.se_mm**2 - (scale_se * drawn.length_mm) ** 2, 0.0))
-                for witness in _witness(vector.name, expected_mm, drawn.length_mm, own_mm):
-                    yield vector.scale, witness
+                for length in _length(vector.name, expected_mm, drawn.length_mm, own_mm):
+                    yield vector.scale, length
 
 
 def given_length(parameters: Mapping[str, FloatArray], vector: str) -> float | None:
@@ -262,7 +259,7 @@ def _scalar(value: FloatArray) -> float:
     return float(np.ravel(value)[0])
 
 
-def _witness(name: str, expected_mm: float, drawn_mm: float, se_mm: float) -> Iterator[_Witness]:
+def _length(name: str, expected_mm: float, drawn_mm: float, se_mm: float) -> Iterator[_Length]:
     """A length long enough to tell the scale."""
     if min(expected_mm, drawn_mm) > LEAST_MM:
-        yield _Witness(name, math.log(expected_mm / drawn_mm), math.hypot(se_mm, DRAWN_MM) / expected_mm)
+        yield _Length(name, math.log(expected_mm / drawn_mm), math.hypot(se_mm, DRAWN_MM) / expected_mm)
