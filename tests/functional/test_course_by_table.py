@@ -21,7 +21,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs" / "assignments.md"
 RUBRIC = """
 schema_version = 1
 id = "conveyor"
-title = { en = "Shaking conveyor" }
+title = { en = "Shaking conveyor", ro = "Transportor oscilant", ru = "Качающийся конвейер" }
 """
 ASKED = ["v_A", "v_B", "v_BA", "v_C", "v_CB", "a_A", "a_BA_t", "a_B_n", "a_B_t", "a_B", "a_C"]
 DEAD_POINT = """
@@ -41,7 +41,8 @@ def conveyor(tmp_path) -> Path:
         "conveyor.csv", "conveyor.mechanism.toml", "conveyor.assignment.toml",
     }  # fmt: skip
     criteria = [
-        f'[[criterion]]\nid = "{name}"\ntitle = {{ en = "{name}" }}\npoints = 2\nvector = "{name}"\n'
+        f'[[criterion]]\nid = "{name}"\n'
+        f'title = {{ en = "{name}", ro = "{name}", ru = "{name}" }}\npoints = 2\nvector = "{name}"\n'
         for name in ASKED
     ]
     for name, content in (*shown, ("conveyor.rubric.toml", RUBRIC + "\n".join(criteria))):
@@ -156,3 +157,13 @@ def test_a_fault_in_the_table_stops_every_command_before_anything_is_written(pla
     assert not (tmp_path / "all.csv").exists()
     with pytest.raises(AuthoredFileError):
         load_assignment(conveyor)
+
+
+def test_an_assignment_like_it_has_a_table_of_its_own(planmark, conveyor, tmp_path):
+    assert planmark("new", "own/mine", "--like", conveyor).returncode == 0
+    assert (tmp_path / "own" / "conveyor.csv").read_text() == (tmp_path / "conveyor.csv").read_text()
+    assert (
+        load_assignment(tmp_path / "own" / "mine.assignment.toml").variants()
+        == load_assignment(conveyor).variants()
+    )
+    assert planmark("new", "second", "--like", conveyor).returncode == 0
