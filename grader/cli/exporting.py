@@ -41,7 +41,6 @@ MODELS: dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]
     "calibration": (CalibrationDocument, "serialization"),
     "moodle-rubric": (MoodleRubricDocument, "serialization"),
     "moodle-marks": (MoodleMarksDocument, "serialization"),
-    "canvas-marks": (api.CanvasMarksDocument, "serialization"),
     "canvas-rubric": (api.CanvasRubricBody, "serialization"),
     "canvas-assessment": (api.CanvasBody, "serialization"),
     "openedx-rubric": (api.EdxRubric, "serialization"),

@@ -8,6 +8,7 @@ points can follow at once; its answer tells the ids it took.
 """
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, Self
@@ -26,10 +27,8 @@ from grader.lms.marks import (
     NotNegative,
     Number,
     Payload,
-    PlatformCriterion,
     Positive,
     Version,
-    check_points,
     check_unique,
     class_criteria,
     json_document,
@@ -41,6 +40,9 @@ from grader.lms.marks import (
 )
 from grader.lms.table import csv_text, match_rows, number
 from reference.errors import CallError, lines_of
+
+_ONE = Field(min_length=1)
+"""Of an object that is never empty."""
 
 # The plan -----------------------------------------------------------------------------------------
 
@@ -67,6 +69,7 @@ class PlanDocument(Payload):
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
         check_unique((call.body for call in self.calls), "body")
+        check_unique((call.path for call in self.calls), "the call")
         return self
 
 
@@ -222,7 +225,7 @@ def rubric(grades: Sequence[Grade], options: Options) -> Delivery:
     return Delivery(csv_text(RUBRIC_HEADER, rows))
 
 
-CanvasUser = Annotated[str, Field(pattern=r"^([1-9][0-9]*|sis_(user|login|integration)_id:[^/?#\s]+)$")]
+_CANVAS_USER = re.compile(r"[1-9][0-9]*|sis_(user|login|integration)_id:[^/?#\s]+")
 
 
 class CanvasMark(Payload):
@@ -232,84 +235,27 @@ class CanvasMark(Payload):
     comments: str
 
 
-class CanvasSubmission(Payload):
-    """The grade."""
-
-    posted_grade: Number
-
-
-class CanvasComment(Payload):
-    """The comment beside it."""
-
-    text_comment: Filled
-
-
 class CanvasBody(Payload):
-    """What is put to a submission."""
+    """What is put to a submission: the grade, the comment beside it, and the points in the rubric."""
 
-    submission: CanvasSubmission
-    comment: CanvasComment
-    rubric_assessment: dict[str, CanvasMark]
-
-
-class CanvasCall(Payload):
-    """One student's grade, to be put to its path."""
-
-    student_id: str
-    method: Literal["PUT"] = "PUT"
-    path: Filled
-    body: CanvasBody
-
-
-class CanvasGrade(Payload):
-    """One student in a call for all."""
-
-    posted_grade: Number
-    text_comment: Filled
-    rubric_assessment: dict[str, CanvasMark]
-
-
-class CanvasGrades(Payload):
-    """By Canvas's number of the student, or `sis_user_id:` and the institution's."""
-
-    grade_data: dict[CanvasUser, CanvasGrade]
-
-
-class CanvasBulk(Payload):
-    """All students' grades in one call."""
-
-    method: Literal["POST"] = "POST"
-    path: Filled
-    body: CanvasGrades
-
-
-class CanvasMarksDocument(Payload):
-    """Grades with points by criterion: a call for each student, and the same in one call."""
-
-    schema_version: Version = 1
-    assignment: str
-    criteria: list[PlatformCriterion]
-    calls: list[CanvasCall]
-    bulk: CanvasBulk
+    submission: Annotated[dict[Literal["posted_grade"], Number], _ONE]
+    comment: Annotated[dict[Literal["text_comment"], Filled], _ONE]
+    rubric_assessment: Annotated[dict[str, CanvasMark], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
-        check_unique((each.id for each in self.criteria), "criterion")
-        check_unique((call.path for call in self.calls), "submission")
-        if len(self.bulk.body.grade_data) != len(self.calls):
-            raise ValueError("the calls and the one call hold different students")
-        for call in self.calls:
-            points = {name: mark.points for name, mark in call.body.rubric_assessment.items()}
-            check_points(self.criteria, points)
-            total = math.fsum(points.values())
-            if not math.isclose(total, float(call.body.submission.posted_grade), abs_tol=CLOSE):
-                raise ValueError(f"{call.student_id}: the criteria give {total:g} together, not the grade")
+        total = math.fsum(mark.points for mark in self.rubric_assessment.values())
+        if not math.isclose(total, float(self.submission["posted_grade"]), abs_tol=CLOSE):
+            raise ValueError(f"the criteria give {total:g} together, not the grade")
         return self
 
 
 def _canvas_user(grade: Grade) -> str:
-    """By Canvas's own number, else by the institution's."""
-    return grade.person.platform_id or f"sis_user_id:{grade.student_id}"
+    """By Canvas's own number, else by the institution's; CallError for what is none of Canvas's."""
+    user = grade.person.platform_id or f"sis_user_id:{grade.student_id}"
+    if not _CANVAS_USER.fullmatch(user):
+        raise CallError("ids", f"{grade.student_id}: '{user}' is no number of a Canvas user (--ids)")
+    return user
 
 
 def _canvas_body(grade: Grade, marks: Mapping[str, Mark]) -> dict[str, dict[str, Any]]:
@@ -320,41 +266,6 @@ def _canvas_body(grade: Grade, marks: Mapping[str, Mark]) -> dict[str, dict[str,
             each: {"points": mark.points, "comments": mark.remark} for each, mark in marks.items()
         },
     }
-
-
-_PLACES = "the paths hold :course_id and :assignment_id: give --course-id and --assignment-id, or put them in"
-
-
-def assessments(grades: Sequence[Grade], options: Options) -> Delivery:
-    """Everybody's grade, comment and points in the rubric: a call for each student, and one for all.
-
-    Raises CallError where the criteria's numbers are not given, InputFileError where they are not the
-    rubric's.
-    """
-    if options.criteria is None:
-        raise CallError(
-            "criteria_needed",
-            "Canvas's numbers of the criteria are needed (--criteria): its answer for the rubric"
-            " (/api/v1/courses/:course_id/rubrics/:id), or a CSV table criterion,id",
-        )
-    criteria, marked = platform_marks(grades, options, options.criteria)
-    course, assignment = options.course_id or ":course_id", options.assignment_id or ":assignment_id"
-    path = f"/api/v1/courses/{course}/assignments/{assignment}/submissions"
-    calls, bulk = [], {}
-    for grade, marks in marked:
-        user, body = _canvas_user(grade), _canvas_body(grade, marks)
-        calls.append({"student_id": grade.student_id, "path": f"{path}/{user}", "body": body})
-        bulk[user] = {**body["submission"], **body["comment"], "rubric_assessment": body["rubric_assessment"]}
-    if len(bulk) < len(calls):
-        raise CallError("ids", "two students have the same number in Canvas (--ids)")
-    content = {
-        "assignment": grades[0].assignment,
-        "criteria": criteria,
-        "calls": calls,
-        "bulk": {"path": f"{path}/update_grades", "body": {"grade_data": bulk}},
-    }
-    text = json_document(CanvasMarksDocument, content, "the rubric's points")
-    return Delivery(text, notes=(_PLACES,) if ":" in path else ())
 
 
 class CanvasRating(Payload):
@@ -516,10 +427,6 @@ class EdxRubric(Payload):
     feedback_default_text: str
 
 
-class EdxLock(Payload):
-    """Nothing: the submission is named in the path."""
-
-
 class EdxMark(Payload):
     """The option that a student is given."""
 
@@ -598,7 +505,7 @@ def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
             ],
         }
         base = "/api/ora_staff_grader/submission"
-        plan.add("POST", f"{base}/lock?{where}", EdxLock, {}, f"{student}--lock")
+        plan.add("POST", f"{base}/lock?{where}", Payload, {}, f"{student}--lock")
         plan.add("POST", f"{base}/grade?{where}", EdxGrade, body, f"{student}--grade")
     notes = [
         (
@@ -752,17 +659,11 @@ class GraphLevel(Payload):
     grading: GraphPointsType
 
 
-class GraphCriterion(Payload):
-    """What a quality is at a level."""
-
-    description: GraphText
-
-
 class GraphQuality(Payload):
     """A criterion of ours; `weight` in per cent of the rubric."""
 
     description: GraphText
-    criteria: list[GraphCriterion]
+    criteria: list[Annotated[dict[Literal["description"], GraphText], _ONE]]
     weight: Positive
 
 
@@ -827,17 +728,11 @@ class GraphPointsOutcome(Payload):
     points: GraphPoints
 
 
-class GraphFeedbackText(Payload):
-    """What is said of the whole."""
-
-    text: GraphText
-
-
 class GraphFeedbackOutcome(Payload):
     """A student's feedback."""
 
     type: Literal["#microsoft.graph.educationFeedbackOutcome"] = Field(alias="@odata.type")
-    feedback: GraphFeedbackText
+    feedback: Annotated[dict[Literal["text"], GraphText], _ONE]
 
 
 _SHARES = (100.0, 75.0, 50.0, 25.0, 0.0)

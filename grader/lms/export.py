@@ -79,7 +79,6 @@ KINDS: Mapping[tuple[str, str], _Kind] = {
     ("moodle", "marks"): _of_grades(".json", moodle_guide.fillings, "criteria assignment_id"),
     ("canvas", "grades"): _of_grades(".csv", gradebooks.grades_file, "maximum rescale form item"),
     ("canvas", "rubric"): _of_grades(".csv", api.rubric, "item"),
-    ("canvas", "marks"): _of_grades(".json", api.assessments, "criteria course_id assignment_id"),
     ("canvas-api", "marks"): _of_grades(".zip", api.canvas_api, "item criteria course_id assignment_id"),
     ("openedx", "marks"): _of_grades(".zip", api.openedx, "submissions assignment_id"),
     ("google-classroom", "marks"): _of_grades(

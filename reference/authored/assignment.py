@@ -31,6 +31,7 @@ from reference.authored.variant_table import (
 )
 from reference.errors import AuthoredFileError, CallError, Finding, ranges_of
 from reference.geometry import FloatArray
+from reference.kinematics.motion import BoolArray
 from reference.mechanism import Crank, Driver, Mechanism
 
 
@@ -402,6 +403,14 @@ def _check_formulas(assignment: Assignment) -> list[Finding]:
         try:
             what(variants)
         except FormulaError as error:
-            findings.append(Finding(path, str(error)))
+            findings.append(Finding(path, str(error) + _failing(variants, error.which)))
             break
     return findings
+
+
+def _failing(variants: list[Variant], which: BoolArray | None) -> str:
+    """The first variant where a formula fails, and how many more there are."""
+    if which is None or which.shape != (len(variants),) or len(variants) == 1:
+        return ""
+    more = int(which.sum()) - 1
+    return f" (for {variants[int(np.argmax(which))]}{f' and {more} more' if more else ''})"

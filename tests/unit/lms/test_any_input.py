@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import zipfile
 from contextlib import suppress
 from datetime import UTC, datetime
 
@@ -141,10 +142,12 @@ def test_points_of_any_marks_are_told_alike_to_all_platforms(tmp_path, points, t
     table = tmp_path / "criteria.csv"
     numbers = [f"c{at},{at}" for at in range(1, len(points) + 1)]
     table.write_text("\n".join(["criterion,id", *numbers]))
-    export(results(one), path, Options(to="canvas", what="marks", criteria=table))
-    calls = json.loads(path.read_bytes())["calls"]
-    assert (not calls) == waits
-    for call in calls:
-        total = sum(mark["points"] for mark in call["body"]["rubric_assessment"].values())
+    path = tmp_path / "out.zip"
+    export(results(one), path, Options(to="canvas-api", course_id="1", assignment_id="2", criteria=table))
+    with zipfile.ZipFile(path) as archive:
+        bodies = [json.loads(archive.read(name)) for name in archive.namelist() if name != "plan.json"]
+    assert (not bodies) == waits
+    for body in bodies:
+        total = sum(mark["points"] for mark in body["rubric_assessment"].values())
         assert abs(total - given_points) < 1e-4
-        assert abs(float(call["body"]["submission"]["posted_grade"]) - given_points) < 1e-5
+        assert abs(float(body["submission"]["posted_grade"]) - given_points) < 1e-5

@@ -4,10 +4,8 @@ import json
 import zipfile
 from dataclasses import replace
 
-import jsonschema
 import pytest
 
-from grader.cli.exporting import schema
 from grader.lms.export import export
 from grader.lms.grades import Options, Person
 from reference.errors import CallError, InputFileError
@@ -426,44 +424,34 @@ def rubric(tmp_path):
 
 
 def points(tmp_path, rubric, *reports, **how):
-    return canvas(tmp_path / "marks.json", *reports, what="marks", criteria=rubric, **how)
+    options = Options(to="canvas-api", criteria=rubric, course_id="12", assignment_id="345", **how)
+    delivery = export(results(*reports), tmp_path / "marks.zip", options)
+    with zipfile.ZipFile(tmp_path / "marks.zip") as archive:
+        return delivery, [json.loads(archive.read(name)) for name in archive.namelist()[1:]]
 
 
 def test_points_add_up_to_the_grade_and_go_to_canvass_own_criteria(tmp_path, rubric):
-    delivery, text = points(
-        tmp_path, rubric, marked("s01", 5.0, 2.5), marked("s02", 3.0, None), course_id=12, assignment_id=345
-    )
-    document = json.loads(text)
-    jsonschema.validate(document, schema("canvas-marks"))
-    first, second = document["calls"]
-    assert first["path"] == "/api/v1/courses/12/assignments/345/submissions/sis_user_id:s01"
-    assert first["body"]["submission"] == {"posted_grade": "7.5"}
-    assert first["body"]["rubric_assessment"]["_2"]["points"] == 2.5
-    assert "Told <why> & how." in first["body"]["rubric_assessment"]["_2"]["comments"]
-    assert {name: one["points"] for name, one in second["body"]["rubric_assessment"].items()} == {
+    _, (first, second) = points(tmp_path, rubric, marked("s01", 5.0, 2.5), marked("s02", 3.0, None))
+    assert first["submission"] == {"posted_grade": "7.5"}
+    assert first["rubric_assessment"]["_2"]["points"] == 2.5
+    assert "Told <why> & how." in first["rubric_assessment"]["_2"]["comments"]
+    assert {name: one["points"] for name, one in second["rubric_assessment"].items()} == {
         "_1": 3.0, "_2": 3.0,
     }  # fmt: skip
-    assert second["body"]["submission"] == {"posted_grade": "6"}
-    assert second["body"]["rubric_assessment"]["_2"]["comments"].startswith("– not judged: ")
-    bulk = document["bulk"]
-    assert bulk["path"].endswith("/345/submissions/update_grades")
-    assert list(bulk["body"]["grade_data"]) == ["sis_user_id:s01", "sis_user_id:s02"]
-    assert delivery.notes == ()
-
-
-def test_paths_have_canvass_own_placeholders_where_numbers_are_not_told(tmp_path, rubric):
-    delivery, text = points(
-        tmp_path, rubric, marked("s01", 5.0, 2.5), people={"s01": Person(platform_id="9")}
-    )
-    path = json.loads(text)["calls"][0]["path"]
-    assert path == "/api/v1/courses/:course_id/assignments/:assignment_id/submissions/9"
-    assert "--course-id" in delivery.notes[0]
+    assert second["submission"] == {"posted_grade": "6"}
+    assert second["rubric_assessment"]["_2"]["comments"].startswith("– not judged: ")
 
 
 @pytest.mark.parametrize("number", ["0", "a/b", "sis_user_id:", "sis_user_id:a/../b", "name"])
 def test_a_number_that_canvas_would_not_take_is_refused(tmp_path, rubric, number):
-    with pytest.raises(InputFileError, match="grade_data"):
+    with pytest.raises(CallError, match="no number of a Canvas user"):
         points(tmp_path, rubric, marked("s01", 5.0, 2.5), people={"s01": Person(platform_id=number)})
+
+
+def test_two_students_with_one_submission_are_refused(tmp_path, rubric):
+    people = {"s01": Person(platform_id="7"), "s02": Person(platform_id="7")}
+    with pytest.raises(InputFileError, match="stands twice"):
+        points(tmp_path, rubric, marked("s01", 5.0, 2.5), marked("s02", 5.0, 2.5), people=people)
 
 
 @pytest.mark.parametrize(
@@ -483,8 +471,8 @@ def test_canvass_answers_of_every_shape_are_understood(tmp_path, rubric, answer)
 def test_criteria_may_be_told_in_a_table(tmp_path):
     table = tmp_path / "criteria.csv"
     table.write_text("criterion,id\nc1,_8\nc2,_9\n", encoding="utf-8")
-    _, text = points(tmp_path, table, marked("s01", 5.0, 2.5))
-    assert list(json.loads(text)["calls"][0]["body"]["rubric_assessment"]) == ["_8", "_9"]
+    _, bodies = points(tmp_path, table, marked("s01", 5.0, 2.5))
+    assert list(bodies[0]["rubric_assessment"]) == ["_8", "_9"]
 
 
 @pytest.mark.parametrize(
@@ -501,7 +489,7 @@ def test_criteria_that_are_not_the_rubrics_are_refused(tmp_path, rubric, change,
     rubric.write_text(json.dumps([{**first, **change}, second]), encoding="utf-8")
     with pytest.raises(InputFileError, match=f"(?s){message}"):
         points(tmp_path, rubric, marked("s01", 5.0, 2.5))
-    assert not (tmp_path / "marks.json").exists()
+    assert not (tmp_path / "marks.zip").exists()
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"id": 1}', "nonsense", "[" * 100_000])
@@ -509,11 +497,6 @@ def test_an_answer_without_criteria_is_refused(tmp_path, rubric, content):
     rubric.write_text(content, encoding="utf-8")
     with pytest.raises(InputFileError, match=r"rubric\.json"):
         points(tmp_path, rubric, marked("s01", 5.0, 2.5))
-
-
-def test_criteria_need_their_numbers(tmp_path):
-    with pytest.raises(CallError, match="numbers of the criteria are needed"):
-        canvas(tmp_path / "out.json", marked("s01", 5.0, 2.5), what="marks")
 
 
 def test_points_that_do_not_add_up_to_the_score_are_refused(tmp_path, rubric):
@@ -551,8 +534,7 @@ def test_a_rubric_has_the_titles_of_the_class(tmp_path):
 
 def test_positions_are_summed_or_averaged_criterion_by_criterion(tmp_path, rubric):
     both = marked("s01", 5.0, 2.5, position=1), marked("s01", 0.0, 5.0, position=2)
-    _, text = points(tmp_path, rubric, *both, combine="mean")
-    body = json.loads(text)["calls"][0]["body"]
+    _, (body,) = points(tmp_path, rubric, *both, combine="mean")
     assert [one["points"] for one in body["rubric_assessment"].values()] == [2.5, 3.75]
     assert body["submission"]["posted_grade"] == "6.25"
     assert "1: ✓" in body["rubric_assessment"]["_1"]["comments"]
@@ -568,14 +550,3 @@ def test_a_gradebook_with_names_apart_is_filled_in(tmp_path):
             results(report(student, 7.5)), tmp_path / "o.csv", Options(to="canvas", form=path, people=people)
         )
         assert (tmp_path / "o.csv").read_text() == NAMES_APART.replace("s01,,1,", "s01,,1,7.5")
-
-
-def test_two_students_of_one_number_have_no_place_in_canvas(tmp_path):
-    people = {"s01": Person(platform_id="1"), "s02": Person(platform_id="1")}
-    criteria = form(tmp_path, "criterion,id\nc1,_1\n")
-    with pytest.raises(CallError, match="same number in Canvas"):
-        export(
-            results(marked("s01", 5.0), marked("s02", 5.0)),
-            tmp_path / "o.json",
-            Options(to="canvas", what="marks", criteria=criteria, people=people),
-        )
