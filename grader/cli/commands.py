@@ -304,6 +304,21 @@ def sheet(
 
 
 @app.command()
+def handout(
+    assignment: AssignmentArgument,
+    out: Annotated[Path, typer.Option("--out", "-o", help="The PDF file to write.")],
+    roster: RosterOption = None,
+    n: NumberOption = None,
+    position: PositionOption = None,
+    lang: LanguageOption = "en",
+) -> None:
+    """Task sheets on A4, of a class or of one --n: scheme, data, empty tables, and no solution."""
+    from grader.cli.sheets import print_handout
+
+    print_handout(assignment, roster, n, position, out, lang)
+
+
+@app.command()
 def calibrate(
     scans: Annotated[list[Path], typer.Argument(help="Scans of the calibration page.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print what was measured as JSON.")] = False,
@@ -346,10 +361,25 @@ def bench(
     show_benchmark(quick=quick, as_json=as_json)
 
 
+def _platforms() -> list[str]:
+    """What there are exports for, for a shell that completes it."""
+    from grader.lms.export import TARGETS
+
+    return list(TARGETS)
+
+
 @app.command()
 def export(
     results: ResultsArgument,
-    to: Annotated[str, typer.Option("--to", help="csv, moodle, canvas, gradescope or lti.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            help="csv, moodle, canvas, canvas-api, openedx, google-classroom, ms-education, brightspace,"
+            " blackboard, ilias, gradescope or lti.",
+            autocompletion=_platforms,
+        ),
+    ],
     what: Annotated[
         str | None,
         typer.Option(
@@ -366,7 +396,10 @@ def export(
         typer.Option("--worksheet", help="Moodle's downloaded offline grading worksheet, to fill in."),
     ] = None,
     gradebook: Annotated[
-        Path | None, typer.Option("--gradebook", help="Canvas's exported gradebook, to fill in.")
+        Path | None,
+        typer.Option(
+            "--gradebook", help="The gradebook as the platform exports it (ILIAS: status.csv), to fill in."
+        ),
     ] = None,
     ids: Annotated[
         Path | None,
@@ -375,6 +408,10 @@ def export(
     criteria: Annotated[
         Path | None,
         typer.Option("--criteria", help="The platform's criteria: its JSON answer, or a CSV criterion,id."),
+    ] = None,
+    submissions: Annotated[
+        Path | None,
+        typer.Option("--submissions", help="The platform's answer that lists the students' submissions."),
     ] = None,
     identity: Annotated[
         str | None,
@@ -393,9 +430,11 @@ def export(
         str | None,
         typer.Option("--visibility", help="Gradescope: visible, hidden, after_due_date, after_published."),
     ] = None,
-    course_id: Annotated[int | None, typer.Option("--course-id", min=1, help="Canvas's.")] = None,
+    course_id: Annotated[
+        str | None, typer.Option("--course-id", help="The platform's own, of the course or class.")
+    ] = None,
     assignment_id: Annotated[
-        int | None, typer.Option("--assignment-id", min=1, help="Canvas's or Moodle's.")
+        str | None, typer.Option("--assignment-id", help="The platform's own, of the assignment.")
     ] = None,
     cmid: Annotated[
         int | None,
@@ -403,6 +442,13 @@ def export(
     ] = None,
     context_id: Annotated[
         int | None, typer.Option("--context-id", min=1, help="Moodle's number of the activity's context.")
+    ] = None,
+    replace_guide: Annotated[
+        Path | None,
+        typer.Option(
+            "--replace-guide",
+            help="Delete the guide there: Moodle's core_grading_get_gradingform_instances tells the points.",
+        ),
     ] = None,
     lang: LanguageOption = "en",
 ) -> None:
@@ -413,13 +459,16 @@ def export(
 
     if worksheet is not None and (gradebook is not None or to != "moodle"):
         raise CallError("option_unused", "--worksheet is Moodle's: give it with --to moodle alone")
-    if gradebook is not None and to != "canvas":
-        raise CallError("option_unused", "--gradebook is Canvas's: give it with --to canvas alone")
+    if gradebook is not None and to in {"moodle", "canvas-api"}:
+        raise CallError("option_unused", f"--gradebook has no meaning for {to}: leave it out")
     options = Options(
-        to=to, what=what, form=worksheet or gradebook, criteria=criteria, identity=identity, item=item,
+        to=to, what=what, form=worksheet or gradebook, criteria=criteria, submissions=submissions,
+        identity=identity, item=item,
         position=position, combine=combine, maximum=maximum, rescale=rescale, visibility=visibility,
-        course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id, lang=lang,
+        course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id,
+        replace_guide=replace_guide, lang=lang,
     )  # fmt: skip
     is_open, path = export_results(results, file, options, roster, ids)
-    note(f"next: {'open' if to == 'csv' else 'upload'} {path}{'' if to == 'csv' else f' to {to}'}")
+    where = "" if to == "csv" else f" to {to}; the documentation of exports says how"
+    note(f"next: {'upload' if where else 'open'} {path}{where}")
     raise typer.Exit(1 if is_open else 0)
