@@ -147,8 +147,10 @@ def test_the_same_table_stands_in_the_file_itself(course):
     "table",
     [
         "[variant.table]\nn = [2, 1]\na = [41, 40]\nside_B = ['right', 'left']",
-        "[[variant.table]]\nn = 2\na = 41\nside_B = 'right'\n"
-        "[[variant.table]]\nn = 1\nside_B = 'left'\na = 40",
+        (
+            "[[variant.table]]\nn = 2\na = 41\nside_B = 'right'\n"
+            "[[variant.table]]\nn = 1\nside_B = 'left'\na = 40"
+        ),
         "table.columns = ['n', 'a', 'side_B']\ntable.rows = [[2, 41, 'right'], [1, 40, 'left']]",
     ],
 )
