@@ -190,7 +190,7 @@ side = "behind"
 def with_group(tmp_path, group: str, angle: str):
     text = FILE.format(angle=angle, variant=TWELVE, **(PARALLELOGRAM | {"ground": 40}))
     text = text[: text.index("[[mechanism.group]]")] + group
-    path = tmp_path / "other.assignment.toml"
+    path = tmp_path / f"{len(group)}.assignment.toml"
     path.write_text(text, encoding="utf-8")
     return load_assignment(path)
 
@@ -204,7 +204,8 @@ def test_an_isosceles_slider_crank_goes_on_beyond_its_pivot(tmp_path):
 
 
 def test_a_slotted_link_goes_on_where_the_pin_passes_its_pivot(tmp_path):
-    assignment = with_group(tmp_path, SLOT, "15 + 30*position")
+    assignment = with_group(tmp_path, SLOT, "205 + 30*position")
+    assert assignment.signs
     together = exact_plan(assignment, assignment.variants())
     np.testing.assert_allclose(together.rates["omega_3"], 5.0, rtol=1e-9)
     for index, variant in enumerate(assignment.variants()):
@@ -218,7 +219,7 @@ def test_the_construction_is_drawn_on_the_side_that_the_motion_has(tmp_path, bar
         bars("15 + 30*position"),
         bars("205 + 30*position", **KITE),
         with_group(tmp_path, SLIDER, "15 + 30*position"),
-        with_group(tmp_path, SLOT, "15 + 30*position"),
+        with_group(tmp_path, SLOT, "205 + 30*position"),
     ):
         assert assignment.signs
         plan = exact_plan(assignment, assignment.variants())
