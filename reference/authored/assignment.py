@@ -27,6 +27,7 @@ from reference.authored.variant_table import (
     DataTable,
     VariantRows,
     misused_columns,
+    or_its_file,
     read_rows,
 )
 from reference.errors import AuthoredFileError, CallError, Finding, ranges_of
@@ -52,7 +53,7 @@ class VariantTable(Authored):
 
     n: Range | None = None
     position: Range | None = None
-    table: DataTable | None = None
+    table: Annotated[DataTable | None, Field(json_schema_extra=or_its_file)] = None
     values: dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], FormulaText] = Field(default={})
 
     @model_validator(mode="after")

@@ -110,6 +110,11 @@ class DataTable(Authored):
         return self
 
 
+def or_its_file(schema: dict[str, Any]) -> None:
+    """In the schema of a table: the name of a CSV may stand in its place."""
+    schema["anyOf"].append({"type": "string"})
+
+
 @dataclass(frozen=True, slots=True)
 class VariantRows:
     """A table that was read: which variant each row is of, and its columns.
