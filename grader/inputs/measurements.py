@@ -446,9 +446,12 @@ def _check_header(
             yield Finding(line, source.say(why, name=short(name), count=count))
 
 
+DID_YOU_MEAN, OR = N_("did you mean %(names)s?"), N_("or")
+
+
 def _did_you_mean(near: Sequence[str], source: _Source) -> str:
-    either = f" {source.say(N_('or'))} ".join(near)
-    return f"; {source.say(N_('did you mean %(names)s?'), names=either)}" if near else ""
+    either = f" {source.say(OR)} ".join(near)
+    return f"; {source.say(DID_YOU_MEAN, names=either)}" if near else ""
 
 
 def _line(
