@@ -235,7 +235,9 @@ def review(
 @app.command()
 def check(
     assignment: AssignmentArgument,
-    measured: Annotated[Path, typer.Option("--measured", help="Measurement file, CSV or JSON.")],
+    measured: Annotated[
+        Path | None, typer.Option("--measured", help="Measurement file, CSV or JSON.")
+    ] = None,
     n: NumberOption = None,
     position: PositionOption = None,
     lang: LanguageOption = "en",
@@ -245,11 +247,15 @@ def check(
     page: Annotated[
         Path | None, typer.Option("--page", help="Draw and tell it in this HTML file, too.")
     ] = None,
+    template: Annotated[
+        Path | None, typer.Option("--template", help="Write the CSV file to fill in.")
+    ] = None,
 ) -> None:
     """Check measured values: right, or off and in which way, without giving the answer away."""
     from grader.cli.checking import check_measured
 
-    raise typer.Exit(1 if check_measured(assignment, n, position, measured, lang, level, page) else 0)
+    is_off = check_measured(assignment, n, position, measured, lang, level, page, template)
+    raise typer.Exit(1 if is_off else 0)
 
 
 @app.command()
