@@ -42,7 +42,7 @@ from grader.lms.table import csv_text, match_rows, number
 from reference.errors import CallError, lines_of
 
 _ONE = Field(min_length=1)
-"""Of an object that is never empty."""
+"""Of an object or a list that is never empty."""
 
 # The plan -----------------------------------------------------------------------------------------
 
@@ -80,15 +80,17 @@ class _Plan:
     platform: str
     server: str
     sources: Sequence[str]
-    calls: list[dict[str, str]] = field(default_factory=list)
+    calls: list[dict[str, str | None]] = field(default_factory=list)
     files: dict[str, bytes] = field(default_factory=dict)
 
-    def add(self, method: str, path: str, model: type[Payload], body: Mapping[str, Any], what: str) -> None:
-        """Add a call; `what` is its student, or ``rubric``."""
-        name = f"{len(self.calls) + 1:03}-{what}.json"
+    def add(
+        self, call: str, model: type[Payload], body: Mapping[str, Any], what: str, student: str | None = None
+    ) -> None:
+        """Add a call, as ``POST /path``; `what` names its file, after the student."""
+        method, _, path = call.partition(" ")
+        name = "-".join(filter(None, (f"{len(self.calls) + 1:03}", student, what))) + ".json"
         self.files[name] = json_document(model, body, f"{name} for {self.platform}").encode()
-        whose = {} if what in {"rubric", "attach"} else {"student_id": what.partition("--")[0]}
-        self.calls.append({"method": method, "path": path, "body": name, **whose})
+        self.calls.append({"method": method, "path": path, "body": name, "student_id": student})
 
     def delivery(self, grades: Sequence[Grade], **more: Any) -> Delivery:  # noqa: ANN401 - fields of a delivery
         """The plan with its files."""
@@ -194,13 +196,6 @@ def _marks(grade: Grade, options: Options) -> list[Mark]:
     return together(marks_of(grade), options.combine)
 
 
-def _two_decimals(faulty: Iterable[tuple[str, float]], platform: str) -> None:
-    """Raises CallError for points that the platform would round."""
-    if rough := [f"{name}: {points:g}" for name, points in faulty if abs(round(points, 2) - points) > CLOSE]:
-        message = f"{platform} keeps two decimals of a rubric's points; nothing was written"
-        raise CallError("points", f"{message}\n{lines_of(rough)}")
-
-
 # Canvas ------------------------------------------------------------------------------------------
 
 _RATING = ("Rating Name", "Rating Description", "Rating Points")
@@ -209,18 +204,24 @@ RUBRIC_HEADER = (
 )  # fmt: skip
 
 
-def rubric(grades: Sequence[Grade], options: Options) -> Delivery:
-    """The rubric as Canvas imports it: each criterion a range of points from nothing to its maximum.
-
-    Raises CallError for points that Canvas would round.
-    """
+def _canvas_criteria(grades: Sequence[Grade], options: Options) -> list[Criterion]:
+    """The rubric; CallError for points that Canvas would round."""
     criteria = class_criteria(grades, options)
-    _two_decimals(((each.name, each.max_points) for each in criteria), "Canvas")
+    rough = [each for each in criteria if abs(round(each.max_points, 2) - each.max_points) > CLOSE]
+    if rough:
+        message = "Canvas keeps two decimals of a rubric's points; nothing was written"
+        lines = lines_of([f"{each.name}: {each.max_points:g}" for each in rough])
+        raise CallError("points", f"{message}\n{lines}")
+    return criteria
+
+
+def rubric(grades: Sequence[Grade], options: Options) -> Delivery:
+    """The rubric as Canvas imports it: each criterion a range of points from nothing to its maximum."""
     name = options.item.strip() or grades[0].assignment
     ratings = ("true", "Full marks", "", "{}", "No marks", "", "0")
     rows = [
         (name, each.name, each.titles[0], *(cell.format(number(each.max_points)) for cell in ratings))
-        for each in criteria
+        for each in _canvas_criteria(grades, options)
     ]
     return Delivery(csv_text(RUBRIC_HEADER, rows))
 
@@ -240,7 +241,7 @@ class CanvasBody(Payload):
 
     submission: Annotated[dict[Literal["posted_grade"], Number], _ONE]
     comment: Annotated[dict[Literal["text_comment"], Filled], _ONE]
-    rubric_assessment: Annotated[dict[str, CanvasMark], Field(min_length=1)]
+    rubric_assessment: Annotated[dict[str, CanvasMark], _ONE]
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
@@ -286,7 +287,7 @@ class CanvasCriterion(Payload):
     description: Filled
     long_description: str
     points: Positive
-    criterion_use_range: bool
+    criterion_use_range: bool = True
     ratings: Annotated[dict[_Index, CanvasRating], Field(min_length=2)]
 
     @model_validator(mode="after")
@@ -300,8 +301,8 @@ class CanvasRubric(Payload):
     """The rubric."""
 
     title: Filled
-    free_form_criterion_comments: bool
-    criteria: Annotated[dict[_Index, CanvasCriterion], Field(min_length=1)]
+    free_form_criterion_comments: bool = False
+    criteria: Annotated[dict[_Index, CanvasCriterion], _ONE]
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
@@ -313,10 +314,9 @@ class CanvasAssociation(Payload):
     """What ties the rubric to an assignment."""
 
     association_id: Id
-    association_type: Literal["Assignment"]
-    use_for_grading: bool
-    hide_score_total: bool
-    purpose: Literal["grading"]
+    association_type: Literal["Assignment"] = "Assignment"
+    use_for_grading: bool = True
+    purpose: Literal["grading"] = "grading"
 
 
 class CanvasRubricBody(Payload):
@@ -341,35 +341,24 @@ def canvas_api(grades: Sequence[Grade], options: Options) -> Delivery:
         ],
     )
     if options.criteria is None:
-        criteria = class_criteria(grades, options)
-        _two_decimals(((each.name, each.max_points) for each in criteria), "Canvas")
         rubric_body = {
             "title": options.item.strip() or grades[0].assignment,
-            "free_form_criterion_comments": False,
             "criteria": {
                 str(index): {
                     "id": each.id,
                     "description": each.name,
                     "long_description": each.titles[0],
                     "points": each.max_points,
-                    "criterion_use_range": True,
                     "ratings": {
                         "0": {"description": "Full marks", "points": each.max_points},
                         "1": {"description": "No marks", "points": 0.0},
                     },
                 }
-                for index, each in enumerate(criteria)
+                for index, each in enumerate(_canvas_criteria(grades, options))
             },
         }
-        association = {
-            "association_id": assignment,
-            "association_type": "Assignment",
-            "use_for_grading": True,
-            "hide_score_total": False,
-            "purpose": "grading",
-        }
-        body = {"rubric": rubric_body, "rubric_association": association}
-        plan.add("POST", f"/api/v1/courses/{course}/rubrics", CanvasRubricBody, body, "rubric")
+        body = {"rubric": rubric_body, "rubric_association": {"association_id": assignment}}
+        plan.add(f"POST /api/v1/courses/{course}/rubrics", CanvasRubricBody, body, "rubric")
         marked = [
             (grade, {mark.criterion: mark for mark in _marks(grade, options)}) for grade in ready(grades)
         ]
@@ -382,9 +371,8 @@ def canvas_api(grades: Sequence[Grade], options: Options) -> Delivery:
         notes = []
     path = f"/api/v1/courses/{course}/assignments/{assignment}/submissions"
     for grade, marks in marked:
-        plan.add(
-            "PUT", f"{path}/{_canvas_user(grade)}", CanvasBody, _canvas_body(grade, marks), grade.student_id
-        )
+        body = _canvas_body(grade, marks)
+        plan.add(f"PUT {path}/{_canvas_user(grade)}", CanvasBody, body, "grade", grade.student_id)
     return plan.delivery(grades, notes=tuple(notes))
 
 
@@ -410,7 +398,7 @@ class EdxCriterion(Payload):
     name: Filled
     label: str
     prompt: str
-    feedback: Literal["disabled", "optional", "required"]
+    feedback: Literal["disabled", "optional", "required"] = "optional"
     options: Annotated[list[EdxOption], Field(min_length=2)]
 
     @model_validator(mode="after")
@@ -422,9 +410,9 @@ class EdxCriterion(Payload):
 class EdxRubric(Payload):
     """The rubric's keys of what Studio's editor sends (EDITOR_UPDATE_SCHEMA)."""
 
-    criteria: Annotated[list[EdxCriterion], Field(min_length=1)]
-    feedback_prompt: str
-    feedback_default_text: str
+    criteria: Annotated[list[EdxCriterion], _ONE]
+    feedback_prompt: str = ""
+    feedback_default_text: str = ""
 
 
 class EdxMark(Payload):
@@ -439,7 +427,7 @@ class EdxGrade(Payload):
     """A staff assessment."""
 
     overallFeedback: str  # noqa: N815
-    criteria: Annotated[list[EdxMark], Field(min_length=1)]
+    criteria: Annotated[list[EdxMark], _ONE]
 
 
 _FACTORS = (1, 2, 4, 5, 10, 20, 25, 50, 100)
@@ -465,7 +453,6 @@ def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
                 "name": each.id,
                 "label": each.titles[0],
                 "prompt": each.titles[0],
-                "feedback": "optional",
                 "options": [
                     {"order_num": place, "name": number(whole / factor), "label": number(whole / factor),
                      "explanation": "", "points": whole}
@@ -474,8 +461,6 @@ def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
             }
             for at, each in enumerate(criteria)
         ],
-        "feedback_prompt": "",
-        "feedback_default_text": "",
     }  # fmt: skip
     plan = _Plan(
         "Open edX",
@@ -505,8 +490,8 @@ def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
             ],
         }
         base = "/api/ora_staff_grader/submission"
-        plan.add("POST", f"{base}/lock?{where}", Payload, {}, f"{student}--lock")
-        plan.add("POST", f"{base}/grade?{where}", EdxGrade, body, f"{student}--grade")
+        plan.add(f"POST {base}/lock?{where}", Payload, {}, "lock", student)
+        plan.add(f"POST {base}/grade?{where}", EdxGrade, body, "grade", student)
     notes = [
         (
             f"Open edX takes whole points: all are times {factor}, {number(_total(criteria))} become"
@@ -536,7 +521,7 @@ def _olx(rubric_body: Mapping[str, Any]) -> bytes:
     """The rubric as it stands in an exported course, to be put into its `openassessment`."""
     root = ET.Element("rubric")
     for criterion in rubric_body["criteria"]:
-        element = ET.SubElement(root, "criterion", feedback=criterion["feedback"])
+        element = ET.SubElement(root, "criterion", feedback="optional")
         for name in ("name", "label", "prompt"):
             ET.SubElement(element, name).text = criterion[name]
         for option in criterion["options"]:
@@ -613,7 +598,7 @@ def google_classroom(grades: Sequence[Grade], options: Options) -> Delivery:
                 for each in class_criteria(grades, options)
             ]
         }
-        plan.add("POST", f"{path}/rubrics", GoogleRubric, body, "rubric")
+        plan.add(f"POST {path}/rubrics", GoogleRubric, body, "rubric")
     else:
         platform_marks(grades, options, options.criteria)
     known, missing = _submissions(grades, options, "courses.courseWork.studentSubmissions.list")
@@ -621,10 +606,9 @@ def google_classroom(grades: Sequence[Grade], options: Options) -> Delivery:
         if submission := known.get(grade.student_id):
             score = round(grade.out_of(options.maximum, rescale=options.rescale), 2)
             where = f"{path}/studentSubmissions/{quote(submission.id, safe='')}"
+            call = f"PATCH {where}?updateMask=draftGrade,assignedGrade"
             fields = {"draftGrade": score, "assignedGrade": score}
-            plan.add(
-                "PATCH", f"{where}?updateMask=draftGrade,assignedGrade", GoogleGrade, fields, grade.student_id
-            )
+            plan.add(call, GoogleGrade, fields, "grade", grade.student_id)
     notes = (
         f"the course work must be out of {number(options.maximum or grades[0].max_score)}",
         "grades have two decimals there; points by criterion are read-only for the API: --to csv has them",
@@ -672,8 +656,8 @@ class GraphRubric(Payload):
 
     displayName: Filled  # noqa: N815
     description: GraphText
-    levels: Annotated[list[GraphLevel], Field(min_length=1)]
-    qualities: Annotated[list[GraphQuality], Field(min_length=1)]
+    levels: Annotated[list[GraphLevel], _ONE]
+    qualities: Annotated[list[GraphQuality], _ONE]
     grading: GraphPointsType
 
     @model_validator(mode="after")
@@ -709,7 +693,9 @@ class GraphSelected(Payload):
 class GraphRubricOutcome(Payload):
     """A student's levels."""
 
-    type: Literal["#microsoft.graph.educationRubricOutcome"] = Field(alias="@odata.type")
+    type: Literal["#microsoft.graph.educationRubricOutcome"] = Field(
+        "#microsoft.graph.educationRubricOutcome", alias="@odata.type"
+    )
     rubricQualityFeedback: list[GraphFeedback]  # noqa: N815
     rubricQualitySelectedLevels: list[GraphSelected]  # noqa: N815
 
@@ -717,21 +703,27 @@ class GraphRubricOutcome(Payload):
 class GraphPoints(Payload):
     """The grade."""
 
-    type: Literal["#microsoft.graph.educationAssignmentPointsGrade"] = Field(alias="@odata.type")
+    type: Literal["#microsoft.graph.educationAssignmentPointsGrade"] = Field(
+        "#microsoft.graph.educationAssignmentPointsGrade", alias="@odata.type"
+    )
     points: Annotated[float, Field(ge=0.0, lt=9_999_999.0)]
 
 
 class GraphPointsOutcome(Payload):
     """A student's grade."""
 
-    type: Literal["#microsoft.graph.educationPointsOutcome"] = Field(alias="@odata.type")
+    type: Literal["#microsoft.graph.educationPointsOutcome"] = Field(
+        "#microsoft.graph.educationPointsOutcome", alias="@odata.type"
+    )
     points: GraphPoints
 
 
 class GraphFeedbackOutcome(Payload):
     """A student's feedback."""
 
-    type: Literal["#microsoft.graph.educationFeedbackOutcome"] = Field(alias="@odata.type")
+    type: Literal["#microsoft.graph.educationFeedbackOutcome"] = Field(
+        "#microsoft.graph.educationFeedbackOutcome", alias="@odata.type"
+    )
     feedback: Annotated[dict[Literal["text"], GraphText], _ONE]
 
 
@@ -764,7 +756,7 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
     )
     ask = f"{base}/submissions?$expand=outcomes"
     if options.criteria is None:
-        plan.add("POST", "/v1.0/education/me/rubrics", GraphRubric, _graph_rubric(grades, options), "rubric")
+        plan.add("POST /v1.0/education/me/rubrics", GraphRubric, _graph_rubric(grades, options), "rubric")
         why = "its points follow once the rubric is there: give Graph's answer for it (--criteria)"
         return plan.delivery(grades, unplaced={grade.student_id: why for grade in ready(grades)})
     answer = read_answer(options.criteria)
@@ -776,7 +768,7 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
         raise CallError("criteria", f"{options.criteria}: is no educationRubric with its id and levels")
     if options.submissions is None:
         reference = {"@odata.id": f"https://graph.microsoft.com/v1.0/education/me/rubrics/{quote(rubric_id)}"}
-        plan.add("PUT", f"{base}/rubric/$ref", GraphReference, reference, "attach")
+        plan.add(f"PUT {base}/rubric/$ref", GraphReference, reference, "attach")
     for grade, marks in marked:
         if submission := known.get(grade.student_id):
             outcomes = {
@@ -790,7 +782,7 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
             for kind, model in _OUTCOMES.items():
                 outcome = quote(outcomes[kind] or "", safe="")
                 path = f"{base}/submissions/{quote(submission.id, safe='')}/outcomes/{outcome}"
-                plan.add("PATCH", path, model, bodies[kind], f"{grade.student_id}--{kind}")
+                plan.add(f"PATCH {path}", model, bodies[kind], kind, grade.student_id)
     notes = [
         f"the assignment must be out of {number(options.maximum or grades[0].max_score)} points",
         "a level is the nearest quarter; the points themselves are the grade's and stand in each feedback",
@@ -807,11 +799,7 @@ def _graph_rubric(grades: Sequence[Grade], options: Options) -> dict[str, Any]:
         "displayName": title,
         "description": {"content": title},
         "levels": [
-            {
-                "displayName": f"{share:g} %",
-                "description": {"content": ""},
-                "grading": {"maxPoints": share},
-            }
+            {"displayName": f"{share:g} %", "description": {"content": ""}, "grading": {"maxPoints": share}}
             for share in _SHARES
         ],
         "qualities": [
@@ -833,7 +821,7 @@ def _graph_levels(answer: object) -> dict[str, float]:
     """The share of the best level that each level of a rubric is, by its id."""
     levels = answer.get("levels") if isinstance(answer, dict) else None
     points = {
-        each["levelId"]: float(each["grading"]["maxPoints"])
+        str(each["levelId"]): float(each["grading"]["maxPoints"])
         for each in (levels if isinstance(levels, list) else [])
         if isinstance(each, dict) and isinstance(each.get("grading"), dict) and "levelId" in each
         if isinstance(each["grading"].get("maxPoints"), int | float)
@@ -846,7 +834,6 @@ def _graph_outcomes(
     grade: Grade, marks: Mapping[str, Mark], levels: Mapping[str, float], score: float
 ) -> dict[str, dict[str, Any]]:
     """The bodies of a student's three outcomes."""
-    graph = "#microsoft.graph.education"
     nearest = {
         quality: min(levels, key=lambda level: abs(levels[level] - mark.points / mark.max_points))
         for quality, mark in marks.items()
@@ -857,7 +844,6 @@ def _graph_outcomes(
     }
     return {
         "rubric": {
-            "@odata.type": f"{graph}RubricOutcome",
             "rubricQualityFeedback": [
                 {"qualityId": quality, "feedback": {"content": text}} for quality, text in said.items()
             ],
@@ -865,12 +851,6 @@ def _graph_outcomes(
                 {"qualityId": quality, "columnId": level} for quality, level in nearest.items()
             ],
         },
-        "points": {
-            "@odata.type": f"{graph}PointsOutcome",
-            "points": {"@odata.type": f"{graph}AssignmentPointsGrade", "points": round(score, 5)},
-        },
-        "feedback": {
-            "@odata.type": f"{graph}FeedbackOutcome",
-            "feedback": {"text": {"content": plain_comment(grade)}},
-        },
+        "points": {"points": {"points": round(score, 5)}},
+        "feedback": {"feedback": {"text": {"content": plain_comment(grade)}}},
     }

@@ -228,7 +228,11 @@ class Gradebook(Form):
         )
         if "Student" in header:
             columns["name"] = header.index("Student")
-        return cls(table, columns, points, possible, platform=layout.platform, names=(last, first_name))
+        notes = ["its cells are apart by tabs: let its name end with .xls, or choose Tab at the upload"]
+        notes = notes if table.delimiter == "\t" else []
+        return cls(
+            table, columns, points, possible, notes, platform=layout.platform, names=(last, first_name)
+        )
 
     @staticmethod
     def amount(text: str) -> float | None:

@@ -405,8 +405,9 @@ def criteria_in(answer: object) -> Iterator[PlatformEntry]:
     name = name.get("content") if isinstance(name, dict) else name
     number = answer.get("id", answer.get("qualityId"))
     if isinstance(name, str) and isinstance(number, str | int) and _OF_A_CRITERION & set(answer):
-        levels = answer.get("levels")
-        best = max((each.get("points", 0.0) for each in levels), default=None) if levels else None
+        levels = answer.get("levels") if isinstance(answer.get("levels"), list) else []
+        of_levels = [each.get("points") for each in levels if isinstance(each, dict)]
+        best = max((each for each in of_levels if isinstance(each, int | float)), default=None)
         points = answer.get("maxscore", answer.get("points", best))
         yield str(number), name, float(points) if isinstance(points, int | float) else None
         return

@@ -64,10 +64,10 @@ def test_canvas_has_the_rubric_with_its_assignment_then_every_students_points(tm
     assert canvas_rubric(rubric) == [("c1", "c1: Vector 1", 5.0), ("c2", "c2: Vector 2", 5.0)]
     assert rubric["rubric_association"] == {
         "association_id": 345, "association_type": "Assignment", "use_for_grading": True,
-        "hide_score_total": False, "purpose": "grading",
+        "purpose": "grading",
     }  # fmt: skip
     assert rubric["rubric"]["title"] == "Pump"
-    first = files["002-s01.json"]
+    first = files["002-s01-grade.json"]
     jsonschema.validate(first, schema("canvas-assessment"))
     assert {name: one["points"] for name, one in first["rubric_assessment"].items()} == {"c1": 5.0, "c2": 2.5}
     assert first["submission"]["posted_grade"] == "7.5"
@@ -87,7 +87,7 @@ def test_the_ids_that_canvas_gave_are_used_and_the_rubric_is_not_made_twice(tmp_
     }  # fmt: skip
     _, calls, files = planned(tmp_path, "canvas-api", **PLACE, criteria=answer)
     assert [call["method"] for call in calls] == ["PUT", "PUT"]
-    assert set(files["001-s01.json"]["rubric_assessment"]) == {"9_77", "9_12"}
+    assert set(files["001-s01-grade.json"]["rubric_assessment"]) == {"9_77", "9_12"}
     answer["rubric"]["data"][0]["points"] = 4.0
     with pytest.raises(InputFileError, match="4 points there, 5 in the rubric"):
         planned(tmp_path, "canvas-api", **PLACE, criteria=answer)
@@ -102,6 +102,11 @@ def test_the_place_of_a_rubric_must_be_told(tmp_path, to):
 def test_a_number_of_canvas_is_one(tmp_path):
     with pytest.raises(CallError, match="--course-id: 'a/b' is no number"):
         planned(tmp_path, "canvas-api", course_id="a/b", assignment_id="1")
+
+
+def test_a_student_may_be_called_as_a_file_is(tmp_path):
+    _, calls, _ = planned(tmp_path, "canvas-api", marked("rubric", 5.0), marked("a--b", 5.0), **PLACE)
+    assert [call.get("student_id") for call in calls] == [None, "rubric", "a--b"]
 
 
 # Open edX -----------------------------------------------------------------------------------------
@@ -129,7 +134,7 @@ def test_open_edx_has_whole_points_and_options_that_are_in_its_rubric(tmp_path):
         f"/api/ora_staff_grader/submission/lock?{where}", f"/api/ora_staff_grader/submission/grade?{where}",
     ]  # fmt: skip
     assert [call["student_id"] for call in calls] == ["s01", "s01", "s02", "s02"]
-    grade = files["002-s01--grade.json"]
+    grade = files["002-s01-grade.json"]
     jsonschema.validate(grade, schema("openedx-assessment"))
     assert [(one["name"], one["selectedOption"]) for one in grade["criteria"]] == [("c1", "5"), ("c2", "2.5")]
     assert all(one["selectedOption"] in options[one["name"]] for one in grade["criteria"])
@@ -174,7 +179,7 @@ def test_classroom_has_the_rubric_and_grades_of_two_decimals(tmp_path):
     assert calls[1]["path"] == (
         "/v1/courses/12/courseWork/345/studentSubmissions/Cg1?updateMask=draftGrade,assignedGrade"
     )
-    assert files["002-s01.json"] == {"draftGrade": 5.33, "assignedGrade": 5.33}
+    assert files["002-s01-grade.json"] == {"draftGrade": 5.33, "assignedGrade": 5.33}
     assert delivery.written == ("s01", "s02")
 
 
@@ -196,7 +201,7 @@ def test_a_classrooms_rubric_that_is_there_is_not_made_again(tmp_path):
         maximum=100,
         rescale=True,
     )
-    assert [call["body"] for call in calls] == ["001-s02.json"]
+    assert [call["body"] for call in calls] == ["001-s02-grade.json"]
     assert "nobody in submissions.json has" in delivery.unplaced["s01"]
 
 
@@ -254,12 +259,12 @@ def test_graph_takes_the_rubric_then_its_place_then_the_outcomes(tmp_path):
     base = "/v1.0/education/classes/12/assignments/345/submissions/sub1/outcomes"
     assert [call["path"] for call in calls] == [f"{base}/o-Rubric", f"{base}/o-Points", f"{base}/o-Feedback"]
     for name in ("rubric", "points", "feedback"):
-        (file,) = [one for one in files if one.endswith(f"--{name}.json")]
+        (file,) = [one for one in files if one.endswith(f"-{name}.json")]
         jsonschema.validate(files[file], schema(f"ms-{name}-outcome"))
-    levels = files["001-s01--rubric.json"]["rubricQualitySelectedLevels"]
+    levels = files["001-s01-rubric.json"]["rubricQualitySelectedLevels"]
     assert levels == [{"qualityId": "q1", "columnId": "l1"}, {"qualityId": "q2", "columnId": "l3"}]
-    assert files["002-s01--points.json"]["points"]["points"] == 7.5
-    assert files["001-s01--rubric.json"]["rubricQualityFeedback"][1]["feedback"]["content"].startswith(
+    assert files["002-s01-points.json"]["points"]["points"] == 7.5
+    assert files["001-s01-rubric.json"]["rubricQualityFeedback"][1]["feedback"]["content"].startswith(
         "2.5 / 5. "
     )
     assert "no outcomes of all kinds" in delivery.unplaced["s02"]
