@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Self
 
@@ -88,7 +89,10 @@ class Column:
 
 
 class DataTable(Authored):
-    """Data of the variants, row by row: `columns` and `rows` here, or the `file` of a CSV beside this one."""
+    """Data of the variants, row by row: `columns` and `rows` here, or the `file` of a CSV beside this one.
+
+    Columns by their names (`a = [40, 45]`), and rows as tables of their own, are read as well.
+    """
 
     file: str | None = None
     columns: list[str] | None = None
@@ -96,8 +100,18 @@ class DataTable(Authored):
 
     @model_validator(mode="before")
     @classmethod
-    def _by_its_file(cls, data: Any) -> Any:  # noqa: ANN401 - not yet validated
-        return {"file": data} if isinstance(data, str) else data
+    def _by_rows(cls, data: Any) -> Any:  # noqa: ANN401 - not yet validated
+        if isinstance(data, str):
+            return {"file": data}
+        if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
+            columns = [*dict.fromkeys(name for row in data for name in row)]
+            return {"columns": columns, "rows": [[row.get(name, "") for name in columns] for row in data]}
+        if isinstance(data, dict) and data and cls.model_fields.keys().isdisjoint(data):
+            if not all(isinstance(cells, list) for cells in data.values()):
+                return data
+            rows = zip_longest(*data.values(), fillvalue="")
+            return {"columns": [*data], "rows": [[*cells] for cells in rows]}
+        return data
 
     @model_validator(mode="after")
     def _has_rows_once(self) -> Self:
@@ -111,8 +125,11 @@ class DataTable(Authored):
 
 
 def or_its_file(schema: dict[str, Any]) -> None:
-    """In the schema of a table: the name of a CSV may stand in its place."""
-    schema["anyOf"].append({"type": "string"})
+    """In the schema of a table: a CSV's name, a list of rows, or lists by column may stand in its place."""
+    cell = {"type": ["number", "string"]}
+    lists = {"type": "object", "additionalProperties": {"type": "array", "items": cell}, "minProperties": 1}
+    rows = {"type": "array", "items": {"type": "object", "additionalProperties": cell}, "minItems": 1}
+    schema["anyOf"] += [{"type": "string"}, lists, rows]
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,9 +212,9 @@ def read_rows(table: DataTable, beside: Path, length_unit_m: float) -> tuple[Dat
     fault, each with its row and column.
     """
     if table.file is None:
-        lines: list[tuple[int, list[Cell]]] = [(-1, [*(table.columns or ())])]
-        lines += enumerate(table.rows or ())
-        reader = _Reader("$.variant.table.columns", "$.variant.table.rows[{}]", "", length_unit_m, [])
+        lines: list[tuple[int, list[Cell]]] = [(0, [*(table.columns or ())])]
+        lines += enumerate(table.rows or (), 1)
+        reader = _Reader("$.variant.table", "$.variant.table, row {}", "", length_unit_m, [])
         source, name = str(beside), "the table"
     else:
         path = beside.parent / table.file
