@@ -293,6 +293,21 @@ def sheet(
 
 
 @app.command()
+def handout(
+    assignment: AssignmentArgument,
+    out: Annotated[Path, typer.Option("--out", help="The PDF file to write.")],
+    roster: RosterOption = None,
+    n: NumberOption = None,
+    position: PositionOption = None,
+    lang: LanguageOption = "en",
+) -> None:
+    """Task sheets on A4, of a class or of one --n: scheme, data, empty tables, and no solution."""
+    from grader.cli.sheets import print_handout
+
+    print_handout(assignment, roster, n, position, out, lang)
+
+
+@app.command()
 def calibrate(
     scans: Annotated[list[Path], typer.Argument(help="Scans of the calibration page.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print what was measured as JSON.")] = False,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
-from grader.language import LANGUAGES
+from grader.language import LANGUAGES, N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Problem
 from reference.authored.assignment import SCALE_NAMES
 from reference.authored.variant_table import delimiter_of, table_lines
@@ -97,15 +97,18 @@ class Roster:
 
 
 def why_no_id(text: str) -> str | None:
-    """Why a text cannot be a student's id, which names the student's folder of results; None where it can."""
+    """Why a text cannot be a student's id, which names the student's folder of results; None where it can.
+
+    What it says is a key of the catalogues.
+    """
     if _STUDENT_ID.fullmatch(text) is None:
-        return "letters A-Z a-z, digits, '.', '_' and '-', at most 64, are allowed"
+        return N_("letters A-Z a-z, digits, '.', '_' and '-', at most 64, are allowed")
     if text.startswith(".") or text.endswith("."):
-        return "it cannot name a folder: it begins or ends with a dot"
+        return N_("it cannot name a folder: it begins or ends with a dot")
     if _DEVICES.fullmatch(text):
-        return "it cannot name a folder: Windows has a device of that name"
+        return N_("it cannot name a folder: Windows has a device of that name")
     if text.lower() in _RESULT_FILES:
-        return "it cannot name a folder: a file of the results has that name"
+        return N_("it cannot name a folder: a file of the results has that name")
     return None
 
 
@@ -156,12 +159,27 @@ def _text_of(path: Path) -> str:
 # Tables, of a roster and of measurements ----------------------------------------------------------
 
 
-def surplus_of(header: Sequence[str], cells: Sequence[str], delimiter: str) -> str | None:
+_ENGLISH = tongue(ROOT_LANGUAGE)
+OF_TABLES = (
+    N_("line %(number)s"),
+    N_("more than %(most)s lines are no table"),
+    N_("is no CSV: %(error)s; check its quotes"),
+)
+"""What `table_lines` says, to be translated."""
+
+
+def surplus_of(
+    header: Sequence[str], cells: Sequence[str], delimiter: str, speaker: Tongue = _ENGLISH
+) -> str | None:
     """What is wrong with a line of more fields than there are columns; None for any other."""
     if not any(cell.strip() for cell in cells[len(header) :]):
         return None
-    message = f"has {len(cells)} fields, the first line names {len(header)} columns"
-    return f"{message}; quote a field that holds a '{delimiter}'"
+    text = N_(
+        "has %(fields)s fields, the first line names %(columns)s columns;"
+        " quote a field that holds a '%(mark)s'"
+    )
+    known = {"fields": len(cells), "columns": len(header), "mark": delimiter}
+    return speaker.gettext(text) % known
 
 
 def whole_number(text: str, delimiter: str) -> int | None:

@@ -64,16 +64,18 @@ class _Numbers:
     def number(self, formula: Formula) -> FloatArray:
         numbers = formula(self.values)
         if np.abs(numbers).max(initial=0.0) > LARGEST:
-            raise FormulaError(f"'{formula.text}' is larger than {LARGEST:g}: beyond any mechanism")
+            message = f"'{formula.text}' is larger than {LARGEST:g}: beyond any mechanism"
+            raise FormulaError(message, np.abs(numbers) > LARGEST)
         return numbers if numbers.ndim else numbers[None]
 
     def length(self, formula: Formula, what: str) -> FloatArray:
         lengths = self.distance(formula)
         least = lengths.min(initial=LARGEST)
         if least <= 0.0:
-            raise FormulaError(f"'{formula.text}' ({what}) must be a positive length")
+            raise FormulaError(f"'{formula.text}' ({what}) must be a positive length", lengths <= 0.0)
         if least < SHORTEST_M:
-            raise FormulaError(f"'{formula.text}' ({what}) is shorter than {SHORTEST_M:g} m")
+            message = f"'{formula.text}' ({what}) is shorter than {SHORTEST_M:g} m"
+            raise FormulaError(message, lengths < SHORTEST_M)
         return lengths
 
     def distance(self, formula: Formula) -> FloatArray:
@@ -98,7 +100,7 @@ class _Numbers:
         signs = np.sign(self.number(text.side))
         if np.any(signs == 0.0):
             detail = f"above zero is {first}, below {second}"
-            raise FormulaError(f"side = '{text.side.text}' is zero for some variant: {detail}")
+            raise FormulaError(f"side = '{text.side.text}' is zero: {detail}", signs == 0.0)
         return signs
 
     def point(self, point: list[Formula]) -> ComplexArray:
@@ -160,7 +162,7 @@ def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _LinkA
     try:
         return _group(table, numbers, bodies)
     except FormulaError as error:
-        raise FormulaError(f"group[{index}]: {error}") from error
+        raise FormulaError(f"group[{index}]: {error}", error.which) from error
 
 
 def _driver(file: MechanismFile, numbers: _Numbers) -> Driver:

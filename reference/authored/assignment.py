@@ -27,10 +27,12 @@ from reference.authored.variant_table import (
     DataTable,
     VariantRows,
     misused_columns,
+    or_its_file,
     read_rows,
 )
 from reference.errors import AuthoredFileError, CallError, Finding, ranges_of
 from reference.geometry import FloatArray
+from reference.kinematics.motion import BoolArray
 from reference.mechanism import Crank, Driver, Mechanism
 
 
@@ -51,7 +53,7 @@ class VariantTable(Authored):
 
     n: Range | None = None
     position: Range | None = None
-    table: DataTable | None = None
+    table: Annotated[DataTable | None, Field(json_schema_extra=or_its_file)] = None
     values: dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], FormulaText] = Field(default={})
 
     @model_validator(mode="after")
@@ -402,6 +404,14 @@ def _check_formulas(assignment: Assignment) -> list[Finding]:
         try:
             what(variants)
         except FormulaError as error:
-            findings.append(Finding(path, str(error)))
+            findings.append(Finding(path, str(error) + _failing(variants, error.which)))
             break
     return findings
+
+
+def _failing(variants: list[Variant], which: BoolArray | None) -> str:
+    """The first variant where a formula fails, and how many more there are."""
+    if which is None or which.shape != (len(variants),) or len(variants) == 1:
+        return ""
+    more = int(which.sum()) - 1
+    return f" (for {variants[int(np.argmax(which))]}{f' and {more} more' if more else ''})"

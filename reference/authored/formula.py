@@ -13,6 +13,7 @@ from functools import cache, reduce
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reference.errors import near_names
 from reference.geometry import FloatArray
@@ -63,7 +64,11 @@ _OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 class FormulaError(ValueError):
-    """The formula cannot be understood, or gives no finite number."""
+    """The formula cannot be understood, or gives no number that can be used for the variants in `which`."""
+
+    def __init__(self, message: str, which: NDArray[np.bool_] | None = None) -> None:
+        super().__init__(message)
+        self.which = which
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +103,9 @@ def _finite(formula: Formula, values: Mapping[str, Value]) -> FloatArray:
     with np.errstate(all="ignore"):
         result = np.asarray(_evaluate(formula.tree, values), dtype=np.float64)
     if not np.isfinite(result).all():
-        raise FormulaError(f"'{formula.text}' does not give a finite number for these data")
+        raise FormulaError(
+            f"'{formula.text}' does not give a finite number for these data", ~np.isfinite(result)
+        )
     return result
 
 

@@ -8,7 +8,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -110,6 +110,11 @@ class DataTable(Authored):
         return self
 
 
+def or_its_file(schema: dict[str, Any]) -> None:
+    """In the schema of a table: the name of a CSV may stand in its place."""
+    schema["anyOf"].append({"type": "string"})
+
+
 @dataclass(frozen=True, slots=True)
 class VariantRows:
     """A table that was read: which variant each row is of, and its columns.
@@ -118,12 +123,14 @@ class VariantRows:
     ----------
     source : what messages call it
     keys : of each row n and position, None where the table has no such column; ascending
+    places : of each row where it stands, in words
     columns : by name, in the order of the rows
     """
 
     source: str
     keys: tuple[VariantKey, ...]
     columns: dict[str, Column]
+    places: tuple[str, ...]
 
     @property
     def has(self) -> tuple[bool, bool]:
@@ -145,23 +152,36 @@ def delimiter_of(text: str) -> str:
     return max(",;\t", key=first.count)
 
 
-def table_lines(text: str, delimiter: str, most: int) -> tuple[list[tuple[int, list[str]]], list[Finding]]:
+AT_LINE = "line %(number)s"
+TOO_MANY = "more than %(most)s lines are no table"
+NO_CSV = "is no CSV: %(error)s; check its quotes"
+
+
+def table_lines(
+    text: str, delimiter: str, most: int, say: Callable[[str], str] = str
+) -> tuple[list[tuple[int, list[str]]], list[Finding]]:
     """Lines of a CSV text that are not blank, and the fault that ends them before the text does.
 
     A record of several lines has the number of its first, from 1. More than `most` lines are a fault.
+
+    Arguments: `say` translates `AT_LINE`, `TOO_MANY` and `NO_CSV`.
     """
+
+    def fault(why: str, **known: object) -> list[Finding]:
+        return [Finding(say(AT_LINE) % {"number": number}, say(why) % known)]
+
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     lines: list[tuple[int, list[str]]] = []
     number = 1
     try:
         for cells in reader:
             if number > most:
-                return lines, [Finding(f"line {number}", f"more than {most} lines are no table")]
+                return lines, fault(TOO_MANY, most=most)
             if any(cell.strip() for cell in cells):
                 lines.append((number, cells))
             number = reader.line_num + 1
     except csv.Error as error:
-        return lines, [Finding(f"line {number}", f"is no CSV: {error}; check its quotes")]
+        return lines, fault(NO_CSV, error=error)
     return lines, []
 
 
@@ -187,12 +207,14 @@ def read_rows(table: DataTable, beside: Path, length_unit_m: float) -> tuple[Dat
         lines = [(number, [cell.strip() for cell in cells]) for number, cells in split]
         reader = _Reader("line 1", "line {}", delimiter, length_unit_m, findings)
         source, name = str(path), path.name
-    keys, columns = reader.read(lines)
+    keys, columns, places = reader.read(lines)
     if reader.findings:
         raise AuthoredFileError(source, tuple(reader.findings))
     cells = [cells for _, cells in lines]
     whole = table.model_copy(update={"columns": [str(cell) for cell in cells[0]], "rows": cells[1:]})
-    return whole, VariantRows(name, keys, columns)
+    if table.file is not None:
+        places = tuple(f"{name} {place}" for place in places)
+    return whole, VariantRows(name, keys, columns, places)
 
 
 @dataclass(slots=True)
@@ -217,8 +239,8 @@ class _Reader:
 
     def read(
         self, lines: Sequence[tuple[int, Sequence[Cell]]]
-    ) -> tuple[tuple[VariantKey, ...], dict[str, Column]]:
-        """The variant of each row, and the columns, in the order of the variants."""
+    ) -> tuple[tuple[VariantKey, ...], dict[str, Column], tuple[str, ...]]:
+        """The variant of each row, the columns, and where each row stands, in the order of the variants."""
         headings = self._headings(lines[0][1] if lines else ())
         rows = lines[1:]
         if not self.findings and not rows:
@@ -230,7 +252,7 @@ class _Reader:
                     self.row.format(number), f"{message}; a decimal comma needs semicolons between cells"
                 )
         if self.findings:
-            return (), {}
+            return (), {}, ()
         columns = {
             heading.name: self._column(
                 heading, [(number, cells[k] if k < len(cells) else "") for number, cells in rows]
@@ -239,14 +261,15 @@ class _Reader:
         }
         keys = self._keys(columns, [number for number, _ in rows])
         if self.findings:
-            return (), {}
+            return (), {}, ()
         order = sorted(range(len(keys)), key=lambda row: [number or 0 for number in keys[row]])
         in_order = {
             name: replace(column, numbers=tuple(column.numbers[row] for row in order))
             for name, column in columns.items()
             if name not in KEYS
         }
-        return tuple(keys[row] for row in order), in_order
+        places = tuple(self.row.format(rows[row][0]) for row in order)
+        return tuple(keys[row] for row in order), in_order, places
 
     def _headings(self, cells: Sequence[Cell]) -> list[Column]:
         """The columns as their headings name them, without numbers."""
@@ -363,7 +386,7 @@ def _number_in(cell: Cell, name: str, *, decimal_comma: bool) -> float:
 
 
 def misused_columns(thing: object, rows: VariantRows, path: str, key: str = "") -> Iterator[Finding]:
-    """Columns that stand alone in a key of the mechanism which is of another kind than they are."""
+    """Columns that stand alone in a key of the mechanism and are of another kind; lengths not above zero."""
     if isinstance(thing, BaseModel):
         inside = [(f"{path}.{name}", name, getattr(thing, name)) for name in type(thing).model_fields]
     elif isinstance(thing, dict):
@@ -378,6 +401,11 @@ def misused_columns(thing: object, rows: VariantRows, path: str, key: str = "") 
             message = _misuse(column, key, thing.words if isinstance(thing, SideText) else ())
             if message:
                 yield Finding(path, f"column {column.name} of {rows.source} {message}")
+            elif key in {"length", "lengths"}:
+                for place, number in zip(rows.places, column.numbers, strict=True):
+                    if number <= 0.0:
+                        where = f"{place}, column {column.name}"
+                        yield Finding(where, f"{number:g}: a length must be above zero ({path})")
     for where, name, part in inside:
         yield from misused_columns(part, rows, where, name)
 

@@ -223,6 +223,20 @@ def test_a_column_in_a_key_of_another_kind_is_told(course, old, new, words):
     assert any(words in message for message in told.values())
 
 
+def test_lengths_that_are_none_are_told_row_by_row(course):
+    lines = [line.replace(";45;125;", ";-45;0;").replace(";50;130;", ";50;-1;") for line in (HEADING, *ROWS)]
+    _, told = faults(course(*lines))
+    assert set(told) == {"six.csv line 2, column b", "six.csv line 5, column a", "six.csv line 5, column b"}
+    assert "above zero (mechanism file, $.crank.length)" in told["six.csv line 5, column a"]
+
+
+def test_a_formula_that_fails_names_the_first_row_where_it_does(course):
+    _, told = faults(course(mechanism=[('length = "a"', 'length = "a - 42"')]))
+    assert told["$.mechanism"] == "'a - 42' (crank) must be a positive length (for n = 1)"
+    _, told = faults(course(mechanism=[('length = "e"', 'length = "sqrt(42 - a)"')]))
+    assert told["$.mechanism"].endswith("(for n = 2 and 2 more)")
+
+
 def test_a_number_that_is_not_in_the_table_is_refused_with_those_that_are(course):
     assignment = load_assignment(course())
     with pytest.raises(CallError, match=r"n = 3: assignment six has n = 1, 2, 4, 9, by six.csv"):
@@ -251,7 +265,7 @@ def test_a_side_is_a_formula_of_the_data(course):
     mechanism = assignment.mechanism(assignment.variants())
     np.testing.assert_array_equal(mechanism.groups[0].side, [1, 1, -1, -1])
     _, told = faults(course(mechanism=[('side = "side_B"', 'side = "2 - n"')]))
-    assert "zero for some variant: above zero is left, below right" in told["$.mechanism"]
+    assert "is zero: above zero is left, below right (for n = 2)" in told["$.mechanism"]
     _, told = faults(course(mechanism=[('side = "side_B"', 'side = "side_D"')]))
     assert "neither left nor right, nor data of a variant" in told["$.mechanism"]
 
