@@ -110,15 +110,20 @@ def new(
     mechanism: Annotated[
         str | None,
         typer.Option(
-            "--mechanism", help="Start from a four-bar (default), slider-crank, ...; the rubric is made."
+            "--mechanism",
+            help="Start from a four-bar (default), slider-crank, ..., or from your own: a .toml file.",
         ),
+    ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option("--table", help="Of your own mechanism: a CSV with the data of each variant."),
     ] = None,
 ) -> None:
     """Write a commented assignment to start from: three files that lint and plan take as they are."""
     from grader.authoring.new import new_assignment
     from reference.authored.assignment import load_assignment
 
-    written = new_assignment(file, like=like, mechanism=mechanism)
+    written = new_assignment(file, like=like, mechanism=mechanism, table=table)
     first = load_assignment(written.assignment).variants()[0]
     chosen = [f"--{name}={value}" for name, value in asdict(first).items() if value is not None]
     for path in (written.assignment, written.mechanism, written.rubric):
@@ -236,7 +241,9 @@ def review(
 @app.command()
 def check(
     assignment: AssignmentArgument,
-    measured: Annotated[Path, typer.Option("--measured", help="Measurement file, CSV or JSON.")],
+    measured: Annotated[
+        Path | None, typer.Option("--measured", help="Measurement file, CSV or JSON.")
+    ] = None,
     n: NumberOption = None,
     position: PositionOption = None,
     lang: LanguageOption = "en",
@@ -246,11 +253,15 @@ def check(
     page: Annotated[
         Path | None, typer.Option("--page", help="Draw and tell it in this HTML file, too.")
     ] = None,
+    template: Annotated[
+        Path | None, typer.Option("--template", help="Write the CSV file to fill in.")
+    ] = None,
 ) -> None:
     """Check measured values: right, or off and in which way, without giving the answer away."""
     from grader.cli.checking import check_measured
 
-    raise typer.Exit(1 if check_measured(assignment, n, position, measured, lang, level, page) else 0)
+    is_off = check_measured(assignment, n, position, measured, lang, level, page, template)
+    raise typer.Exit(1 if is_off else 0)
 
 
 @app.command()
