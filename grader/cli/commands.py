@@ -390,6 +390,16 @@ def export(
     context_id: Annotated[
         int | None, typer.Option("--context-id", min=1, help="Moodle's number of the activity's context.")
     ] = None,
+    replace_guide: Annotated[
+        bool, typer.Option("--replace-guide", help="Moodle: a marking guide that is there may go.")
+    ] = False,
+    fillings: Annotated[
+        Path | None,
+        typer.Option("--fillings", help="Moodle's answer with everybody's points in the guide that is there."),
+    ] = None,
+    groups: Annotated[
+        bool | None, typer.Option("--groups/--no-groups", help="Whether students hand in as groups.")
+    ] = None,
     lang: LanguageOption = "en",
 ) -> None:
     """Write the results for a learning platform, validated before anything is written."""
@@ -405,5 +415,6 @@ def export(
         to=to, what=what, form=worksheet or gradebook, criteria=criteria, identity=identity, item=item,
         position=position, combine=combine, maximum=maximum, rescale=rescale, visibility=visibility,
         course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id, lang=lang,
+        replace_guide=replace_guide, fillings=fillings, groups=groups,
     )  # fmt: skip
     raise typer.Exit(1 if export_results(results, file, options, roster, ids) else 0)

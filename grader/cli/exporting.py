@@ -68,7 +68,7 @@ def export_results(
     """Write the export file and report who is not in it; whether anybody is missing."""
     check_language(options.lang)
     path = file or folder / usual_name(options)
-    for source in (folder / "results.json", options.form, options.criteria, roster, ids):
+    for source in (folder / "results.json", options.form, options.criteria, options.fillings, roster, ids):
         if source is not None and path.resolve() == source.resolve():
             raise CallError("file_exists", f"{path}: is read for this export; name another file (--file)")
     results = read_results(folder)

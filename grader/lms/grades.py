@@ -48,6 +48,8 @@ class Options:
     titles : the criteria's, in the language of the class, by id; `export` takes them from the results
     form : the platform's own file to fill in: Moodle's worksheet, Canvas's exported gradebook
     item : the grade item's name; the assignment's id where empty
+    fillings : Moodle's answer with everybody's points in the guide that is there
+    groups : whether students hand in as groups; None where not said
     now : time of the export; the clock's if None
     """
 
@@ -69,6 +71,9 @@ class Options:
     assignment_id: int | None = None
     cmid: int | None = None
     context_id: int | None = None
+    replace_guide: bool = False
+    fillings: Path | None = None
+    groups: bool | None = None
     lang: str = "en"
     now: datetime | None = None
 

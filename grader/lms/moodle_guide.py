@@ -6,6 +6,7 @@ are filled: both are checked here.
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -24,6 +25,7 @@ from grader.lms.marks import (
     check_points,
     check_unique,
     class_criteria,
+    comment,
     criteria_in,
     json_document,
     platform_marks,
@@ -109,10 +111,14 @@ class MoodleAreas(Payload):
 
 
 class MoodleRubricDocument(Payload):
-    """The call that makes the rubric a marking guide of an assignment."""
+    """The call that makes the rubric a marking guide of an assignment.
+
+    `replace_guide` says whether a guide that is there may go.
+    """
 
     schema_version: Version = 1
     assignment: str
+    replace_guide: bool = False
     wsfunction: Literal["core_grading_save_definitions"] = "core_grading_save_definitions"
     arguments: MoodleAreas
 
@@ -151,6 +157,24 @@ class MoodleAdvanced(Payload):
     guide: MoodleGuideFilled
 
 
+class MoodleEditor(Payload):
+    """A comment as Moodle's editor tells it."""
+
+    text: str
+    format: Html = 1
+
+
+class MoodlePlugins(Payload):
+    """What feedback plugins are told.
+
+    The plugin of comments reads its editor without asking whether it is there: without it, points are
+    stored and the call then fails where a student has a comment already.
+    Source: mod/assign/feedback/comments/locallib.php, assign_feedback_comments::is_feedback_modified.
+    """
+
+    assignfeedbackcomments_editor: MoodleEditor
+
+
 class MoodleGrade(Payload):
     """Arguments of the call.
 
@@ -166,6 +190,7 @@ class MoodleGrade(Payload):
     addattempt: Literal[0] = 0
     workflowstate: Literal[""] = ""
     applytoall: Literal[0] = 0
+    plugindata: MoodlePlugins
     advancedgradingdata: MoodleAdvanced
 
 
@@ -203,10 +228,11 @@ class MoodleMarksDocument(Payload):
 def guide(grades: Sequence[Grade], options: Options) -> Delivery:
     """The call that makes the rubric a marking guide of an assignment.
 
-    Raises CallError where nothing says which assignment, and where it has a guide already: saving
-    another would delete it with everybody's points.
+    Raises CallError where nothing says which assignment, and where it has a guide already, or may have
+    one, that nobody wants replaced: saving another deletes it with everybody's points.
+    Source: grade/grading/form/guide/lib.php, gradingform_guide_controller::update_or_check_guide.
     """
-    cmid, context_id = _free_place(options)
+    cmid, context_id, notes = _place(options)
     moment = int(options.moment.timestamp())
     criteria = class_criteria(grades, options)
     definition = {
@@ -220,13 +246,17 @@ def guide(grades: Sequence[Grade], options: Options) -> Delivery:
     }
     content = {
         "assignment": grades[0].assignment,
+        "replace_guide": options.replace_guide,
         "arguments": {"areas": [{"cmid": cmid, "contextid": context_id, "definitions": [definition]}]},
     }
-    return Delivery(json_document(MoodleRubricDocument, content, "the marking guide"))
+    return Delivery(json_document(MoodleRubricDocument, content, "the marking guide"), notes=notes)
 
 
-def _free_place(options: Options) -> tuple[int, int]:
-    """The numbers of an activity without a guide and of its context; CallError where there are none."""
+def _place(options: Options) -> tuple[int, int, tuple[str, ...]]:
+    """The numbers of an activity whose guide may be saved and of its context, and what goes by that.
+
+    Raises CallError where there are none, and where a guide would go that nobody wants replaced.
+    """
     area = _area(options)
     cmid = options.cmid or _number(area.get("cmid"))
     context_id = options.context_id or _number(area.get("contextid"))
@@ -243,13 +273,39 @@ def _free_place(options: Options) -> tuple[int, int]:
             f"{options.criteria}: the assignment is graded by '{method}', and saving a guide would put"
             " that aside; choose 'Marking guide' or 'Simple direct grading' in Moodle first",
         )
-    if any(criteria_in(area)):
+    lost = _lost(area, options)
+    if lost and not options.replace_guide:
         raise CallError(
             "guide_exists",
-            f"{options.criteria}: the assignment has a marking guide already, and saving another would"
-            " delete it with everybody's points; delete it in Moodle first if that is meant",
+            f"{options.criteria or 'the assignment'}: saving this guide would delete {lost}; give"
+            " --replace-guide if that is meant",
         )
-    return cmid, context_id
+    return cmid, context_id, (f"Moodle deletes {lost}",) if lost else ()
+
+
+def _lost(area: Mapping[str, object], options: Options) -> str:
+    """What goes where a guide is saved in this activity; empty where it has none."""
+    criteria = len(list(criteria_in(area)))
+    if options.criteria is not None and not criteria:
+        return ""
+    guide = "the marking guide that is there" if criteria else "a marking guide, if one is there,"
+    if options.fillings is not None:
+        filled = _fillings_of(options.fillings)
+        students, total = len({student for student, _ in filled}), sum(count for _, count in filled)
+        return f"{guide} with {total} fillings (points on a criterion) of {students} students"
+    how = "how many, Moodle's answer to core_grading_get_gradingform_instances tells (--fillings)"
+    each = f"{criteria} for each student who was graded" if criteria else "everybody's"
+    return f"{guide} with its fillings (points on a criterion), {each}: {how}"
+
+
+def _fillings_of(path: Path) -> list[tuple[object, int]]:
+    """The grade and the number of its fillings for each that was given by a guide."""
+    answer = read_answer(path)
+    try:
+        return [(each["itemid"], len((each.get("guide") or {}).get("criteria", ()))) for each in answer["instances"]]
+    except (TypeError, KeyError, AttributeError) as error:
+        message = "is not Moodle's answer to core_grading_get_gradingform_instances"
+        raise InputFileError("fillings", f"{path}: {message}") from error
 
 
 def _area(options: Options) -> Mapping[str, object]:
@@ -301,6 +357,7 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
         arguments = {
             "assignmentid": options.assignment_id,
             "userid": user,
+            "plugindata": {"assignfeedbackcomments_editor": {"text": comment(grade)}},
             "advancedgradingdata": {"guide": {"criteria": filled}},
         }
         calls.append({"student_id": grade.student_id, "arguments": arguments})
@@ -310,7 +367,9 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
         )
     content = {"assignment": grades[0].assignment, "criteria": criteria, "calls": calls}
     return Delivery(
-        json_document(MoodleMarksDocument, content, "the marking guide's points"), unplaced=missing
+        json_document(MoodleMarksDocument, content, "the marking guide's points"),
+        unplaced=missing,
+        notes=("each call also replaces the student's feedback comment by this one",),
     )
 
 

@@ -80,7 +80,9 @@ def test_names_have_nothing_that_moodle_takes_for_a_tag(tmp_path, answer):
 
 
 def test_the_activity_may_be_told_by_its_numbers(tmp_path):
-    _, path = moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2)
+    with pytest.raises(CallError, match="a marking guide, if one is there, with its fillings"):
+        moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2)
+    _, path = moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2, replace_guide=True)
     assert json.loads(path.read_bytes())["arguments"]["areas"][0]["contextid"] == 2
 
 
@@ -91,10 +93,36 @@ def test_an_activity_that_nobody_tells_is_asked_for(tmp_path, answer):
         moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=answer(contextid="57"))
 
 
-def test_a_guide_is_never_written_over_another(tmp_path, answer):
-    with pytest.raises(CallError, match="has a marking guide already"):
+INSTANCES = {
+    "instances": [
+        {"id": 1, "itemid": 7, "status": 1, "guide": {"criteria": [{"criterionid": 11}, {"criterionid": 12}]}},
+        {"id": 2, "itemid": 7, "status": 0, "guide": {"criteria": [{"criterionid": 11}]}},
+        {"id": 3, "itemid": 8, "status": 1},
+    ]
+}
+
+
+def test_a_guide_goes_only_where_that_is_wanted_with_the_number_of_fillings(tmp_path, answer):
+    """gradingform_guide_controller::update_or_check_guide deletes criteria that are not sent again."""
+    path = tmp_path / "instances.json"
+    path.write_text(json.dumps(INSTANCES))
+    how = {"criteria": answer(GUIDE), "fillings": path}
+    with pytest.raises(CallError, match=r"delete the marking guide .* 3 fillings .* 2 students; give --rep"):
+        moodle(tmp_path, "rubric", marked("s01", 5.0), **how)
+    with pytest.raises(CallError, match=r"2 for each student who was graded: how many, .* \(--fillings\)"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=answer(GUIDE))
     assert not (tmp_path / "out.json").exists()
+    delivery, out = moodle(tmp_path, "rubric", marked("s01", 5.0), **how, replace_guide=True)
+    assert delivery.notes[0].startswith("Moodle deletes the marking guide that is there with 3 fillings")
+    assert json.loads(out.read_bytes())["replace_guide"] is True
+
+
+@pytest.mark.parametrize("document", ["[]", "{}", '{"instances": [1]}', '{"instances": [{}]}', "x"])
+def test_an_answer_without_fillings_is_refused(tmp_path, document):
+    path = tmp_path / "instances.json"
+    path.write_text(document)
+    with pytest.raises(InputFileError, match=r"instances\.json"):
+        moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2, fillings=path)
 
 
 def test_another_way_of_grading_is_never_put_aside(tmp_path, answer):
@@ -124,6 +152,11 @@ def test_points_fill_every_criterion_of_the_guide(tmp_path, answer):
     assert first["wsfunction"] == "mod_assign_save_grade"
     arguments = first["arguments"]
     assert (arguments["assignmentid"], arguments["userid"], arguments["grade"]) == (17, 101, -1)
+    # assign_feedback_comments::is_feedback_modified reads the editor where it is not sent, too.
+    assert arguments["plugindata"]["assignfeedbackcomments_editor"] == {
+        "text": "<ul><li>~ <b>Vector 2</b>: Told &lt;why&gt; &amp; how.</li></ul>",
+        "format": 1,
+    }
     assert arguments["advancedgradingdata"]["guide"]["criteria"][1] == {
         "criterionid": 12,
         "fillings": [
