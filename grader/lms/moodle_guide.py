@@ -302,7 +302,10 @@ def _fillings_of(path: Path) -> list[tuple[object, int]]:
     """The grade and the number of its fillings for each that was given by a guide."""
     answer = read_answer(path)
     try:
-        return [(each["itemid"], len((each.get("guide") or {}).get("criteria", ()))) for each in answer["instances"]]
+        return [
+            (each["itemid"], len((each.get("guide") or {}).get("criteria", ())))
+            for each in answer["instances"]
+        ]
     except (TypeError, KeyError, AttributeError) as error:
         message = "is not Moodle's answer to core_grading_get_gradingform_instances"
         raise InputFileError("fillings", f"{path}: {message}") from error

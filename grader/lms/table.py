@@ -7,7 +7,8 @@ import re
 import unicodedata
 from abc import ABC, abstractmethod
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path
@@ -381,7 +382,9 @@ _CellKey = tuple[str, str]
 """A column and what is compared of a cell in it."""
 
 
-def _rows_with(cells: Mapping[int, Mapping[str, str]], wanted: Set[_CellKey]) -> dict[_CellKey, list[int]]:
+def _rows_with(
+    cells: Mapping[int, Mapping[str, str]], wanted: AbstractSet[_CellKey]
+) -> dict[_CellKey, list[int]]:
     """The rows of each cell; of a wanted name that no row has, those that have it in part."""
     rows_with: dict[_CellKey, list[int]] = defaultdict(list)
     parts: dict[str, set[int]] = defaultdict(set)
@@ -411,7 +414,12 @@ def _key(column: str, text: str) -> str:
     if column != NAME:
         return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
     letters = unicodedata.normalize("NFKD", text).casefold()
-    plain = "".join(letter for letter in letters if letter.isalnum() or letter.isspace() or letter in ",-")
+    # Of the apostrophes some are letters to Unicode: category Lm.
+    plain = "".join(
+        letter
+        for letter in letters
+        if letter in ",-" or letter.isspace() or (letter.isalnum() and unicodedata.category(letter) != "Lm")
+    )
     return " ".join(sorted(plain.replace(",", " ").replace("-", " ").split()))
 
 

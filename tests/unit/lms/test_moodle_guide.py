@@ -95,7 +95,12 @@ def test_an_activity_that_nobody_tells_is_asked_for(tmp_path, answer):
 
 INSTANCES = {
     "instances": [
-        {"id": 1, "itemid": 7, "status": 1, "guide": {"criteria": [{"criterionid": 11}, {"criterionid": 12}]}},
+        {
+            "id": 1,
+            "itemid": 7,
+            "status": 1,
+            "guide": {"criteria": [{"criterionid": 11}, {"criterionid": 12}]},
+        },
         {"id": 2, "itemid": 7, "status": 0, "guide": {"criteria": [{"criterionid": 11}]}},
         {"id": 3, "itemid": 8, "status": 1},
     ]
