@@ -74,7 +74,8 @@ Of other languages the columns are known by what stands in them.
 
 _REQUIRED = ("identifier", "grade", "modified")
 _NO = {
-    "no", "nu", "нет", "nein", "non", "não", "nee", "nej", "nie", "ні", "hayır", "όχι", "ne", "ez", "لا", "否",
+    "no", "nu", "нет", "nein", "non", "não", "nee", "nej", "nie", "ні", "hayır", "όχι", "ne", "ez", "لا",
+    "否",
 }  # fmt: skip
 """How the pack of each language says that a grade cannot be changed."""
 _PARTICIPANT = re.compile(r"([^\W\d_]\D*?)([0-9]+)")
@@ -393,7 +394,7 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
         raise CallError("gradebook", f"{message}\n{lines_of(faults)}")
     scores = [grade.out_of(options.maximum, rescale=options.rescale) for grade in graded]
     users = [_user(grade, identity) for grade in graded]
-    rows = zip(users, map(number, scores), comments, strict=True)
+    rows = zip(users, [number(score, 2) for score in scores], comments, strict=True)
     maximum = options.maximum or max((grade.max_score for grade in graded), default=0.0)
     new = "a new item is out of 100 and takes no feedback"
     notes = [
