@@ -395,7 +395,7 @@ def export(
     ] = False,
     fillings: Annotated[
         Path | None,
-        typer.Option("--fillings", help="Moodle's answer with everybody's points in the guide that is there."),
+        typer.Option("--fillings", help="Moodle's answer: everybody's points in the guide that is there."),
     ] = None,
     groups: Annotated[
         bool | None, typer.Option("--groups/--no-groups", help="Whether students hand in as groups.")

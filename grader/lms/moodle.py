@@ -116,7 +116,7 @@ class Worksheet(Form):
         columns = _columns(table)
         header = ", ".join(table.value(0, place).strip() for place in range(len(table.rows[0])))
         faults = [
-            f"row 1: there is no column '{COLUMNS[name][0]}' (columns: {header})"
+            f"row 1: there is no column '{COLUMNS[name][0].capitalize()}' (columns: {header})"
             for name in _REQUIRED
             if name not in columns
         ]

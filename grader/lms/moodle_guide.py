@@ -275,10 +275,13 @@ def _place(options: Options) -> tuple[int, int, tuple[str, ...]]:
         )
     lost = _lost(area, options)
     if lost and not options.replace_guide:
+        known = (
+            "" if options.criteria else ", or Moodle's answer to core_grading_get_definitions (--criteria)"
+        )
         raise CallError(
             "guide_exists",
-            f"{options.criteria or 'the assignment'}: saving this guide would delete {lost}; give"
-            " --replace-guide if that is meant",
+            f"{options.criteria or 'the assignment'}: saving this guide would delete {lost}. Give"
+            f" --replace-guide if that is meant{known}",
         )
     return cmid, context_id, (f"Moodle deletes {lost}",) if lost else ()
 
@@ -288,14 +291,14 @@ def _lost(area: Mapping[str, object], options: Options) -> str:
     criteria = len(list(criteria_in(area)))
     if options.criteria is not None and not criteria:
         return ""
-    guide = "the marking guide that is there" if criteria else "a marking guide, if one is there,"
+    guide = f"the marking guide that {'is' if criteria else 'may be'} there"
     if options.fillings is not None:
         filled = _fillings_of(options.fillings)
         students, total = len({student for student, _ in filled}), sum(count for _, count in filled)
         return f"{guide} with {total} fillings (points on a criterion) of {students} students"
     how = "how many, Moodle's answer to core_grading_get_gradingform_instances tells (--fillings)"
-    each = f"{criteria} for each student who was graded" if criteria else "everybody's"
-    return f"{guide} with its fillings (points on a criterion), {each}: {how}"
+    each = f", {criteria} of each student who was graded" if criteria else " of everybody"
+    return f"{guide} with all fillings (points on a criterion){each}; {how}"
 
 
 def _fillings_of(path: Path) -> list[tuple[object, int]]:

@@ -22,7 +22,7 @@ from tests.unit.lms.classroom import a_class, marked, report, results
 
 NEEDED = {
     ("moodle", "feedback"): {"people": {"s09": Person(participant=1)}},
-    ("moodle", "rubric"): {"cmid": 1, "context_id": 2},
+    ("moodle", "rubric"): {"cmid": 1, "context_id": 2, "replace_guide": True},
     ("moodle", "marks"): {"criteria": "c1,11", "assignment_id": 17},
     ("canvas", "marks"): {"criteria": "c1,11"},
 }

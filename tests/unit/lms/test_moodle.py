@@ -229,9 +229,9 @@ def test_columns_of_people_are_known_by_what_stands_in_them_where_their_names_ar
     ("data", "why"),
     [
         (b"", "empty"),
-        (worksheet(line("x"), header=HEADER.replace("Identifier", "Id")), "no column 'identifier'"),
-        (worksheet("Participant 7,x", header="Identifier,Mark"), "no column 'grade'"),
-        (worksheet("Participant 7,7.0,10.0", header="Identifier,Grade,Maximum grade"), "last modified"),
+        (worksheet(line("x"), header=HEADER.replace("Identifier", "Id")), "no column 'Identifier'"),
+        (worksheet("Participant 7,x", header="Identifier,Mark"), "no column 'Grade'"),
+        (worksheet("Participant 7,7.0,10.0", header="Identifier,Grade,Maximum grade"), "Last modified"),
         (worksheet(line(101) + ",extra"), "row 2: has 12 cells"),
         (worksheet(line(101), line(101, email="b@x.ro")), "same participant"),
         (worksheet(line("x")), "is not 'Participant' and a number"),

@@ -80,7 +80,7 @@ def test_names_have_nothing_that_moodle_takes_for_a_tag(tmp_path, answer):
 
 
 def test_the_activity_may_be_told_by_its_numbers(tmp_path):
-    with pytest.raises(CallError, match="a marking guide, if one is there, with its fillings"):
+    with pytest.raises(CallError, match="guide that may be there with all fillings"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2)
     _, path = moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2, replace_guide=True)
     assert json.loads(path.read_bytes())["arguments"]["areas"][0]["contextid"] == 2
@@ -112,9 +112,9 @@ def test_a_guide_goes_only_where_that_is_wanted_with_the_number_of_fillings(tmp_
     path = tmp_path / "instances.json"
     path.write_text(json.dumps(INSTANCES))
     how = {"criteria": answer(GUIDE), "fillings": path}
-    with pytest.raises(CallError, match=r"delete the marking guide .* 3 fillings .* 2 students; give --rep"):
+    with pytest.raises(CallError, match=r"delete the marking guide .* 3 fillings .* 2 students. Give --rep"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), **how)
-    with pytest.raises(CallError, match=r"2 for each student who was graded: how many, .* \(--fillings\)"):
+    with pytest.raises(CallError, match=r"2 of each student who was graded; how many, .* \(--fillings\)"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=answer(GUIDE))
     assert not (tmp_path / "out.json").exists()
     delivery, out = moodle(tmp_path, "rubric", marked("s01", 5.0), **how, replace_guide=True)
