@@ -13,6 +13,7 @@ from pathlib import Path
 from grader.files import create_whole
 from grader.rubric import load_rubric
 from reference.authored.assignment import SUFFIXES, Assignment, library, load_assignment, locate
+from reference.authored.toml_file import text_of
 from reference.errors import CallError
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
@@ -64,8 +65,17 @@ def new_assignment(file: Path, *, like: str | None = None, mechanism: str | None
     }
     beside = {kind: path.with_name(f"{name}{SUFFIXES[kind]}") for kind in ("mechanism", "rubric")}
     written = New(path, **beside)
-    create_whole({getattr(written, kind): text for kind, text in texts.items()})
+    create_whole({getattr(written, kind): text for kind, text in texts.items()} | _table(source, path))
     return written
+
+
+def _table(source: Assignment, path: Path) -> dict[Path, str]:
+    """The CSV of the source's variants, which the copy names too; none where both use the same file."""
+    table = source.file.variant.table
+    if table is None or table.file is None:
+        return {}
+    own, copied = source.path.parent / table.file, path.parent / table.file
+    return {} if own.resolve() == copied.resolve() else {copied: text_of(own)}
 
 
 def _path_and_name(file: Path) -> tuple[Path, str]:

@@ -293,6 +293,21 @@ def sheet(
 
 
 @app.command()
+def handout(
+    assignment: AssignmentArgument,
+    out: Annotated[Path, typer.Option("--out", help="The PDF file to write.")],
+    roster: RosterOption = None,
+    n: NumberOption = None,
+    position: PositionOption = None,
+    lang: LanguageOption = "en",
+) -> None:
+    """Task sheets on A4, of a class or of one --n: scheme, data, empty tables, and no solution."""
+    from grader.cli.sheets import print_handout
+
+    print_handout(assignment, roster, n, position, out, lang)
+
+
+@app.command()
 def calibrate(
     scans: Annotated[list[Path], typer.Argument(help="Scans of the calibration page.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print what was measured as JSON.")] = False,
@@ -335,7 +350,14 @@ def bench(
 @app.command()
 def export(
     results: Annotated[Path, typer.Argument(metavar="OUT", help="The folder that `planmark grade` wrote.")],
-    to: Annotated[str, typer.Option("--to", help="csv, moodle, canvas, gradescope or lti.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            help="csv, moodle, canvas, canvas-api, openedx, google-classroom, ms-education, brightspace,"
+            " blackboard, ilias, gradescope or lti.",
+        ),
+    ],
     what: Annotated[
         str | None,
         typer.Option(
@@ -352,7 +374,10 @@ def export(
         typer.Option("--worksheet", help="Moodle's downloaded offline grading worksheet, to fill in."),
     ] = None,
     gradebook: Annotated[
-        Path | None, typer.Option("--gradebook", help="Canvas's exported gradebook, to fill in.")
+        Path | None,
+        typer.Option(
+            "--gradebook", help="The gradebook as the platform exports it (ILIAS: status.csv), to fill in."
+        ),
     ] = None,
     ids: Annotated[
         Path | None,
@@ -361,6 +386,10 @@ def export(
     criteria: Annotated[
         Path | None,
         typer.Option("--criteria", help="The platform's criteria: its JSON answer, or a CSV criterion,id."),
+    ] = None,
+    submissions: Annotated[
+        Path | None,
+        typer.Option("--submissions", help="The platform's answer that lists the students' submissions."),
     ] = None,
     identity: Annotated[
         str | None,
@@ -379,9 +408,11 @@ def export(
         str | None,
         typer.Option("--visibility", help="Gradescope: visible, hidden, after_due_date, after_published."),
     ] = None,
-    course_id: Annotated[int | None, typer.Option("--course-id", min=1, help="Canvas's.")] = None,
+    course_id: Annotated[
+        str | None, typer.Option("--course-id", help="The platform's own, of the course or class.")
+    ] = None,
     assignment_id: Annotated[
-        int | None, typer.Option("--assignment-id", min=1, help="Canvas's or Moodle's.")
+        str | None, typer.Option("--assignment-id", help="The platform's own, of the assignment.")
     ] = None,
     cmid: Annotated[
         int | None,
@@ -391,11 +422,11 @@ def export(
         int | None, typer.Option("--context-id", min=1, help="Moodle's number of the activity's context.")
     ] = None,
     replace_guide: Annotated[
-        bool, typer.Option("--replace-guide", help="Moodle: a marking guide that is there may go.")
-    ] = False,
-    fillings: Annotated[
         Path | None,
-        typer.Option("--fillings", help="Moodle's answer: everybody's points in the guide that is there."),
+        typer.Option(
+            "--replace-guide",
+            help="Delete the guide there: Moodle's core_grading_get_gradingform_instances tells the points.",
+        ),
     ] = None,
     groups: Annotated[
         bool | None, typer.Option("--groups/--no-groups", help="Whether students hand in as groups.")
@@ -409,12 +440,13 @@ def export(
 
     if worksheet is not None and (gradebook is not None or to != "moodle"):
         raise CallError("option_unused", "--worksheet is Moodle's: give it with --to moodle alone")
-    if gradebook is not None and to != "canvas":
-        raise CallError("option_unused", "--gradebook is Canvas's: give it with --to canvas alone")
+    if gradebook is not None and to in {"moodle", "canvas-api"}:
+        raise CallError("option_unused", f"--gradebook has no meaning for {to}: leave it out")
     options = Options(
-        to=to, what=what, form=worksheet or gradebook, criteria=criteria, identity=identity, item=item,
+        to=to, what=what, form=worksheet or gradebook, criteria=criteria, submissions=submissions,
+        identity=identity, item=item,
         position=position, combine=combine, maximum=maximum, rescale=rescale, visibility=visibility,
-        course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id, lang=lang,
-        replace_guide=replace_guide, fillings=fillings, groups=groups,
+        course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id,
+        replace_guide=replace_guide, groups=groups, lang=lang,
     )  # fmt: skip
     raise typer.Exit(1 if export_results(results, file, options, roster, ids) else 0)

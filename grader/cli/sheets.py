@@ -1,4 +1,4 @@
-"""``planmark sheet``, ``planmark match`` and ``planmark calibrate``."""
+"""``planmark sheet``, ``planmark handout``, ``planmark match`` and ``planmark calibrate``."""
 
 import json
 import os
@@ -18,8 +18,9 @@ from grader.folder.draft_roster import SURE, contact_sheet, draft_csv, suggest, 
 from grader.folder.inventory import submissions, take_inventory
 from grader.folder.workers import Limits, Workers, result_of
 from grader.inputs.measurements import names_of
-from grader.inputs.roster import read_roster
+from grader.inputs.roster import RosterRow, read_roster
 from grader.printed.answer_sheet import make_calibration, make_sheets
+from grader.printed.handout import make_handout
 from grader.records import FloatArray, PageRef, Problem, Unread
 from grader.rubric import rubric_of
 from grader.scan.decode.pages import count_pages
@@ -132,6 +133,29 @@ def _suggest_scales(name: str, roster: Path) -> None:
     typer.echo(
         "  to be written into the scale boxes by the student, or into the roster (kL, kv, ka)", err=True
     )
+
+
+# handout ------------------------------------------------------------------------------------------
+
+
+def print_handout(
+    name: str, roster: Path | None, n: int | None, position: int | None, out: Path, lang: str
+) -> None:
+    """Write the PDF of task sheets, of a class or of one variant."""
+    check_language(lang)
+    if out.suffix.lower() != ".pdf":
+        raise CallError("handout_file", f"--out {out}: the name must end in .pdf")
+    if roster is not None and (n is not None or position is not None):
+        raise CallError("option_unused", "--roster says each student's n and position: leave --n out")
+    assignment = load_assignment(name)
+    if roster is None:
+        rows: tuple[RosterRow, ...] = (RosterRow("", n=n, position=position),)
+        assignment.variant(n, position)
+    else:
+        rows = read_roster(roster).rows
+    file = "" if roster is None else roster.name
+    write_whole(out, make_handout(assignment, rubric_of(assignment), rows, lang, roster=file))
+    typer.echo(f"{out}: {len(rows)} task sheet(s) on A4, without the solution")
 
 
 # match --------------------------------------------------------------------------------------------

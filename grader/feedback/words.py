@@ -172,6 +172,7 @@ PROBLEMS: dict[str, str] = {
     "measurements_encoding": N_("The file of measurements is not UTF-8 text."),
     "measurements_unreadable": N_("The file of measurements could not be read."),
     "measurement_fault": N_("A measured value could not be used."),
+    "measurement_columns": N_("Columns of the measurements that are not known were passed over."),
     "measurement_not_used": N_("A measured value is not asked for in this assignment."),
     "roster_columns": N_("Columns of the roster without meaning here were passed over."),
     "scale_refused": N_("A declared scale could not be understood."),

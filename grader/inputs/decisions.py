@@ -33,14 +33,13 @@ from grader.files import OutputError, make_folder, sync_folder, write_whole
 from grader.inputs.decision_texts import LARGEST, PageDecision, page_decision, place
 from grader.inputs.roster import (
     ScanRef,
-    delimiter_of,
     parse_scan,
     short,
     surplus_of,
-    table_lines,
     whole_number,
     why_no_id,
 )
+from reference.authored.variant_table import delimiter_of, table_lines
 from reference.errors import CallError, Finding, InputFileError, PlanmarkError, lines_of, near_names
 
 FILE_NAME = "decisions.csv"

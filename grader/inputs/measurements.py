@@ -3,11 +3,12 @@
 CSV for a class: ``student_id,n,position,kL,kv,ka``, then vector names (drawn millimetres),
 ``NAME_deg`` (directions counter-clockwise from the assignment's +x) and ``NAME_value`` (SI; angular
 quantities counter-clockwise positive). Semicolon-separated files have decimal commas; blank means
-not measured. JSON for one student: `grader.documents.MeasurementsDocument`.
+not measured; a line that begins with ``#`` is a comment. JSON for one student:
+`grader.documents.MeasurementsDocument`.
 
-A fault of the whole file (an unknown column, no CSV at all) raises InputFileError with all of them.
-A value that is refused costs that value alone: it is a problem of that student, and `Reading.unread`
-names what it was entered for, so that no criterion is judged without it.
+A fault of the whole file (no student_id, no CSV at all) raises InputFileError with all of them. A value
+that is refused costs that value alone, and so does a column that is not known: it is a problem of that
+student, and `Reading.unread` names what it was entered for, so that no criterion is judged without it.
 """
 
 import json
@@ -19,12 +20,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeGuard
 
-from pydantic import ValidationError
-
 from grader.documents import MeasurementsDocument
 from grader.inputs.decisions import Decision
-from grader.inputs.roster import MAX_LINES, delimiter_of, surplus_of, table_lines, whole_number, why_no_id
+from grader.inputs.roster import MAX_LINES, short, surplus_of, whole_number, why_no_id
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
+from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import (
     ACCELERATION_PLAN,
     VELOCITY_PLAN,
@@ -36,7 +36,7 @@ from grader.records import (
     Unread,
 )
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.authored.toml_file import findings_of
+from reference.authored.variant_table import delimiter_of, table_lines
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, coincident
 from reference.errors import MOST_FINDINGS, Finding, InputFileError, lines_of, near_names
@@ -163,39 +163,82 @@ def names_of(assignment: Assignment) -> Names:
     return Names(vectors, tuple(construction.rates), unused)
 
 
-def read_measurements(path: Path | str, names: Names, file: str | None = None) -> tuple[Measurements, ...]:
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """The file that is read, and how its faults are told.
+
+    Attributes
+    ----------
+    file : the name that the user knows it by
+    is_own : whether it is one student's own, who need not be named in it
+    """
+
+    file: str
+    names: Names
+    speaker: Tongue
+    is_own: bool
+
+    def say(self, text: str, /, **known: object) -> str:
+        """A sentence in the reader's language."""
+        return self.speaker.gettext(text) % known if known else self.speaker.gettext(text)
+
+    def line(self, number: int) -> str:
+        """A line of the file, as a place of a fault."""
+        return self.say(N_("line %(number)s"), number=number)
+
+    def refuse(self, findings: Sequence[Finding]) -> InputFileError:
+        """The error that says everything that is wrong with the file as a whole."""
+        head = self.say(N_("%(file)s: cannot be used"), file=self.file)
+        return InputFileError("measurements", f"{head}\n{lines_of(findings)}")
+
+
+def read_measurements(
+    path: Path | str,
+    names: Names,
+    file: str | None = None,
+    *,
+    lang: str = ROOT_LANGUAGE,
+    is_own: bool = False,
+) -> tuple[Measurements, ...]:
     """Read a CSV file of a class, or a JSON file of one student.
 
-    Arguments: `file` is the name that the user knows it by, if that is not the path's own.
+    Arguments
+    ---------
+    file : the name that the user knows it by, if that is not the path's own
+    lang : of all that is told of its faults
+    is_own : whether it is one student's own file: a CSV file then needs no ``student_id``
 
     Raises InputFileError with every fault of the file as a whole.
     """
     path = Path(path)
-    file = file or path.name
-    text = _text_of(path, file)
+    source = _Source(file or path.name, names, tongue(lang), is_own)
+    text = _text_of(path, source)
     if path.suffix.lower() == ".json":
-        return (_parse_json(text, file, names),)
-    return tuple(_parse_csv(text, file, names))
+        return (_parse_json(text, source),)
+    return tuple(_parse_csv(text, source))
 
 
-def _text_of(path: Path, file: str) -> str:
-    if path.exists() and not path.is_file():
-        why = f"{file}: cannot be read: it is a folder or a pipe, not a file"
-        raise InputFileError("measurements_unreadable", why)
+def _text_of(path: Path, source: _Source) -> str:
+    def unreadable(text: str, /, **known: object) -> InputFileError:
+        return InputFileError("measurements_unreadable", f"{source.file}: {source.say(text, **known)}")
+
+    if not path.exists():
+        raise unreadable(N_("there is no such file"))
+    if not path.is_file():
+        raise unreadable(N_("it is a folder or a pipe, not a file"))
     try:
         with path.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)
     except OSError as error:
-        why = f"{file}: cannot be read: {error.strerror or error}"
-        raise InputFileError("measurements_unreadable", why) from error
+        raise unreadable(N_("cannot be read: %(why)s"), why=error.strerror or error) from error
     if len(content) > MAX_BYTES:
-        why = f"{file}: is larger than {MAX_BYTES // 1_000_000} MB: these are no measurements"
-        raise InputFileError("measurements_unreadable", why)
+        most = MAX_BYTES // 1_000_000
+        raise unreadable(N_("is larger than %(most)s MB: these are no measurements"), most=most)
     try:
         return content.decode("utf-16" if content[:2] in {b"\xff\xfe", b"\xfe\xff"} else "utf-8-sig")
     except UnicodeDecodeError as error:
-        why = f"{file}: is not UTF-8 text; save it as CSV in UTF-8"
-        raise InputFileError("measurements_encoding", why) from error
+        why = source.say(N_("is not UTF-8 text; save it as CSV in UTF-8"))
+        raise InputFileError("measurements_encoding", f"{source.file}: {why}") from error
 
 
 def students_in(path: Path) -> tuple[str, ...]:
@@ -219,10 +262,6 @@ def students_in(path: Path) -> tuple[str, ...]:
     return tuple(name for name in dict.fromkeys(named) if why_no_id(name) is None)
 
 
-def _refuse(file: str, findings: Sequence[Finding]) -> InputFileError:
-    return InputFileError("measurements", f"{file}: cannot be used\n{lines_of(findings)}")
-
-
 def _columns(names: Names) -> Mapping[str, tuple[str, str]]:
     """The columns of a CSV file that hold numbers: the table of each, and the name in it."""
     known = {"segments_mm": names.vectors, "directions_deg": names.vectors, "values": names.values}
@@ -231,7 +270,7 @@ def _columns(names: Names) -> Mapping[str, tuple[str, str]]:
 
 @dataclass(frozen=True, slots=True)
 class _NoValue:
-    """What stands in a JSON file in place of a value, and why it is none."""
+    """What stands in a file in place of a value, and why it is none: a key of the catalogues."""
 
     text: str
     why: str
@@ -250,24 +289,26 @@ class _Entries:
     line : of a CSV file
     """
 
-    names: Names
+    source: _Source
     columns: Mapping[str, tuple[str, str]]
-    file: str
     line: int | None = None
     scales: dict[str, str] = field(default_factory=dict)
     tables: dict[str, dict[str, float]] = field(default_factory=lambda: {table: {} for table in TABLES})
     faults: list[Finding] = field(default_factory=list)
+    problems: list[Problem] = field(default_factory=list)
     unread: list[Unread] = field(default_factory=list)
 
     def fault(self, path: str, why: str) -> None:
         """Note what is wrong, where a path or a column says; the whole line for none."""
         if self.line is not None:
-            path = f"line {self.line}, {path}" if path else f"line {self.line}"
+            line = self.source.line(self.line)
+            path = f"{line}, {path}" if path else line
         self.faults.append(Finding(path, why))
 
     def number(self, path: str, column: str, text: str, value: float | _NoValue) -> None:
         """Enter the number that a column or table has, or note why it is refused."""
-        why = value.why if isinstance(value, _NoValue) else self._refusal(column, value)
+        say = self.source.say
+        why = say(value.why) if isinstance(value, _NoValue) else self._refusal(column, value)
         if why is None and isinstance(value, float):
             table, name = self.columns[column]
             self.tables[table][name] = value
@@ -279,21 +320,30 @@ class _Entries:
         """Why a number cannot be what it is entered for, or None."""
         table, _ = self.columns[column]
         if not math.isfinite(value):
-            return "is no finite number"
+            return self.source.say(NOT_FINITE)
         if table == "segments_mm" and not 0.0 <= value <= MAX_LENGTH_MM:
-            return f"a drawn length is from 0 to {MAX_LENGTH_MM:g} mm"
+            most = f"{MAX_LENGTH_MM:g}"
+            return self.source.say(N_("a drawn length is from 0 to %(most)s mm"), most=most)
         if table == "directions_deg" and abs(value) > 360.0:
-            return "a direction is from -360 to 360 degrees"
+            return self.source.say(N_("a direction is from -360 to 360 degrees"))
         return None
+
+    def unknown(self, column: str, text: str, near: Sequence[str]) -> None:
+        """Tell that a column is not known; what it may be meant for is not judged without it."""
+        why = self.source.say(N_("the column is not known and was passed over"))
+        self.problems.append(
+            Problem("measurement_columns", f"{short(column)}: {why}{_did_you_mean(near, self.source)}")
+        )
+        self.unread += [Unread(self.columns[meant][1], f"{column}: '{text}'") for meant in near]
 
     def scale(self, path: str, name: str, text: str | _NoValue) -> None:
         """Enter a scale as declared, or note why it is refused."""
         if isinstance(text, str) and len(text) > LONGEST_SCALE:
-            text = _NoValue(f"{text[:40]}...", f"a scale has at most {LONGEST_SCALE} characters")
+            text = _NoValue(f"{text[:40]}...", TOO_LONG_A_SCALE)
         if isinstance(text, str):
             self.scales[name] = text
         else:
-            self.fault(path, f"'{text}': {text.why}")
+            self.fault(path, f"'{text}': {self.source.say(text.why)}")
             self.unread.append(Unread(name, f"{name}: '{text}'"))
 
     def measurements(
@@ -301,25 +351,25 @@ class _Entries:
     ) -> Measurements:
         """All that was entered, in the order of the construction."""
         lengths, directions, values = (self.tables[table] for table in TABLES)
-        reading = reading_of(self.names.vectors, lengths, directions)
-        problems = [
-            Problem("measurement_fault", str(fault), self.file) for fault in self.faults[:MOST_FINDINGS]
-        ]
+        names, file, say = self.source.names, self.source.file, self.source.say
+        reading = reading_of(names.vectors, lengths, directions)
+        problems = [Problem("measurement_fault", str(fault), file) for fault in self.faults[:MOST_FINDINGS]]
         if len(self.faults) > MOST_FINDINGS:
-            more = f"... and {len(self.faults) - MOST_FINDINGS} more faults"
-            problems.append(Problem("measurement_fault", more, self.file))
-        unused = sorted(self.names.unused.intersection({*lengths, *directions, *values}))
+            more = say(N_("... and %(count)s more faults"), count=len(self.faults) - MOST_FINDINGS)
+            problems.append(Problem("measurement_fault", more, file))
+        problems += [replace(problem, file=file) for problem in self.problems[:MOST_FINDINGS]]
+        unused = sorted(names.unused.intersection({*lengths, *directions, *values}))
         if unused:
-            message = f"{', '.join(unused)}: not drawn in this mechanism's plans, and not judged"
-            problems.append(Problem("measurement_not_used", message, self.file))
+            why = say(N_("not drawn in this mechanism's plans, and not judged"))
+            problems.append(Problem("measurement_not_used", f"{', '.join(unused)}: {why}", file))
         return Measurements(
             student_id=student_id,
             n=n,
             position=position,
             scales=self.scales,
             reading=replace(reading, unread=tuple(self.unread)),
-            values={name: values[name] for name in self.names.values if name in values},
-            source=self.file,
+            values={name: values[name] for name in names.values if name in values},
+            source=file,
             line=self.line,
             problems=tuple(problems),
             is_usable=is_usable,
@@ -329,60 +379,86 @@ class _Entries:
 # CSV ----------------------------------------------------------------------------------------------
 
 
-def _parse_csv(text: str, file: str, names: Names) -> Iterator[Measurements]:
+NOT_FINITE, NO_NUMBER = N_("is no finite number"), N_("is no number")
+TOO_LONG_A_SCALE = N_("is too long for a scale")
+NO_WHOLE_NUMBER = N_("'%(text)s' is no whole number")
+NO_ID = N_("'%(text)s' is refused: %(why)s")
+_COMMENT = re.compile(r'^[ \t]*"?#[^\n]*', re.MULTILINE)
+
+
+def _parse_csv(text: str, source: _Source) -> Iterator[Measurements]:
+    text = _COMMENT.sub("", text)
     delimiter = delimiter_of(text)
-    lines, faults = table_lines(text, delimiter)
+    lines, faults = table_lines(text, delimiter, MAX_LINES, source.speaker.gettext)
     if not lines and not faults:
-        faults = [Finding("line 1", "the file is empty; its first line must name the columns")]
+        why = source.say(N_("the file is empty; its first line must name the columns"))
+        faults = [Finding(source.line(1), why)]
     header = [cell.strip() for cell in lines[0][1]] if lines else []
-    faults = faults or list(_check_header(header, names))
+    columns = _columns(source.names)
+    faults = faults or list(_check_header(header, columns, source))
     if faults:
-        raise _refuse(file, faults)
-    columns = _columns(names)
+        raise source.refuse(faults)
+    known = frozenset((*KEYS, *SCALE_NAMES, *columns))
+    unknown = [name for name in header if name and name not in known][:MOST_FINDINGS]
+    near = {name: [one for one in near_names(name, sorted(columns)) if one not in header] for name in unknown}
     for number, cells in lines[1:]:
-        yield _line(header, cells, delimiter, _Entries(names, columns, file, number))
+        yield _line(header, cells, delimiter, near, _Entries(source, columns, number))
 
 
-def _check_header(header: list[str], names: Names) -> Iterator[Finding]:
-    known = frozenset((*KEYS, *SCALE_NAMES, *_columns(names)))
-    if "student_id" not in header:
-        yield Finding("line 1", "column student_id is missing")
-    for index, (name, count) in enumerate(Counter(filter(None, header)).items()):
+def _check_header(
+    header: list[str], columns: Mapping[str, tuple[str, str]], source: _Source
+) -> Iterator[Finding]:
+    line = source.line(1)
+    if "student_id" not in header and not source.is_own:
+        yield Finding(line, source.say(N_("column student_id is missing")))
+    if not {*SCALE_NAMES, *columns}.intersection(header):
+        example = ", ".join(list(columns)[:3])
+        why = N_("no column of measurements is known here; there are %(names)s, ...")
+        yield Finding(line, source.say(why, names=example))
+    for name, count in Counter(filter(None, header)).items():
         if count > 1:
-            yield Finding("line 1", f"column {name} is there {count} times")
-        if name not in known:
-            near = near_names(name, sorted(known)) if index < MOST_FINDINGS + len(known) else []
-            yield Finding("line 1", f"column '{name}' is not known{_did_you_mean(near)}")
+            why = N_("column %(name)s is there %(count)s times")
+            yield Finding(line, source.say(why, name=short(name), count=count))
 
 
-def _did_you_mean(near: Sequence[str]) -> str:
-    return f"; did you mean {' or '.join(near)}?" if near else ""
+def _did_you_mean(near: Sequence[str], source: _Source) -> str:
+    either = f" {source.say(N_('or'))} ".join(near)
+    return f"; {source.say(N_('did you mean %(names)s?'), names=either)}" if near else ""
 
 
-def _line(header: list[str], cells: list[str], delimiter: str, entries: _Entries) -> Measurements:
+def _line(
+    header: list[str],
+    cells: list[str],
+    delimiter: str,
+    near: Mapping[str, Sequence[str]],
+    entries: _Entries,
+) -> Measurements:
     """What one line says; what is wrong in it is left out and reported."""
+    source = entries.source
     known = {name: cell.strip() for name, cell in zip(header, cells, strict=False) if name and cell.strip()}
-    surplus = surplus_of(header, cells, delimiter)
+    surplus = surplus_of(header, cells, delimiter, source.speaker)
     if surplus is not None:
-        entries.fault("", f"{surplus}; nothing of it is used")
+        entries.fault("", source.say(N_("%(why)s; nothing of it is used"), why=surplus))
         known = {"student_id": cells[0].strip()} if header[0] == "student_id" else {}
     student = known.get("student_id", "")
-    why = why_no_id(student)
+    why = None if source.is_own and not student else why_no_id(student)
     if why is not None:
-        entries.fault("student_id", f"'{student[:40]}' is refused: {why}")
+        entries.fault("student_id", source.say(NO_ID, text=student[:40], why=source.say(why)))
     numbers = {name: whole_number(known[name], delimiter) for name in ("n", "position") if name in known}
     for name, number in numbers.items():
         if number is None:
-            entries.fault(name, f"'{known[name][:40]}' is no whole number")
+            entries.fault(name, source.say(NO_WHOLE_NUMBER, text=known[name][:40]))
     # Without its student, n and position nobody knows what it is held against.
     is_usable = not entries.faults
     for column, text in known.items():
         if column in entries.columns:
             entries.number(column, column, text[:40], _number(text, delimiter))
+        elif column in near:
+            entries.unknown(column, text[:40], near[column])
     for scale in SCALE_NAMES:
         if scale in known:
             entries.scale(scale, scale, known[scale])
-    owner = None if why else student
+    owner = None if why else student or None
     return entries.measurements(owner, numbers.get("n"), numbers.get("position"), is_usable=is_usable)
 
 
@@ -395,9 +471,9 @@ def _number(text: str, delimiter: str) -> float | _NoValue:
         plain = plain.replace(",", ".", 1)
     if _NUMBER.fullmatch(plain) is not None:
         return float(plain)
-    comma = "," in text and delimiter == ","
-    advice = "; write a decimal point, or separate fields by semicolons" if comma else ""
-    return _NoValue(text, f"is no number{advice}")
+    if "," in text and delimiter == ",":
+        return _NoValue(text, N_("is no number; write a decimal point, or separate fields by semicolons"))
+    return _NoValue(text, NO_NUMBER)
 
 
 def reading_of(
@@ -469,7 +545,7 @@ def _object(pairs: Sequence[tuple[str, object]]) -> dict[str, object]:
         # A half of a surrogate pair can be written in JSON, and in no file of ours.
         name, read = _encodable(key), _encodable(value) if isinstance(value, str) else value
         if name in table:
-            read = _NoValue(f"{_shown(table[name])} and {_shown(read)}", "is there more than once")
+            read = _NoValue(f"{_shown(table[name])} and {_shown(read)}", N_("is there more than once"))
         table[name] = read
     return table
 
@@ -491,31 +567,33 @@ def _whole_number(digits: str) -> int | float:
     return int(digits) if len(digits) <= MOST_DIGITS else float(digits)
 
 
-def _parse_json(text: str, file: str, names: Names) -> Measurements:
+def _parse_json(text: str, source: _Source) -> Measurements:
     try:
         data = json.loads(
             text,
             object_pairs_hook=_object,
             parse_int=_whole_number,
-            parse_constant=lambda name: _NoValue(name, "is no finite number"),
+            parse_constant=lambda name: _NoValue(name, NOT_FINITE),
         )
     except (ValueError, RecursionError) as error:
-        raise _refuse(file, [Finding("$", f"is not JSON: {error}")]) from error
+        why = source.say(N_("is not JSON: %(error)s"), error=error)
+        raise source.refuse([Finding("$", why)]) from error
     if not isinstance(data, dict):
-        raise _refuse(file, [Finding("$", "is no table: a file of measurements begins with a brace")])
-    entries = _Entries(names, _columns(names), file)
+        why = source.say(N_("is no table: a file of measurements begins with a brace"))
+        raise source.refuse([Finding("$", why)])
+    entries = _Entries(source, _columns(source.names))
     for name, value in _take(data, "scales"):
         if name not in SCALE_NAMES:
-            entries.fault(f"$.scales.{name[:40]}", f"is not known here; there are {', '.join(SCALE_NAMES)}")
+            known = source.say(N_("is not known here; there are %(names)s"), names=", ".join(SCALE_NAMES))
+            entries.fault(f"$.scales.{name[:40]}", known)
         else:
             declared = str(value) if _is_number(value) else value
             if not isinstance(declared, str | _NoValue):
-                declared = _NoValue(_shown(value), "is no number")
+                declared = _NoValue(_shown(value), NO_NUMBER)
             entries.scale(f"$.scales.{name}", name, declared)
     for table, end in TABLES.items():
         _enter(dict(_take(data, table)), table, end, entries)
-    about = _about(data, file)
-    return entries.measurements(about.student_id, about.n, about.position)
+    return entries.measurements(*_about(data, source))
 
 
 def _take(data: dict[str, object], key: str) -> list[tuple[str, object]]:
@@ -533,35 +611,60 @@ def _is_number(value: object) -> TypeGuard[int | float]:
 
 def _enter(given: Mapping[str, object], table: str, end: str, entries: _Entries) -> None:
     """Enter the numbers of a table."""
-    known = entries.names.values if table == "values" else tuple(entries.names.vectors)
+    names = entries.source.names
+    known = names.values if table == "values" else tuple(names.vectors)
     for name, value in given.items():
         path, shown = f"$.{table}.{name[:40]}", _shown(value)
         if name not in known:
             near = near_names(name, known) if len(entries.faults) < MOST_FINDINGS else []
-            entries.fault(path, f"is not known here{_did_you_mean(near)}")
+            why = entries.source.say(NOT_KNOWN)
+            entries.fault(path, f"{why}{_did_you_mean(near, entries.source)}")
             entries.unread += [Unread(meant, f"{name}: '{shown}'") for meant in near if meant not in given]
         elif _is_number(value):
             entries.number(path, f"{name}{end}", shown, float(value))
         else:
-            refused = value if isinstance(value, _NoValue) else _NoValue(shown, "is no number")
+            refused = value if isinstance(value, _NoValue) else _NoValue(shown, NO_NUMBER)
             entries.number(path, f"{name}{end}", shown, refused)
 
 
-def _about(data: Mapping[str, object], file: str) -> MeasurementsDocument:
-    """Whose they are and for which variant. Raises InputFileError with all faults in what is left."""
-    faults = [
-        Finding(f"$.{key[:40]}", f"{value.why}: {value}")
-        for key, value in data.items()
-        if isinstance(value, _NoValue)
-    ]
-    rest = {key: value for key, value in data.items() if not isinstance(value, _NoValue)}
-    try:
-        document = MeasurementsDocument.model_validate(rest)
-    except ValidationError as error:
-        raise _refuse(file, [*faults, *findings_of(error, MeasurementsDocument)]) from error
-    why = None if document.student_id is None else why_no_id(document.student_id)
-    if why is not None:
-        faults.append(Finding("$.student_id", f"'{_shown(document.student_id)}' is refused: {why}"))
+NOT_KNOWN = N_("is not known here")
+NO_TABLE = N_("must be a table in braces")
+KEYS_OF_DOCUMENT = tuple(MeasurementsDocument.model_fields)
+
+
+def _about(data: Mapping[str, object], source: _Source) -> tuple[str | None, int | None, int | None]:
+    """Whose they are, n and position. Raises InputFileError with all faults in what is left of the file."""
+    faults: list[Finding] = []
+    for key, value in data.items():
+        why = ""
+        if isinstance(value, _NoValue):
+            why = f"{source.say(value.why)}: {value}"
+        elif key not in KEYS_OF_DOCUMENT:
+            why = source.say(NOT_KNOWN) + _did_you_mean(near_names(key, KEYS_OF_DOCUMENT), source)
+        elif key in {"scales", *TABLES}:
+            why = source.say(NO_TABLE)
+        elif key == "schema_version":
+            why = "" if value == 1 else source.say(N_("must be 1"))
+        elif value is not None:
+            why = _misfit(key, value, source)
+        if why:
+            faults.append(Finding(f"$.{key[:40]}", why))
     if faults:
-        raise _refuse(file, faults)
-    return document
+        raise source.refuse(faults)
+    student, n, position = (data.get(key) for key in KEYS)
+    return (
+        student if isinstance(student, str) else None,
+        n if isinstance(n, int) else None,
+        position if isinstance(position, int) else None,
+    )
+
+
+def _misfit(key: str, value: object, source: _Source) -> str:
+    """Why a value cannot be a student's id, n or position; empty where it can."""
+    if key != "student_id":
+        is_whole = isinstance(value, int) and not isinstance(value, bool)
+        return "" if is_whole else source.say(NO_WHOLE_NUMBER, text=_shown(value))
+    if not isinstance(value, str):
+        return source.say(N_("must be text in quotes"))
+    why = why_no_id(value)
+    return "" if why is None else source.say(NO_ID, text=_shown(value), why=source.say(why))

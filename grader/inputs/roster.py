@@ -5,8 +5,6 @@ a student with several positions has a line for each. Comma or semicolon separat
 semicolon-separated file numbers have decimal commas, and a `scans` field of several files is quoted.
 """
 
-import csv
-import io
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,9 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
-from grader.language import LANGUAGES
+from grader.language import LANGUAGES, N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Problem
 from reference.authored.assignment import SCALE_NAMES
+from reference.authored.variant_table import delimiter_of, table_lines
 from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
 
 _STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
@@ -98,15 +97,18 @@ class Roster:
 
 
 def why_no_id(text: str) -> str | None:
-    """Why a text cannot be a student's id, which names the student's folder of results; None where it can."""
+    """Why a text cannot be a student's id, which names the student's folder of results; None where it can.
+
+    What it says is a key of the catalogues.
+    """
     if _STUDENT_ID.fullmatch(text) is None:
-        return "letters A-Z a-z, digits, '.', '_' and '-', at most 64, are allowed"
+        return N_("letters A-Z a-z, digits, '.', '_' and '-', at most 64, are allowed")
     if text.startswith(".") or text.endswith("."):
-        return "it cannot name a folder: it begins or ends with a dot"
+        return N_("it cannot name a folder: it begins or ends with a dot")
     if _DEVICES.fullmatch(text):
-        return "it cannot name a folder: Windows has a device of that name"
+        return N_("it cannot name a folder: Windows has a device of that name")
     if text.lower() in _RESULT_FILES:
-        return "it cannot name a folder: a file of the results has that name"
+        return N_("it cannot name a folder: a file of the results has that name")
     return None
 
 
@@ -122,7 +124,7 @@ def read_roster(path: Path | str) -> Roster:
 def parse_roster(text: str, file: str = "roster.csv") -> Roster:
     """The roster in a text; raises as `read_roster` does."""
     delimiter = delimiter_of(text)
-    lines, findings = table_lines(text, delimiter)
+    lines, findings = table_lines(text, delimiter, MAX_LINES)
     if not lines:
         findings = findings or [Finding("line 1", "the file is empty; its first line must name the columns")]
         raise AuthoredFileError(file, tuple(findings))
@@ -157,40 +159,27 @@ def _text_of(path: Path) -> str:
 # Tables, of a roster and of measurements ----------------------------------------------------------
 
 
-def delimiter_of(text: str) -> str:
-    """`;` or `,`, whichever the first line of a CSV text has more of."""
-    first = next((line for line in text.splitlines() if line.strip()), "")
-    return ";" if first.count(";") > first.count(",") else ","
+_ENGLISH = tongue(ROOT_LANGUAGE)
+OF_TABLES = (
+    N_("line %(number)s"),
+    N_("more than %(most)s lines are no table"),
+    N_("is no CSV: %(error)s; check its quotes"),
+)
+"""What `table_lines` says, to be translated."""
 
 
-def table_lines(
-    text: str, delimiter: str, most: int = MAX_LINES
-) -> tuple[list[tuple[int, list[str]]], list[Finding]]:
-    """Lines of a CSV text that are not blank, and the fault that ends them before the text does.
-
-    A record of several lines has the number of its first, from 1. More than `most` lines are a fault.
-    """
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
-    lines: list[tuple[int, list[str]]] = []
-    number = 1
-    try:
-        for cells in reader:
-            if number > most:
-                return lines, [Finding(f"line {number}", f"more than {most} lines are no class")]
-            if any(cell.strip() for cell in cells):
-                lines.append((number, cells))
-            number = reader.line_num + 1
-    except csv.Error as error:
-        return lines, [Finding(f"line {number}", f"is no CSV: {error}; check its quotes")]
-    return lines, []
-
-
-def surplus_of(header: Sequence[str], cells: Sequence[str], delimiter: str) -> str | None:
+def surplus_of(
+    header: Sequence[str], cells: Sequence[str], delimiter: str, speaker: Tongue = _ENGLISH
+) -> str | None:
     """What is wrong with a line of more fields than there are columns; None for any other."""
     if not any(cell.strip() for cell in cells[len(header) :]):
         return None
-    message = f"has {len(cells)} fields, the first line names {len(header)} columns"
-    return f"{message}; quote a field that holds a '{delimiter}'"
+    text = N_(
+        "has %(fields)s fields, the first line names %(columns)s columns;"
+        " quote a field that holds a '%(mark)s'"
+    )
+    known = {"fields": len(cells), "columns": len(header), "mark": delimiter}
+    return speaker.gettext(text) % known
 
 
 def whole_number(text: str, delimiter: str) -> int | None:

@@ -46,9 +46,10 @@ class Options:
     out : the folder of results; only ``feedback`` needs it
     people : names, addresses and the platform's numbers by student_id
     titles : the criteria's, in the language of the class, by id; `export` takes them from the results
-    form : the platform's own file to fill in: Moodle's worksheet, Canvas's exported gradebook
+    form : the platform's own file to fill in: Moodle's worksheet, an exported gradebook
+    criteria, submissions : the platform's answers for its rubric and for the students' submissions
     item : the grade item's name; the assignment's id where empty
-    fillings : Moodle's answer with everybody's points in the guide that is there
+    replace_guide : Moodle's answer with everybody's points in the guide that goes
     groups : whether students hand in as groups; None where not said
     now : time of the export; the clock's if None
     """
@@ -60,6 +61,7 @@ class Options:
     titles: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     form: Path | None = None
     criteria: Path | None = None
+    submissions: Path | None = None
     identity: str | None = None
     item: str = ""
     position: int | None = None
@@ -67,12 +69,11 @@ class Options:
     maximum: float | None = None
     rescale: bool = False
     visibility: str | None = None
-    course_id: int | None = None
-    assignment_id: int | None = None
+    course_id: str | None = None
+    assignment_id: str | None = None
     cmid: int | None = None
     context_id: int | None = None
-    replace_guide: bool = False
-    fillings: Path | None = None
+    replace_guide: Path | None = None
     groups: bool | None = None
     lang: str = "en"
     now: datetime | None = None

@@ -97,7 +97,7 @@ class Worksheet(Form):
     """A worksheet that Moodle would take."""
 
     name = "the worksheet"
-    platform = "Moodle"
+    platform: str = "Moodle"
     replaced = (
         ": it skips them unless the box for updating records is ticked at the upload, or the worksheet was"
         " downloaded afresh"
@@ -452,7 +452,7 @@ def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
     for grade in graded:
         if grade.student_id in numbers:
             folder = f"Participant_{numbers[grade.student_id]}_assignfeedback_file"
-            files.update(_pages(grade, options.out or Path(), folder, faults))
+            files.update(pages(grade, options.out or Path(), folder, faults))
     if faults:
         message = "not all feedback is there; grade again, nothing was written"
         raise InputFileError("feedback_missing", f"{message}\n{lines_of(faults)}")
@@ -505,7 +505,7 @@ def _participants(
     return numbers, {**matches.missing, **locked}, doubtful
 
 
-def _pages(grade: Grade, out: Path, folder: str, faults: list[str]) -> Iterator[tuple[str, Path]]:
+def pages(grade: Grade, out: Path, folder: str, faults: list[str]) -> Iterator[tuple[str, Path]]:
     """A student's pages by their names in the archive; what is missing or of another run goes to `faults`."""
     for report, where in zip(grade.reports, grade.folders, strict=True):
         before = "" if len(grade.reports) == 1 else f"position-{where.rpartition('/')[2]}-"

@@ -113,12 +113,12 @@ class MoodleAreas(Payload):
 class MoodleRubricDocument(Payload):
     """The call that makes the rubric a marking guide of an assignment.
 
-    `replace_guide` says whether a guide that is there may go.
+    `fillings_lost` says how many points of students may go with a guide that is there; None: none may be.
     """
 
     schema_version: Version = 1
     assignment: str
-    replace_guide: bool = False
+    fillings_lost: Annotated[int, Field(ge=0)] | None = None
     wsfunction: Literal["core_grading_save_definitions"] = "core_grading_save_definitions"
     arguments: MoodleAreas
 
@@ -158,18 +158,16 @@ class MoodleAdvanced(Payload):
 
 
 class MoodleEditor(Payload):
-    """A comment as Moodle's editor tells it."""
+    """The comment on the whole."""
 
     text: str
     format: Html = 1
 
 
 class MoodlePlugins(Payload):
-    """What feedback plugins are told.
+    """What feedback plugins take; Moodle aborts in the midst where the one for comments is given nothing.
 
-    The plugin of comments reads its editor without asking whether it is there: without it, points are
-    stored and the call then fails where a student has a comment already.
-    Source: mod/assign/feedback/comments/locallib.php, assign_feedback_comments::is_feedback_modified.
+    So in mod/assign/feedback/comments/locallib.php, `is_feedback_modified`, where a comment exists.
     """
 
     assignfeedbackcomments_editor: MoodleEditor
@@ -228,11 +226,11 @@ class MoodleMarksDocument(Payload):
 def guide(grades: Sequence[Grade], options: Options) -> Delivery:
     """The call that makes the rubric a marking guide of an assignment.
 
-    Raises CallError where nothing says which assignment, and where it has a guide already, or may have
-    one, that nobody wants replaced: saving another deletes it with everybody's points.
-    Source: grade/grading/form/guide/lib.php, gradingform_guide_controller::update_or_check_guide.
+    Raises CallError where nothing says which assignment, and where it has or may have a guide: saving
+    another deletes it with everybody's points. `replace_guide` allows that, by Moodle's answer to
+    core_grading_get_gradingform_instances, which holds what goes.
     """
-    cmid, context_id, notes = _place(options)
+    cmid, context_id = _place(options)
     moment = int(options.moment.timestamp())
     criteria = class_criteria(grades, options)
     definition = {
@@ -246,17 +244,18 @@ def guide(grades: Sequence[Grade], options: Options) -> Delivery:
     }
     content = {
         "assignment": grades[0].assignment,
-        "replace_guide": options.replace_guide,
         "arguments": {"areas": [{"cmid": cmid, "contextid": context_id, "definitions": [definition]}]},
     }
-    return Delivery(json_document(MoodleRubricDocument, content, "the marking guide"), notes=notes)
+    notes = []
+    if options.replace_guide is not None:
+        lost = _fillings(options.replace_guide)
+        content["fillings_lost"] = sum(lost)
+        notes = [f"saving this guide deletes the one there with {sum(lost)} fillings of {len(lost)} grades"]
+    return Delivery(json_document(MoodleRubricDocument, content, "the marking guide"), notes=tuple(notes))
 
 
-def _place(options: Options) -> tuple[int, int, tuple[str, ...]]:
-    """The numbers of an activity whose guide may be saved and of its context, and what goes by that.
-
-    Raises CallError where there are none, and where a guide would go that nobody wants replaced.
-    """
+def _place(options: Options) -> tuple[int, int]:
+    """The numbers of an activity and of its context; CallError where there are none, or it has a guide."""
     area = _area(options)
     cmid = options.cmid or _number(area.get("cmid"))
     context_id = options.context_id or _number(area.get("contextid"))
@@ -273,45 +272,26 @@ def _place(options: Options) -> tuple[int, int, tuple[str, ...]]:
             f"{options.criteria}: the assignment is graded by '{method}', and saving a guide would put"
             " that aside; choose 'Marking guide' or 'Simple direct grading' in Moodle first",
         )
-    lost = _lost(area, options)
-    if lost and not options.replace_guide:
-        known = (
-            "" if options.criteria else ", or Moodle's answer to core_grading_get_definitions (--criteria)"
-        )
+    if options.replace_guide is None and (not area or any(criteria_in(area))):
+        known = "has a guide already" if area else "may have a guide (Moodle's answer, --criteria, tells)"
         raise CallError(
             "guide_exists",
-            f"{options.criteria or 'the assignment'}: saving this guide would delete {lost}. Give"
-            f" --replace-guide if that is meant{known}",
+            f"the assignment {known}, and saving another deletes it with everybody's points. If that is meant"
+            " give Moodle's answer to core_grading_get_gradingform_instances, which tells how many"
+            " (--replace-guide)",
         )
-    return cmid, context_id, (f"Moodle deletes {lost}",) if lost else ()
+    return cmid, context_id
 
 
-def _lost(area: Mapping[str, object], options: Options) -> str:
-    """What goes where a guide is saved in this activity; empty where it has none."""
-    criteria = len(list(criteria_in(area)))
-    if options.criteria is not None and not criteria:
-        return ""
-    guide = f"the marking guide that {'is' if criteria else 'may be'} there"
-    if options.fillings is not None:
-        filled = _fillings_of(options.fillings)
-        students, total = len({student for student, _ in filled}), sum(count for _, count in filled)
-        return f"{guide} with {total} fillings (points on a criterion) of {students} students"
-    how = "how many, Moodle's answer to core_grading_get_gradingform_instances tells (--fillings)"
-    each = f", {criteria} of each student who was graded" if criteria else " of everybody"
-    return f"{guide} with all fillings (points on a criterion){each}; {how}"
-
-
-def _fillings_of(path: Path) -> list[tuple[object, int]]:
-    """The grade and the number of its fillings for each that was given by a guide."""
+def _fillings(path: Path) -> list[int]:
+    """How many points each grade by a guide holds, by Moodle's answer; InputFileError for another."""
     answer = read_answer(path)
     try:
-        return [
-            (each["itemid"], len((each.get("guide") or {}).get("criteria", ())))
-            for each in answer["instances"]
-        ]
-    except (TypeError, KeyError, AttributeError) as error:
+        # An instance that nobody filled in has no guide.
+        return [len((each.get("guide") or {}).get("criteria", ())) for each in answer["instances"]]
+    except (LookupError, TypeError, AttributeError) as error:
         message = "is not Moodle's answer to core_grading_get_gradingform_instances"
-        raise InputFileError("fillings", f"{path}: {message}") from error
+        raise InputFileError("criteria", f"{path}: {message}") from error
 
 
 def _area(options: Options) -> Mapping[str, object]:
@@ -373,9 +353,7 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
         )
     content = {"assignment": grades[0].assignment, "criteria": criteria, "calls": calls}
     return Delivery(
-        json_document(MoodleMarksDocument, content, "the marking guide's points"),
-        unplaced=missing,
-        notes=("each call also replaces the student's feedback comment by this one",),
+        json_document(MoodleMarksDocument, content, "the marking guide's points"), unplaced=missing
     )
 
 

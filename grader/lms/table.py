@@ -16,8 +16,8 @@ from typing import ClassVar, Self
 
 from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
 from grader.files import OutputError, write_whole
-from grader.inputs.roster import delimiter_of
 from grader.lms.grades import Delivery, Grade, Options, Person, in_a_row, ready
+from reference.authored.variant_table import delimiter_of
 from reference.errors import CallError, InputFileError, lines_of
 
 Cell = str | int | float | None
@@ -220,12 +220,18 @@ class RawTable:
     mark : a byte order mark, or nothing
     rows : raw cells
     ends : each row's line end; nothing after the last where the file has none
+    kept : the columns that are written; all where None
     """
 
     mark: str
     delimiter: str
     rows: list[list[str]] = field(default_factory=list)
     ends: list[str] = field(default_factory=list)
+    kept: Sequence[int] | None = None
+
+    def header(self) -> list[str]:
+        """The first row's cells; none of an empty file."""
+        return [self.value(0, column) for column in range(len(self.rows[0]))] if self.rows else []
 
     def value(self, row: int, column: int) -> str:
         """A cell's meaning."""
@@ -233,14 +239,22 @@ class RawTable:
         return cell[1:-1].replace('""', '"') if cell.startswith('"') else cell
 
     def put(self, row: int, column: int, text: str) -> None:
-        """Change one cell; one that already means this text stays as it is written."""
+        """Change one cell; one that already means this text stays as it is written.
+
+        It is quoted where it must be, and where the whole header is.
+        """
         if self.value(row, column) != text:
-            self.rows[row][column] = quoted(text, self.delimiter)
+            is_quoted = all(cell.startswith('"') for cell in self.rows[0])
+            self.rows[row][column] = quoted(text, self.delimiter, always=is_quoted)
 
     def text(self, rows: Iterable[int] | None = None) -> str:
-        """The file, or these of its rows."""
-        rows = range(len(self.rows)) if rows is None else rows
-        return self.mark + "".join(self.delimiter.join(self.rows[row]) + self.ends[row] for row in rows)
+        """The file, or these of its rows, with the columns that are kept."""
+        chosen = range(len(self.rows)) if rows is None else rows
+        return self.mark + "".join(self.delimiter.join(self._kept(row)) + self.ends[row] for row in chosen)
+
+    def _kept(self, row: int) -> list[str]:
+        cells = self.rows[row]
+        return cells if self.kept is None or cells == [""] else [cells[column] for column in self.kept]
 
     def ragged(self) -> list[str]:
         """Faults of rows that have more or fewer cells than the first; empty lines are none."""
@@ -252,9 +266,9 @@ class RawTable:
         ]
 
 
-def quoted(text: str, delimiter: str) -> str:
+def quoted(text: str, delimiter: str, *, always: bool = False) -> str:
     """A raw cell that means this text."""
-    if any(mark in text for mark in (delimiter, '"', "\n", "\r")) or text != text.strip():
+    if always or any(mark in text for mark in (delimiter, '"', "\n", "\r")) or text != text.strip():
         return '"' + text.replace('"', '""') + '"'
     return text
 
@@ -442,9 +456,9 @@ class Form(ABC):
     above: int = 0
     possible: float | None = None
     notes: list[str] = field(default_factory=list)
+    platform: str = ""
 
     name: ClassVar[str]
-    platform: ClassVar[str]
     replaced: ClassVar[str] = ""
     """What the platform does where grades that it holds already are changed."""
     keeps_others: ClassVar[bool] = True

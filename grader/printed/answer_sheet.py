@@ -8,7 +8,7 @@ import segno
 from reportlab.lib.units import mm
 
 from grader.inputs.roster import RosterRow
-from grader.language import N_, Tongue, tongue
+from grader.language import N_, SIDES, Tongue, tongue
 from grader.printed.layout import (
     CALIBRATION,
     CODE_MM,
@@ -178,7 +178,7 @@ def _task(drawing: PdfDrawing, assignment: Assignment, identity: Identity, tongu
     """The task in words at the largest size that leaves room for the data below it."""
     x, y, wide, high = _TASK_MM
     task = assignment.file.task.in_language(tongue.lang)
-    data = _given(assignment, Variant(identity.n, identity.position), tongue)
+    data = given_data(assignment, Variant(identity.n, identity.position), tongue)
     for size in (8.5, 8.0, 7.5, 7.0, 6.5, 6.0):
         step = 1.3 * size * _PT
         rows = _flow(data, size, wide)
@@ -200,12 +200,12 @@ def _task(drawing: PdfDrawing, assignment: Assignment, identity: Identity, tongu
 _SPACE_MM = 3.0
 
 
-def _given(assignment: Assignment, variant: Variant, tongue: Tongue) -> list[tuple[Piece, ...]]:
+def given_data(assignment: Assignment, variant: Variant, tongue: Tongue) -> list[tuple[Piece, ...]]:
     """The given data, each as label = value unit."""
-    values = assignment.values([variant])
     data = []
-    for datum in assignment.file.given:
-        value = number(float(np.ravel(datum.value(values))[0]), tongue.decimal_mark)
+    for datum, given in assignment.given(variant):
+        is_side = given if isinstance(given, str) else None
+        value = tongue.gettext(SIDES[is_side]) if is_side else number(float(given), tongue.decimal_mark)
         unit = tongue.unit(datum.unit)
         gap = "" if unit in {"", "°"} else "\N{NO-BREAK SPACE}"
         data.append((*pieces_of(datum.label), Piece(f" = {value}{gap}{unit}")))
@@ -327,7 +327,7 @@ def make_sheets(
 
     Raises AuthoredFileError with every row whose n or position does not suit the assignment.
     """
-    variants = _variants(assignment, rows, roster)
+    variants = variants_of(assignment, rows, roster)
     forms, problems = _forms(assignment, asked)
     poles = [poles_mm(assignment, form.template, variants) for form in forms]
     drawing = PdfDrawing.begin(assignment.file.title.in_language(lang))
@@ -349,7 +349,8 @@ def _unprintable(rows: Sequence[RosterRow], roster: str) -> Iterator[Problem]:
             yield Problem("sheet_letters", message, roster)
 
 
-def _variants(assignment: Assignment, rows: Sequence[RosterRow], roster: str) -> list[Variant]:
+def variants_of(assignment: Assignment, rows: Sequence[RosterRow], roster: str) -> list[Variant]:
+    """The variant of each row; raises AuthoredFileError with every row that the assignment has none for."""
     findings: list[Finding] = []
     variants: list[Variant] = []
     for row in rows:

@@ -1,7 +1,7 @@
 """Fonts, texts and shapes of printed PDFs."""
 
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -9,14 +9,16 @@ from importlib.resources import files
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from reportlab.lib.colors import Color, HexColor
 from reportlab.lib.units import mm
 from reportlab.pdfbase import pdfmetrics
 from reportlab.pdfbase.ttfonts import TTFont
 from reportlab.pdfgen.canvas import Canvas
+from reportlab.pdfgen.pathobject import PDFPathObject
 
 from grader.printed.layout import FRAME_MM, MARKER_CORNERS, MARKER_MM, PAGE_MM, Template
 from grader.records import Box
-from reference.drawing.canvas import Piece
+from reference.drawing.canvas import SLANT, Area, Curve, Label, Piece, Point, Ring, Shape, Stroke, set_pieces
 
 # Markers ------------------------------------------------------------------------------------------
 
@@ -112,6 +114,79 @@ def fitted(
             return size, lines
     cut = lines[: max(room, 1)]
     return size, [*cut[:-1], f"{cut[-1].rstrip('.,;')} …"] if cut else []
+
+
+# Shapes of drawings -------------------------------------------------------------------------------
+
+
+def put_shapes(canvas: Canvas, shapes: Iterable[Shape], origin: tuple[float, float], unit: float) -> None:
+    """Draw shapes whose (0, 0) lies at `origin` (points, y up); a millimetre is `unit` points long."""
+    canvas.saveState()
+    canvas.translate(*origin)
+    canvas.scale(unit, unit)
+    canvas.setLineCap(1)
+    for shape in shapes:
+        _put(canvas, shape)
+    canvas.restoreState()
+
+
+@cache
+def ink(colour: str) -> Color:
+    """A colour that leaves the canvas as opaque as it is set."""
+    made = HexColor(colour)
+    made.alpha = None
+    return made
+
+
+def _put(canvas: Canvas, shape: Shape) -> None:
+    """One shape; the canvas' unit is the millimetre, y up."""
+    match shape:
+        case Stroke(start=(x1, y1), end=(x2, y2)):
+            _pen(canvas, shape.width, shape.colour, shape.dash)
+            canvas.line(x1, -y1, x2, -y2)
+        case Ring(centre=(x, y)):
+            _pen(canvas, shape.width, shape.colour)
+            filled = shape.fill != "none"
+            if filled:
+                canvas.setFillColor(ink(shape.fill))
+            canvas.circle(x, -y, shape.radius, stroke=int(shape.width > 0), fill=int(filled))
+        case Area(points=points):
+            _pen(canvas, shape.width, shape.colour)
+            canvas.setFillColor(ink(shape.fill))
+            canvas.drawPath(_path(canvas, points, closed=True), stroke=int(shape.width > 0), fill=1)
+        case Curve(points=points):
+            _pen(canvas, shape.width, shape.colour, shape.dash)
+            canvas.drawPath(_path(canvas, points, closed=False), stroke=1, fill=0)
+        case Label():
+            _write(canvas, shape)
+
+
+def _path(canvas: Canvas, points: Sequence[Point], *, closed: bool) -> PDFPathObject:
+    path = canvas.beginPath()
+    path.moveTo(points[0][0], -points[0][1])
+    for x, y in points[1:]:
+        path.lineTo(x, -y)
+    if closed:
+        path.close()
+    return path
+
+
+def _write(canvas: Canvas, label: Label) -> None:
+    """A text: each of its pieces in its own place."""
+    canvas.setFillColor(ink(label.colour))
+    for piece in set_pieces(label.text, label.size):
+        canvas.saveState()
+        slant = SLANT if label.italic else 0.0
+        canvas.transform(1.0, 0.0, slant, 1.0, label.left + piece.right, piece.above - label.at[1])
+        canvas.setFont(REGULAR, piece.size)
+        canvas.drawString(0.0, 0.0, piece.text)
+        canvas.restoreState()
+
+
+def _pen(canvas: Canvas, width_mm: float, colour: str, dash: tuple[float, ...] = ()) -> None:
+    canvas.setDash(list(dash))
+    canvas.setLineWidth(width_mm)
+    canvas.setStrokeColor(ink(colour))
 
 
 # Pages --------------------------------------------------------------------------------------------

@@ -22,7 +22,12 @@ CAPTION_GAP_MM, CAPTION_MM = 6.0, 3.5
 
 
 def sketch(subject: Subject) -> DrawnFigure:
-    """The mechanism of one variant."""
+    """The mechanism of one variant, with its title and scale."""
+    return captioned(subject, "mechanism", scheme(subject).parts, INK)
+
+
+def scheme(subject: Subject) -> DrawnFigure:
+    """The mechanism of one variant: links, joints and guides with their names, and the driving arrow."""
     nodes = subject.nodes("mechanism")
     thin = altitudes(subject, nodes)
     layers = (_plates(subject, nodes), thin.lines, *_layers(subject, nodes), thin.vectors)
@@ -30,7 +35,7 @@ def sketch(subject: Subject) -> DrawnFigure:
     style = Style(LETTER_MM, SMALL_LETTER_MM, INK, symbols.JOINT_RADIUS_MM)
     others = [*_link_numbers(subject, nodes), *drive_letter(subject, nodes), *thin.letters]
     named = letters(subject, nodes, [part.shape for part in drawn], style, others)
-    return captioned(subject, "mechanism", (*drawn, *named), INK)
+    return DrawnFigure("mechanism", (*drawn, *named))
 
 
 def captioned(subject: Subject, name: str, parts: tuple[Part, ...], colour: str) -> DrawnFigure:

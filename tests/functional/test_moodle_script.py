@@ -107,7 +107,7 @@ def definitions(tmp_path, *guides):
 
 def marks(tmp_path):
     reports = [marked(f"s{at}", 5.0, 1.0 * at) for at in (1, 2, 3)]
-    how = {"criteria": definitions(tmp_path, GUIDE), "people": PEOPLE, "assignment_id": 17}
+    how = {"criteria": definitions(tmp_path, GUIDE), "people": PEOPLE, "assignment_id": "17"}
     return moodle(tmp_path, "marks", *reports, **how)[1]
 
 
@@ -150,10 +150,13 @@ def test_a_guide_that_came_meanwhile_is_not_deleted_with_its_fillings(tmp_path, 
     assert (ran.returncode, site.saved) == (1, [])
     assert "has 2 fillings of 2 grades" in ran.stdout
     assert "export with --replace-guide" in ran.stderr
-    how = {"criteria": definitions(tmp_path, GUIDE), "replace_guide": True}
-    _, path = moodle(tmp_path, "rubric", report, **how)
-    assert send(tmp_path, site, path).returncode == 0
-    assert site.saved == ["c1: Vector 1"]
+    points = tmp_path / "instances.json"
+    how = {"criteria": definitions(tmp_path, GUIDE), "replace_guide": points}
+    for instances, stored in (([], []), ([FILLED], ["c1: Vector 1"])):
+        points.write_text(json.dumps({"instances": instances}))
+        _, path = moodle(tmp_path, "rubric", report, **how)
+        send(tmp_path, site, path)
+        assert site.saved == stored
 
 
 def test_a_guide_is_made_where_there_is_none(tmp_path, site):

@@ -171,3 +171,12 @@ def test_a_crank_alone_that_turns_clockwise_and_speeds_down_is_a_mechanism_too(p
     assert vectors["a_A_n"]["direction_deg"] == pytest.approx(210)
     assert vectors["a_A_t"]["direction_deg"] == pytest.approx(120)
     assert vectors["a_A_t"]["value"] == pytest.approx(0.3)
+
+
+def test_a_handout_is_written_for_one_number_and_nothing_for_a_wrong_one(planmark, tmp_path):
+    assert planmark("handout", "pump", "--n", 7, "--out", tmp_path / "task.pdf").returncode == 0
+    assert (tmp_path / "task.pdf").read_bytes().startswith(b"%PDF")
+    ran = planmark("handout", "pump", "--n", 99, "--out", tmp_path / "none.pdf")
+    assert ran.returncode == 2
+    assert "n from 1 to 30" in ran.stderr
+    assert not (tmp_path / "none.pdf").exists()

@@ -79,11 +79,23 @@ def test_names_have_nothing_that_moodle_takes_for_a_tag(tmp_path, answer):
     assert definition["name"] == "‹Pump›"
 
 
-def test_the_activity_may_be_told_by_its_numbers(tmp_path):
-    with pytest.raises(CallError, match="guide that may be there with all fillings"):
+@pytest.fixture
+def points(tmp_path):
+    path = tmp_path / "instances.json"
+    filled = [{"id": at, "guide": {"criteria": [{"id": 1}, {"id": 2}, {"id": 3}]}} for at in range(2)]
+    filled.append({"id": 2})
+    path.write_text(json.dumps({"instances": filled, "warnings": []}))
+    return path
+
+
+def test_an_activity_told_by_its_numbers_alone_may_have_a_guide(tmp_path, points):
+    with pytest.raises(CallError, match=r"may have a guide .*another deletes it"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2)
-    _, path = moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2, replace_guide=True)
+    delivery, path = moodle(
+        tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2, replace_guide=points
+    )
     assert json.loads(path.read_bytes())["arguments"]["areas"][0]["contextid"] == 2
+    assert "6 fillings of 3 grades" in delivery.notes[0]
 
 
 def test_an_activity_that_nobody_tells_is_asked_for(tmp_path, answer):
@@ -93,41 +105,19 @@ def test_an_activity_that_nobody_tells_is_asked_for(tmp_path, answer):
         moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=answer(contextid="57"))
 
 
-INSTANCES = {
-    "instances": [
-        {
-            "id": 1,
-            "itemid": 7,
-            "status": 1,
-            "guide": {"criteria": [{"criterionid": 11}, {"criterionid": 12}]},
-        },
-        {"id": 2, "itemid": 7, "status": 0, "guide": {"criteria": [{"criterionid": 11}]}},
-        {"id": 3, "itemid": 8, "status": 1},
-    ]
-}
-
-
-def test_a_guide_goes_only_where_that_is_wanted_with_the_number_of_fillings(tmp_path, answer):
-    """gradingform_guide_controller::update_or_check_guide deletes criteria that are not sent again."""
-    path = tmp_path / "instances.json"
-    path.write_text(json.dumps(INSTANCES))
-    how = {"criteria": answer(GUIDE), "fillings": path}
-    with pytest.raises(CallError, match=r"delete the marking guide .* 3 fillings .* 2 students. Give --rep"):
-        moodle(tmp_path, "rubric", marked("s01", 5.0), **how)
-    with pytest.raises(CallError, match=r"2 of each student who was graded; how many, .* \(--fillings\)"):
+def test_a_guide_is_never_written_over_another(tmp_path, answer):
+    with pytest.raises(CallError, match="has a guide already"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=answer(GUIDE))
     assert not (tmp_path / "out.json").exists()
-    delivery, out = moodle(tmp_path, "rubric", marked("s01", 5.0), **how, replace_guide=True)
-    assert delivery.notes[0].startswith("Moodle deletes the marking guide that is there with 3 fillings")
-    assert json.loads(out.read_bytes())["replace_guide"] is True
 
 
-@pytest.mark.parametrize("document", ["[]", "{}", '{"instances": [1]}', '{"instances": [{}]}', "x"])
-def test_an_answer_without_fillings_is_refused(tmp_path, document):
-    path = tmp_path / "instances.json"
-    path.write_text(document)
-    with pytest.raises(InputFileError, match=r"instances\.json"):
-        moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2, fillings=path)
+def test_a_guide_is_replaced_only_with_a_count_of_the_points_that_go(tmp_path, answer, points):
+    with_guide = answer(GUIDE)
+    delivery, path = moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=with_guide, replace_guide=points)
+    assert json.loads(path.read_bytes())["fillings_lost"] == 6
+    assert "deletes the one there with 6 fillings of 3 grades" in delivery.notes[0]
+    with pytest.raises(InputFileError, match="core_grading_get_gradingform_instances"):
+        moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=with_guide, replace_guide=with_guide)
 
 
 def test_another_way_of_grading_is_never_put_aside(tmp_path, answer):
@@ -157,11 +147,10 @@ def test_points_fill_every_criterion_of_the_guide(tmp_path, answer):
     assert first["wsfunction"] == "mod_assign_save_grade"
     arguments = first["arguments"]
     assert (arguments["assignmentid"], arguments["userid"], arguments["grade"]) == (17, 101, -1)
-    # assign_feedback_comments::is_feedback_modified reads the editor where it is not sent, too.
+    # Moodle reads this where a comment exists: feedback/comments/locallib.php, is_feedback_modified.
     assert arguments["plugindata"]["assignfeedbackcomments_editor"] == {
-        "text": "<ul><li>~ <b>Vector 2</b>: Told &lt;why&gt; &amp; how.</li></ul>",
-        "format": 1,
-    }
+        "text": "<ul><li>~ <b>Vector 2</b>: Told &lt;why&gt; &amp; how.</li></ul>", "format": 1,
+    }  # fmt: skip
     assert arguments["advancedgradingdata"]["guide"]["criteria"][1] == {
         "criterionid": 12,
         "fillings": [

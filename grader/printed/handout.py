@@ -1,0 +1,315 @@
+"""Task sheets: what a student is given and the tables to fill in, without any of the solution."""
+
+import io
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+from markupsafe import Markup
+from reportlab.lib.colors import grey, whitesmoke
+from reportlab.lib.pagesizes import A4
+from reportlab.lib.styles import ParagraphStyle
+from reportlab.lib.units import mm
+from reportlab.platypus import Flowable, PageBreak, Paragraph, SimpleDocTemplate, Spacer, Table
+
+from grader.inputs.roster import RosterRow
+from grader.language import N_, Tongue, tongue
+from grader.printed.answer_sheet import given_data, variants_of
+from grader.printed.pdf import BOLD, REGULAR, embed_fonts, number, put_shapes
+from grader.rubric import RubricFile
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.drawing.canvas import Piece, bounds, pieces_of, scale_pieces
+from reference.drawing.sketch import scheme
+from reference.drawing.subject import SCALE_UNITS, VECTOR_UNITS, Subject
+from reference.errors import MechanismError
+from reference.geometry import ComplexArray
+from reference.mechanism import DrivenSlider, FixedGuide, guides_of
+from reference.plan import exact_plan
+
+NAME, GROUP, DATE = N_("Name"), N_("Group"), N_("Date")
+NUMBER = {"n": N_("number"), "position": N_("position")}
+GIVEN, FIXED = N_("Given data"), N_("Fixed points and guides (x; y)")
+SCHEME = N_("Scheme of the mechanism, not to scale and not in the given position")
+OWN_SCHEME = N_("Scheme of the mechanism, not to scale")
+GUIDE = N_("guide of %(joint)s through %(point)s, %(angle)s to the horizontal")
+TABLES = {
+    "scales": N_("Scales"),
+    "velocity_plan": N_("Velocities"),
+    "acceleration_plan": N_("Accelerations"),
+    "angular": N_("Angular velocities and accelerations"),
+}
+SCALE, VALUE, VECTOR, LENGTH = N_("Scale"), N_("Value"), N_("Vector"), N_("Drawn, mm")
+DIRECTION, QUANTITY = N_("Direction, °"), N_("Quantity")
+SIGNS = N_(
+    "Directions count counter-clockwise from the horizontal to the right; angular quantities are positive"
+    " counter-clockwise."
+)
+
+WIDE_MM = 182.0
+"""Of A4 between margins of 14 mm."""
+FRAME_PT = 6.0
+"""What reportlab leaves free at each side of a page's text."""
+SCHEME_MM = (104.0, 78.0)
+"""Room for the scheme: the data stand beside it."""
+SYMBOLS_MM = 34.0
+"""Of that room, what grounds, guides and letters need around the joints."""
+ROW_MM, GAP_MM = 6.2, 6.0
+"""Rows are high enough to write in by hand."""
+MOST_ROWS = 38
+"""In a column of tables: as many as a page is high; longer tables stand below one another."""
+
+
+def make_handout(
+    assignment: Assignment,
+    rubric: RubricFile,
+    rows: Sequence[RosterRow],
+    lang: str = "en",
+    *,
+    roster: str = "roster.csv",
+) -> bytes:
+    """A4 task sheets as PDF, in the rows' order; a row without a student has lines to write a name on.
+
+    Arguments
+    ---------
+    rows : their `lang`, where given, goes before `lang`
+    roster : the file's name, for messages
+
+    Raises AuthoredFileError with every row whose n or position does not suit the assignment, and
+    MechanismError where no variant assembles.
+    """
+    embed_fonts()
+    variants = variants_of(assignment, rows, roster)
+    story: list[Flowable] = []
+    for row, variant in zip(rows, variants, strict=True):
+        if story:
+            story.append(PageBreak())
+        story += _sheet(assignment, rubric, row, variant, tongue(row.lang or lang))
+    buffer = io.BytesIO()
+    margin = (A4[0] - WIDE_MM * mm) / 2.0
+    document = SimpleDocTemplate(
+        buffer, pagesize=A4, title=assignment.file.title.in_language(lang), creator="planmark", invariant=1,
+        leftMargin=margin - FRAME_PT, rightMargin=margin - FRAME_PT, topMargin=12 * mm, bottomMargin=12 * mm,
+    )  # fmt: skip
+    document.build(story)
+    return buffer.getvalue()
+
+
+def _sheet(
+    assignment: Assignment, rubric: RubricFile, row: RosterRow, variant: Variant, speaker: Tongue
+) -> Iterator[Flowable]:
+    """All that one student is given."""
+    file = assignment.file
+    yield _text(file.title.in_language(speaker.lang), 14, BOLD)
+    yield Spacer(1, 1.5 * mm)
+    yield _text(_whose(row, variant, speaker), 10, BOLD)
+    yield Spacer(1, 2.5 * mm)
+    yield _text(file.task.in_language(speaker.lang), 10)
+    yield Spacer(1, 2.5 * mm)
+    drawn, title = _scheme(assignment, variant)
+    caption = _text(speaker.gettext(title), 8)
+    data: list[Flowable] = [_text(speaker.gettext(GIVEN), 10, BOLD)]
+    data += [_markup(_letters(datum), 10) for datum in given_data(assignment, variant, speaker)]
+    data += [Spacer(1, 2 * mm), _text(speaker.gettext(FIXED), 10, BOLD)]
+    data += [_markup(line, 9) for line in _fixed(assignment, variant, speaker)]
+    yield _side_by_side(data, [drawn, caption], WIDE_MM - SCHEME_MM[0] - GAP_MM)
+    yield Spacer(1, 3 * mm)
+    yield from _tables(assignment, rubric, speaker)
+    yield Spacer(1, 2 * mm)
+    yield _text(speaker.gettext(SIGNS), 8)
+
+
+def _whose(row: RosterRow, variant: Variant, speaker: Tongue) -> str:
+    """The student and the variant; lines to write on where there is no student."""
+    blank = "_" * 22
+    parts = [
+        f"{speaker.gettext(NUMBER[name])} {value}"
+        for name, value in (("n", variant.n), ("position", variant.position))
+        if value is not None
+    ]
+    if row.student_id:
+        name = f"{row.name} ({row.student_id})" if row.name else row.student_id
+        return " · ".join([name, *parts])
+    return "   ".join([*parts, *(f"{speaker.gettext(word)} {blank}" for word in (NAME, GROUP, DATE))])
+
+
+# The scheme ---------------------------------------------------------------------------------------
+
+
+class _Picture(Flowable):  # type: ignore[misc]  # reportlab has no types
+    """A figure in the middle of the room for it."""
+
+    def __init__(self, subject: Subject) -> None:
+        super().__init__()
+        self.shapes = scheme(subject).shapes
+        left, top, right, bottom = bounds(self.shapes)
+        room = tuple(side * mm for side in SCHEME_MM)
+        self.unit = min(mm, room[0] / (right - left), room[1] / (bottom - top))
+        self.width, self.height = room[0], (bottom - top) * self.unit
+        self.origin = ((room[0] - (left + right) * self.unit) / 2.0, bottom * self.unit)
+
+    def draw(self) -> None:
+        put_shapes(self.canv, self.shapes, self.origin, self.unit)
+
+
+def _scheme(assignment: Assignment, variant: Variant) -> tuple[Flowable, str]:
+    """The mechanism in a position that is not the student's own, where the assignment has another.
+
+    Drawing the mechanism is part of the task: the scheme shows which joints and links there are and how
+    they are assembled, but not where they lie. The variant farthest in the list that assembles with the
+    same sides is taken.
+    """
+    every = assignment.variants()
+    own = every.index(variant)
+    others = [every[(own + len(every) // 2 + shift) % len(every)] for shift in range(len(every))]
+    error: MechanismError | None = None
+    for other in (*(one for one in others if one != variant), variant):
+        if _sides(assignment, other) != _sides(assignment, variant):
+            continue
+        try:
+            return _Picture(_fitted(assignment, other)), OWN_SCHEME if other == variant else SCHEME
+        except MechanismError as refused:
+            error = refused
+    raise error or ValueError("a variant has its own sides")
+
+
+def _sides(assignment: Assignment, variant: Variant) -> list[float]:
+    groups = assignment.mechanism([variant]).groups
+    return [float(np.ravel(getattr(group, "side", 0))[0]) for group in groups]
+
+
+def _fitted(assignment: Assignment, variant: Variant) -> Subject:
+    """The mechanism at the scale at which it fills the room for the scheme."""
+    plan = exact_plan(assignment, [variant], accelerations=False)
+    at = np.array([np.ravel(place)[0] for place in plan.nodes_mm["mechanism"].values()])
+    needed = max(
+        float(np.ptp(part)) / (room - SYMBOLS_MM)
+        for part, room in zip((at.real, at.imag), SCHEME_MM, strict=True)
+    )
+    scales = assignment.scales([variant], kL=plan.scales.kL * needed)
+    return Subject(assignment, exact_plan(assignment, [variant], scales, accelerations=False))
+
+
+# Data ---------------------------------------------------------------------------------------------
+
+LENGTH_UNITS = {"mm": 1e3, "cm": 1e2, "m": 1.0}
+
+
+def _fixed(assignment: Assignment, variant: Variant, speaker: Tongue) -> Iterator[Markup]:
+    """Where the ground's joints and guides lie, in the unit of the given lengths."""
+    mechanism = assignment.mechanism([variant])
+    unit = next((one.unit for one in assignment.file.given if one.unit in LENGTH_UNITS), "m")
+
+    def point(at: ComplexArray) -> str:
+        place = complex(np.ravel(at)[0]) * LENGTH_UNITS[unit]
+        x, y = (number(round(part, 6) + 0.0, speaker.decimal_mark) for part in (place.real, place.imag))
+        return f"({x}; {y})\N{NO-BREAK SPACE}{speaker.unit(unit)}"
+
+    def letter(name: str) -> Markup:
+        return _letters(pieces_of(assignment.file.names.get(name, name)))
+
+    for joint, at in mechanism.ground_m.items():
+        yield Markup("{} {}").format(letter(joint), point(at))
+    driver = mechanism.driver
+    guides = [
+        (group.node, guide.through_m, guide.angle_rad)
+        for group in mechanism.groups
+        for guide in guides_of(group)
+        if isinstance(guide, FixedGuide)
+    ]
+    if isinstance(driver, DrivenSlider):
+        guides.insert(0, (driver.pin, driver.guide_m, driver.guide_rad))
+    for joint, through, angle in guides:
+        degrees = number(float(np.degrees(np.ravel(angle)[0])), speaker.decimal_mark)
+        known = {"joint": letter(joint), "point": point(through), "angle": f"{degrees}°"}
+        yield Markup(speaker.gettext(GUIDE)) % known  # noqa: S704 - our own sentence
+
+
+# Tables to fill in --------------------------------------------------------------------------------
+
+
+def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iterator[Flowable]:
+    """An empty table for each kind of quantity that the rubric asks for."""
+    names = assignment.file.names
+    asked: dict[str, list[str]] = {title: [] for title in TABLES}
+    for criterion in rubric.criterion:
+        if criterion.name not in asked.get(criterion.section, [criterion.name]):
+            asked[criterion.section].append(criterion.name)
+    asked["scales"] = [name for name in SCALE_NAMES if name != "ka" or rubric.needs_accelerations]
+
+    def table(kind: str, wide_mm: float) -> list[Flowable]:
+        if not asked[kind]:
+            return []
+        _ = speaker.gettext
+        if kind == "scales":
+            head = [_(SCALE), _(VALUE)]
+            rows = [[_scale_cell(names.get(name, name), name, speaker), ""] for name in asked[kind]]
+        elif kind == "angular":
+            head = [_(QUANTITY), _(VALUE)]
+            rows = [[_rate_cell(names.get(name, name), name, speaker), ""] for name in asked[kind]]
+        else:
+            unit = speaker.unit(VECTOR_UNITS["kv" if kind == "velocity_plan" else "ka"])
+            head = [_(VECTOR), _(LENGTH), _(DIRECTION), f"{_(VALUE)}, {unit}"]
+            rows = [[_letters(pieces_of(names.get(name, name))), "", "", ""] for name in asked[kind]]
+        return [
+            _text(_(TABLES[kind]), 10, BOLD),
+            Spacer(1, mm),
+            _empty(head, rows, wide_mm),
+            Spacer(1, 3 * mm),
+        ]
+
+    half = (WIDE_MM - GAP_MM) / 2.0
+    first, second = ("velocity_plan", "scales", "angular"), ("acceleration_plan",)
+    if max(sum(len(asked[kind]) + 2 for kind in kinds) for kinds in (first, second)) > MOST_ROWS:
+        for kind in (*first, *second):
+            yield from table(kind, WIDE_MM)
+        return
+    left, right = ([part for kind in kinds for part in table(kind, half)] for kinds in (first, second))
+    yield _side_by_side(left, right, half)
+
+
+def _scale_cell(shown: str, scale: str, speaker: Tongue) -> Markup:
+    return Markup("{}, {}").format(_letters(scale_pieces(shown)), speaker.unit(SCALE_UNITS[scale]))
+
+
+def _rate_cell(shown: str, rate: str, speaker: Tongue) -> Markup:
+    unit = "rad/s" if rate.startswith("omega") else "rad/s²"
+    return Markup("{}, {}").format(_letters(pieces_of(shown)), speaker.unit(unit))
+
+
+def _empty(head: list[str], rows: Iterable[Sequence[str]], wide_mm: float) -> Table:
+    first = 0.4 if len(head) == 2 else 0.2
+    rest = (1.0 - first) / (len(head) - 1)
+    widths = [share * wide_mm * mm for share in (first, *[rest] * (len(head) - 1))]
+    cells = [[_text(word, 8) for word in head], *([_markup(cell, 10) for cell in row] for row in rows)]
+    style = [
+        ("GRID", (0, 0), (-1, -1), 0.4, grey), ("BACKGROUND", (0, 0), (-1, 0), whitesmoke),
+        ("VALIGN", (0, 0), (-1, -1), "MIDDLE"), ("TOPPADDING", (0, 0), (-1, -1), 0),
+        ("BOTTOMPADDING", (0, 0), (-1, -1), 0),
+    ]  # fmt: skip
+    return Table(cells, colWidths=widths, rowHeights=[ROW_MM * mm] * len(cells), style=style, repeatRows=1)
+
+
+def _side_by_side(left: list[Flowable], right: list[Flowable], left_mm: float) -> Table:
+    widths = ((left_mm + GAP_MM) * mm, (WIDE_MM - left_mm - GAP_MM) * mm)
+    style = [
+        ("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0),
+        ("RIGHTPADDING", (0, 0), (0, 0), GAP_MM * mm), ("RIGHTPADDING", (1, 0), (1, 0), 0),
+    ]  # fmt: skip
+    return Table([[left, right]], colWidths=widths, style=style)
+
+
+# Texts --------------------------------------------------------------------------------------------
+
+
+def _letters(pieces: Iterable[Piece]) -> Markup:
+    """A name with its indices, as reportlab reads it."""
+    marks = {0: "{}", -1: '<sub rise="2" size="70%">{}</sub>', 1: '<super rise="3" size="70%">{}</super>'}
+    return Markup("").join(Markup(marks[piece.height]).format(piece.text) for piece in pieces)  # noqa: S704
+
+
+def _text(text: str, size: float, font: str = REGULAR) -> Paragraph:
+    return _markup(Markup.escape(text), size, font)
+
+
+def _markup(text: str, size: float, font: str = REGULAR) -> Paragraph:
+    style = ParagraphStyle(f"{font}{size}", fontName=font, fontSize=size, leading=1.3 * size)
+    return Paragraph(str(text), style)

@@ -1,0 +1,81 @@
+"""Task sheets: what a student is given is there, and nothing of the solution."""
+
+import re
+
+import numpy as np
+import pypdfium2
+import pytest
+
+from grader.inputs.roster import RosterRow
+from grader.printed import handout
+from grader.printed.handout import make_handout
+from grader.rubric import rubric_of
+from reference.authored.assignment import Variant, built_in, load_assignment
+from reference.errors import AuthoredFileError
+from reference.plan import exact_plan
+
+A4_POINTS = (595.3, 841.9)
+
+
+def pages_of(assignment, *rows, lang="en"):
+    """The text of every page."""
+    document = pypdfium2.PdfDocument(make_handout(assignment, rubric_of(assignment), rows, lang))
+    assert all(page.get_size() == pytest.approx(A4_POINTS, abs=0.5) for page in document)
+    return [page.get_textpage().get_text_bounded() for page in document]
+
+
+def first_row(assignment, **known):
+    variant = assignment.variants()[0]
+    return RosterRow("s07", "Ana Țîrlea", variant.n, variant.position, line=2, **known)
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_a_sheet_has_task_data_and_tables_and_no_number_of_the_solution(name):
+    assignment = load_assignment(name)
+    row = first_row(assignment)
+    (text,) = pages_of(assignment, row)
+    words = " ".join(text.split())
+    assert assignment.file.title.en in words
+    assert "Ana Țîrlea (s07)" in words
+    assert "Velocities" in words
+    variant = Variant(row.n, row.position)
+    given = {
+        abs(float(np.ravel(one.value(assignment.values([variant])))[0])) for one in assignment.file.given
+    }
+    plan = exact_plan(assignment, [variant])
+    solution = {float(np.abs(plan.drawn_mm(name))[0]) for name in plan.construction.vectors}
+    solution |= {float(np.abs(value)[0]) for value in plan.rates.values()}
+    printed = {float(number) for number in re.findall(r"\d+\.\d+", words)}
+    for number in printed - given:
+        assert not any(number == pytest.approx(value, rel=1e-3) for value in solution if value > 1.0)
+
+
+def test_each_student_reads_their_own_language():
+    assignment = load_assignment("pump")
+    rows = [first_row(assignment, lang=lang) for lang in ("ro", "ru", "en")]
+    for text, lang in zip(pages_of(assignment, *rows), ("ro", "ru", "en"), strict=True):
+        assert assignment.file.title.in_language(lang) in " ".join(text.split())
+
+
+def test_a_sheet_without_a_student_has_lines_for_the_name():
+    (text,) = pages_of(load_assignment("pump"), RosterRow("", n=7))
+    assert "Name ____" in text
+
+
+def test_the_scheme_is_not_in_the_position_that_the_student_has_to_draw():
+    assignment = load_assignment("press")
+    own = assignment.variant(None, 3)
+    picture, title = handout._scheme(assignment, own)
+    assert title == handout.SCHEME
+    assert picture.shapes != handout._Picture(handout._fitted(assignment, own)).shapes
+
+
+def test_many_vectors_take_several_pages(monkeypatch):
+    monkeypatch.setattr(handout, "MOST_ROWS", 8)
+    assignment = load_assignment("pump")
+    assert len(pages_of(assignment, first_row(assignment))) == 2
+
+
+def test_a_row_that_does_not_suit_the_assignment_is_told_with_its_line():
+    with pytest.raises(AuthoredFileError, match="line 2, s07"):
+        pages_of(load_assignment("pump"), RosterRow("s07", "Ana", 77, line=2))
