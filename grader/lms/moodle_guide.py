@@ -242,7 +242,7 @@ def guide(grades: Sequence[Grade], options: Options) -> Delivery:
             "guide_comments": [{"sortorder": 1, "description": "See the feedback file."}],
         },
     }
-    content = {
+    content: dict[str, object] = {
         "assignment": grades[0].assignment,
         "arguments": {"areas": [{"cmid": cmid, "contextid": context_id, "definitions": [definition]}]},
     }
@@ -352,9 +352,9 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
             "ids_needed", "nobody's number in Moodle is known: give a table student_id,id (--ids)"
         )
     content = {"assignment": grades[0].assignment, "criteria": criteria, "calls": calls}
-    return Delivery(
-        json_document(MoodleMarksDocument, content, "the marking guide's points"), unplaced=missing
-    )
+    document = json_document(MoodleMarksDocument, content, "the marking guide's points")
+    note = "each call also replaces the student's feedback comment: without one Moodle stores half of it"
+    return Delivery(document, unplaced=missing, notes=(note,))
 
 
 def _filled(number: str, mark: Mark) -> dict[str, object]:
