@@ -177,7 +177,7 @@ class Worksheet(Form):
             self.table.put(row, self.columns["modified"], downloaded.isoformat(timespec="seconds"))
         if rows:
             self.notes.append(
-                f"Moodle reads no date in this language: {len(rows)} are written as"
+                "Moodle reads no date in this language: they are written as"
                 f" {downloaded.isoformat(sep=' ', timespec='minutes')}, when the worksheet was downloaded"
             )
 

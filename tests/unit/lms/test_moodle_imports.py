@@ -150,7 +150,7 @@ def test_a_regrade_updates_every_grade_in_every_language(tmp_path, language):
     data, notes, _ = exported(tmp_path, as_it_was, *a_class())
     assert site.upload(data).updated == 23
     assert "Moodle must tell 23 updated grades" in notes
-    assert ("23 are written as 2026-03-02 12:00" in notes) == (language is not ENGLISH)
+    assert ("they are written as 2026-03-02 12:00" in notes) == (language is not ENGLISH)
 
 
 def test_without_iso_a_date_of_another_language_lets_moodle_update_nothing():
