@@ -72,7 +72,7 @@ KINDS: Mapping[tuple[str, str], _Kind] = {
     ("csv", "marks"): _Kind(".csv", of_results=criteria_text),
     ("csv", "grades"): _Kind(".csv", of_results=summary_text),
     ("moodle", "grades"): _of_grades(".csv", moodle.grades_file, "maximum rescale form identity item"),
-    ("moodle", "feedback"): _of_grades(".zip", moodle.feedback_files, "form"),
+    ("moodle", "feedback"): _of_grades(".zip", moodle.feedback_files, "form groups"),
     ("moodle", "rubric"): _of_grades(
         ".json", moodle_guide.guide, "criteria cmid context_id replace_guide item"
     ),

@@ -55,8 +55,10 @@ def test_moodle_stores_what_was_meant_in_any_worksheet(people, style, mark):
     filled = fill_worksheet(
         data, "w.csv", grades_of(results(*graded), options), options, comments, datetime.now(UTC)
     )
-    stored = importers.moodle_worksheet(filled.content, 10.0)
-    assert stored == {at: (round(people[at][2], 2), comments[f"s{at}"]) for at in range(len(people))}
+    site = importers.MoodleSite(10.0).upload(filled.content)
+    assert site.comments == {at: comments[f"s{at}"] for at in range(len(people))}
+    stored = {at: grade for at, (grade, _) in site.grades.items()}
+    assert stored == {at: round(people[at][2], 2) for at in range(len(people))}
     for before, after in zip(read(data)[1:], read(filled.content)[1:], strict=True):
         assert before[:2] + before[3:5] == after[:2] + after[3:5]
 

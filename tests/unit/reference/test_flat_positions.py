@@ -8,6 +8,7 @@ import pytest
 from reference.authored.assignment import AssignmentFile, Variant, load_assignment
 from reference.authored.flat_positions import other_assemblies
 from reference.authored.formula import parse
+from reference.construction.graph import evaluate
 from reference.errors import MechanismError
 from reference.kinematics.cycle import cycle
 from reference.kinematics.motion import move
@@ -96,7 +97,8 @@ def test_a_parallelogram_stays_one_through_its_flat_positions(bars, angle, side)
 
 
 def test_positions_are_those_of_the_cycle(bars):
-    assignment = bars("15 + 30*position", **KITE)
+    assignment = bars("205 + 30*position", **KITE)
+    assert assignment.signs
     first = cycle(assignment.mechanism([Variant(position=0)]), 1441)
     for variant in assignment.variants():
         mechanism = assignment.mechanism([variant])
@@ -162,3 +164,66 @@ def test_other_mechanisms_have_one_assembly(bars):
 def test_files_without_positions_are_not_followed(bars):
     assert isinstance(bars("30", "").file, AssignmentFile)
     assert not bars("15 + 30*n", "n = { from = 0, to = 11 }").signs
+
+
+SLIDER = """
+[[mechanism.group]]
+type = "RRP"
+node = "B"
+pin = "A"
+link = "2"
+length = 40
+guide = { through = [0, 0], angle_deg = 0 }
+side = "ahead"
+"""
+SLOT = """
+[[mechanism.group]]
+type = "RPR"
+node = "A3"
+pin = "A"
+pivot = "O2"
+link = "3"
+side = "behind"
+"""
+
+
+def with_group(tmp_path, group: str, angle: str):
+    text = FILE.format(angle=angle, variant=TWELVE, **(PARALLELOGRAM | {"ground": 40}))
+    text = text[: text.index("[[mechanism.group]]")] + group
+    path = tmp_path / f"{len(group)}.assignment.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_assignment(path)
+
+
+def test_an_isosceles_slider_crank_goes_on_beyond_its_pivot(tmp_path):
+    assignment = with_group(tmp_path, SLIDER, "15 + 30*position")
+    motion = exact_plan(assignment, assignment.variants()).motion
+    angle = np.radians(15 + 30 * np.arange(12))
+    np.testing.assert_allclose(motion.position["B"], 0.08 * np.cos(angle), atol=1e-12)
+    np.testing.assert_allclose(motion.velocity["B"], -0.8 * np.sin(angle), atol=1e-12)
+
+
+def test_a_slotted_link_goes_on_where_the_pin_passes_its_pivot(tmp_path):
+    assignment = with_group(tmp_path, SLOT, "205 + 30*position")
+    assert assignment.signs
+    together = exact_plan(assignment, assignment.variants())
+    np.testing.assert_allclose(together.rates["omega_3"], 5.0, rtol=1e-9)
+    for index, variant in enumerate(assignment.variants()):
+        alone = exact_plan(assignment, [variant])
+        for name, vector in together.vectors_si.items():
+            assert vector[index] == pytest.approx(alone.vectors_si[name][0], abs=1e-9), name
+
+
+def test_the_construction_is_drawn_on_the_side_that_the_motion_has(tmp_path, bars):
+    for assignment in (
+        bars("15 + 30*position"),
+        bars("205 + 30*position", **KITE),
+        with_group(tmp_path, SLIDER, "15 + 30*position"),
+        with_group(tmp_path, SLOT, "205 + 30*position"),
+    ):
+        assert assignment.signs
+        plan = exact_plan(assignment, assignment.variants())
+        nodes = evaluate(plan.construction, plan.drawing.parameters)
+        for figure in plan.nodes_mm.values():
+            for name, place in figure.items():
+                np.testing.assert_allclose(nodes[name], place, atol=1e-8)

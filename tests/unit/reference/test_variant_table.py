@@ -143,6 +143,30 @@ def test_the_same_table_stands_in_the_file_itself(course):
         np.testing.assert_allclose(vector, beside.vectors_si[name], rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "table",
+    [
+        "[variant.table]\nn = [2, 1]\na = [41, 40]\nside_B = ['right', 'left']",
+        (
+            "[[variant.table]]\nn = 2\na = 41\nside_B = 'right'\n"
+            "[[variant.table]]\nn = 1\nside_B = 'left'\na = 40"
+        ),
+        "table.columns = ['n', 'a', 'side_B']\ntable.rows = [[2, 41, 'right'], [1, 40, 'left']]",
+    ],
+)
+def test_columns_by_name_and_rows_as_tables_are_the_same_table(course, table):
+    rest = "\n[variant.values]\nb = 120\nc = 80\nd = 130\ne = 160\nh = 80\nphi = 30\nn1 = 120\nside_C = 1"
+    data = load_assignment(course(variant=table + rest)).values([Variant(1), Variant(2)])
+    np.testing.assert_array_equal([data["a"], data["side_B"]], [[40, 41], [1, -1]])
+
+
+def test_columns_of_unequal_length_and_rows_that_lack_a_cell_are_told(course):
+    _, told = faults(course(variant="[variant.table]\nn = [2, 1]\na = [41]"))
+    assert told == {"$.variant.table, row 2, column a": "is empty"}
+    _, told = faults(course(variant="[[variant.table]]\nn = 2\na = 41\n[[variant.table]]\nn = 1"))
+    assert told == {"$.variant.table, row 2, column a": "is empty"}
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
 @pytest.mark.parametrize("mark", [";", ",", "\t"])
 def test_csv_as_spreadsheets_write_it(course, mark, encoding):
@@ -176,13 +200,14 @@ def test_every_faulty_cell_is_told_at_once_with_row_and_column(course):
 @pytest.mark.parametrize(
     ("heading", "where", "words"),
     [
+        ("n;a, mm;b (stone)", "line 1, column 3", "'stone' is no unit"),
         ("n;a [inch]", "line 1, column 2", "'inch' is no unit known here"),
         ("n;l AB", "line 1, column 2", "is no heading"),
         ("n;;a", "line 1, column 2", "has no heading"),
         ("n;a;a", "line 1, column 3", "two columns a"),
         ("n;pi", "line 1, column 2", "has a meaning in formulas already"),
-        ("number;a", "line 1", "no column n"),
-        ("n;\u0430", "line 1, column 2", "is no heading"),
+        ("number;a", "line 1", "no column n (or position), which says whose row it is: if number holds"),
+        ("n;\u0430", "line 1, column 2", "'\u0430' is CYRILLIC SMALL LETTER A"),
     ],
 )
 def test_a_heading_that_is_none_is_told(course, heading, where, words):
@@ -197,11 +222,36 @@ def test_too_many_cells_an_empty_table_and_no_table_are_told(course):
     assert "either file" in faults(course(variant="[variant.table]\nrows = [[1]]"))[1]["$.variant.table"]
 
 
+@pytest.mark.parametrize(
+    ("table", "path", "words"),
+    [
+        ("table = 3", "$.variant.table", "either file"),
+        (
+            "table = { columns = ['n', 'a'], rows = [[1, true]] }",
+            "$.variant.table.rows[0][1]",
+            "a number or a side",
+        ),
+        ("table = {}", "$.variant.table", "either file"),
+    ],
+)
+def test_what_is_no_table_is_told_once(course, table, path, words):
+    _, told = faults(course(variant=table))
+    assert list(told) == [path]
+    assert words in told[path]
+
+
+def test_a_spreadsheet_is_no_csv(course, tmp_path):
+    (tmp_path / "six.xlsx").write_bytes(b"PK\x03\x04" + bytes(100))
+    assert faults(course(variant='table = "six.xlsx"'))[1] == {
+        "$": "is a spreadsheet: save it as CSV in UTF-8"
+    }
+
+
 def test_a_faulty_row_in_the_file_itself_is_told_with_its_path(course):
     table = '[variant.table]\ncolumns = ["n", "a"]\nrows = [[1, 40], [2, "4O"]]'
     file, told = faults(course(variant=table))
     assert file.endswith("six.assignment.toml")
-    assert told == {"$.variant.table.rows[1], column a": "'4O' is no number"}
+    assert told == {"$.variant.table, row 2, column a": "'4O' is no number"}
 
 
 def test_a_table_and_a_range_of_one_number_contradict_each_other(course):
