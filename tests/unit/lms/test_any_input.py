@@ -108,7 +108,8 @@ def test_a_file_of_any_content_is_used_or_refused(tmp_path, data):
 
 keys = st.sampled_from(
     "areas cmid contextid definitions guide guide_criteria data criteria rubric id shortname description"
-    " id userId recipient outcomes levels qualityId maxscore points schema_version reports student_id score assignment".split()
+    " id userId recipient outcomes levels qualityId maxscore points schema_version reports student_id score"
+    " assignment".split()
 )
 answers = st.recursive(
     st.one_of(st.none(), st.booleans(), st.integers(-2, 3), st.floats(), texts),
