@@ -461,6 +461,9 @@ def export(
             help="Delete the guide there: Moodle's core_grading_get_gradingform_instances tells the points.",
         ),
     ] = None,
+    groups: Annotated[
+        bool | None, typer.Option("--groups/--no-groups", help="Whether students hand in as groups.")
+    ] = None,
     lang: LanguageOption = "en",
 ) -> None:
     """Write the results for a learning platform, validated before anything is written."""
@@ -477,7 +480,7 @@ def export(
         identity=identity, item=item,
         position=position, combine=combine, maximum=maximum, rescale=rescale, visibility=visibility,
         course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id,
-        replace_guide=replace_guide, lang=lang,
+        replace_guide=replace_guide, groups=groups, lang=lang,
     )  # fmt: skip
     is_open, path = export_results(results, file, options, roster, ids)
     where = "" if to == "csv" else f" to {to}; the documentation of exports says how"
